@@ -1,0 +1,125 @@
+"""Every exception that spindle_fem raises on purpose.
+
+Each carries three texts: ``where`` (file, key or object), ``what`` (the fault
+and the offending value) and ``how_to_fix`` (what is allowed).
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class SpindleFemError(Exception):
+    """Base of all errors; the command line maps it to exit status 1.
+
+    Parameters
+    ----------
+    where : str
+        File and key, or the object that is at fault.
+    what : str
+        The fault, with the offending value.
+    how_to_fix : str
+        What is allowed, or what to do about it.
+    """
+
+    exit_status = 1
+
+    def __init__(self, where: str, what: str, how_to_fix: str = "") -> None:
+        self.where = where
+        self.what = what
+        self.how_to_fix = how_to_fix
+        super().__init__(where, what, how_to_fix)
+
+    def __str__(self) -> str:
+        text = f"{self.where}: {self.what}" if self.where else self.what
+        return f"{text} {self.how_to_fix}".rstrip()
+
+
+class BadInputError(SpindleFemError):
+    """The user's input cannot be used; exit status 2."""
+
+    exit_status = 2
+
+
+class SpecError(BadInputError):
+    """A machine, study or bearing definition is wrong."""
+
+
+class UnknownKeyError(SpecError):
+    """A key that the schema does not have."""
+
+
+class UnitError(SpecError):
+    """A bare number, an unknown unit or the wrong dimension."""
+
+
+class FaultsError(SpecError):
+    """Several faults of one file at once.
+
+    Parameters
+    ----------
+    where : str
+        The file.
+    faults : sequence of SpindleFemError
+        Every fault that was found, in file order.
+    """
+
+    def __init__(self, where: str, faults: Iterable[SpindleFemError]) -> None:
+        self.faults = tuple(faults)
+        listing = "\n".join(f"  - {fault}" for fault in self.faults)
+        number = len(self.faults)
+        super().__init__(where, f"{number} fault{'s' if number != 1 else ''}\n{listing}")
+
+
+class GeometryError(BadInputError):
+    """Parts overlap or float, a channel breaks through, a design is impossible."""
+
+
+class MeshTagError(SpindleFemError):
+    """A facet without a name, with two names, or a name without facets."""
+
+
+class UnknownSurfaceError(BadInputError):
+    """A surface, part, joint or probe name that does not exist."""
+
+
+class MeshQualityError(SpindleFemError):
+    """Inverted elements, a mesh that does not conform, areas away from CAD."""
+
+
+class OutOfValidityError(SpindleFemError):
+    """A correlation was asked outside the range of its source."""
+
+
+class NoEquilibriumError(SpindleFemError):
+    """A bearing has no quasi-static equilibrium at the asked state."""
+
+
+class NoSteadyStateError(SpindleFemError):
+    """Heat and temperature run away: no thermal equilibrium exists."""
+
+
+class ConvergenceError(SpindleFemError):
+    """An iteration ended without reaching its tolerance."""
+
+
+class EnergyBalanceError(SpindleFemError):
+    """Heat in and heat out differ by more than the tolerance."""
+
+
+class RecordingError(BadInputError):
+    """A recording or its manifest cannot be used."""
+
+
+def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+    """Sentence that offers the closest allowed name and lists all of them.
+
+    >>> did_you_mean("housing.chanel_wall", ["housing.channel_wall"])
+    'Did you mean "housing.channel_wall"? Allowed: housing.channel_wall.'
+    """
+    choices = list(allowed)
+    close = difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
+    offer = f'Did you mean "{close[0]}"? ' if close else ""
+    listing = ", ".join(choices) if choices else "nothing"
+    return f"{offer}Allowed: {listing}."
