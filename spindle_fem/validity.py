@@ -1,0 +1,83 @@
+"""Ranges of validity: refusal outside them, and warnings that carry a code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from spindle_fem.errors import OutOfValidityError
+
+
+@dataclass(frozen=True, slots=True)
+class CodedWarning:
+    """Something the reader of a result must know, although it is no error.
+
+    Attributes
+    ----------
+    code : str
+        Stable, lower case with underscores, for programs:
+        ``"coolant_property_extrapolated"``.
+    text : str
+        One sentence with the value and the range, for people.
+    """
+
+    code: str
+    text: str
+
+
+def require_range(where: str, *, how_to_fix: str = "", **quantities: tuple[ArrayLike, float, float]) -> None:
+    """Refuse values outside the range of a source; NaN is outside every range.
+
+    Parameters
+    ----------
+    where : str
+        Name of the correlation or function that was asked.
+    how_to_fix : str
+        What to do instead; the allowed range is always named in the message.
+    **quantities : tuple of (array_like, float, float)
+        Value, lowest and highest allowed value (both allowed) by name. Give
+        ``-numpy.inf`` or ``numpy.inf`` for an open side.
+
+    Raises
+    ------
+    OutOfValidityError
+        Any value outside; the message names every offending quantity.
+
+    >>> require_range("nusselt_gnielinski", reynolds=([4.0e3, 1.0e4], 3.0e3, 5.0e6))
+    >>> require_range("nusselt_gnielinski", reynolds=(290.0, 3.0e3, 5.0e6))
+    Traceback (most recent call last):
+        ...
+    spindle_fem.errors.OutOfValidityError: nusselt_gnielinski: reynolds is 290, allowed 3000 to 5e+06.
+    """
+    faults = [text for name, entry in quantities.items() if (text := range_fault(name, *entry))]
+    if faults:
+        raise OutOfValidityError(where, "; ".join(faults) + ".", how_to_fix)
+
+
+def range_fault(name: str, value: ArrayLike, lowest: float, highest: float) -> str:
+    """Sentence part that says which value leaves its range; empty when none does.
+
+    For code that warns instead of refusing.
+
+    >>> range_fault("prandtl", [0.7, 3000.0, 2500.0], 0.5, 2.0e3)
+    'prandtl is 3000, allowed 0.5 to 2000 (2 of 3 values outside)'
+    >>> range_fault("prandtl", 7.0, 0.5, 2.0e3)
+    ''
+    """
+    values = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    outside = ~((values >= lowest) & (values <= highest))
+    if not outside.any():
+        return ""
+    offending = values[outside]
+    overshoot = np.maximum(lowest - offending, offending - highest)
+    worst = offending[np.argmax(np.where(np.isnan(overshoot), np.inf, overshoot))]
+    if np.isneginf(lowest):
+        allowed = f"at most {highest:.6g}"
+    elif np.isposinf(highest):
+        allowed = f"at least {lowest:.6g}"
+    else:
+        allowed = f"{lowest:.6g} to {highest:.6g}"
+    number = f" ({offending.size} of {values.size} values outside)" if values.size > 1 else ""
+    return f"{name} is {worst:.6g}, allowed {allowed}{number}"
