@@ -1,0 +1,1 @@
+"""Machine definitions: TOML in, frozen typed models out."""
