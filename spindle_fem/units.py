@@ -114,7 +114,8 @@ def _parse(value: Any, unit: str, kind: str, where: str, expected: str) -> float
 def _example(unit: str, kind: str) -> str:
     if kind == "temperature":
         return '"15 degC"'
-    return f'"1 {unit}"' if unit else "1.0"
+    customary = {"m": "19 mm", "rad/s": "3000 rpm", "rad": "15 deg", "m**3/s": "20 L/min", "K": "5 K"}
+    return f'"{customary.get(unit, "1 " + unit)}"' if unit else "1.0"
 
 
 @dataclass(frozen=True, slots=True)

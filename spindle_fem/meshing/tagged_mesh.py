@@ -18,7 +18,9 @@ class Joint:
     Attributes
     ----------
     name : str
-        ``"part_a|part_b"``, for example ``"F1.inner_ring|shaft"``.
+        ``"part_a|part_b"`` of a cylindrical contact, for example
+        ``"F1.inner_ring|shaft"``, and ``"part_a|part_b:face"`` of a plane one;
+        parts in sorted order. One joint may hold several separate faces.
     facets_a, facets_b : (n, 6) int64 ndarray
         Nodes of each quadratic triangle (three corners, then the middles of
         edges 01, 12, 20); row ``i`` and column ``j`` of both lie at the same

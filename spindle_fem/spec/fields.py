@@ -24,19 +24,24 @@ def _read_with(function: Any, *arguments: Any, **keywords: Any) -> BeforeValidat
 def _plain_text(value: float, unit: str, kind: str) -> Any:
     if kind == "temperature":
         return f"{value - ZERO_CELSIUS_K:.10g} degC"
-    return f"{value:.12g} {unit}" if unit else float(f"{value:.12g}")
+    return f"{value!r} {unit}" if unit else value
 
 
-def _keep_float(value: Any, unit: str, kind: str, *, where: str) -> float:
-    # A number that is already SI only reaches this from Python (model_copy, defaults).
-    return to_si(value, unit, where=where, kind=kind)
+def _rounded_si(value: Any, unit: str, kind: str, *, where: str) -> float:
+    # Conversion leaves "410 mm" at 0.41000000000000003 m; 13 digits make equal texts equal.
+    return float(f"{to_si(value, unit, where=where, kind=kind):.13g}")
+
+
+def _rounded_uncertain(value: Any, unit: str, *, where: str) -> Uncertain:
+    read = uncertain_to_si(value, unit, where=where)
+    return Uncertain(float(f"{read.value:.13g}"), float(f"{read.sigma_log:.13g}"))
 
 
 def quantity_field(unit: str, kind: str = "quantity") -> Any:
     """Annotated float that reads text with a unit and writes it back."""
     return Annotated[
         float,
-        _read_with(_keep_float, unit, kind),
+        _read_with(_rounded_si, unit, kind),
         PlainSerializer(lambda value: _plain_text(value, unit, kind)),
     ]
 
@@ -46,9 +51,9 @@ def uncertain_field(unit: str) -> Any:
 
     def write(value: Uncertain) -> Any:
         text = _plain_text(value.value, unit, "quantity")
-        return text if value.is_fixed else {"value": text, "sigma_rel": float(f"{value.sigma_log:.6g}")}
+        return text if value.is_fixed else {"value": text, "sigma_rel": value.sigma_log}
 
-    return Annotated[Uncertain, _read_with(uncertain_to_si, unit), PlainSerializer(write)]
+    return Annotated[Uncertain, _read_with(_rounded_uncertain, unit), PlainSerializer(write)]
 
 
 Length = quantity_field("m")
@@ -58,6 +63,7 @@ TemperatureDifference = quantity_field("K", "temperature_difference")
 Pressure = quantity_field("Pa")
 Density = quantity_field("kg/m**3")
 Conductivity = quantity_field("W/m/K")
+HeatCapacity = quantity_field("J/K")
 SpecificHeat = quantity_field("J/kg/K")
 KinematicViscosity = quantity_field("m**2/s")
 VolumeFlow = quantity_field("m**3/s")
@@ -73,7 +79,7 @@ UncertainNumber = uncertain_field("")
 UncertainFilm = uncertain_field("W/m**2/K")
 UncertainConductance = uncertain_field("W/K")
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.]*$", max_length=64)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.]*$", max_length=64)]
 Range = Annotated[tuple[Length, Length], Field(description="from, to")]
 
 

@@ -19,6 +19,7 @@ from spindle_fem.spec.fields import (
     FilmCoefficient,
     Force,
     Fraction,
+    HeatCapacity,
     KinematicViscosity,
     Length,
     Name,
@@ -194,15 +195,8 @@ class BallRow(SpecModel):
 
     kind: Literal["contact", "constant"] = "contact"
     conductance: UncertainConductance | None = None
-    capacity: Annotated[Any, Field()] = None
+    capacity: HeatCapacity | None = None
     grease_conductance: UncertainConductance | None = None
-
-    @field_validator("capacity", mode="before")
-    @classmethod
-    def _read_capacity(cls, value: Any) -> Any:
-        from spindle_fem.units import to_si
-
-        return None if value is None else to_si(value, "J/K", where="")
 
     @model_validator(mode="after")
     def _check(self) -> BallRow:
@@ -353,8 +347,10 @@ class Heat(SpecModel):
 class JointGroup(SpecModel):
     """Contact faces that share one conductance (one factor when uncertain).
 
-    ``contacts`` are names ``part_a|part_b`` as ``spindle-fem check`` lists
-    them; ``*`` stands for any text. ``perfect`` means no resistance.
+    ``contacts`` are names ``part_a|part_b`` (parts in sorted order) of a
+    cylindrical contact and ``part_a|part_b:face`` of a plane one, as
+    ``spindle-fem check`` lists them; ``*`` stands for any text. ``perfect``
+    means no resistance.
     """
 
     name: Name
@@ -460,7 +456,7 @@ class Gap(SpecModel):
     kind: Literal["power_law", "becker_kaye"] = "power_law"
     at_rest: FilmCoefficient | None = None
     rise: FilmCoefficient = 0.0
-    reference_speed: RotationalSpeed = 314.1592653589793
+    reference_speed: RotationalSpeed = 314.159265359
     exponent: Number = 0.75
     factor: UncertainNumber = Uncertain(1.0)
 
@@ -468,6 +464,23 @@ class Gap(SpecModel):
     def _check(self) -> Gap:
         if (self.kind == "power_law") != (self.at_rest is not None):
             raise ValueError('at_rest goes with kind = "power_law", and only with it.')
+        return self
+
+
+class SharedFactor(SpecModel):
+    """One uncertain factor, 1 when nominal, on several coefficients at once.
+
+    ``applies_to`` names them as ``film.NAME``, ``gap.NAME``, ``joint.NAME``,
+    ``heat.SET`` or ``ball_row.SET``.
+    """
+
+    name: Name
+    sigma_rel: Number
+    applies_to: Annotated[tuple[str, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _check(self) -> SharedFactor:
+        _require_positive(self, "sigma_rel")
         return self
 
 
@@ -532,6 +545,7 @@ class MachineSpec(SpecModel):
     surface: tuple[Surface, ...] = ()
     film: tuple[Film, ...] = ()
     gap: tuple[Gap, ...] = ()
+    factor: tuple[SharedFactor, ...] = ()
     probe: tuple[Probe, ...] = ()
     mesh: MeshSettings = MeshSettings()
     effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -540,6 +554,25 @@ class MachineSpec(SpecModel):
     def bearings(self) -> tuple[tuple[BearingSet, SetBearing], ...]:
         """Every bearing with its set, in file order."""
         return tuple((group, bearing) for group in self.bearing_set for bearing in group.bearing)
+
+    @property
+    def all_surfaces(self) -> tuple[Surface, ...]:
+        """The named surfaces of the file and the raceways of every bearing.
+
+        ``F1.inner_raceway`` is the outer cylinder of ``F1.inner_ring``,
+        ``F1.outer_raceway`` the inner cylinder of ``F1.outer_ring``.
+        """
+        raceways = []
+        for _, bearing in self.bearings:
+            for ring, facing in (("inner", "outward"), ("outer", "inward")):
+                raceways.append(
+                    Surface(
+                        name=f"{bearing.name}.{ring}_raceway",
+                        part=f"{bearing.name}.{ring}_ring",
+                        where=(FaceSelector(facing=facing),),
+                    )
+                )
+        return self.surface + tuple(raceways)
 
     def part_material(self, part_name: str) -> Material:
         """Material of a part, the rings of bearings included (``F1.inner_ring``)."""

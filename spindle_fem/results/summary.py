@@ -1,0 +1,129 @@
+"""``summary.json``: the result as plain numbers in the units users read."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import platform
+from typing import Any
+
+from spindle_fem.results.thermal_result import BearingResult, CoolantResult, ThermalResult
+from spindle_fem.units import ZERO_CELSIUS_K
+
+SUMMARY_SCHEMA = "spindle-fem/summary/1"
+_PACKAGES = ("spindle-fem", "numpy", "scipy", "scikit-fem", "gmsh", "pygmsh", "pyamg", "pyvista", "vtk", "pydantic")
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of Python and of the packages that make a result."""
+    versions = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions
+
+
+def build_summary(result: ThermalResult, wall_time_s: float, peak_rss_MB: float) -> dict[str, Any]:
+    """Dictionary written as ``summary.json``; ``nan`` becomes ``None``."""
+    maximum_mm = [round(float(value) * 1e3, 3) for value in result.temperature_maximum_at]
+    return _without_nan(
+        {
+            "schema": SUMMARY_SCHEMA,
+            "machine": result.spec.name,
+            "versions": package_versions(),
+            "wall_time_s": wall_time_s,
+            "peak_rss_MB": peak_rss_MB,
+            "timings_s": dict(result.timings),
+            "mesh": {
+                "nodes": result.n_unknowns,
+                "elements": result.mesh.n_elements,
+                "order": result.order,
+                "min_quality": result.mesh.min_quality,
+                "area_error_relative": dict(result.area_error_relative),
+                "volume_error_relative": dict(result.volume_error_relative),
+                "digest": result.mesh.digest,
+            },
+            "energy": {
+                "heat_in_W": result.energy.heat_in,
+                "heat_in_by_W": dict(result.energy.heat_in_by),
+                "heat_out_W": dict(result.energy.heat_out),
+                "imbalance_relative": result.energy.imbalance_relative,
+            },
+            "bearings": {name: _bearing(bearing) for name, bearing in result.bearings.items()},
+            "coolant": None if result.coolant is None else _coolant(result.coolant),
+            "probes": {name: value - ZERO_CELSIUS_K for name, value in result.probes.items()},
+            "temperature": {
+                "min_degC": result.temperature_minimum - ZERO_CELSIUS_K,
+                "max_degC": result.temperature_maximum - ZERO_CELSIUS_K,
+                "max_at_mm": maximum_mm,
+            },
+            "joints": {name: {"heat_W": value} for name, value in result.heat_flows.items()},
+            "iterations": dict(result.iterations),
+            "checks": [
+                {
+                    "name": check.name,
+                    "value": check.value,
+                    "limit": check.limit,
+                    "unit": check.unit,
+                    "passed": check.passed,
+                    "explanation": check.explanation,
+                }
+                for check in result.checks
+            ],
+            "warnings": [{"code": warning.code, "text": warning.text} for warning in result.warnings],
+            **result.extra,
+        }
+    )
+
+
+def _bearing(bearing: BearingResult) -> dict[str, Any]:
+    return {
+        "heat_W": bearing.heat,
+        "terms_W": dict(bearing.terms),
+        "heat_to_W": dict(bearing.heat_to),
+        "temperature_inner_degC": bearing.temperature_inner - ZERO_CELSIUS_K,
+        "temperature_outer_degC": bearing.temperature_outer - ZERO_CELSIUS_K,
+        "temperature_ball_degC": bearing.temperature_ball - ZERO_CELSIUS_K,
+        "ring_difference_K": bearing.ring_difference,
+        "contact_angle_inner_deg": math.degrees(bearing.contact_angle_inner),
+        "contact_angle_outer_deg": math.degrees(bearing.contact_angle_outer),
+        "preload_N": bearing.preload,
+        "film_um": bearing.film_thickness * 1e6,
+        "lambda": bearing.film_thickness_ratio,
+    }
+
+
+def _coolant(coolant: CoolantResult) -> dict[str, Any]:
+    return {
+        "flow_m3_s": coolant.flow,
+        "inlet_degC": coolant.inlet_temperature - ZERO_CELSIUS_K,
+        "outlet_degC": coolant.outlet_temperature - ZERO_CELSIUS_K,
+        "heat_W": coolant.heat,
+        "reynolds": coolant.reynolds,
+        "prandtl": coolant.prandtl,
+        "velocity_m_s": coolant.velocity,
+        "regime": coolant.regime,
+        "source": coolant.source,
+        "film_coefficient_W_m2K": {
+            "value": coolant.mean_film_coefficient,
+            "low": coolant.mean_film_low,
+            "high": coolant.mean_film_high,
+        },
+        "pressure_drop_Pa": coolant.pressure_drop,
+        "pumping_power_W": coolant.pumping_power,
+        "wetted_area_m2": coolant.wetted_area,
+        "length_m": coolant.length,
+        "hydraulic_diameter_m": coolant.hydraulic_diameter,
+    }
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_without_nan(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

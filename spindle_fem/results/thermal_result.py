@@ -1,0 +1,153 @@
+"""What a solved machine knows: the field and everything derived from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from spindle_fem.meshing.tagged_mesh import TaggedMesh
+    from spindle_fem.spec.model import MachineSpec
+    from spindle_fem.validity import CodedWarning
+
+
+@dataclass(frozen=True, slots=True)
+class BearingResult:
+    """State of one bearing at the solution; temperatures in K.
+
+    ``contact_angle_*`` in rad, ``film_thickness`` (central, thinner contact)
+    in m; ``nan`` where the heat model does not give them.
+    """
+
+    heat: float
+    terms: Mapping[str, float]
+    heat_to: Mapping[str, float]
+    temperature_inner: float
+    temperature_outer: float
+    temperature_ball: float
+    contact_angle_inner: float
+    contact_angle_outer: float
+    preload: float
+    film_thickness: float
+    film_thickness_ratio: float
+
+    @property
+    def ring_difference(self) -> float:
+        """Mean inner raceway minus mean outer raceway temperature, K."""
+        return self.temperature_inner - self.temperature_outer
+
+
+@dataclass(frozen=True, slots=True)
+class CoolantResult:
+    """Channel flow; arrays run along the helix, one entry a cell.
+
+    Attributes
+    ----------
+    position : (n,) ndarray, [m]
+        Developed length from the inlet to the cell centre.
+    angle : (n,) ndarray, [rad]
+        Helix angle of the cell centre from the inlet.
+    bulk_temperature, wall_temperature : (n,) ndarray, [K]
+    film_coefficient, film_low, film_high : (n,) ndarray, [W/(m²·K)]
+    """
+
+    flow: float
+    inlet_temperature: float
+    outlet_temperature: float
+    heat: float
+    reynolds: float
+    prandtl: float
+    velocity: float
+    regime: str
+    source: str
+    pressure_drop: float
+    pumping_power: float
+    hydraulic_diameter: float
+    length: float
+    wetted_area: float
+    position: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    bulk_temperature: NDArray[np.float64]
+    wall_temperature: NDArray[np.float64]
+    film_coefficient: NDArray[np.float64]
+    film_low: NDArray[np.float64]
+    film_high: NDArray[np.float64]
+    mean_film_coefficient: float
+    mean_film_low: float
+    mean_film_high: float
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyBalance:
+    """Heat in W; ``heat_out`` by surface or film name, positive when it leaves."""
+
+    heat_in: float
+    heat_in_by: Mapping[str, float]
+    heat_out: Mapping[str, float]
+
+    @property
+    def imbalance_relative(self) -> float:
+        """(in − out) over the larger of the heat put in and the largest flow."""
+        scale = max(abs(self.heat_in), *(abs(value) for value in self.heat_out.values()), 1.0e-12)
+        return (self.heat_in - sum(self.heat_out.values())) / scale
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One self-check of a run: its value, its limit and whether it held."""
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+    passed: bool
+    explanation: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ThermalResult:
+    """A solved machine.
+
+    Attributes
+    ----------
+    temperature : (n_nodes,) ndarray, [K]
+        At every mesh point (linear solutions interpolated to edge middles).
+    air_temperature : mapping of str to float, [K]
+        Averaged air of each gap band, by lumped-node name.
+    film_coefficient : mapping of str to (n_facets,) ndarray, [W/(m²·K)]
+        Coefficient in force on each named surface.
+    fluid_temperature : mapping of str to (n_facets,) ndarray, [K]
+    probes : mapping of str to float, [K]
+    temperature_maximum_at : (3,) ndarray, [m]
+    heat_flows : mapping of str to float, [W]
+        Through each joint, from the first-named part to the second.
+    timings : mapping of str to float, [s]
+    """
+
+    spec: MachineSpec
+    mesh: TaggedMesh
+    order: int
+    n_unknowns: int
+    temperature: NDArray[np.float64]
+    air_temperature: Mapping[str, float]
+    film_coefficient: Mapping[str, NDArray[np.float64]]
+    fluid_temperature: Mapping[str, NDArray[np.float64]]
+    bearings: Mapping[str, BearingResult]
+    coolant: CoolantResult | None
+    probes: Mapping[str, float]
+    energy: EnergyBalance
+    heat_flows: Mapping[str, float]
+    area_error_relative: Mapping[str, float]
+    volume_error_relative: Mapping[str, float]
+    temperature_minimum: float
+    temperature_maximum: float
+    temperature_maximum_at: NDArray[np.float64]
+    checks: tuple[Check, ...]
+    warnings: tuple[CodedWarning, ...]
+    iterations: Mapping[str, int]
+    timings: Mapping[str, float]
+    extra: Mapping[str, Any] = field(default_factory=dict)
