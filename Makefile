@@ -1,0 +1,37 @@
+# Two commands: `make run` solves the reference spindle, `make test` runs the tests.
+# Both set everything up first. PYTHON names the interpreter (3.11 or later).
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+RESULT ?= runs/wu_tan_2016
+
+# More BLAS threads than one only fight with the solver's own.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: run test setup lint wheel-check clean
+
+run: $(READY)
+	$(BIN)/spindle-fem run -o $(RESULT)
+
+test: $(READY) lint
+	$(BIN)/python -m pytest -q
+	$(MAKE) --no-print-directory wheel-check
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+setup: $(READY)
+
+$(READY): pyproject.toml constraints.txt scripts/setup.sh
+	PYTHON="$(PYTHON)" VENV="$(VENV)" bash scripts/setup.sh
+	touch $@
+
+# A small run from an installed wheel, away from the source tree.
+wheel-check: $(READY)
+	bash scripts/wheel_check.sh $(BIN)/python
+
+clean:
+	rm -rf $(VENV) build dist runs .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,159 @@
+"""The command line: parse, call one function, print."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from spindle_fem import __version__
+
+app = typer.Typer(
+    name="spindle-fem",
+    help="Thermal finite elements for grease-lubricated machine-tool spindles.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Machine = Annotated[str, typer.Argument(help="A TOML definition, or the name of a machine that ships.")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="PATH=VALUE", help="Override a value, with its unit: channel.depth=19mm."),
+]
+Folder = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the results.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"spindle-fem {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _version_asked: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> None:
+    _State.debug = debug
+
+
+class _State:
+    debug = False
+
+
+def _print_json(content: Any) -> None:
+    typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
+
+
+@app.command()
+def run(
+    output: Folder,
+    machine: Machine = "wu_tan_2016",
+    set_: Overrides = None,
+    as_json: AsJson = False,
+    estimate_mesh_error: Annotated[
+        bool, typer.Option("--estimate-mesh-error", help="Solve on a second, coarser mesh and report the change.")
+    ] = False,
+) -> None:
+    """Geometry, mesh, heat, films, solve, pictures, report."""
+    from spindle_fem.commands import run_machine
+    from spindle_fem.console import print_run
+
+    summary = run_machine(
+        machine, output, overrides=set_ or (), estimate_mesh_error=estimate_mesh_error, progress=not as_json
+    )
+    _print_json(summary) if as_json else print_run(summary, output)
+
+
+@app.command()
+def check(machine: Machine, set_: Overrides = None, as_json: AsJson = False) -> None:
+    """Validate a machine without solving; every fault at once."""
+    from spindle_fem.commands import check_machine
+    from spindle_fem.console import print_check
+
+    content = check_machine(machine, overrides=set_ or ())
+    _print_json(content) if as_json else print_check(content)
+
+
+@app.command()
+def mesh(
+    machine: Machine,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".msh, .vtu or .step")],
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write the mesh (.msh, .vtu with named parts and surfaces) or the solid model (.step)."""
+    from spindle_fem.commands import mesh_machine
+    from spindle_fem.console import print_pairs
+
+    content = mesh_machine(machine, output, overrides=set_ or ())
+    _print_json(content) if as_json else print_pairs(f"wrote {output}", content)
+
+
+@app.command()
+def heat(
+    machine: Machine,
+    speed: Annotated[
+        list[str] | None, typer.Option("--speed", help='Speeds, repeatable: "3000 rpm"; default 500 to 4500 rpm.')
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for tables and pictures.")
+    ] = None,
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Bearing loads, angles, films and heat term by term over speed."""
+    from spindle_fem.commands import heat_table
+    from spindle_fem.console import print_heat
+
+    content = heat_table(machine, speeds=speed or (), folder=output, overrides=set_ or ())
+    _print_json(content) if as_json else print_heat(content)
+
+
+@app.command()
+def bearing(
+    file: Annotated[Path, typer.Argument(help="TOML with [bearing], [operation] and perhaps [lubricant].")],
+    as_json: AsJson = False,
+) -> None:
+    """One bearing or one preloaded set, without a machine."""
+    from spindle_fem.console import print_bearing
+    from spindle_fem.tribology.bearing_file import bearing_report
+
+    content = bearing_report(file)
+    _print_json(content) if as_json else print_bearing(content)
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier command.")],
+) -> None:
+    """Rebuild the report of an output folder."""
+    from spindle_fem.commands import rebuild
+
+    typer.echo(f"wrote {rebuild(folder)}")
+
+
+def main() -> None:
+    """Entry point: exit status 0 done, 2 bad input, 1 anything else."""
+    from spindle_fem.errors import SpindleFemError
+
+    try:
+        app(standalone_mode=True)
+    except SpindleFemError as error:
+        if _State.debug:
+            raise
+        typer.echo(f"{type(error).__name__}: {error}", err=True)
+        sys.exit(error.exit_status)
+    except OSError as error:
+        if _State.debug:
+            raise
+        typer.echo(f"{type(error).__name__}: {error}", err=True)
+        sys.exit(1)

@@ -1,0 +1,1 @@
+"""Heat, films and exchange nodes on the named surfaces of a machine."""

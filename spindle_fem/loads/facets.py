@@ -1,0 +1,60 @@
+"""Centres and areas of curved (six-node) boundary triangles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Degree-4 rule of Dunavant (1985), six points, on the unit triangle; weights sum to 1.
+_A, _B = 0.445948490915965, 0.091576213509771
+_WEIGHT_A, _WEIGHT_B = 0.223381589678011, 0.109951743655322
+_POINTS = np.array(
+    [(_A, _A), (1 - 2 * _A, _A), (_A, 1 - 2 * _A), (_B, _B), (1 - 2 * _B, _B), (_B, 1 - 2 * _B)]
+)
+_WEIGHTS = np.array([_WEIGHT_A] * 3 + [_WEIGHT_B] * 3)
+
+
+def _shapes(points: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
+    x, y = points.T
+    z = 1.0 - x - y
+    values = np.stack([z * (2 * z - 1), x * (2 * x - 1), y * (2 * y - 1), 4 * z * x, 4 * x * y, 4 * y * z], axis=1)
+    zero = np.zeros_like(x)
+    along_x = np.stack([1 - 4 * z, 4 * x - 1, zero, 4 * (z - x), 4 * y, -4 * y], axis=1)
+    along_y = np.stack([1 - 4 * z, zero, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y)], axis=1)
+    return values, along_x, along_y
+
+
+def facet_areas_and_centres(
+    points: NDArray[np.float64], facets: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Area and centroid of every curved triangle.
+
+    Parameters
+    ----------
+    points : (n_nodes, 3) ndarray, [m]
+    facets : (n, 6) ndarray
+        Corners, then the middles of edges 01, 12, 20.
+
+    Returns
+    -------
+    areas : (n,) ndarray, [m²]
+    centres : (n, 3) ndarray, [m]
+    """
+    values, along_x, along_y = _shapes(_POINTS)
+    corners = points[facets]
+    tangent_x = np.einsum("qk,fkd->fqd", along_x, corners)
+    tangent_y = np.einsum("qk,fkd->fqd", along_y, corners)
+    jacobian = 0.5 * np.linalg.norm(np.cross(tangent_x, tangent_y), axis=2) * _WEIGHTS
+    areas = jacobian.sum(axis=1)
+    places = np.einsum("qk,fkd->fqd", values, corners)
+    return areas, np.einsum("fq,fqd->fd", jacobian, places) / areas[:, None]
+
+
+def mean_over_facets(values: NDArray[np.float64], facets: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Mean of a quadratic field over each triangle, (n,) ndarray.
+
+    On a straight triangle the integral of a quadratic field is the mean of its
+    three edge middles; the curvature of a facet changes that by far less than
+    the film laws that use it.
+    """
+    return values[facets[:, 3:]].mean(axis=1)
