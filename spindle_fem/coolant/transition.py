@@ -1,0 +1,142 @@
+"""Where laminar flow in a helical channel ends, and the bridge to turbulent flow."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spindle_fem.validity import require_range
+
+TURBULENT_FROM_REYNOLDS = 2.2e4
+
+
+def critical_reynolds_schmidt(curvature_ratio: ArrayLike) -> NDArray[np.float64]:
+    """Reynolds number at which laminar flow in a helical coil ends.
+
+    Parameters
+    ----------
+    curvature_ratio : (n,) array_like, [-]
+        Hydraulic over coil diameter.
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+
+    Raises
+    ------
+    OutOfValidityError
+        Outside Range.
+
+    Range: 0 (straight) to 0.2.
+
+    Source: Schmidt (1967), Chem.-Ing.-Techn. 39, 781–789.
+
+    >>> float(critical_reynolds_schmidt(10.909 / 226.0).round(0))
+    7357.0
+    """
+    delta = np.asarray(curvature_ratio, float)
+    require_range(
+        "critical_reynolds_schmidt",
+        curvature_ratio=(delta, 0.0, 0.2),
+        how_to_fix="A channel this tightly wound has no source; use a larger coil diameter.",
+    )
+    return 2300.0 * (1.0 + 8.6 * delta**0.45)
+
+
+def critical_reynolds_ito(curvature_ratio: ArrayLike) -> NDArray[np.float64]:
+    """Reynolds number at which laminar flow in a curved pipe ends, from friction.
+
+    Parameters
+    ----------
+    curvature_ratio : (n,) array_like, [-]
+        Pipe over coil diameter.
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+
+    Raises
+    ------
+    OutOfValidityError
+        Outside Range.
+
+    Range: 0.0012 to 0.067.
+
+    Source: Ito (1959), J. Basic Eng. 81, 123–134.
+
+    >>> float(critical_reynolds_ito(10.909 / 226.0).round(0))
+    7582.0
+    """
+    delta = np.asarray(curvature_ratio, float)
+    require_range(
+        "critical_reynolds_ito",
+        curvature_ratio=(delta, 0.0012, 0.067),
+        how_to_fix="Use critical_reynolds_schmidt.",
+    )
+    return 2.0e4 * delta**0.32
+
+
+def transition_weight(reynolds: ArrayLike, critical_reynolds: ArrayLike) -> NDArray[np.float64]:
+    """Share of the laminar value between the critical Reynolds number and 2.2e4.
+
+    Parameters
+    ----------
+    reynolds, critical_reynolds : (n,) array_like, [-]
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+        1 in laminar, 0 in turbulent flow, linear between.
+
+    Source: Gnielinski (1986); VDI Heat Atlas, section G3.
+
+    >>> transition_weight([5000.0, 15000.0, 30000.0], 8000.0).tolist()
+    [1.0, 0.5, 0.0]
+    """
+    critical = np.asarray(critical_reynolds, float)
+    share = (TURBULENT_FROM_REYNOLDS - np.asarray(reynolds, float)) / (TURBULENT_FROM_REYNOLDS - critical)
+    return np.clip(share, 0.0, 1.0)
+
+
+def nusselt_transition(
+    reynolds: ArrayLike,
+    critical_reynolds: ArrayLike,
+    nusselt_laminar_at_critical: ArrayLike,
+    nusselt_turbulent_at_upper: ArrayLike,
+) -> NDArray[np.float64]:
+    """Nusselt number between laminar and turbulent flow in a helical coil.
+
+    Parameters
+    ----------
+    reynolds, critical_reynolds : (n,) array_like, [-]
+    nusselt_laminar_at_critical : (n,) array_like, [-]
+        At the critical Reynolds number.
+    nusselt_turbulent_at_upper : (n,) array_like, [-]
+        At Re = 2.2e4.
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+        Meets both branches without a jump.
+
+    Raises
+    ------
+    OutOfValidityError
+        Reynolds number not between the critical one and 2.2e4.
+
+    Source: Gnielinski (1986); VDI Heat Atlas, section G3.
+
+    >>> float(nusselt_transition(15000.0, 8000.0, 100.0, 900.0))
+    500.0
+    """
+    re, critical = np.broadcast_arrays(np.asarray(reynolds, float), np.asarray(critical_reynolds, float))
+    require_range(
+        "nusselt_transition",
+        critical_reynolds=(critical, 0.0, TURBULENT_FROM_REYNOLDS),
+        reynolds_over_critical=(re / critical, 1.0, np.inf),
+        reynolds=(re, 0.0, TURBULENT_FROM_REYNOLDS),
+        how_to_fix="Let coolant.regimes choose the correlation.",
+    )
+    weight = transition_weight(re, critical)
+    laminar = np.asarray(nusselt_laminar_at_critical, float)
+    return weight * laminar + (1.0 - weight) * np.asarray(nusselt_turbulent_at_upper, float)
