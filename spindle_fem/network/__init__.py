@@ -1,0 +1,1 @@
+"""Lumped thermal networks: nodes with capacity, links, boundaries, sources."""

@@ -1,0 +1,431 @@
+"""A thermal network: named nodes, boundaries, links, sources, and their temperature laws.
+
+The balance of node i is
+
+    C_i dT_i/dt = Q_i(T, inputs) + sum_links G (T_other - T_i) + sum_streams W (T_upstream - T_i)
+
+where conductances G and heat Q are constants or laws of temperature and
+input that return their own derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import SpecError, UnknownSurfaceError, did_you_mean
+
+Array = NDArray[np.float64]
+Inputs = Mapping[str, float]
+
+#: First and second end's temperatures and the inputs -> conductance and its two derivatives.
+ConductanceFunction = Callable[[Array, Array, Inputs], tuple[Array, Array, Array]]
+#: Node temperatures, boundary temperatures and the inputs -> heat of each node and its (n, n) derivative.
+HeatFunction = Callable[[Array, Array, Inputs], tuple[Array, Array]]
+
+
+@dataclass(frozen=True, slots=True)
+class ConductanceLaw:
+    """Conductance of some links as a law of the temperatures at their ends.
+
+    Attributes
+    ----------
+    links : (k,) int64 ndarray
+        Positions in the network's links; their constant conductance is
+        replaced by the law.
+    function : callable
+        ``(first (k,) [K], second (k,) [K], inputs)`` to conductance
+        ``(k,) [W/K]`` and its derivatives to the first and second
+        temperature ``(k,) [W/K²]``.
+    """
+
+    links: NDArray[np.int64]
+    function: ConductanceFunction
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of a network that a prior may leave free.
+
+    Attributes
+    ----------
+    name : str
+        ``capacity.<node>``, ``conductance.<link>``, ``gain.<source>``,
+        ``temperature.<boundary>`` or ``initial.<node>``.
+    kind : str
+        The word before the point.
+    index : int
+        Position among the nodes, links, sources or boundaries.
+    value : float
+        SI; positive unless fixed.
+    sigma_log : float
+        One standard deviation of the natural logarithm; 0 means fixed.
+    unit : str
+        SI unit of ``value``.
+    """
+
+    name: str
+    kind: str
+    index: int
+    value: float
+    sigma_log: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class ThermalNetwork:
+    """A lumped heat-conducting system.
+
+    Ends of links are positions in ``node_names + boundary_names``.
+
+    Attributes
+    ----------
+    node_names, boundary_names, link_names, source_names : tuple of str
+    capacity : (n,) float64 ndarray, [J/K]
+    link_first, link_second : (m,) int64 ndarray
+    link_conductance : (m,) float64 ndarray, [W/K]
+    boundary_temperature : (b,) float64 ndarray, [K]
+        NaN where ``boundary_input`` names the input that drives it.
+    boundary_input : tuple of str or None
+    source_node : (s,) int64 ndarray
+    source_input : tuple of str or None
+        None: the heat is the gain itself, in W.
+    source_gain, source_exponent : (s,) float64 ndarray
+        Heat = gain · input^exponent, all in SI (angular speed in rad/s).
+    source_gain_unit : tuple of str
+        SI base units of each gain, to be checked against the input's.
+    stream_upstream, stream_downstream : (k,) int64 ndarray
+        Fluid streams: the downstream node receives ``rate · (T_up - T_down)``,
+        the upstream end gives nothing (its own balance has its own inflow).
+    stream_rate : (k,) float64 ndarray, [W/K]
+        Mass flow times specific heat.
+    conductance_laws : tuple of ConductanceLaw
+    heat_laws : tuple of callable
+        ``(nodes (n,) [K], boundaries (b,) [K], inputs)`` to heat ``(n,) [W]``
+        and its derivative ``(n, n) [W/K]`` to the node temperatures.
+    law_inputs : tuple of str
+        Inputs that the laws read, besides those of boundaries and sources.
+    parameters : tuple of Parameter
+        Values that carry a prior.
+    """
+
+    node_names: tuple[str, ...]
+    capacity: Array
+    link_first: NDArray[np.int64]
+    link_second: NDArray[np.int64]
+    link_conductance: Array
+    boundary_names: tuple[str, ...] = ()
+    boundary_temperature: Array = field(default_factory=lambda: np.empty(0))
+    boundary_input: tuple[str | None, ...] = ()
+    link_names: tuple[str, ...] = ()
+    source_node: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    source_input: tuple[str | None, ...] = ()
+    source_gain: Array = field(default_factory=lambda: np.empty(0))
+    source_exponent: Array = field(default_factory=lambda: np.empty(0))
+    source_gain_unit: tuple[str, ...] = ()
+    source_names: tuple[str, ...] = ()
+    stream_upstream: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    stream_downstream: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    stream_rate: Array = field(default_factory=lambda: np.empty(0))
+    conductance_laws: tuple[ConductanceLaw, ...] = ()
+    heat_laws: tuple[HeatFunction, ...] = ()
+    law_inputs: tuple[str, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+
+    def __post_init__(self) -> None:
+        converted = {
+            "capacity": np.float64,
+            "link_first": np.int64,
+            "link_second": np.int64,
+            "link_conductance": np.float64,
+            "boundary_temperature": np.float64,
+            "source_node": np.int64,
+            "source_gain": np.float64,
+            "source_exponent": np.float64,
+            "stream_upstream": np.int64,
+            "stream_downstream": np.int64,
+            "stream_rate": np.float64,
+        }
+        for name, kind in converted.items():
+            array = np.array(getattr(self, name), dtype=kind)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        names = self.node_names + self.boundary_names
+        if not self.boundary_input:
+            object.__setattr__(self, "boundary_input", (None,) * len(self.boundary_names))
+        if not self.link_names:
+            pairs = zip(self.link_first, self.link_second, strict=True)
+            object.__setattr__(self, "link_names", tuple(f"{names[a]}|{names[b]}" for a, b in pairs))
+        if not self.source_names:
+            pairs = zip(self.source_node, self.source_input, strict=True)
+            labels = tuple(f"{self.node_names[n]}.{i or 'constant'}" for n, i in pairs)
+            object.__setattr__(self, "source_names", labels)
+        require_sound_network(self)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of unknown temperatures."""
+        return len(self.node_names)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether no conductance or heat depends on temperature."""
+        return not self.conductance_laws and not self.heat_laws
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether heat flows by conduction only (no fluid streams)."""
+        return self.stream_rate.size == 0
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Every input the network needs, once, in order of first use."""
+        used = [*self.boundary_input, *self.source_input, *self.law_inputs]
+        return tuple(dict.fromkeys(name for name in used if name is not None))
+
+    def node_index(self, name: str, where: str = "network") -> int:
+        """Position of a node; an unknown name is refused with the nearest one."""
+        if name not in self.node_names:
+            raise UnknownSurfaceError(where, f'"{name}" is not a node.', did_you_mean(name, self.node_names))
+        return self.node_names.index(name)
+
+    def conductance_matrix(self) -> Array:
+        """Constant conductances as ``K (n, n + b) [W/K]``: heat out of node i is ``(K T)_i``.
+
+        Columns run over nodes, then boundaries; links that a law governs are left out.
+        """
+        n, total = self.n_nodes, self.n_nodes + len(self.boundary_names)
+        governed = [law.links for law in self.conductance_laws]
+        conductance = self.link_conductance.copy()
+        if governed:
+            conductance[np.concatenate(governed)] = 0.0
+        matrix = np.zeros((total, total))
+        first, second = self.link_first, self.link_second
+        np.add.at(matrix, (first, first), conductance)
+        np.add.at(matrix, (second, second), conductance)
+        np.add.at(matrix, (first, second), -conductance)
+        np.add.at(matrix, (second, first), -conductance)
+        np.add.at(matrix, (self.stream_downstream, self.stream_downstream), self.stream_rate)
+        np.add.at(matrix, (self.stream_downstream, self.stream_upstream), -self.stream_rate)
+        return matrix[:n]
+
+    def boundary_values(self, inputs: Inputs) -> Array:
+        """Boundary temperatures, ``(b,) [K]``, at given inputs (SI)."""
+        values = self.boundary_temperature.copy()
+        for position, name in enumerate(self.boundary_input):
+            if name is not None:
+                values[position] = _input_value(inputs, name)
+        return values
+
+    def source_values(self, inputs: Inputs) -> Array:
+        """Heat of each source, ``(s,) [W]``, at given inputs (SI)."""
+        heat = self.source_gain.copy()
+        for position, name in enumerate(self.source_input):
+            if name is not None:
+                heat[position] *= np.float64(_input_value(inputs, name)) ** self.source_exponent[position]
+        return heat
+
+    def node_heat(self, source_heat: Array) -> Array:
+        """Sum of source heat over each node, ``(..., n) [W]``, of ``(..., s) [W]``."""
+        spread = np.zeros((self.source_node.size, self.n_nodes))
+        spread[np.arange(self.source_node.size), self.source_node] = 1.0
+        return source_heat @ spread
+
+    def with_values(self, values: Mapping[str, float]) -> ThermalNetwork:
+        """The same network with some parameters set, by name (SI).
+
+        Raises
+        ------
+        UnknownSurfaceError
+            A name that is not a parameter of this network.
+        """
+        arrays = {
+            "capacity": self.capacity.copy(),
+            "conductance": self.link_conductance.copy(),
+            "gain": self.source_gain.copy(),
+            "temperature": self.boundary_temperature.copy(),
+        }
+        known = {parameter.name: parameter for parameter in self.parameters}
+        for name, value in values.items():
+            if name not in known:
+                raise UnknownSurfaceError("parameters", f'"{name}" is unknown.', did_you_mean(name, known))
+            arrays[known[name].kind][known[name].index] = value
+        parameters = tuple(
+            replace(item, value=float(values[item.name])) if item.name in values else item
+            for item in self.parameters
+        )
+        return replace(
+            self,
+            capacity=arrays["capacity"],
+            link_conductance=arrays["conductance"],
+            source_gain=arrays["gain"],
+            boundary_temperature=arrays["temperature"],
+            parameters=parameters,
+        )
+
+
+def _input_value(inputs: Inputs, name: str) -> float:
+    try:
+        return float(inputs[name])
+    except KeyError as error:
+        raise UnknownSurfaceError(
+            "inputs", f'the network needs "{name}".', did_you_mean(name, inputs)
+        ) from error
+
+
+def floating_nodes(n_nodes: int, n_total: int, first: Array, second: Array) -> list[int]:
+    """Nodes from which no chain of links reaches a boundary.
+
+    >>> floating_nodes(3, 4, [0, 1], [3, 2])
+    [1, 2]
+    """
+    neighbours: dict[int, list[int]] = {}
+    for a, b in zip(first, second, strict=True):
+        neighbours.setdefault(int(a), []).append(int(b))
+        neighbours.setdefault(int(b), []).append(int(a))
+    reached = set(range(n_nodes, n_total))
+    frontier = list(reached)
+    while frontier:
+        for other in neighbours.get(frontier.pop(), ()):
+            if other not in reached:
+                reached.add(other)
+                frontier.append(other)
+    return [node for node in range(n_nodes) if node not in reached]
+
+
+def require_sound_network(network: ThermalNetwork) -> None:
+    """Refuse a network that has no solution, naming every cause.
+
+    Raises
+    ------
+    SpecError
+        A capacity or conductance that is negative or not finite, a floating
+        node, a name used twice, a link to itself.
+    """
+    faults = []
+    names = network.node_names + network.boundary_names
+    faults += [f'the name "{name}" is used twice.' for name in dict.fromkeys(names) if names.count(name) > 1]
+    for name, value in zip(network.node_names, network.capacity, strict=True):
+        if not (np.isfinite(value) and value > 0.0):
+            faults.append(f'capacity of node "{name}" is {value:g} J/K, it must be above 0.')
+    for name, value in zip(network.link_names, network.link_conductance, strict=True):
+        if not (np.isfinite(value) and value >= 0.0):
+            faults.append(f'conductance of link "{name}" is {value:g} W/K, it must not be negative.')
+    for a in network.link_first[network.link_first == network.link_second]:
+        faults.append(f'a link joins "{names[a]}" to itself.')
+    for rate in network.stream_rate[~(network.stream_rate >= 0.0)]:
+        faults.append(f"a stream carries {rate:g} W/K, it must not be negative.")
+    floating = floating_nodes(
+        network.n_nodes,
+        len(names),
+        np.concatenate([network.link_first, network.stream_upstream]),
+        np.concatenate([network.link_second, network.stream_downstream]),
+    )
+    faults += [f'node "{names[node]}" floats: no chain of links joins it to a boundary.' for node in floating]
+    if faults:
+        raise SpecError("network", " ".join(faults))
+
+
+class NetworkBalance:
+    """Net heat into every node and its derivative, prepared for repeated evaluation.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    """
+
+    def __init__(self, network: ThermalNetwork) -> None:
+        self.network = network
+        n = network.n_nodes
+        matrix = network.conductance_matrix()
+        self.node_matrix = matrix[:, :n]
+        self.boundary_matrix = -matrix[:, n:]
+        self._laws = [_PlacedLaw(network, law) for law in network.conductance_laws]
+
+    def __call__(
+        self, temperature: Array, boundary: Array, source_heat: Array, inputs: Inputs
+    ) -> tuple[Array, Array]:
+        """Net heat and its Jacobian.
+
+        Parameters
+        ----------
+        temperature : (n,) float64 ndarray, [K]
+        boundary : (b,) float64 ndarray, [K]
+        source_heat : (n,) float64 ndarray, [W]
+            Sources summed over nodes.
+        inputs : mapping of str to float
+            For the laws, SI.
+
+        Returns
+        -------
+        net : (n,) float64 ndarray, [W]
+        derivative : (n, n) float64 ndarray, [W/K]
+        """
+        net = source_heat - self.node_matrix @ temperature + self.boundary_matrix @ boundary
+        derivative = -self.node_matrix
+        if self._laws or self.network.heat_laws:
+            derivative = derivative.copy()
+            both = np.concatenate([temperature, boundary])
+            for law in self._laws:
+                law.add(both, inputs, net, derivative)
+            for function in self.network.heat_laws:
+                heat, heat_derivative = function(temperature, boundary, inputs)
+                net = net + heat
+                derivative += heat_derivative
+        return net, derivative
+
+    def net_heat(self, temperature: Array, boundary: Array, source_heat: Array, inputs: Inputs) -> Array:
+        """Net heat into every node, ``(n,) [W]``, without the Jacobian."""
+        net = source_heat - self.node_matrix @ temperature + self.boundary_matrix @ boundary
+        if self._laws or self.network.heat_laws:
+            both = np.concatenate([temperature, boundary])
+            for law in self._laws:
+                law.add(both, inputs, net, None)
+            for function in self.network.heat_laws:
+                net = net + function(temperature, boundary, inputs)[0]
+        return net
+
+    def link_conductances(self, temperature: Array, boundary: Array, inputs: Inputs) -> Array:
+        """Conductance of every link, ``(m,) [W/K]``, laws evaluated."""
+        conductance = self.network.link_conductance.copy()
+        both = np.concatenate([temperature, boundary])
+        for law in self._laws:
+            conductance[law.links] = law.evaluate(both, inputs)[0]
+        return conductance
+
+
+class _PlacedLaw:
+    """A conductance law with the places of its contributions worked out once."""
+
+    def __init__(self, network: ThermalNetwork, law: ConductanceLaw) -> None:
+        n = network.n_nodes
+        self.n_nodes = n
+        self.links = np.asarray(law.links, dtype=np.int64)
+        self.function = law.function
+        self.first = network.link_first[self.links]
+        self.second = network.link_second[self.links]
+        rows = np.concatenate([self.first, self.first, self.second, self.second])
+        columns = np.concatenate([self.first, self.second, self.first, self.second])
+        self._inside = (rows < n) & (columns < n)
+        self._flat = (rows * n + columns)[self._inside]
+        self._nodes = np.concatenate([self.first, self.second])
+        self._n_total = n + len(network.boundary_names)
+
+    def evaluate(self, both: Array, inputs: Inputs) -> tuple[Array, Array, Array]:
+        return self.function(both[self.first], both[self.second], inputs)
+
+    def add(self, both: Array, inputs: Inputs, net: Array, derivative: Array | None) -> None:
+        conductance, to_first, to_second = self.evaluate(both, inputs)
+        difference = both[self.first] - both[self.second]
+        flow = conductance * difference
+        gathered = np.bincount(self._nodes, np.concatenate([-flow, flow]), self._n_total)
+        net += gathered[: self.n_nodes]
+        if derivative is None:
+            return
+        by_first = conductance + to_first * difference
+        by_second = to_second * difference - conductance
+        weights = np.concatenate([-by_first, -by_second, by_first, by_second])[self._inside]
+        derivative += np.bincount(self._flat, weights, self.n_nodes**2).reshape(derivative.shape)
