@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import re
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -20,15 +21,24 @@ ZERO_CELSIUS_K = 273.15
 # 90 % of a normal distribution lie within this many standard deviations.
 NORMAL_90_PERCENT = 1.6448536269514722
 
+# A log-normal prior wider than this is a slip (30 written for 30 %).
+LARGEST_SIGMA_REL = 3.0
+
+_NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+# Products and quotients of unit names with small powers, one level of brackets: what is
+# not of this form never reaches pint, whose parser would also evaluate arithmetic.
+_FACTOR = r"(?:%|Δ?°[^\W\d]*|[^\W\d]+)(?:(?:\*\*|\^)-?\d|⁻?[¹²³⁴])?"
+_CHAIN = rf"{_FACTOR}(?:\s*[*/·]\s*{_FACTOR}|\s+{_FACTOR})*"
+_UNIT = re.compile(rf"(?:1\s*/\s*)?(?:{_CHAIN}|\({_CHAIN}\))(?:\s*[*/·]\s*(?:{_FACTOR}|\({_CHAIN}\)))*")
+_TEMPERATURE_SCALES = ("degree_Celsius", "degree_Fahrenheit", "degree_Reaumur")
+
 
 @cache
 def registry() -> Any:
     """The application's pint registry (made on first use; pint is slow to import)."""
     import pint
 
-    units = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
-    units.define("percent = 0.01 = %")
-    return units
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
 def to_si(value: Any, unit: str, *, where: str, kind: str = "quantity") -> float:
@@ -37,7 +47,8 @@ def to_si(value: Any, unit: str, *, where: str, kind: str = "quantity") -> float
     Parameters
     ----------
     value : str or pint.Quantity
-        For example ``"19 mm"``. Dimensionless kinds also take a bare number.
+        One number and its unit, for example ``"19 mm"``. Dimensionless kinds
+        also take a bare number.
     unit : str
         The SI unit that the value must convert to, ``""`` for a pure number,
         ``"K"`` with ``kind="temperature"`` or ``kind="temperature_difference"``.
@@ -53,62 +64,122 @@ def to_si(value: Any, unit: str, *, where: str, kind: str = "quantity") -> float
     Raises
     ------
     UnitError
-        Bare number, unknown unit, wrong dimension, or not finite.
+        Bare number, unknown unit, wrong dimension, not finite, or a
+        temperature below absolute zero.
+
+    Notes
+    -----
+    ``°C`` in a compound unit is a difference: pint's own reading of
+    ``"10 W/m²/°C"`` would divide by 274.15 K. A frequency in Hz is refused
+    for a rotational speed, since pint would take 1 Hz for 1 rad/s.
 
     >>> to_si("19 mm", "m", where="channel.depth")
     0.019
     >>> round(to_si("15 degC", "K", where="inlet", kind="temperature"), 2)
     288.15
+    >>> to_si("10 W/m²/°C", "W/m**2/K", where="film")
+    10.0
     """
-    expected = unit or "a pure number"
-    if isinstance(value, bool) or value is None:
-        raise UnitError(where, f"{value!r} is not a quantity.", f"Give text such as {_example(unit, kind)}.")
+    if isinstance(value, bool) or value is None or isinstance(value, (list, tuple, dict)):
+        raise UnitError(where, f"{value!r} is not a quantity.", f"Write it as {_example(unit, kind)}.")
     if isinstance(value, numbers.Real):
-        if unit:
-            raise UnitError(
-                where, f"bare number {value!r}, a unit is needed.", f"Write it as {_example(unit, kind)}."
-            )
-        magnitude = float(value)
+        magnitude = _pure_number(value, value, unit, kind, where)
     else:
-        magnitude = _parse(value, unit, kind, where, expected)
+        magnitude = _convert(value, unit, kind, where)
     if not math.isfinite(magnitude):
-        raise UnitError(where, f"{value!r} is not finite.", f"Allowed: a finite value in {expected}.")
+        raise UnitError(
+            where,
+            f"{_shown(value)} is not finite.",
+            f"Allowed: a finite value in {_allowed_unit(unit, kind)}.",
+        )
+    if kind == "temperature" and magnitude < 0.0:
+        raise UnitError(where, f"{_shown(value)} is below absolute zero.", "Allowed: above -273.15 degC.")
     return magnitude
 
 
-def _parse(value: Any, unit: str, kind: str, where: str, expected: str) -> float:
-    import pint
+def _pure_number(number: Any, value: Any, unit: str, kind: str, where: str) -> float:
+    if unit:
+        raise UnitError(
+            where, f"bare number {_shown(value)}, a unit is needed.", f"Write it as {_example(unit, kind)}."
+        )
+    return float(number)
 
+
+def _shown(value: Any) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def _convert(value: Any, unit: str, kind: str, where: str) -> float:
     units = registry()
-    try:
-        quantity = value if isinstance(value, units.Quantity) else units.parse_expression(str(value).strip())
-    except (pint.errors.PintError, TypeError, ValueError, SyntaxError, AttributeError, ArithmeticError) as error:
+    if isinstance(value, units.Quantity):
+        number, written = value.magnitude, str(value.units)
+    else:
+        number, written = _split(str(value), unit, kind, where)
+    if written in ("", "dimensionless"):
+        return _pure_number(number, value, unit, kind, where)
+    parsed, root = _parse_unit(written)
+    if parsed is None:
         raise UnitError(
-            where, f"{value!r} cannot be read as a quantity ({error}).", f"Write it as {_example(unit, kind)}."
-        ) from error
-    except Exception as error:  # pint's tokenizer raises its own undocumented classes on garbage
+            where,
+            f'{_shown(value)} has the unknown unit "{written}".',
+            f"Allowed: units of {_allowed_unit(unit, kind)}, such as {_example(unit, kind)}.",
+        )
+    name = str(parsed)
+    if kind == "temperature_difference" and name in _TEMPERATURE_SCALES:
         raise UnitError(
-            where, f"{value!r} cannot be read as a quantity.", f"Write it as {_example(unit, kind)}."
-        ) from error
-    if not isinstance(quantity, units.Quantity):
-        if unit:
-            raise UnitError(
-                where, f"bare number {value!r}, a unit is needed.", f"Write it as {_example(unit, kind)}."
-            )
-        return float(quantity)
-    name = str(quantity.units)
-    if kind == "temperature_difference" and name in ("degree_Celsius", "degree_Fahrenheit"):
-        raise UnitError(
-            where, f"{value!r} is a temperature, a difference is needed.", "Write it in K or delta_degC."
+            where,
+            f"{_shown(value)} is a temperature, a difference is needed.",
+            "Write it in K or delta_degC.",
         )
     if kind == "temperature" and name.startswith("delta_"):
-        raise UnitError(where, f"{value!r} is a difference, a temperature is needed.", "Write it in degC or K.")
-    try:
-        return float(quantity.to(unit or "dimensionless").magnitude)
-    except pint.errors.PintError as error:
         raise UnitError(
-            where, f"{value!r} has the wrong dimension ({error}).", f"Allowed: units of {expected}."
-        ) from error
+            where, f"{_shown(value)} is a difference, a temperature is needed.", "Write it in degC or K."
+        )
+    if root != _root_of(unit):
+        raise UnitError(
+            where,
+            f"{_shown(value)} has the wrong dimension.",
+            f"Allowed: units of {_allowed_unit(unit, kind)}, such as {_example(unit, kind)}.",
+        )
+    return float(units.Quantity(float(number), parsed).to(unit or "dimensionless").magnitude)
+
+
+def _split(text: str, unit: str, kind: str, where: str) -> tuple[float, str]:
+    match = _NUMBER_AND_UNIT.fullmatch(text.replace("\N{MINUS SIGN}", "-"))
+    if match is None:
+        raise UnitError(
+            where,
+            f"{_shown(text)} cannot be read as a quantity.",
+            f"Write one number and its unit, such as {_example(unit, kind)}.",
+        )
+    return float(match[1]), match[2]
+
+
+@cache
+def _parse_unit(text: str) -> tuple[Any, str]:
+    """Unit and its root units as text; ``(None, "")`` when the text is no unit."""
+    import pint
+
+    if _UNIT.fullmatch(text) is None:
+        return None, ""
+    units = registry()
+    try:
+        parsed = units.parse_units(text)
+        return parsed, str(units.Quantity(1.0, parsed).to_root_units().units)
+    except (pint.errors.PintError, TypeError, ValueError):
+        return None, ""
+
+
+@cache
+def _root_of(unit: str) -> str:
+    units = registry()
+    return str(units.Quantity(1.0, unit or "dimensionless").to_root_units().units)
+
+
+def _allowed_unit(unit: str, kind: str) -> str:
+    if kind == "temperature":
+        return "temperature"
+    return unit or "a pure number"
 
 
 def _example(unit: str, kind: str) -> str:
@@ -147,8 +218,12 @@ def uncertain_to_si(value: Any, unit: str, *, where: str) -> Uncertain:
     if set(value) == {"value", "sigma_rel"}:
         magnitude = to_si(value["value"], unit, where=f"{where}.value")
         sigma = to_si(value["sigma_rel"], "", where=f"{where}.sigma_rel")
-        if sigma < 0.0:
-            raise UnitError(where, f"sigma_rel is {sigma:g}, it must not be negative.", allowed)
+        if not 0.0 <= sigma <= LARGEST_SIGMA_REL:
+            raise UnitError(
+                f"{where}.sigma_rel".lstrip("."),
+                f"sigma_rel is {sigma:g}.",
+                f"Allowed: 0 to {LARGEST_SIGMA_REL:g}, 1 sigma of the logarithm (30 % is 0.3).",
+            )
         if magnitude <= 0.0 and sigma > 0.0:
             raise UnitError(where, f"value is {magnitude:g}, a log-normal prior needs it above 0.", allowed)
         return Uncertain(magnitude, sigma)

@@ -2,115 +2,319 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, NoReturn
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, field_validator
+from pydantic_core import PydanticCustomError
 
-from spindle_fem.errors import SpindleFemError
+from spindle_fem.errors import SpindleFemError, did_you_mean
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain, to_si, uncertain_to_si
 
+MARKS = {
+    "P": "the paper",
+    "C": "bearing catalogue",
+    "A": "assumed",
+    "U": "set by the user, without a source",
+}
 
-def _read_with(function: Any, *arguments: Any, **keywords: Any) -> BeforeValidator:
-    # pydantic gathers ValueErrors of all fields; the place is added by the loader.
-    def read(value: Any) -> Any:
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One fault inside a table, before the file and the table are known.
+
+    ``key`` is relative to the value that is read: empty for the value itself.
+    """
+
+    key: str
+    what: str
+    how_to_fix: str = ""
+    error: str = "SpecError"
+
+
+def raise_faults(faults: Iterable[Fault]) -> None:
+    """Hand faults to pydantic, which gathers those of all fields; none raises nothing."""
+    listed = tuple(faults)
+    if listed:
+        text = "; ".join(f"{fault.key}: {fault.what} {fault.how_to_fix}".strip(": ") for fault in listed)
+        raise PydanticCustomError("faults", "{text}", {"text": text, "faults": listed})
+
+
+def _refuse(what: str, how_to_fix: str, *, key: str = "", error: str = "SpecError") -> NoReturn:
+    raise_faults([Fault(key, what, how_to_fix, error)])
+    raise AssertionError("unreachable")
+
+
+def _fault_of(error: SpindleFemError, key: str = "") -> Fault:
+    return Fault(key or error.where.strip("."), error.what, error.how_to_fix, type(error).__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class QuantityRule:
+    """What one quantity may be; also the source of the reference page.
+
+    Attributes
+    ----------
+    unit : str
+        SI unit, ``""`` for a pure number.
+    kind : str
+        As for :func:`spindle_fem.units.to_si`.
+    above, at_least, at_most : float or None
+        Limits in ``unit``.
+    words : tuple of str
+        Texts that stand for a value, such as ``"ambient"``.
+    uncertain : bool
+        Whether a prior may be given.
+    """
+
+    unit: str
+    kind: str = "quantity"
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    words: tuple[str, ...] = ()
+    uncertain: bool = False
+
+    def allowed(self) -> str:
+        """The limits in words, ``""`` where there are none."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.at_least is not None and self.at_most is not None:
+            return f"{self.at_least:g} to {self.at_most:g}{unit}"
+        if self.above is not None and self.at_most is not None:
+            return f"above {self.above:g} up to {self.at_most:g}{unit}"
+        if self.above is not None:
+            return f"above {self.above:g}{unit}"
+        if self.at_least is not None:
+            return f"at least {self.at_least:g}{unit}"
+        return ""
+
+    def holds(self, value: float) -> bool:
+        """Whether a value in ``unit`` keeps the limits."""
+        return (
+            (self.above is None or value > self.above)
+            and (self.at_least is None or value >= self.at_least)
+            and (self.at_most is None or value <= self.at_most)
+        )
+
+    def read(self, value: Any) -> Any:
+        """SI value of what the file gives."""
+        if isinstance(value, str) and value in self.words:
+            return value
+        if self.words and isinstance(value, str) and re.fullmatch(r"[A-Za-z_]+", value.strip()):
+            _refuse(f'"{value}" is not known.', did_you_mean(value, self.words) + " Or a quantity.")
         try:
-            return function(value, *arguments, where="", **keywords)
+            if self.uncertain:
+                return self._read_uncertain(value)
+            # Conversion leaves "410 mm" at 0.41000000000000003 m; 13 digits make equal texts equal.
+            result = _rounded(to_si(value, self.unit, where="", kind=self.kind))
         except SpindleFemError as error:
-            raise ValueError(f"{error.what} {error.how_to_fix}".strip()) from error
+            raise_faults([_fault_of(error)])
+        self._require_limits(result, value)
+        return result
 
-    return BeforeValidator(read)
+    def _read_uncertain(self, value: Any) -> Uncertain:
+        read = uncertain_to_si(value, self.unit, where="")
+        result = Uncertain(_rounded(read.value), _rounded(read.sigma_log))
+        self._require_limits(result.value, value)
+        return result
+
+    def _require_limits(self, result: float, value: Any) -> None:
+        if not self.holds(result):
+            shown = value.get("value", value) if isinstance(value, dict) else value
+            shown = f'"{shown}"' if isinstance(shown, str) else shown
+            _refuse(f"{shown} is outside what is possible.", f"Allowed: {self.allowed()}.")
+
+    def write(self, value: Any) -> Any:
+        """Text that reads back as the same value."""
+        if isinstance(value, str):
+            return value
+        if isinstance(value, Uncertain):
+            text = self._plain(value.value)
+            return text if value.is_fixed else {"value": text, "sigma_rel": value.sigma_log}
+        return self._plain(value)
+
+    def _plain(self, value: float) -> Any:
+        if self.kind == "temperature":
+            celsius = round(value - ZERO_CELSIUS_K, 10)
+            if _rounded(celsius + ZERO_CELSIUS_K) == value:
+                return f"{celsius!r} degC"
+        return f"{value!r} {self.unit}" if self.unit else value
 
 
-def _plain_text(value: float, unit: str, kind: str) -> Any:
-    if kind == "temperature":
-        return f"{value - ZERO_CELSIUS_K:.10g} degC"
-    return f"{value!r} {unit}" if unit else value
+def _rounded(value: float) -> float:
+    return float(f"{value:.13g}")
 
 
-def _rounded_si(value: Any, unit: str, kind: str, *, where: str) -> float:
-    # Conversion leaves "410 mm" at 0.41000000000000003 m; 13 digits make equal texts equal.
-    return float(f"{to_si(value, unit, where=where, kind=kind):.13g}")
+def _field(python_type: Any, rule: QuantityRule) -> Any:
+    return Annotated[python_type, BeforeValidator(rule.read), PlainSerializer(rule.write), rule]
 
 
-def _rounded_uncertain(value: Any, unit: str, *, where: str) -> Uncertain:
-    read = uncertain_to_si(value, unit, where=where)
-    return Uncertain(float(f"{read.value:.13g}"), float(f"{read.sigma_log:.13g}"))
+def quantity_field(
+    unit: str,
+    kind: str = "quantity",
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    words: tuple[str, ...] = (),
+) -> Any:
+    """Annotated float (or one of ``words``) that reads text with a unit and writes it back."""
+    rule = QuantityRule(unit, kind, above, at_least, at_most, words)
+    return _field(float | str if words else float, rule)
 
 
-def quantity_field(unit: str, kind: str = "quantity") -> Any:
-    """Annotated float that reads text with a unit and writes it back."""
-    return Annotated[
-        float,
-        _read_with(_rounded_si, unit, kind),
-        PlainSerializer(lambda value: _plain_text(value, unit, kind)),
-    ]
-
-
-def uncertain_field(unit: str) -> Any:
+def uncertain_field(
+    unit: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    words: tuple[str, ...] = (),
+) -> Any:
     """Annotated :class:`Uncertain`: a quantity, or one with a prior."""
-
-    def write(value: Uncertain) -> Any:
-        text = _plain_text(value.value, unit, "quantity")
-        return text if value.is_fixed else {"value": text, "sigma_rel": value.sigma_log}
-
-    return Annotated[Uncertain, _read_with(_rounded_uncertain, unit), PlainSerializer(write)]
+    rule = QuantityRule(unit, "quantity", above, at_least, at_most, words, uncertain=True)
+    return _field(Uncertain | str if words else Uncertain, rule)
 
 
 Length = quantity_field("m")
+PositiveLength = quantity_field("m", above=0.0)
+Radius = quantity_field("m", at_least=0.0)
 Angle = quantity_field("rad")
 Temperature = quantity_field("K", "temperature")
+AmbientOrTemperature = quantity_field("K", "temperature", words=("ambient",))
 TemperatureDifference = quantity_field("K", "temperature_difference")
-Pressure = quantity_field("Pa")
-Density = quantity_field("kg/m**3")
-Conductivity = quantity_field("W/m/K")
-HeatCapacity = quantity_field("J/K")
-SpecificHeat = quantity_field("J/kg/K")
-KinematicViscosity = quantity_field("m**2/s")
-VolumeFlow = quantity_field("m**3/s")
+Pressure = quantity_field("Pa", above=0.0)
+Density = quantity_field("kg/m**3", above=0.0)
+Conductivity = quantity_field("W/m/K", above=0.0)
+HeatCapacity = quantity_field("J/K", above=0.0)
+SpecificHeat = quantity_field("J/kg/K", above=0.0)
+KinematicViscosity = quantity_field("m**2/s", above=0.0)
+VolumeFlow = quantity_field("m**3/s", above=0.0)
 Force = quantity_field("N")
-Power = quantity_field("W")
-RotationalSpeed = quantity_field("rad/s")
-PressureViscosity = quantity_field("1/Pa")
-Fraction = quantity_field("")
+PositiveForce = quantity_field("N", above=0.0)
+Preload = quantity_field("N", at_least=0.0)
+Power = quantity_field("W", at_least=0.0)
+RotationalSpeed = quantity_field("rad/s", at_least=0.0)
+PressureViscosity = quantity_field("1/Pa", above=0.0)
+Fraction = quantity_field("", at_least=0.0, at_most=1.0)
 Number = quantity_field("")
-FilmCoefficient = quantity_field("W/m**2/K")
+PositiveNumber = quantity_field("", above=0.0)
+FilmCoefficient = quantity_field("W/m**2/K", at_least=0.0)
 
-UncertainNumber = uncertain_field("")
-UncertainFilm = uncertain_field("W/m**2/K")
-UncertainConductance = uncertain_field("W/K")
+UncertainNumber = uncertain_field("", above=0.0)
+UncertainShare = uncertain_field("", at_least=0.0, at_most=1.0)
+UncertainFilm = uncertain_field("W/m**2/K", at_least=0.0)
+FilmOrPerfect = uncertain_field("W/m**2/K", at_least=0.0, words=("perfect",))
+UncertainConductance = uncertain_field("W/K", above=0.0)
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.]*$", max_length=64)]
-Range = Annotated[tuple[Length, Length], Field(description="from, to")]
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.]{0,63}")
+NAME_RULE = "letters, digits, _ and . (first a letter or digit), at most 64 characters"
+
+
+def _read_name(value: Any) -> str:
+    if not isinstance(value, str) or _NAME.fullmatch(value) is None:
+        shown = f'"{value}"' if isinstance(value, str) else repr(value)
+        _refuse(f"{shown} is not a name.", f"Allowed: {NAME_RULE}.")
+    return value
+
+
+Name = Annotated[str, BeforeValidator(_read_name)]
+Flag = Annotated[bool, Field(strict=True)]
+
+_LENGTH_RULE = QuantityRule("m")
+
+
+def _read_range(value: Any) -> tuple[float, float]:
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        _refuse(f"{value!r} is not a range.", 'Allowed: from and to, such as ["45 mm", "137 mm"].')
+    ends, faults = [], []
+    for position, item in enumerate(value):
+        try:
+            ends.append(_rounded(to_si(item, "m", where="")))
+        except SpindleFemError as error:
+            faults.append(_fault_of(error, f"[{position + 1}]"))
+    raise_faults(faults)
+    return ends[0], ends[1]
+
+
+def _require_order(ends: tuple[float, float], value: Any, *, may_be_equal: bool) -> None:
+    if ends[1] < ends[0] or (ends[1] == ends[0] and not may_be_equal):
+        _refuse(
+            f"runs from {ends[0] * 1e3:g} mm to {ends[1] * 1e3:g} mm.", "Allowed: an end beyond the start."
+        )
+
+
+def _read_extent(value: Any) -> tuple[float, float]:
+    ends = _read_range(value)
+    _require_order(ends, value, may_be_equal=False)
+    return ends
+
+
+def _read_place(value: Any) -> tuple[float, float]:
+    single = not isinstance(value, (list, tuple))
+    if single:
+        place = _LENGTH_RULE.read(value)
+        return place, place
+    ends = _read_range(value)
+    _require_order(ends, value, may_be_equal=True)
+    return ends
+
+
+def _write_range(ends: tuple[float, float]) -> list[str]:
+    return [_LENGTH_RULE.write(end) for end in ends]
+
+
+# Pydantic's own tuple schema would hide the two-value message behind one per item.
+Range = Annotated[tuple[Any, Any], BeforeValidator(_read_extent), PlainSerializer(_write_range)]
+Place = Annotated[tuple[Any, Any], BeforeValidator(_read_place), PlainSerializer(_write_range)]
 
 
 class SpecModel(BaseModel):
     """Base of every table of a definition file: frozen, no unknown keys.
 
     ``marks`` says where values come from: ``"A"`` for all of the table, or
-    ``{default = "A", outer_diameter = "C"}``; P paper, C catalogue, A assumed.
+    ``{default = "A", outer_diameter = "C"}``. P the paper, C bearing
+    catalogue, A assumed, U set by the user without a source.
     """
 
     model_config: ClassVar[ConfigDict] = ConfigDict(
-        extra="forbid", frozen=True, arbitrary_types_allowed=True, validate_default=False
+        extra="forbid",
+        frozen=True,
+        arbitrary_types_allowed=True,
+        validate_default=False,
+        use_attribute_docstrings=True,
     )
     marks: dict[str, str] = Field(default_factory=dict)
+    """Where the values come from: P, C, A or U, for the table or key by key."""
 
-    @model_validator(mode="before")
+    @field_validator("marks", mode="before")
     @classmethod
-    def _read_marks(cls, data: Any) -> Any:
-        if not isinstance(data, dict) or "marks" not in data:
-            return data
-        marks = data["marks"]
+    def _read_marks(cls, marks: Any) -> Any:
         marks = {"default": marks} if isinstance(marks, str) else marks
         if not isinstance(marks, dict):
-            raise ValueError('marks must be a text or a table such as {default = "A", bore = "C"}.')
-        allowed = [name for name in cls.model_fields if name != "marks"]
-        for key, mark in marks.items():
-            if key != "default" and key not in allowed:
-                raise ValueError(f'marks names "{key}". Allowed: default, {", ".join(allowed)}.')
-            if mark not in ("P", "C", "A"):
-                raise ValueError(f'mark "{mark}" of {key}. Allowed: P (paper), C (catalogue), A (assumed).')
-        return {**data, "marks": dict(marks)}
+            _refuse(
+                f"{marks!r} are no marks.",
+                'Allowed: a letter for the whole table, or {default = "A", bore_diameter = "C"} and the like.',
+            )
+        keys = [
+            "default",
+            *(field.alias or name for name, field in cls.model_fields.items() if name != "marks"),
+        ]
+        letters = ", ".join(f"{letter} ({meaning})" for letter, meaning in MARKS.items())
+        faults = [
+            Fault(key, "is no key of this table.", did_you_mean(str(key), keys), "UnknownKeyError")
+            for key in marks
+            if key not in keys
+        ]
+        faults += [
+            Fault("" if key == "default" else key, f"{mark!r} is no mark.", f"Allowed: {letters}.")
+            for key, mark in marks.items()
+            if mark not in MARKS
+        ]
+        raise_faults(faults)
+        return dict(marks)
 
     def mark_of(self, field: str) -> str:
         """Source mark of one field, ``""`` where the file gives none."""
