@@ -1,0 +1,355 @@
+"""Still air around a machine: properties, natural convection, radiation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spindle_fem.errors import OutOfValidityError, did_you_mean
+from spindle_fem.units import ZERO_CELSIUS_K
+from spindle_fem.validity import require_range
+
+STEFAN_BOLTZMANN = 5.670374419e-8
+STANDARD_GRAVITY = 9.80665
+ATMOSPHERIC_PRESSURE = 101325.0
+_SPECIFIC_GAS_CONSTANT = 287.05
+_AIR_RANGE_K = (ZERO_CELSIUS_K - 50.0, ZERO_CELSIUS_K + 200.0)
+
+
+@dataclass(frozen=True, slots=True)
+class AirProperties:
+    """Properties of dry air; every array has the shape of the temperature.
+
+    Attributes
+    ----------
+    density : ndarray, [kg/m³]
+    dynamic_viscosity : ndarray, [Pa·s]
+    specific_heat_capacity : ndarray, [J/(kg·K)]
+    thermal_conductivity : ndarray, [W/(m·K)]
+    expansion_coefficient : ndarray, [1/K]
+    """
+
+    density: NDArray[np.float64]
+    dynamic_viscosity: NDArray[np.float64]
+    specific_heat_capacity: NDArray[np.float64]
+    thermal_conductivity: NDArray[np.float64]
+    expansion_coefficient: NDArray[np.float64]
+
+    @property
+    def kinematic_viscosity(self) -> NDArray[np.float64]:
+        """Dynamic viscosity over density, [m²/s]."""
+        return self.dynamic_viscosity / self.density
+
+    @property
+    def prandtl(self) -> NDArray[np.float64]:
+        """Prandtl number, [-]."""
+        return self.specific_heat_capacity * self.dynamic_viscosity / self.thermal_conductivity
+
+
+def air_properties(temperature: ArrayLike, pressure: float = ATMOSPHERIC_PRESSURE) -> AirProperties:
+    """Properties of dry air at moderate pressure.
+
+    Parameters
+    ----------
+    temperature : (n,) array_like, [K]
+    pressure : float, [Pa]
+
+    Returns
+    -------
+    AirProperties
+
+    Raises
+    ------
+    OutOfValidityError
+        Outside Range.
+
+    Range: −50 to 200 °C, 0.5 to 2 bar; within 0.5 % of the source.
+
+    Source: ideal gas; Sutherland's form for viscosity and conductivity, constants
+    fitted to Lemmon & Jacobsen (2004), Int. J. Thermophys. 25, 21–69; heat
+    capacity a parabola through Lemmon et al. (2000), J. Phys. Chem. Ref. Data 29, 331–385.
+
+    >>> air = air_properties(293.15)
+    >>> [float(x.round(3)) for x in (air.density, air.thermal_conductivity * 1e3, air.prandtl)]
+    [1.204, 25.911, 0.707]
+    """
+    kelvin = np.asarray(temperature, dtype=np.float64)
+    require_range(
+        "air_properties",
+        temperature=(kelvin, *_AIR_RANGE_K),
+        pressure=(pressure, 0.5e5, 2.0e5),
+        how_to_fix="Temperatures in K, pressure in Pa.",
+    )
+    ratio = kelvin / ZERO_CELSIUS_K
+    celsius = kelvin - ZERO_CELSIUS_K
+    return AirProperties(
+        density=pressure / (_SPECIFIC_GAS_CONSTANT * kelvin),
+        dynamic_viscosity=1.7224e-5 * ratio**1.5 * (ZERO_CELSIUS_K + 118.8) / (kelvin + 118.8),
+        specific_heat_capacity=1005.6 + celsius * (0.017 + 4.0e-4 * celsius),
+        thermal_conductivity=0.024373 * ratio**1.5 * (ZERO_CELSIUS_K + 163.5) / (kelvin + 163.5),
+        expansion_coefficient=1.0 / kelvin,
+    )
+
+
+def nusselt_churchill_chu_cylinder(rayleigh: ArrayLike, prandtl: ArrayLike) -> NDArray[np.float64]:
+    """Mean Nusselt number of natural convection around a horizontal cylinder.
+
+    Parameters
+    ----------
+    rayleigh : (n,) array_like, [-]
+        On the diameter.
+    prandtl : (n,) array_like, [-]
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+        On the diameter.
+
+    Raises
+    ------
+    OutOfValidityError
+        Outside Range.
+
+    Range: Ra <= 1e12 (0 is allowed: Nu = 0.36), every Prandtl number.
+
+    Source: Churchill & Chu (1975), Int. J. Heat Mass Transfer 18, 1049–1053.
+
+    >>> float(nusselt_churchill_chu_cylinder(1.0e7, 0.71).round(2))
+    28.26
+    """
+    ra, pr = np.broadcast_arrays(np.asarray(rayleigh, float), np.asarray(prandtl, float))
+    require_range(
+        "nusselt_churchill_chu_cylinder",
+        rayleigh=(ra, 0.0, 1.0e12),
+        prandtl=(pr, np.finfo(float).tiny, np.inf),
+        how_to_fix="Check temperatures and diameter.",
+    )
+    prandtl_term = (1.0 + (0.559 / pr) ** (9.0 / 16.0)) ** (8.0 / 27.0)
+    return (0.60 + 0.387 * ra ** (1.0 / 6.0) / prandtl_term) ** 2
+
+
+def nusselt_churchill_chu_plate(rayleigh: ArrayLike, prandtl: ArrayLike) -> NDArray[np.float64]:
+    """Mean Nusselt number of natural convection on a vertical plate.
+
+    Parameters
+    ----------
+    rayleigh : (n,) array_like, [-]
+        On the height.
+    prandtl : (n,) array_like, [-]
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+        On the height.
+
+    Raises
+    ------
+    OutOfValidityError
+        Outside Range.
+
+    Range: Ra <= 1e12, every Prandtl number.
+
+    Source: Churchill & Chu (1975), Int. J. Heat Mass Transfer 18, 1323–1329.
+
+    >>> float(nusselt_churchill_chu_plate(1.0e7, 0.71).round(2))
+    31.21
+    """
+    ra, pr = np.broadcast_arrays(np.asarray(rayleigh, float), np.asarray(prandtl, float))
+    require_range(
+        "nusselt_churchill_chu_plate",
+        rayleigh=(ra, 0.0, 1.0e12),
+        prandtl=(pr, np.finfo(float).tiny, np.inf),
+        how_to_fix="Check temperatures and height.",
+    )
+    prandtl_term = (1.0 + (0.492 / pr) ** (9.0 / 16.0)) ** (8.0 / 27.0)
+    return (0.825 + 0.387 * ra ** (1.0 / 6.0) / prandtl_term) ** 2
+
+
+def rayleigh_number(
+    surface_temperature: ArrayLike, ambient_temperature: ArrayLike, length: float
+) -> NDArray[np.float64]:
+    """Rayleigh number in air, properties at the mean of surface and ambient.
+
+    Parameters
+    ----------
+    surface_temperature, ambient_temperature : (n,) array_like, [K]
+    length : float, [m]
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+
+    Raises
+    ------
+    OutOfValidityError
+        Temperatures outside the range of ``air_properties``, length not positive.
+
+    >>> float(rayleigh_number(303.15, 293.15, 0.3).round(-4))
+    25800000.0
+    """
+    require_range("rayleigh_number", length=(length, np.finfo(float).tiny, np.inf), how_to_fix="Length in m.")
+    surface = np.asarray(surface_temperature, dtype=np.float64)
+    ambient = np.asarray(ambient_temperature, dtype=np.float64)
+    air = air_properties(0.5 * (surface + ambient))
+    grashof = (
+        STANDARD_GRAVITY
+        * air.expansion_coefficient
+        * np.abs(surface - ambient)
+        * length**3
+        / air.kinematic_viscosity**2
+    )
+    return grashof * air.prandtl
+
+
+def natural_convection_cylinder(
+    surface_temperature: ArrayLike, ambient_temperature: ArrayLike, diameter: float
+) -> NDArray[np.float64]:
+    """Heat transfer coefficient of a horizontal cylinder in still air.
+
+    Parameters
+    ----------
+    surface_temperature, ambient_temperature : (n,) array_like, [K]
+    diameter : float, [m]
+
+    Returns
+    -------
+    (n,) ndarray, [W/(m²·K)]
+
+    Raises
+    ------
+    OutOfValidityError
+        As ``rayleigh_number`` and ``nusselt_churchill_chu_cylinder``.
+
+    Source: Churchill & Chu (1975), properties at the film temperature.
+
+    >>> float(natural_convection_cylinder(303.15, 293.15, 0.3).round(2))
+    3.28
+    """
+    return _natural_convection(
+        nusselt_churchill_chu_cylinder, surface_temperature, ambient_temperature, diameter
+    )
+
+
+def natural_convection_plate(
+    surface_temperature: ArrayLike, ambient_temperature: ArrayLike, height: float
+) -> NDArray[np.float64]:
+    """Heat transfer coefficient of a vertical face in still air.
+
+    Parameters
+    ----------
+    surface_temperature, ambient_temperature : (n,) array_like, [K]
+    height : float, [m]
+
+    Returns
+    -------
+    (n,) ndarray, [W/(m²·K)]
+
+    Raises
+    ------
+    OutOfValidityError
+        As ``rayleigh_number`` and ``nusselt_churchill_chu_plate``.
+
+    Source: Churchill & Chu (1975), properties at the film temperature.
+
+    >>> float(natural_convection_plate(303.15, 293.15, 0.3).round(2))
+    3.59
+    """
+    return _natural_convection(nusselt_churchill_chu_plate, surface_temperature, ambient_temperature, height)
+
+
+def _natural_convection(
+    correlation: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+    surface_temperature: ArrayLike,
+    ambient_temperature: ArrayLike,
+    length: float,
+) -> NDArray[np.float64]:
+    rayleigh = rayleigh_number(surface_temperature, ambient_temperature, length)
+    mean = 0.5 * (np.asarray(surface_temperature, float) + np.asarray(ambient_temperature, float))
+    air = air_properties(mean)
+    return correlation(rayleigh, air.prandtl) * air.thermal_conductivity / length
+
+
+def radiation_coefficient(
+    surface_temperature: ArrayLike, ambient_temperature: ArrayLike, emissivity: ArrayLike
+) -> NDArray[np.float64]:
+    """Heat transfer coefficient of grey radiation to large surroundings, exact.
+
+    h (T_s − T_a) equals ε σ (T_s⁴ − T_a⁴) without remainder.
+
+    Parameters
+    ----------
+    surface_temperature, ambient_temperature : (n,) array_like, [K]
+    emissivity : (n,) array_like, [-]
+
+    Returns
+    -------
+    (n,) ndarray, [W/(m²·K)]
+
+    Raises
+    ------
+    OutOfValidityError
+        Negative temperature, emissivity outside 0–1.
+
+    Range: convex grey surface in surroundings much larger than itself.
+
+    Source: Stefan–Boltzmann law, σ = 5.670374419e-8 W/(m²·K⁴) (CODATA 2018).
+
+    >>> float(radiation_coefficient(300.0, 290.0, 0.9).round(2))
+    5.24
+    """
+    surface, ambient, grey = np.broadcast_arrays(
+        np.asarray(surface_temperature, float),
+        np.asarray(ambient_temperature, float),
+        np.asarray(emissivity, float),
+    )
+    require_range(
+        "radiation_coefficient",
+        surface_temperature=(surface, 0.0, np.finfo(float).max),
+        ambient_temperature=(ambient, 0.0, np.finfo(float).max),
+        emissivity=(grey, 0.0, 1.0),
+        how_to_fix="Temperatures in K.",
+    )
+    return grey * STEFAN_BOLTZMANN * (surface**2 + ambient**2) * (surface + ambient)
+
+
+def outside_coefficient(
+    surface_temperature: ArrayLike,
+    ambient_temperature: ArrayLike,
+    length: float,
+    emissivity: float,
+    *,
+    shape: str = "cylinder",
+) -> NDArray[np.float64]:
+    """Natural convection and radiation of an outside face together.
+
+    Parameters
+    ----------
+    surface_temperature, ambient_temperature : (n,) array_like, [K]
+    length : float, [m]
+        Diameter of a cylinder, height of a plate.
+    emissivity : float, [-]
+    shape : {"cylinder", "plate"}
+
+    Returns
+    -------
+    (n,) ndarray, [W/(m²·K)]
+
+    Raises
+    ------
+    OutOfValidityError
+        Unknown shape, or as the two parts.
+
+    >>> float(outside_coefficient(303.15, 293.15, 0.3, 0.9).round(2))
+    8.69
+    """
+    convection = {"cylinder": natural_convection_cylinder, "plate": natural_convection_plate}
+    if shape not in convection:
+        raise OutOfValidityError(
+            "outside_coefficient", f'shape is "{shape}".', did_you_mean(shape, tuple(convection))
+        )
+    return convection[shape](surface_temperature, ambient_temperature, length) + radiation_coefficient(
+        surface_temperature, ambient_temperature, emissivity
+    )
