@@ -69,6 +69,9 @@ class TaggedMesh:
         Smallest gmsh minSICN over all elements after curving.
     digest : str
         Hash of the geometry, sizes and library versions that made the mesh.
+    notes : tuple of str
+        What was decided on the way: ports drilled narrower, other mesh
+        settings than the first.
     """
 
     points: NDArray[np.float64]
@@ -84,6 +87,7 @@ class TaggedMesh:
     rotating: Mapping[str, bool]
     min_quality: float
     digest: str = field(default="")
+    notes: tuple[str, ...] = ()
 
     @property
     def n_elements(self) -> int:

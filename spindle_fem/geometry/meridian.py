@@ -1,0 +1,440 @@
+"""Faces, contacts and faults of solids of revolution, found in the meridian plane.
+
+Coordinates are whole nanometres, so that touching is equality.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import GeometryError, did_you_mean
+
+if TYPE_CHECKING:
+    from spindle_fem.geometry.assembly import FaceBox, PartGeometry, SurfaceDefinition
+
+Facing = Literal["outward", "inward", "front", "rear"]
+
+NANOMETRES = 1.0e9
+VOID = -1
+AXIS_NAME = ""
+
+
+def to_nanometres(length: float) -> int:
+    """Length in m as whole nanometres.
+
+    >>> to_nanometres(0.019)
+    19000000
+    """
+    return round(length * NANOMETRES)
+
+
+def in_millimetres(nanometres: int) -> str:
+    """Length for a message.
+
+    >>> in_millimetres(2_500_000)
+    '2.5 mm'
+    """
+    return f"{nanometres * 1e-6:g} mm"
+
+
+@dataclass(frozen=True, slots=True)
+class MeridianEdge:
+    """A face of revolution as a line in the meridian plane.
+
+    Attributes
+    ----------
+    name : str
+        Surface or joint; empty on the axis.
+    parts : tuple of str
+        The part it bounds, or the two parts of a contact in sorted order.
+    facings : tuple of {"outward", "inward", "front", "rear"}
+        Normal as seen from each of ``parts``.
+    z, r : (low, high), [m]
+        Equal bounds of ``r`` make a cylinder, of ``z`` a plane.
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    facings: tuple[Facing, ...]
+    z: tuple[float, float]
+    r: tuple[float, float]
+
+    @property
+    def is_contact(self) -> bool:
+        """Whether two parts meet here."""
+        return len(self.parts) == 2
+
+    @property
+    def is_cylinder(self) -> bool:
+        """Whether the face is a cylinder (else a plane)."""
+        return self.r[0] == self.r[1]
+
+    @property
+    def is_axis(self) -> bool:
+        """Whether the line lies on the axis and makes no face."""
+        return self.r[1] == 0.0
+
+    @property
+    def area(self) -> float:
+        """Area of the face of revolution without channel and ports, m²."""
+        if self.is_cylinder:
+            return 2.0 * np.pi * self.r[0] * (self.z[1] - self.z[0])
+        return np.pi * (self.r[1] ** 2 - self.r[0] ** 2)
+
+
+@dataclass(frozen=True, slots=True)
+class MeridianMap:
+    """Which part owns each cell of the grid spanned by all coordinates.
+
+    Attributes
+    ----------
+    part_names : tuple of str
+    z_lines, r_lines : (n,), (m,) int64 ndarray, [nm]
+    owner : (n + 1, m + 1) int32 ndarray
+        Part of the cell below each pair of lines, VOID outside; the rim of
+        cells around the grid is VOID.
+    """
+
+    part_names: tuple[str, ...]
+    z_lines: NDArray[np.int64]
+    r_lines: NDArray[np.int64]
+    owner: NDArray[np.int32]
+
+    @classmethod
+    def of_parts(
+        cls,
+        parts: Sequence[PartGeometry],
+        surfaces: Sequence[SurfaceDefinition],
+        faults: list[GeometryError],
+    ) -> MeridianMap:
+        """Build the map; degenerate segments and overlapping parts go to ``faults``."""
+        names = tuple(part.name for part in parts)
+        boxes = []
+        for index, part in enumerate(parts):
+            for segment in part.segments:
+                bounds = [
+                    to_nanometres(value)
+                    for value in (segment.z_start, segment.z_end, segment.inner_radius, segment.outer_radius)
+                ]
+                if _check_segment(part.name, bounds, faults):
+                    boxes.append((index, *bounds))
+        z_values = {value for box in boxes for value in box[1:3]}
+        r_values = {value for box in boxes for value in box[3:5]} | {0}
+        for surface in surfaces:
+            for box in surface.where:
+                z_values.update(to_nanometres(value) for value in box.z or ())
+                r_values.update(max(0, to_nanometres(value)) for value in box.r or ())
+        z_lines = np.array(sorted(z_values), dtype=np.int64)
+        r_lines = np.array(sorted(r_values), dtype=np.int64)
+        owner = np.full((len(z_lines) + 1, len(r_lines) + 1), VOID, dtype=np.int32)
+        overlaps: dict[tuple[int, int], list[int]] = {}
+        for index, z_start, z_end, inner, outer in boxes:
+            cells = (
+                slice(*(np.searchsorted(z_lines, (z_start, z_end)) + 1)),
+                slice(*(np.searchsorted(r_lines, (inner, outer)) + 1)),
+            )
+            block = owner[cells]
+            for other in np.unique(block[(block != VOID) & (block != index)]).tolist():
+                overlaps.setdefault((other, index), [z_start, z_end, inner, outer])
+            block[block == VOID] = index
+        for (first, second), (z_start, z_end, inner, outer) in overlaps.items():
+            faults.append(
+                GeometryError(
+                    f'part "{names[second]}"',
+                    f"z {in_millimetres(z_start)} to {in_millimetres(z_end)}, r {in_millimetres(inner)} to "
+                    f'{in_millimetres(outer)} overlaps part "{names[first]}".',
+                    "Allowed: parts that touch or keep apart.",
+                )
+            )
+        return cls(names, z_lines, r_lines, owner)
+
+    def named_edges(
+        self,
+        surfaces: Sequence[SurfaceDefinition],
+        remaining: Literal["adiabatic", "error"],
+        faults: list[GeometryError],
+    ) -> tuple[MeridianEdge, ...]:
+        """Name every face and join neighbours of one name into edges.
+
+        Parts that float, come apart or pinch, selectors that match nothing and
+        faces claimed twice go to ``faults``.
+        """
+        pieces = self._boundary_pieces()
+        self._check_connection(pieces, faults)
+        labels = self._label(pieces, surfaces, remaining, faults)
+        return _merge(pieces, labels, self.part_names)
+
+    def cell_boxes(self) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+        """Bounds (z low, z high, r low, r high) in nm and owner of every cell.
+
+        The rim reaches ten metres out.
+        """
+        far = 10_000_000_000
+        z_edges = np.concatenate(([self.z_lines[0] - far], self.z_lines, [self.z_lines[-1] + far]))
+        r_edges = np.concatenate(([-far], self.r_lines, [self.r_lines[-1] + far]))
+        z_index, r_index = np.indices(self.owner.shape)
+        boxes = np.stack(
+            [z_edges[z_index], z_edges[z_index + 1], r_edges[r_index], r_edges[r_index + 1]], axis=-1
+        )
+        # Below the axis there is nothing to break into.
+        inside = (r_index > 0).ravel()
+        return boxes.reshape(-1, 4)[inside], self.owner.ravel()[inside]
+
+    def _boundary_pieces(self) -> list[_Piece]:
+        pieces = []
+        owner = self.owner
+        for low, high in zip(*np.nonzero(owner[:, 1:] != owner[:, :-1]), strict=True):
+            pieces.append(
+                _Piece(
+                    "cylinder",
+                    (self.z_lines[low - 1].item(), self.z_lines[low].item()),
+                    (self.r_lines[high].item(),) * 2,
+                    owner[low, high].item(),
+                    owner[low, high + 1].item(),
+                )
+            )
+        for low, high in zip(*np.nonzero(owner[1:] != owner[:-1]), strict=True):
+            pieces.append(
+                _Piece(
+                    "plane",
+                    (self.z_lines[low].item(),) * 2,
+                    (self.r_lines[high - 1].item(), self.r_lines[high].item()),
+                    owner[low, high].item(),
+                    owner[low + 1, high].item(),
+                )
+            )
+        return pieces
+
+    def _check_connection(self, pieces: list[_Piece], faults: list[GeometryError]) -> None:
+        from scipy.ndimage import label
+
+        touching = {part for piece in pieces if piece.is_contact for part in (piece.below, piece.above)}
+        for index, name in enumerate(self.part_names):
+            cells = self.owner == index
+            if not cells.any():
+                continue
+            if len(self.part_names) > 1 and index not in touching:
+                faults.append(
+                    GeometryError(
+                        f'part "{name}"', "touches no other part.", "Allowed: parts with a face in contact."
+                    )
+                )
+            _, number = label(cells)
+            if number > 1:
+                faults.append(
+                    GeometryError(
+                        f'part "{name}"',
+                        f"comes apart into {number} bodies.",
+                        "Allowed: segments that share a face.",
+                    )
+                )
+            diagonal = (cells[1:, 1:] & cells[:-1, :-1] & ~cells[1:, :-1] & ~cells[:-1, 1:]) | (
+                cells[1:, :-1] & cells[:-1, 1:] & ~cells[1:, 1:] & ~cells[:-1, :-1]
+            )
+            for z_index, r_index in zip(*np.nonzero(diagonal), strict=True):
+                faults.append(
+                    GeometryError(
+                        f'part "{name}"',
+                        f"has zero thickness at z {in_millimetres(self.z_lines[z_index])}, "
+                        f"r {in_millimetres(self.r_lines[r_index])}, where two segments meet in an edge only.",
+                        "Allowed: segments that share a face.",
+                    )
+                )
+
+    def _label(
+        self,
+        pieces: list[_Piece],
+        surfaces: Sequence[SurfaceDefinition],
+        remaining: Literal["adiabatic", "error"],
+        faults: list[GeometryError],
+    ) -> list[str]:
+        names = self.part_names
+        labels = [piece.joint_name(names) if piece.is_contact else "" for piece in pieces]
+        claimed_twice: set[tuple[str, str]] = set()
+        for surface in surfaces:
+            if surface.part not in names:
+                faults.append(
+                    GeometryError(
+                        f'surface "{surface.name}"',
+                        f'part "{surface.part}" does not exist.',
+                        did_you_mean(surface.part, names),
+                    )
+                )
+                continue
+            part = names.index(surface.part)
+            for number, box in enumerate(surface.where):
+                hits = [
+                    index
+                    for index, piece in enumerate(pieces)
+                    if piece.is_exposed_of(part) and piece.lies_in(box)
+                ]
+                if not hits:
+                    faults.append(
+                        GeometryError(
+                            f'surface "{surface.name}", where[{number}]',
+                            f'{_describe(box)} matches no exposed face of part "{surface.part}".',
+                            f"Faces that look {box.facing}: {_list_faces(pieces, part, box.facing)}.",
+                        )
+                    )
+                for index in hits:
+                    if labels[index] not in ("", surface.name):
+                        claimed_twice.add((labels[index], surface.name))
+                    else:
+                        labels[index] = surface.name
+        for first, second in sorted(claimed_twice):
+            faults.append(
+                GeometryError(
+                    f'surface "{second}"',
+                    f'claims a face that surface "{first}" has already.',
+                    "Allowed: each face in one surface.",
+                )
+            )
+        for index, piece in enumerate(pieces):
+            if labels[index] == "" and not piece.is_axis:
+                part = names[max(piece.below, piece.above)]
+                labels[index] = f"{part}.adiabatic"
+                if remaining == "error":
+                    faults.append(
+                        GeometryError(
+                            f'part "{part}"',
+                            f"{piece.describe()} belongs to no surface.",
+                            'Name it in a [[surface]], or set remaining_surfaces = "adiabatic".',
+                        )
+                    )
+        return labels
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """Part of a face between neighbouring grid lines; below and above along its normal."""
+
+    kind: Literal["cylinder", "plane"]
+    z: tuple[int, int]
+    r: tuple[int, int]
+    below: int
+    above: int
+
+    @property
+    def is_contact(self) -> bool:
+        return self.below != VOID and self.above != VOID
+
+    @property
+    def is_axis(self) -> bool:
+        return self.r == (0, 0)
+
+    def is_exposed_of(self, part: int) -> bool:
+        return not self.is_contact and not self.is_axis and part in (self.below, self.above)
+
+    def facing(self, of_below: bool) -> Facing:
+        if self.kind == "cylinder":
+            return "outward" if of_below else "inward"
+        return "rear" if of_below else "front"
+
+    def joint_name(self, names: Sequence[str]) -> str:
+        pair = "|".join(sorted((names[self.below], names[self.above])))
+        return pair if self.kind == "cylinder" else f"{pair}:face"
+
+    def lies_in(self, box: FaceBox) -> bool:
+        if self.facing(self.above == VOID) != box.facing:
+            return False
+        for own, bounds in ((self.z, box.z), (self.r, box.r)):
+            if bounds is not None and not (
+                to_nanometres(bounds[0]) <= own[0] and own[1] <= to_nanometres(bounds[1])
+            ):
+                return False
+        return True
+
+    def describe(self) -> str:
+        facing = self.facing(self.above == VOID)
+        if self.kind == "cylinder":
+            return f"the {facing} face r {in_millimetres(self.r[0])}, z {_span(self.z)}"
+        return f"the {facing} face z {in_millimetres(self.z[0])}, r {_span(self.r)}"
+
+
+def _span(bounds: tuple[int, int]) -> str:
+    return f"{bounds[0] * 1e-6:g} to {in_millimetres(bounds[1])}"
+
+
+def _check_segment(part: str, bounds: list[int], faults: list[GeometryError]) -> bool:
+    z_start, z_end, inner, outer = bounds
+    where = f'part "{part}"'
+    if z_end <= z_start or outer <= inner:
+        faults.append(
+            GeometryError(
+                where,
+                f"a segment z {in_millimetres(z_start)} to {in_millimetres(z_end)}, r {in_millimetres(inner)} to "
+                f"{in_millimetres(outer)} has no thickness.",
+                "Allowed: z and r that grow.",
+            )
+        )
+        return False
+    if inner < 0:
+        faults.append(
+            GeometryError(where, f"inner radius is {in_millimetres(inner)}.", "Allowed: 0 mm or more.")
+        )
+        return False
+    return True
+
+
+def _describe(box: FaceBox) -> str:
+    text = f'facing "{box.facing}"'
+    for key, bounds in (("z", box.z), ("r", box.r)):
+        if bounds is not None:
+            low, high = (to_nanometres(value) for value in bounds)
+            text += f", {key} {in_millimetres(low)}" if low == high else f", {key} {_span((low, high))}"
+    return text
+
+
+def _list_faces(pieces: list[_Piece], part: int, facing: Facing) -> str:
+    faces = [
+        piece for piece in pieces if piece.is_exposed_of(part) and piece.facing(piece.above == VOID) == facing
+    ]
+    if not faces:
+        return "none"
+    if faces[0].kind == "cylinder":
+        return "; ".join(f"r {in_millimetres(piece.r[0])}, z {_span(piece.z)}" for piece in faces)
+    return "; ".join(f"z {in_millimetres(piece.z[0])}, r {_span(piece.r)}" for piece in faces)
+
+
+def _merge(pieces: list[_Piece], labels: list[str], names: Sequence[str]) -> tuple[MeridianEdge, ...]:
+    """Join pieces in line that bound the same parts under the same name."""
+    meeting: dict[tuple[int, int], list[int]] = defaultdict(list)
+    for index, piece in enumerate(pieces):
+        meeting[piece.z[0], piece.r[0]].append(index)
+        meeting[piece.z[1], piece.r[1]].append(index)
+
+    def signature(index: int) -> tuple[object, ...]:
+        piece = pieces[index]
+        return piece.kind, piece.below, piece.above, labels[index]
+
+    follows = {}
+    for (z, r), indices in meeting.items():
+        if len(indices) == 2 and signature(indices[0]) == signature(indices[1]):
+            before, after = sorted(indices, key=lambda index: (pieces[index].z, pieces[index].r))
+            follows[before] = after
+    started = set(range(len(pieces))) - set(follows.values())
+    edges = []
+    for first in sorted(started):
+        last = first
+        while last in follows:
+            last = follows[last]
+        piece = pieces[first]
+        sides = [(names[piece.below], True)] * (piece.below != VOID)
+        sides += [(names[piece.above], False)] * (piece.above != VOID)
+        sides.sort()
+        edges.append(
+            MeridianEdge(
+                AXIS_NAME if piece.is_axis else labels[first],
+                tuple(name for name, _ in sides),
+                tuple(piece.facing(below) for _, below in sides),
+                (piece.z[0] / NANOMETRES, pieces[last].z[1] / NANOMETRES),
+                (piece.r[0] / NANOMETRES, pieces[last].r[1] / NANOMETRES),
+            )
+        )
+    return tuple(edges)

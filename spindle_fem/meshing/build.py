@@ -1,0 +1,104 @@
+"""A checked, tagged, curved mesh of an assembly, from the cache where it is known."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+
+from spindle_fem.errors import MeshQualityError, MeshTagError
+from spindle_fem.geometry.assembly import AssemblyGeometry
+from spindle_fem.meshing.cache import cached_mesh, mesh_digest, store_mesh
+from spindle_fem.meshing.generate import LADDER, Attempt, mesh_once
+from spindle_fem.meshing.quality import require_quality
+from spindle_fem.meshing.sizes import MeshSizes, Preset, build_sizes
+from spindle_fem.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.meshing.tags import tag_mesh
+
+LOGGER = logging.getLogger(__name__)
+
+
+def build_mesh(
+    assembly: AssemblyGeometry,
+    preset: Preset = "normal",
+    *,
+    size_factor: float = 1.0,
+    sizes: Mapping[str, float] | None = None,
+    use_cache: bool = True,
+    threads: int | None = None,
+) -> TaggedMesh:
+    """Mesh an assembly.
+
+    Parameters
+    ----------
+    assembly : AssemblyGeometry
+    preset : {"coarse", "normal", "fine"}
+    size_factor : float
+        On every size of the preset; 0.5 makes about eight times the elements.
+    sizes : mapping of str to float, optional, [m]
+        Sizes of single parts, and ``"channel"``, in place of the preset's.
+    use_cache : bool
+        Read a mesh made before from the user's cache, and keep this one there.
+    threads : int, optional
+        For the 2-D and 3-D mesher; the number of cores, at most four.
+
+    Returns
+    -------
+    TaggedMesh
+
+    Raises
+    ------
+    MeshQualityError
+        No settings of the ladder gave areas and volumes within 0.1 % of the
+        solid model and minSICN above 0.15.
+    """
+    chosen = build_sizes(assembly, preset, size_factor=size_factor, overrides=sizes)
+    digest = mesh_digest(assembly, chosen)
+    if use_cache:
+        mesh = cached_mesh(digest)
+        if mesh is not None:
+            return mesh
+    mesh = generate_mesh(assembly, chosen, threads=threads, digest=digest)
+    if use_cache:
+        store_mesh(mesh)
+    return mesh
+
+
+def generate_mesh(
+    assembly: AssemblyGeometry,
+    sizes: MeshSizes,
+    *,
+    ladder: tuple[Attempt, ...] = LADDER,
+    threads: int | None = None,
+    digest: str = "",
+) -> TaggedMesh:
+    """Mesh with the first settings of ``ladder`` that pass every check.
+
+    What had to be tried beyond the first is in the mesh's ``notes`` and logged.
+
+    Raises
+    ------
+    MeshQualityError
+        With the reason of each attempt.
+    """
+    threads = threads or min(4, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
+    failures: list[str] = []
+    for attempt in ladder:
+        try:
+            mesh = tag_mesh(assembly, mesh_once(assembly, sizes, attempt, threads), digest)
+            require_quality(mesh, minimum=0.0)
+        except (MeshQualityError, MeshTagError) as error:
+            failures.append(f"{attempt.describe()}: {error.what}")
+            LOGGER.info("meshing attempt failed: %s", failures[-1])
+            continue
+        if failures:
+            mesh = replace(
+                mesh, notes=(*mesh.notes, f"meshed with {attempt.describe()} after " + "; ".join(failures))
+            )
+        return mesh
+    raise MeshQualityError(
+        "mesh",
+        "no settings gave a sound mesh: " + "; ".join(failures) + ".",
+        "Change mesh.preset, mesh.size_factor or mesh.size.",
+    )
