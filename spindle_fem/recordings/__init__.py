@@ -1,0 +1,1 @@
+"""Measured recordings: manifests, files with their defects, a common time grid."""

@@ -1,0 +1,342 @@
+"""A recording on one time grid: temperatures, inputs, flags, noise, segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import RecordingError, did_you_mean
+from spindle_fem.network.history import InputHistory
+from spindle_fem.recordings.checks import (
+    ChannelNoise,
+    Flag,
+    channel_noise,
+    longest_run,
+    resolution,
+    temperature_flags,
+)
+from spindle_fem.recordings.defects import ChannelDefects, DefectReport, Gap
+from spindle_fem.recordings.manifest import Channel, Manifest, conversions, load_manifest
+from spindle_fem.recordings.read import RawTable, read_table
+
+Array = NDArray[np.float64]
+
+GAP_STEPS = 1.5
+UNIFORM_TOLERANCE = 0.01
+LONG_GAP_SECONDS = 1800.0
+LONG_GAP_STEPS = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What was measured, at every distinct stamp in order.
+
+    Attributes
+    ----------
+    name : str
+    source : str
+        Manifest file.
+    start : str or None
+        ISO 8601 stamp of zero seconds.
+    times : (N,) float64 ndarray, [s]
+        From the earliest stamp, strictly increasing.
+    temperature_names : tuple of str
+        Columns, as ``simulated.csv`` names them.
+    probes : tuple of str
+        Probe or network node of each.
+    temperature : (N, c) float64 ndarray, [K]
+        As read; NaN where missing. Flagged readings are kept.
+    flags : (N, c) uint8 ndarray
+        :class:`~spindle_fem.recordings.checks.Flag`; 0 is a reading to use.
+    sigma : (c,) float64 ndarray, [K]
+        Declared white noise, measured where none is declared.
+    noise : tuple of ChannelNoise
+        Measured, of each temperature channel.
+    input_names, input_columns : tuple of str
+        What each input drives, and its column.
+    inputs : (N, m) float64 ndarray
+        SI; NaN where missing or flagged.
+    held : (m,) bool ndarray
+        True: holds until the next reading; False: straight line.
+    input_units : tuple of str
+        SI base units.
+    covariate_names : tuple of str
+    covariates : (N, k) float64 ndarray
+        SI.
+    segments : (S, 2) int64 ndarray
+        Start and stop of the stretches between long gaps.
+    defects : DefectReport
+    """
+
+    name: str
+    source: str
+    start: str | None
+    times: Array
+    temperature_names: tuple[str, ...]
+    probes: tuple[str, ...]
+    temperature: Array
+    flags: NDArray[np.uint8]
+    sigma: Array
+    noise: tuple[ChannelNoise, ...]
+    input_names: tuple[str, ...]
+    input_columns: tuple[str, ...]
+    inputs: Array
+    held: NDArray[np.bool_]
+    input_units: tuple[str, ...]
+    covariate_names: tuple[str, ...]
+    covariates: Array
+    segments: NDArray[np.int64]
+    defects: DefectReport
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Readings that carry no flag, ``(N, c)``."""
+        return self.flags == 0
+
+    def input_at(self, name: str, times: Array) -> Array:
+        """An input at any times, held or on a straight line between its readings.
+
+        Parameters
+        ----------
+        name : str
+            What it drives.
+        times : (n,) ndarray, [s]
+
+        Returns
+        -------
+        (n,) ndarray
+            SI. Before the first reading: the first; after the last: the last.
+
+        Raises
+        ------
+        RecordingError
+            No channel drives it.
+        """
+        if name not in self.input_names:
+            raise RecordingError(
+                self.source, f'no channel drives "{name}".', did_you_mean(name, self.input_names)
+            )
+        column = self.input_names.index(name)
+        present = np.isfinite(self.inputs[:, column])
+        at, values = self.times[present], self.inputs[present, column]
+        if self.held[column]:
+            return values[np.maximum(np.searchsorted(at, times, side="right") - 1, 0)]
+        return np.interp(times, at, values)
+
+    def input_history(self, names: tuple[str, ...] | None = None) -> InputHistory:
+        """Inputs on the recording's own grid, gaps bridged as each one's ``hold`` says."""
+        chosen = self.input_names if names is None else names
+        values = np.empty((self.times.size, len(chosen)))
+        for position, name in enumerate(chosen):
+            values[:, position] = self.input_at(name, self.times)
+        held = np.array([self.held[self.input_names.index(name)] for name in chosen], dtype=bool)
+        return InputHistory(self.times, tuple(chosen), values, held)
+
+    def first_readings(self, segment: int = 0) -> dict[str, float]:
+        """First usable reading, [K], of each probe in a segment."""
+        begin, end = self.segments[segment]
+        first: dict[str, float] = {}
+        for column, probe in enumerate(self.probes):
+            rows = np.flatnonzero(self.usable[begin:end, column])
+            if rows.size:
+                first.setdefault(probe, float(self.temperature[begin + rows[0], column]))
+        return first
+
+    def stamps(self, seconds: Array) -> list[str | float]:
+        """ISO 8601 stamps of times where the recording has stamps, else the times."""
+        if self.start is None:
+            return [float(second) for second in np.atleast_1d(seconds)]
+        origin = np.datetime64(self.start.removesuffix("Z"), "us")
+        offsets = np.round(np.atleast_1d(seconds) * 1.0e6).astype("timedelta64[us]")
+        return [str(np.datetime_as_string(origin + offset, unit="s")) + "Z" for offset in offsets]
+
+
+def read_recording(path: str | Path, *, long_gap: float | None = None) -> Recording:
+    """Read a recording and find its defects.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder or manifest file.
+    long_gap : float, optional, [s]
+        Gaps longer than this begin a new segment, in which a network starts
+        again from its readings. Default: half an hour or 60 median steps,
+        whichever is longer.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    FaultsError
+        The manifest, every fault at once.
+    RecordingError
+        The data cannot be used: file, line and column.
+    """
+    manifest, data = load_manifest(path)
+    return align(manifest, read_table(data, manifest), source=str(path), long_gap=long_gap)
+
+
+def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float | None = None) -> Recording:
+    """Put a raw table on its grid of distinct stamps and flag its defects.
+
+    Repeated stamps are merged: means of what they read, the last value of an
+    input that is held.
+    """
+    grid = _Grid(table.seconds)
+    units = conversions(manifest)
+    by_role: dict[str, list[Channel]] = {"temperature": [], "input": [], "covariate": []}
+    for channel in manifest.channel:
+        by_role[channel.role].append(channel)
+    aligned: dict[str, Array] = {}
+    defects: list[ChannelDefects] = []
+    noises: dict[str, ChannelNoise] = {}
+    flags: dict[str, NDArray[np.uint8]] = {}
+    times = grid.times
+    for channel in manifest.channel:
+        raw = table.columns[channel.column]
+        held = channel.role == "input" and channel.hold == "previous"
+        merged = grid.merge(raw, last=held)
+        unit = units[channel.column]
+        fine = resolution(merged) * unit.scale
+        coarse = resolution(merged, share=0.5) * unit.scale
+        values = merged * unit.scale + unit.offset
+        if unit.is_temperature:
+            marked = temperature_flags(values, channel.sigma, fine, judge_stuck=channel.role == "temperature")
+        else:
+            marked = np.where(np.isfinite(values), 0, int(Flag.MISSING)).astype(np.uint8)
+        good = marked == 0
+        noise = channel_noise(times[good], values[good], fine, coarse)
+        noises[channel.column], flags[channel.column], aligned[channel.column] = noise, marked, values
+        defects.append(
+            ChannelDefects(
+                column=channel.column,
+                role=channel.role,
+                readings=int(np.isfinite(values).sum()),
+                empty_cells=int(np.isnan(raw).sum()) - table.infinite[channel.column],
+                infinite=table.infinite[channel.column],
+                longest_missing_s=longest_run(~np.isfinite(values), times),
+                spikes=_count(marked, Flag.SPIKE),
+                dropouts=_count(marked, Flag.DROPOUT),
+                stuck=_count(marked, Flag.STUCK),
+                implausible=_count(marked, Flag.IMPLAUSIBLE),
+                bridged=int((~good).sum()) if channel.role == "input" else 0,
+                noise=noise,
+                sigma_declared=channel.sigma,
+            )
+        )
+        if channel.role == "input" and not good.any():
+            raise RecordingError(source, f'the input column "{channel.column}" has no reading.')
+    temperatures = by_role["temperature"]
+    if not any((flags[c.column] == 0).any() for c in temperatures):
+        raise RecordingError(source, "no temperature channel has a reading that can be used.")
+    inputs = by_role["input"]
+    input_values = _stack([np.where(flags[c.column] == 0, aligned[c.column], np.nan) for c in inputs], times)
+    report, segments = _report(manifest, table, grid, tuple(defects), long_gap)
+    sigma = [c.sigma if c.sigma is not None else noises[c.column].white for c in temperatures]
+    recording = Recording(
+        name=manifest.name,
+        source=source,
+        start=table.start,
+        times=times,
+        temperature_names=tuple(c.column for c in temperatures),
+        probes=tuple(str(c.probe) for c in temperatures),
+        temperature=_stack([aligned[c.column] for c in temperatures], times),
+        flags=np.stack([flags[c.column] for c in temperatures], axis=1),
+        sigma=np.array(sigma),
+        noise=tuple(noises[c.column] for c in temperatures),
+        input_names=tuple(str(c.drives) for c in inputs),
+        input_columns=tuple(c.column for c in inputs),
+        inputs=input_values,
+        held=np.array([c.hold == "previous" for c in inputs], dtype=bool),
+        input_units=tuple(units[c.column].unit for c in inputs),
+        covariate_names=tuple(c.column for c in by_role["covariate"]),
+        covariates=_stack([aligned[c.column] for c in by_role["covariate"]], times),
+        segments=segments,
+        defects=report,
+    )
+    for array in (recording.times, recording.temperature, recording.flags, recording.inputs, recording.sigma):
+        array.setflags(write=False)
+    return recording
+
+
+def _stack(columns: list[Array], times: Array) -> Array:
+    return np.stack(columns, axis=1) if columns else np.empty((times.size, 0))
+
+
+def _count(marked: NDArray[np.uint8], flag: Flag) -> int:
+    return int(np.count_nonzero(marked & np.uint8(flag)))
+
+
+class _Grid:
+    """Distinct stamps in order, and where each row of the file belongs."""
+
+    def __init__(self, seconds: Array) -> None:
+        self.timed = np.isfinite(seconds)
+        stamps = seconds[self.timed]
+        self.unordered = int(np.count_nonzero(stamps[1:] < np.maximum.accumulate(stamps)[:-1]))
+        self.times, self.place = np.unique(stamps, return_inverse=True)
+        self.repeated = stamps.size - self.times.size
+        self._sorted = self.unordered == 0 and self.repeated == 0
+        self.conflicting: set[int] = set()
+
+    def merge(self, raw: Array, *, last: bool) -> Array:
+        """Values on the grid from values by row."""
+        values = raw[self.timed]
+        if self._sorted:
+            return values
+        present = np.isfinite(values)
+        place, values = self.place[present], values[present]
+        merged = np.full(self.times.size, np.nan)
+        merged[place] = values
+        if self.repeated:
+            self.conflicting.update(place[merged[place] != values].tolist())
+            if not last:
+                number = np.bincount(place, minlength=merged.size)
+                several = number > 1
+                total = np.bincount(place, values, merged.size)
+                merged[several] = total[several] / number[several]
+        return merged
+
+
+def _report(
+    manifest: Manifest,
+    table: RawTable,
+    grid: _Grid,
+    channels: tuple[ChannelDefects, ...],
+    long_gap: float | None,
+) -> tuple[DefectReport, NDArray[np.int64]]:
+    times = grid.times
+    steps = np.diff(times)
+    median = float(np.median(steps))
+    if long_gap is None:
+        long_gap = max(LONG_GAP_SECONDS, LONG_GAP_STEPS * median)
+    wide = np.flatnonzero(steps > GAP_STEPS * median)
+    breaks = np.flatnonzero(steps > long_gap) + 1
+    edges = np.concatenate([[0], breaks, [times.size]])
+    segments = np.stack([edges[:-1], edges[1:]], axis=1).astype(np.int64)
+    report = DefectReport(
+        name=manifest.name,
+        rows=table.seconds.size,
+        stamps=times.size,
+        duration_s=float(times[-1]),
+        rows_without_time=int((~grid.timed).sum()),
+        blank_rows=table.blank_rows,
+        short_rows=table.short_rows,
+        truncated_last_row=table.truncated,
+        unordered_rows=grid.unordered,
+        repeated_rows=grid.repeated,
+        conflicting_stamps=len(grid.conflicting),
+        median_step_s=median,
+        non_uniform_steps=int(np.count_nonzero(np.abs(steps - median) > UNIFORM_TOLERANCE * median)),
+        gaps=tuple(Gap(float(times[k]), float(times[k + 1])) for k in wide),
+        long_gap_s=float(long_gap),
+        segments=len(segments),
+        unused_columns=table.unused_columns,
+        channels=channels,
+    )
+    return report, segments

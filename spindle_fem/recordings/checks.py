@@ -1,0 +1,265 @@
+"""What is wrong with one channel's readings, and how noisy they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.stats import chi2
+
+Array = NDArray[np.float64]
+
+
+class Flag(IntFlag):
+    """Why a reading is not used; none means it is."""
+
+    MISSING = 1
+    SPIKE = 2
+    DROPOUT = 4
+    STUCK = 8
+    IMPLAUSIBLE = 16
+
+
+# Lengths are in samples, temperatures in K.
+SPIKE_WINDOW = 5
+SPIKE_SIGMAS = 6.0
+SPIKE_FLOOR = 0.5
+SPIKE_STANDS_OUT = 3.0
+DROPOUT_SIGMAS = 12.0
+DROPOUT_FLOOR = 3.0
+DROPOUT_LONGEST = 200
+STUCK_CHANCE = 1.0e-9
+STUCK_MOST_EQUAL = 0.6
+QUIET_SHARE = 0.25
+# An open thermocouple reads above or below this; no spindle sensor does in earnest.
+PLAUSIBLE_KELVIN = (213.15, 673.15)
+
+# The standard deviation of a normal sample cut at its 98 % smallest magnitudes is this fraction.
+_KEPT_FRACTION = 0.98
+_TRIMMED_NORMAL = 0.93463
+_RESOLUTIONS = [factor * 10.0**power for power in range(2, -5, -1) for factor in (5.0, 2.5, 2.0, 1.0)]
+_SAMPLE_FOR_RESOLUTION = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelNoise:
+    """How a channel scatters, in SI.
+
+    Attributes
+    ----------
+    white : float
+        One standard deviation of independent noise, rounding included.
+    slow : float
+        One standard deviation of errors that last many samples: an upper
+        estimate, since slow changes of the machine that a parabola does not
+        follow count as errors too; half steps of a coarse sensor included.
+    resolution : float
+        Largest step that 99 % of the readings are multiples of, 0 if none.
+    coarse_step : float
+        Largest step that half of the readings are multiples of, 0 if none.
+    """
+
+    white: float
+    slow: float
+    resolution: float
+    coarse_step: float
+
+
+def resolution(values: Array, share: float = 0.99) -> float:
+    """Largest round step that a share of the readings are multiples of, 0 if none.
+
+    >>> resolution(np.array([20.0, 20.2, 20.4, 21.0, 19.8]))
+    0.2
+    """
+    finite = values[np.isfinite(values)]
+    if finite.size > _SAMPLE_FOR_RESOLUTION:
+        finite = finite[:: -(-finite.size // _SAMPLE_FOR_RESOLUTION)]
+    if finite.size < 2 or np.all(finite == finite[0]):
+        return 0.0
+    for step in _RESOLUTIONS:
+        quotient = finite / step
+        # chance multiples of a fine step by values of a few digits are excluded by the share
+        matching = np.abs(quotient - np.round(quotient)) < 1.0e-6 * np.maximum(1.0, np.abs(quotient))
+        if np.mean(matching) >= share:
+            return float(f"{step:.6g}")
+    return 0.0
+
+
+def white_noise(values: Array) -> float:
+    """Standard deviation of independent noise, from second differences.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Present readings in time order.
+
+    Returns
+    -------
+    float
+        Linear drift drops out; the largest 2 % (curvature, spikes) are cut and
+        the cut is corrected for a normal distribution. NaN below 8 readings.
+
+    >>> rng = np.random.default_rng(1)
+    >>> round(white_noise(0.1 * rng.standard_normal(20000) + np.arange(20000)), 3)
+    0.1
+    """
+    if values.size < 8:
+        return float("nan")
+    second = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
+    kept = max(1, int(_KEPT_FRACTION * second.size))
+    smallest = np.partition(second, kept - 1)[:kept]
+    return float(np.sqrt(np.mean(smallest**2) / 6.0) / _TRIMMED_NORMAL)
+
+
+def slow_error(times: Array, values: Array, white: float, block: int = 16, blocks: int = 12) -> float:
+    """Upper estimate of errors that last many samples.
+
+    Block means are compared with a parabola through a dozen of them; what the
+    white noise does not explain is left. The quietest quarter of the windows
+    decides, where the machine itself changes least. NaN when the record is
+    shorter than three windows.
+    """
+    window = block * blocks
+    number = values.size // window
+    if number < 3 or not np.isfinite(white):
+        return float("nan")
+    means = values[: number * window].reshape(number, blocks, block).mean(axis=2)
+    at = times[: number * window].reshape(number, blocks, block).mean(axis=2)
+    centred = at - at.mean(axis=1, keepdims=True)
+    half = np.maximum(np.abs(centred).max(axis=1, keepdims=True), 1.0e-30)
+    scaled = centred / half
+    basis = np.stack([np.ones_like(scaled), scaled, scaled**2], axis=2)
+    projector, _ = np.linalg.qr(basis)
+    fitted = np.einsum("wbj,wj->wb", projector, np.einsum("wbj,wb->wj", projector, means))
+    freedom = blocks - 3
+    # a quarter of purely random windows lie below this quantile of chi-square
+    expected = float(chi2.ppf(QUIET_SHARE, freedom)) / freedom
+    variance = np.quantile(np.sum((means - fitted) ** 2, axis=1) / freedom, QUIET_SHARE) / expected
+    return float(np.sqrt(max(0.0, float(variance) - white**2 / block)))
+
+
+def channel_noise(times: Array, values: Array, grid: float, coarse: float) -> ChannelNoise:
+    """Noise of the readings that are in use.
+
+    Parameters
+    ----------
+    times : (n,) ndarray, [s]
+    values : (n,) ndarray
+    grid, coarse : float
+        Resolution and coarse step in the same unit as ``values``.
+    """
+    white = white_noise(values)
+    slow = slow_error(times, values, white)
+    white = float(np.fmax(white, grid / np.sqrt(12.0)))
+    if coarse > 2.0 * white:
+        # a slow signal on a coarse sensor is wrong by up to half a step for a long time
+        slow = float(np.fmax(slow, coarse / np.sqrt(12.0)))
+    return ChannelNoise(white=white, slow=slow, resolution=grid, coarse_step=coarse)
+
+
+def temperature_flags(
+    kelvin: Array, sigma: float | None, grid: float, *, judge_stuck: bool
+) -> NDArray[np.uint8]:
+    """Flags of one temperature channel's readings.
+
+    Parameters
+    ----------
+    kelvin : (n,) ndarray, [K]
+        NaN where missing; in time order.
+    sigma : float or None, [K]
+        Declared white noise.
+    grid : float, [K]
+        Resolution.
+    judge_stuck : bool
+        Whether a run of equal readings may be held against the sensor.
+
+    Returns
+    -------
+    (n,) uint8 ndarray of :class:`Flag`
+    """
+    flags = np.zeros(kelvin.size, dtype=np.uint8)
+    present = np.isfinite(kelvin)
+    flags[~present] |= np.uint8(Flag.MISSING)
+    outside = present & ((kelvin < PLAUSIBLE_KELVIN[0]) | (kelvin > PLAUSIBLE_KELVIN[1]))
+    flags[outside] |= np.uint8(Flag.IMPLAUSIBLE)
+    rows = np.flatnonzero(present & ~outside)
+    if rows.size < 2 * SPIKE_WINDOW:
+        return flags
+    values = kelvin[rows]
+    noise = max(white_noise(values), grid, 0.0 if sigma is None else sigma)
+    spikes = _spikes(values, noise)
+    flags[rows[spikes]] |= np.uint8(Flag.SPIKE)
+    kept = rows[~spikes]
+    flags[kept[_dropouts(kelvin[kept], noise)]] |= np.uint8(Flag.DROPOUT)
+    if judge_stuck:
+        kept = kept[flags[kept] == 0]
+        flags[kept[_stuck(kelvin[kept])]] |= np.uint8(Flag.STUCK)
+    return flags
+
+
+def _spikes(values: Array, noise: float) -> NDArray[np.bool_]:
+    """Readings that leave their neighbours, while those agree with each other.
+
+    A true peak has steep flanks: the departure must stand out from the
+    differences between the neighbours too.
+    """
+    departures = np.abs(values - median_filter(values, SPIKE_WINDOW, mode="nearest"))
+    padded = np.pad(values, 2, mode="edge")
+    flanks = np.maximum(np.abs(padded[1:-3] - padded[:-4]), np.abs(padded[4:] - padded[3:-1]))
+    roughness = np.maximum(flanks, np.abs(padded[3:-1] - padded[1:-3]))
+    return departures > np.maximum(max(SPIKE_SIGMAS * noise, SPIKE_FLOOR), SPIKE_STANDS_OUT * roughness)
+
+
+def _dropouts(values: Array, noise: float) -> NDArray[np.bool_]:
+    """Stretches that are left and entered again in a single jump each."""
+    inside = np.zeros(values.size, dtype=bool)
+    change = np.diff(values)
+    jumps = np.flatnonzero(np.abs(change) > max(DROPOUT_SIGMAS * noise, DROPOUT_FLOOR))
+    position = 0
+    while position < jumps.size:
+        out = jumps[position]
+        later = jumps[position + 1 :]
+        later = later[later <= out + DROPOUT_LONGEST]
+        level = values[out]
+        size = abs(change[out])
+        back = later[
+            (np.sign(change[later]) != np.sign(change[out]))
+            & (np.abs(values[later + 1] - level) < 0.25 * size)
+        ]
+        if back.size and np.ptp(values[out + 1 : back[0] + 1]) < 0.25 * size:
+            inside[out + 1 : back[0] + 1] = True
+            position = int(np.searchsorted(jumps, back[0])) + 1
+        else:
+            position += 1
+    return inside
+
+
+def _stuck(values: Array) -> NDArray[np.bool_]:
+    """Runs of one value so long that chance repeats do not explain them."""
+    stuck = np.zeros(values.size, dtype=bool)
+    if values.size < 50:
+        return stuck
+    equal = np.diff(values) == 0.0
+    chance = float(equal.mean())
+    if chance > STUCK_MOST_EQUAL:  # the resolution hides the noise: a constant reading proves nothing
+        return stuck
+    longest = int(np.ceil(np.log(STUCK_CHANCE) / np.log(max(chance, 0.1))))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]).astype(np.int8)))
+    for begin, end in edges.reshape(-1, 2):
+        if end - begin >= longest:
+            # the first reading of the run is a true one
+            stuck[begin + 1 : end + 1] = True
+    return stuck
+
+
+def longest_run(marked: NDArray[np.bool_], times: Array) -> float:
+    """Longest time, in s, from the last reading before to the first after a marked run."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))).reshape(-1, 2)
+    if edges.size == 0:
+        return 0.0
+    before = times[np.maximum(edges[:, 0] - 1, 0)]
+    after = times[np.minimum(edges[:, 1], times.size - 1)]
+    return float((after - before).max())
