@@ -81,7 +81,9 @@ def to_si(value: Any, unit: str, *, where: str, kind: str = "quantity") -> float
     10.0
     """
     if isinstance(value, bool) or value is None or isinstance(value, (list, tuple, dict)):
-        raise UnitError(where, f"{value!r} is not a quantity.", f"Write it as {_example(unit, kind)}.")
+        raise UnitError(
+            where, f"{value!r} is not a quantity.", f"Write it as {quantity_example(unit, kind)}."
+        )
     if isinstance(value, numbers.Real):
         magnitude = _pure_number(value, value, unit, kind, where)
     else:
@@ -100,7 +102,9 @@ def to_si(value: Any, unit: str, *, where: str, kind: str = "quantity") -> float
 def _pure_number(number: Any, value: Any, unit: str, kind: str, where: str) -> float:
     if unit:
         raise UnitError(
-            where, f"bare number {_shown(value)}, a unit is needed.", f"Write it as {_example(unit, kind)}."
+            where,
+            f"bare number {_shown(value)}, a unit is needed.",
+            f"Write it as {quantity_example(unit, kind)}.",
         )
     return float(number)
 
@@ -122,7 +126,7 @@ def _convert(value: Any, unit: str, kind: str, where: str) -> float:
         raise UnitError(
             where,
             f'{_shown(value)} has the unknown unit "{written}".',
-            f"Allowed: units of {_allowed_unit(unit, kind)}, such as {_example(unit, kind)}.",
+            f"Allowed: units of {_allowed_unit(unit, kind)}, such as {quantity_example(unit, kind)}.",
         )
     name = str(parsed)
     if kind == "temperature_difference" and name in _TEMPERATURE_SCALES:
@@ -139,7 +143,7 @@ def _convert(value: Any, unit: str, kind: str, where: str) -> float:
         raise UnitError(
             where,
             f"{_shown(value)} has the wrong dimension.",
-            f"Allowed: units of {_allowed_unit(unit, kind)}, such as {_example(unit, kind)}.",
+            f"Allowed: units of {_allowed_unit(unit, kind)}, such as {quantity_example(unit, kind)}.",
         )
     return float(units.Quantity(float(number), parsed).to(unit or "dimensionless").magnitude)
 
@@ -150,7 +154,7 @@ def _split(text: str, unit: str, kind: str, where: str) -> tuple[float, str]:
         raise UnitError(
             where,
             f"{_shown(text)} cannot be read as a quantity.",
-            f"Write one number and its unit, such as {_example(unit, kind)}.",
+            f"Write one number and its unit, such as {quantity_example(unit, kind)}.",
         )
     return float(match[1]), match[2]
 
@@ -182,7 +186,12 @@ def _allowed_unit(unit: str, kind: str) -> str:
     return unit or "a pure number"
 
 
-def _example(unit: str, kind: str) -> str:
+def quantity_example(unit: str, kind: str = "quantity") -> str:
+    """How a quantity of a unit is written in a definition file.
+
+    >>> quantity_example("m")
+    '"19 mm"'
+    """
     if kind == "temperature":
         return '"15 degC"'
     customary = {"m": "19 mm", "rad/s": "3000 rpm", "rad": "15 deg", "m**3/s": "20 L/min", "K": "5 K"}

@@ -262,13 +262,24 @@ def _read_place(value: Any) -> tuple[float, float]:
     return ends
 
 
+@dataclass(frozen=True, slots=True)
+class RangeRule:
+    """Metadata of a field that takes from and to; a place may be a single length too."""
+
+    single: bool
+
+
 def _write_range(ends: tuple[float, float]) -> list[str]:
     return [_LENGTH_RULE.write(end) for end in ends]
 
 
 # Pydantic's own tuple schema would hide the two-value message behind one per item.
-Range = Annotated[tuple[Any, Any], BeforeValidator(_read_extent), PlainSerializer(_write_range)]
-Place = Annotated[tuple[Any, Any], BeforeValidator(_read_place), PlainSerializer(_write_range)]
+Range = Annotated[
+    tuple[Any, Any], BeforeValidator(_read_extent), PlainSerializer(_write_range), RangeRule(False)
+]
+Place = Annotated[
+    tuple[Any, Any], BeforeValidator(_read_place), PlainSerializer(_write_range), RangeRule(True)
+]
 
 
 class SpecModel(BaseModel):
@@ -296,7 +307,7 @@ class SpecModel(BaseModel):
         if not isinstance(marks, dict):
             _refuse(
                 f"{marks!r} are no marks.",
-                'Allowed: a letter for the whole table, or {default = "A", bore_diameter = "C"} and the like.',
+                'Allowed: a letter for the whole table, or such as {default = "A", width = "C"}.',
             )
         keys = [
             "default",

@@ -4,17 +4,36 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import tomli_w
-from pydantic import BaseModel, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
-from spindle_fem.errors import FaultsError, SpecError, SpindleFemError, UnitError, UnknownKeyError, did_you_mean
-from spindle_fem.spec.consistency import find_faults
+from spindle_fem.errors import FaultsError, SpecError, SpindleFemError, did_you_mean
+from spindle_fem.spec.consistency import Declared, find_faults
+from spindle_fem.spec.faults import validation_faults
+from spindle_fem.spec.inherit import Layer, apply_overrides, merge, relabelled, split_override, without_none
 from spindle_fem.spec.model import MACHINE_SCHEMA, MachineSpec
+from spindle_fem.spec.schema import annotation_of
 
-Model = TypeVar("Model", bound=BaseModel)
+__all__ = [
+    "Examination",
+    "apply_overrides",
+    "examine",
+    "examine_machine",
+    "find_machine",
+    "load_machine",
+    "machine_folder",
+    "merge",
+    "read_definition",
+    "read_toml",
+    "shipped_machines",
+    "validate",
+    "validation_faults",
+    "write_machine",
+]
 
 
 def machine_folder() -> Path:
@@ -38,20 +57,17 @@ def find_machine(machine: str | Path) -> Path:
         Neither exists.
     """
     path = Path(machine)
+    if path.is_file():
+        return path
+    shipped = shipped_machines()
     if path.suffix == ".toml" or path.exists():
-        if path.is_file():
-            return path
-        raise SpecError(str(machine), "there is no such file.", f"Or name one that ships: {_names()}.")
-    shipped = machine_folder() / f"{machine}.toml"
-    if not shipped.is_file():
+        what = "is a folder." if path.is_dir() else "there is no such file."
+        raise SpecError(str(machine), what, f"Or name a machine that ships: {', '.join(shipped)}.")
+    if str(machine) not in shipped:
         raise SpecError(
-            str(machine), "is neither a file nor a machine that ships.", did_you_mean(str(machine), shipped_machines())
+            str(machine), "is neither a file nor a machine that ships.", did_you_mean(str(machine), shipped)
         )
-    return shipped
-
-
-def _names() -> str:
-    return ", ".join(shipped_machines())
+    return machine_folder() / f"{machine}.toml"
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -67,202 +83,200 @@ def read_toml(path: Path) -> dict[str, Any]:
             return tomllib.load(file)
     except OSError as error:
         raise SpecError(str(path), f"cannot be read ({error.strerror}).") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SpecError(str(path), f"is not valid TOML: {error}.") from error
+    except UnicodeDecodeError as error:
+        raise SpecError(
+            str(path), f"is not UTF-8 (byte {error.start + 1}).", "Save it as UTF-8 text."
+        ) from error
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(
+            str(path), f"is not valid TOML: {error}.", "See https://toml.io for the format."
+        ) from error
 
 
-def merge(base: Any, change: Any) -> Any:
-    """Lay one definition over another.
-
-    Tables merge key by key, lists of named tables by ``name``; any other value
-    replaces the base's, and ``"none"`` removes a key.
-    """
-    if isinstance(base, Mapping) and isinstance(change, Mapping):
-        if set(change) & {"value", "sigma_rel", "low", "high"} or set(base) & {"value", "sigma_rel", "low", "high"}:
-            return change  # a quantity with a prior is one value
-        merged = dict(base)
-        for key, value in change.items():
-            if isinstance(value, str) and value == "none":
-                merged.pop(key, None)
-            else:
-                merged[key] = merge(base[key], value) if key in base else value
-        return merged
-    if _named_tables(base) and _named_tables(change):
-        by_name = {item["name"]: item for item in base}
-        for item in change:
-            by_name[item["name"]] = merge(by_name.get(item["name"], {}), item)
-        return list(by_name.values())
-    return change
-
-
-def _named_tables(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(item, Mapping) and "name" in item for item in value)
-
-
-def read_definition(path: Path, visited: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """Raw tables of a definition file with its ``base`` files laid under it."""
+def read_layers(path: Path, visited: tuple[Path, ...] = ()) -> list[Layer]:
+    """A definition file after its ``base`` files, each as it is written."""
     content = read_toml(path)
-    if "base" not in content:
-        return content
-    base_name = content.pop("base")
-    where = f"{path}: base"
+    base_name = content.pop("base", None)
+    layer = Layer(path.name, content)
+    if base_name is None:
+        return [layer]
+    where = f"{path.name}: base"
     if not isinstance(base_name, str):
-        raise SpecError(where, f"{base_name!r} is not a name.", "Allowed: a file beside this one or " + _names() + ".")
+        raise SpecError(
+            where,
+            f"{base_name!r} is not a name.",
+            f"Allowed: a file beside this one, or {', '.join(shipped_machines())}.",
+        )
     beside = path.parent / base_name
-    base_path = beside if beside.is_file() else find_machine(base_name)
-    if base_path.resolve() in {item.resolve() for item in (*visited, path)}:
-        raise SpecError(where, f'"{base_name}" leads back to this file.')
-    return merge(read_definition(base_path, (*visited, path)), content)
+    try:
+        base_path = beside if beside.is_file() else find_machine(base_name)
+    except SpecError as error:
+        raise SpecError(where, f'"{base_name}" {error.what}', error.how_to_fix) from error
+    chain = (*visited, path)
+    if base_path.resolve() in {item.resolve() for item in chain}:
+        trail = " -> ".join([*(item.name for item in chain), base_path.name])
+        raise SpecError(
+            where, f'"{base_name}" leads back to this file ({trail}).', "A base must end somewhere."
+        )
+    return [*read_layers(base_path, chain), layer]
 
 
-def apply_overrides(content: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Apply ``path=value`` texts, for example ``channel.depth=19mm``.
+def read_definition(path: Path) -> dict[str, Any]:
+    """Raw tables of a definition file with its ``base`` files laid under it."""
+    return _merged(read_layers(path))
 
-    Lists of named tables are entered by name (``bearing_set.front.preload``).
 
-    Raises
-    ------
-    UnknownKeyError
-        The path does not lead to a key that the definition may have.
-    """
-    for override in overrides:
-        path, separator, text = override.partition("=")
-        if not separator or not path.strip():
-            raise SpecError(f"--set {override}", "is not of the form path=value.", "For example channel.depth=19mm.")
-        content = _with_value(content, path.strip().split("."), _typed(text.strip()), f"--set {path.strip()}")
+def _merged(layers: Iterable[Layer]) -> dict[str, Any]:
+    content: Any = {}
+    for layer in layers:
+        content = merge(content, layer.content) if content else dict(layer.content)
     return content
 
 
-def _typed(text: str) -> Any:
+@dataclass(frozen=True, slots=True)
+class Examination:
+    """What a definition holds, sound or not.
+
+    Attributes
+    ----------
+    spec : MachineSpec or None
+        The machine; where there are faults only its sound tables, so that
+        checks that need no more can still run. None where nothing can be read.
+    faults : tuple of SpindleFemError
+        In file order; empty for a valid machine.
+    unsound : frozenset of str
+        Top-level keys with a fault inside, whose entries ``spec`` may lack.
+    """
+
+    spec: MachineSpec | None
+    faults: tuple[SpindleFemError, ...]
+    unsound: frozenset[str] = frozenset()
+
+
+def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine") -> Examination:
+    """Every fault of raw tables, those within tables and those between them.
+
+    Parameters
+    ----------
+    content : mapping
+        Merged raw tables.
+    layers : iterable of Layer, or str
+        Where the keys come from, for the messages.
+    """
+    layers = (Layer(layers, {}),) if isinstance(layers, str) else tuple(layers)
+    content = without_none(dict(content))
+    fault = _schema_fault(content)
+    if fault is not None:
+        return Examination(None, (relabelled(fault, layers),))
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
+        spec, faults = MachineSpec.model_validate(content), []
+    except ValidationError as error:
+        faults = validation_faults(error, "", MachineSpec, content)
+        spec = _sound_tables(content, error)
+    unsound = frozenset(key for key in content if any(_is_inside(fault.where, key) for fault in faults))
+    faults += find_faults(spec, Declared.of(content, unsound))
+    return Examination(spec, tuple(relabelled(fault, layers) for fault in faults), unsound)
 
 
-def _with_value(content: Any, path: list[str], value: Any, where: str) -> Any:
-    if not path:
-        if isinstance(content, Mapping) and "value" in content and not isinstance(value, Mapping):
-            return {**content, "value": value}
-        return value
-    key, rest = path[0], path[1:]
-    if _named_tables(content) and content:
-        names = [item["name"] for item in content]
-        if key not in names:
-            raise UnknownKeyError(where, f'there is no "{key}" here.', did_you_mean(key, names))
-        return [_with_value(item, rest, value, where) if item["name"] == key else item for item in content]
-    if not isinstance(content, Mapping):
-        raise UnknownKeyError(where, f'"{key}" leads into a plain value.')
-    if key not in content:
-        if rest:
-            raise UnknownKeyError(where, f'there is no "{key}" here.', did_you_mean(key, content))
-        return {**content, key: value}  # a default made explicit; unknown keys fail in validation
-    return {**content, key: _with_value(content[key], rest, value, where)}
+def _is_inside(where: str, key: str) -> bool:
+    return where == key or where.startswith((key + ".", key + "["))
 
 
-def validation_faults(error: ValidationError, source: str, model: type[BaseModel]) -> list[SpindleFemError]:
-    """Our errors for each of pydantic's, with the key path as the file writes it."""
-    faults: list[SpindleFemError] = []
-    for item in error.errors():
-        where = f"{source}: {_key_path(item['loc'])}"
-        kind, message = item["type"], item["msg"]
-        if kind == "extra_forbidden":
-            allowed = _allowed_keys(model, item["loc"][:-1])
-            faults.append(UnknownKeyError(where, "unknown key.", did_you_mean(str(item["loc"][-1]), allowed)))
-        elif kind == "missing":
-            faults.append(SpecError(where, "is missing."))
-        elif kind == "value_error":
-            text = message.removeprefix("Value error, ")
-            fault = UnitError if "unit is needed" in text or "dimension" in text else SpecError
-            faults.append(fault(where, text))
-        else:
-            faults.append(SpecError(where, f"{_short(item['input'])}: {message}."))
-    return faults
+def _schema_fault(content: Mapping[str, Any]) -> SpindleFemError | None:
+    allowed = f'Allowed: "{MACHINE_SCHEMA}".'
+    if not content:
+        return SpecError("file", "holds nothing.", f'A machine starts with schema = "{MACHINE_SCHEMA}".')
+    if "schema" not in content:
+        return SpecError("schema", "is missing.", allowed)
+    if content["schema"] != MACHINE_SCHEMA:
+        shown = content["schema"]
+        shown = f'"{shown}"' if isinstance(shown, str) else repr(shown)
+        return SpecError("schema", f"{shown} is not known.", allowed)
+    if "network" in content and "part" not in content:
+        return SpecError(
+            "network",
+            "is a machine without geometry.",
+            "Only simulate and diagnose take one; this needs [[part]].",
+        )
+    return None
 
 
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
-
-
-_VARIANTS = ("constant", "natural_convection_radiation", "rotating", "function-before", "function-after")
-
-
-def _key_path(location: tuple[int | str, ...]) -> str:
-    text = ""
-    for item in location:
-        if isinstance(item, int):
-            text += f"[{item + 1}]"
-        elif str(item).startswith(_VARIANTS) and text.startswith("film"):
+def _sound_tables(content: Mapping[str, Any], error: ValidationError) -> MachineSpec:
+    """The machine without its faulty tables, never validated as a whole."""
+    faulty: dict[str, set[Any]] = {}
+    for item in error.errors(include_url=False, include_context=False, include_input=False):
+        top, *deeper = item["loc"]
+        faulty.setdefault(str(top), set()).add(deeper[0] if deeper else None)
+    values: dict[str, Any] = {}
+    for name, field in MachineSpec.model_fields.items():
+        key = field.alias or name
+        given = content.get(key)
+        if key not in content or (key in faulty and None in faulty[key]):
             continue
-        elif str(item).startswith(("literal[", "function-", "tuple[", "float", "constrained")):
+        if key in faulty and isinstance(given, list):
+            given = [item for position, item in enumerate(given) if position not in faulty[key]]
+        elif key in faulty and key in ("materials", "bearing_types"):
+            given = {entry: table for entry, table in given.items() if entry not in faulty[key]}
+        elif key in faulty:
             continue
-        else:
-            text += f".{item}" if text else str(item)
-    return text or "file"
+        try:
+            values[name] = TypeAdapter(annotation_of(field)).validate_python(given)
+        except ValidationError:
+            values[name] = ()  # every entry of a list that needs one was faulty
+    empty = {"materials": {}, "part": (), "operation": None, "heat": None, "name": ""}
+    return MachineSpec.model_construct(**{**empty, **values})
 
 
-def _allowed_keys(model: Any, location: tuple[int | str, ...]) -> list[str]:
-    from typing import get_args
-
-    candidates: list[type[BaseModel]] = [model]
-    for item in location:
-        if isinstance(item, int):
-            continue
-        following: list[type[BaseModel]] = []
-        for candidate in candidates:
-            for name, field in candidate.model_fields.items():
-                if item in (name, field.alias):
-                    following += _models_in(field.annotation, get_args)
-        if following:
-            candidates = following
-        else:
-            matching = [c for c in candidates if item in _kinds(c)]
-            candidates = matching or candidates
-    keys: dict[str, None] = {}
-    for candidate in candidates:
-        for name, field in candidate.model_fields.items():
-            keys[field.alias or name] = None
-    return list(keys)
-
-
-def _kinds(model: type[BaseModel]) -> tuple[str, ...]:
-    from typing import get_args
-
-    field = model.model_fields.get("kind")
-    return get_args(field.annotation) if field else ()
-
-
-def _models_in(annotation: Any, get_args: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    found: list[type[BaseModel]] = []
-    for argument in get_args(annotation):
-        found += _models_in(argument, get_args)
-    return found
-
-
-def validate(content: dict[str, Any], source: str) -> MachineSpec:
+def validate(content: Mapping[str, Any], source: str | Iterable[Layer] = "machine") -> MachineSpec:
     """Typed machine of raw tables; every fault at once.
+
+    Parameters
+    ----------
+    content : mapping
+        Merged raw tables.
+    source : str or iterable of Layer
+        File name for the messages, or the layers that were merged.
 
     Raises
     ------
     FaultsError
         One or more faults; each names file, key, value and what is allowed.
     """
-    schema = content.get("schema")
-    if schema != MACHINE_SCHEMA:
-        raise FaultsError(
-            source, [SpecError(f"{source}: schema", f"{schema!r} is not known.", f'Allowed: "{MACHINE_SCHEMA}".')]
-        )
-    try:
-        spec = MachineSpec.model_validate(content)
-    except ValidationError as error:
-        raise FaultsError(source, validation_faults(error, source, MachineSpec)) from error
-    faults = [type(fault)(f"{source}: {fault.where}", fault.what, fault.how_to_fix) for fault in find_faults(spec)]
+    layers = (Layer(source, {}),) if isinstance(source, str) else tuple(source)
+    result = examine(content, layers)
+    if result.faults or result.spec is None:
+        files = [layer.source for layer in layers if not layer.override]
+        raise FaultsError(files[-1] if files else "machine", result.faults)
+    return result.spec
+
+
+def _layers_and_content(machine: str | Path, overrides: Iterable[str]) -> tuple[list[Layer], dict[str, Any]]:
+    layers = read_layers(find_machine(machine))
+    content = _merged(layers)
+    faults: list[SpindleFemError] = []
+    for override in overrides:
+        try:
+            content = apply_overrides(content, [override])
+            path, _ = split_override(override)
+            layers.append(Layer(f"--set {path}", {}, path))
+        except SpecError as error:
+            faults.append(error)
     if faults:
-        raise FaultsError(source, faults)
-    return spec
+        faults += examine(content, layers).faults
+        raise FaultsError(str(machine), faults)
+    return layers, content
+
+
+def examine_machine(machine: str | Path, overrides: Iterable[str] = ()) -> Examination:
+    """Every fault of a definition file, with its sound tables.
+
+    Raises
+    ------
+    SpecError
+        The file or its base cannot be read, or an override leads nowhere.
+    """
+    layers, content = _layers_and_content(machine, overrides)
+    return examine(content, layers)
 
 
 def load_machine(machine: str | Path, overrides: Iterable[str] = ()) -> MachineSpec:
@@ -278,10 +292,12 @@ def load_machine(machine: str | Path, overrides: Iterable[str] = ()) -> MachineS
     ------
     SpecError
         Anything wrong with the file, its base or the overrides.
+
+    >>> round(load_machine("wu_tan_2016", ["channel.depth=19mm"]).channel.depth, 6)
+    0.019
     """
-    path = find_machine(machine)
-    content = apply_overrides(read_definition(path), overrides)
-    return validate(content, path.name)
+    layers, content = _layers_and_content(machine, overrides)
+    return validate(content, layers)
 
 
 def write_machine(spec: MachineSpec) -> str:
