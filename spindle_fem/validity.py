@@ -9,6 +9,10 @@ from numpy.typing import ArrayLike
 
 from spindle_fem.errors import OutOfValidityError
 
+# Ranges to unpack: ``require_range("here", length=(length, *POSITIVE))``.
+POSITIVE = (float(np.finfo(np.float64).tiny), float(np.finfo(np.float64).max))
+NOT_NEGATIVE = (0.0, float(np.finfo(np.float64).max))
+
 
 @dataclass(frozen=True, slots=True)
 class CodedWarning:
@@ -73,11 +77,17 @@ def range_fault(name: str, value: ArrayLike, lowest: float, highest: float) -> s
     offending = values[outside]
     overshoot = np.maximum(lowest - offending, offending - highest)
     worst = offending[np.argmax(np.where(np.isnan(overshoot), np.inf, overshoot))]
-    if np.isneginf(lowest):
-        allowed = f"at most {highest:.6g}"
-    elif np.isposinf(highest):
-        allowed = f"at least {lowest:.6g}"
-    else:
-        allowed = f"{lowest:.6g} to {highest:.6g}"
+    allowed = _range_text(lowest, highest)
     number = f" ({offending.size} of {values.size} values outside)" if values.size > 1 else ""
     return f"{name} is {worst:.6g}, allowed {allowed}{number}"
+
+
+def _range_text(lowest: float, highest: float) -> str:
+    above_zero = lowest == POSITIVE[0]
+    if highest >= POSITIVE[1]:
+        if lowest <= -POSITIVE[1]:
+            return "any finite number"
+        return "above 0" if above_zero else f"at least {lowest:.6g}"
+    if lowest <= -POSITIVE[1]:
+        return f"at most {highest:.6g}"
+    return f"above 0, at most {highest:.6g}" if above_zero else f"{lowest:.6g} to {highest:.6g}"

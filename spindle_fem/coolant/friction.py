@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from spindle_fem.coolant.properties import CoolantProperties
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.coolant.transition import TURBULENT_FROM_REYNOLDS, transition_weight
-from spindle_fem.validity import CodedWarning, range_fault, require_range
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, CodedWarning, range_fault, require_range
 
 _HOW_TO_FIX = "Let coolant.friction.channel_pressure_drop choose the correlation."
 _WHITE_DEAN_RANGE = (0.0, 2000.0)
@@ -154,7 +154,7 @@ def friction_factor_channel(
     re = np.asarray(reynolds, float)
     require_range(
         "friction_factor_channel",
-        reynolds=(re, np.finfo(float).tiny, np.inf),
+        reynolds=(re, *POSITIVE),
         how_to_fix="The coolant must flow.",
     )
 
@@ -207,12 +207,11 @@ def port_loss_coefficient(
     8.83
     """
     re = np.asarray(reynolds, float)
-    tiny = np.finfo(float).tiny
     require_range(
         "port_loss_coefficient",
-        reynolds=(re, tiny, np.inf),
-        diameter=(diameter, tiny, np.inf),
-        length_to_diameter=(length_to_diameter, 0.0, np.inf),
+        reynolds=(re, *POSITIVE),
+        diameter=(diameter, *POSITIVE),
+        length_to_diameter=(length_to_diameter, *NOT_NEGATIVE),
         how_to_fix="Give SI values; the coolant must flow.",
     )
     weight = np.clip((4000.0 - re) / (4000.0 - 2300.0), 0.0, 1.0)
@@ -288,7 +287,7 @@ def channel_pressure_drop(
     """
     require_range(
         "channel_pressure_drop",
-        volume_flow=(volume_flow, np.finfo(float).tiny, np.inf),
+        volume_flow=(volume_flow, *POSITIVE),
         how_to_fix="Set coolant.flow above 0.",
     )
     velocity = section.velocity(volume_flow)

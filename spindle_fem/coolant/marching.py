@@ -20,7 +20,7 @@ from spindle_fem.coolant.properties import Coolant
 from spindle_fem.coolant.regimes import ChannelState, FilmCoefficient, select_film
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, did_you_mean
-from spindle_fem.validity import require_range
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
 _ITERATIONS = 50
 _TEMPERATURE_TOLERANCE_K = 1.0e-10
@@ -133,16 +133,15 @@ def march_enthalpy(
         np.asarray(specific_heat_capacity, dtype=np.float64),
         np.asarray(pumping_heat, dtype=np.float64),
     )
-    tiny, largest = np.finfo(np.float64).tiny, np.finfo(np.float64).max
     require_range(
         "coolant march",
-        inlet_temperature=(inlet_temperature, tiny, largest),
-        mass_flow=(mass_flow, tiny, largest),
-        specific_heat_capacity=(capacity, tiny, largest),
-        wall_temperature=(wall, tiny, largest),
-        wetted_area=(area, 0.0, largest),
-        film_coefficient=(film, 0.0, largest),
-        pumping_heat=(pumping, -largest, largest),
+        inlet_temperature=(inlet_temperature, *POSITIVE),
+        mass_flow=(mass_flow, *POSITIVE),
+        specific_heat_capacity=(capacity, *POSITIVE),
+        wall_temperature=(wall, *POSITIVE),
+        wetted_area=(area, *NOT_NEGATIVE),
+        film_coefficient=(film, *NOT_NEGATIVE),
+        pumping_heat=(pumping, -POSITIVE[1], POSITIVE[1]),
         how_to_fix="Give SI values; without flow there is nothing to march.",
     )
     capacity_rate = mass_flow * capacity

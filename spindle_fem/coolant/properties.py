@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.errors import OutOfValidityError, did_you_mean
 from spindle_fem.units import ZERO_CELSIUS_K
-from spindle_fem.validity import CodedWarning, range_fault, require_range
+from spindle_fem.validity import POSITIVE, CodedWarning, range_fault, require_range
 
 # Rounding of °C to K and back must not put a temperature outside its range.
 _TEMPERATURE_ROUNDING_K = 1.0e-6
@@ -288,12 +288,11 @@ class UserCoolant(Coolant):
 
     def __post_init__(self) -> None:
         where = f"coolant {self.name}"
-        tiny = np.finfo(np.float64).tiny
         require_range(
             where,
             reference_temperature=(self.reference_temperature, 100.0, 1000.0),
             viscosity_temperature=(self.viscosity_temperatures, 100.0, 1000.0),
-            kinematic_viscosity=(self.kinematic_viscosities, tiny, np.inf),
+            kinematic_viscosity=(self.kinematic_viscosities, *POSITIVE),
             lowest_temperature=(self.lowest_temperature, 100.0, self.highest_temperature),
             how_to_fix="Give SI values: K, m²/s.",
         )
@@ -314,9 +313,9 @@ class UserCoolant(Coolant):
         ends = np.array([self.lowest_temperature, self.highest_temperature])
         require_range(
             where,
-            density=(self._density(ends), tiny, np.inf),
-            specific_heat_capacity=(self._specific_heat_capacity(ends), tiny, np.inf),
-            thermal_conductivity=(self._thermal_conductivity(ends), tiny, np.inf),
+            density=(self._density(ends), *POSITIVE),
+            specific_heat_capacity=(self._specific_heat_capacity(ends), *POSITIVE),
+            thermal_conductivity=(self._thermal_conductivity(ends), *POSITIVE),
             how_to_fix="Check the slopes: these are the values at the ends of the temperature range.",
         )
         if self.viscosity_law == "walther":

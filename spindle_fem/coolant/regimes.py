@@ -19,7 +19,7 @@ from spindle_fem.coolant.transition import (
     transition_weight,
 )
 from spindle_fem.errors import OutOfValidityError, did_you_mean
-from spindle_fem.validity import CodedWarning, range_fault, require_range
+from spindle_fem.validity import POSITIVE, CodedWarning, range_fault, require_range
 
 __all__ = [
     "FILM_MODELS",
@@ -231,7 +231,7 @@ def _unwrap(array: NDArray[Any]) -> Any:
 def _flow_groups(section: ChannelSection, state: ChannelState) -> _Flow:
     require_range(
         "select_film",
-        volume_flow=(state.volume_flow, np.finfo(float).tiny, np.finfo(float).max),
+        volume_flow=(state.volume_flow, *POSITIVE),
         how_to_fix="Set coolant.flow above 0, or use a machine without a channel.",
     )
     bulk = np.asarray(state.bulk_temperature, dtype=np.float64)

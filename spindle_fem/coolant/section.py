@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from spindle_fem.errors import OutOfValidityError
-from spindle_fem.validity import require_range
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +48,14 @@ class ChannelSection:
     starts: int = 1
 
     def __post_init__(self) -> None:
-        tiny = np.finfo(np.float64).tiny
         require_range(
             "channel section",
-            inner_radius=(self.inner_radius, tiny, np.finfo(np.float64).max),
-            depth=(self.depth, tiny, np.finfo(np.float64).max),
-            width=(self.width, tiny, np.finfo(np.float64).max),
-            pitch=(self.pitch, 0.0, np.finfo(np.float64).max),
-            turns=(self.turns, tiny, np.finfo(np.float64).max),
-            starts=(self.starts, 1, np.finfo(np.float64).max),
+            inner_radius=(self.inner_radius, *POSITIVE),
+            depth=(self.depth, *POSITIVE),
+            width=(self.width, *POSITIVE),
+            pitch=(self.pitch, *NOT_NEGATIVE),
+            turns=(self.turns, *POSITIVE),
+            starts=(self.starts, 1, POSITIVE[1]),
             how_to_fix="Lengths are in metres.",
         )
         if self.starts != int(self.starts):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.errors import OutOfValidityError, did_you_mean
 from spindle_fem.units import ZERO_CELSIUS_K
-from spindle_fem.validity import require_range
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 STANDARD_GRAVITY = 9.80665
@@ -124,7 +124,7 @@ def nusselt_churchill_chu_cylinder(rayleigh: ArrayLike, prandtl: ArrayLike) -> N
     require_range(
         "nusselt_churchill_chu_cylinder",
         rayleigh=(ra, 0.0, 1.0e12),
-        prandtl=(pr, np.finfo(float).tiny, np.inf),
+        prandtl=(pr, *POSITIVE),
         how_to_fix="Check temperatures and diameter.",
     )
     prandtl_term = (1.0 + (0.559 / pr) ** (9.0 / 16.0)) ** (8.0 / 27.0)
@@ -161,7 +161,7 @@ def nusselt_churchill_chu_plate(rayleigh: ArrayLike, prandtl: ArrayLike) -> NDAr
     require_range(
         "nusselt_churchill_chu_plate",
         rayleigh=(ra, 0.0, 1.0e12),
-        prandtl=(pr, np.finfo(float).tiny, np.inf),
+        prandtl=(pr, *POSITIVE),
         how_to_fix="Check temperatures and height.",
     )
     prandtl_term = (1.0 + (0.492 / pr) ** (9.0 / 16.0)) ** (8.0 / 27.0)
@@ -190,7 +190,7 @@ def rayleigh_number(
     >>> float(rayleigh_number(303.15, 293.15, 0.3).round(-4))
     25800000.0
     """
-    require_range("rayleigh_number", length=(length, np.finfo(float).tiny, np.inf), how_to_fix="Length in m.")
+    require_range("rayleigh_number", length=(length, *POSITIVE), how_to_fix="Length in m.")
     surface = np.asarray(surface_temperature, dtype=np.float64)
     ambient = np.asarray(ambient_temperature, dtype=np.float64)
     air = air_properties(0.5 * (surface + ambient))
@@ -307,8 +307,8 @@ def radiation_coefficient(
     )
     require_range(
         "radiation_coefficient",
-        surface_temperature=(surface, 0.0, np.finfo(float).max),
-        ambient_temperature=(ambient, 0.0, np.finfo(float).max),
+        surface_temperature=(surface, *NOT_NEGATIVE),
+        ambient_temperature=(ambient, *NOT_NEGATIVE),
         emissivity=(grey, 0.0, 1.0),
         how_to_fix="Temperatures in K.",
     )

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.validity import require_range
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
 _BECKER_KAYE_LIMIT = 1.0e7
 
@@ -39,13 +39,12 @@ def taylor_number(
     >>> float(taylor_number(314.159, 0.09, 0.001, 1.55e-5).round(0))
     37178.0
     """
-    tiny = np.finfo(float).tiny
     require_range(
         "taylor_number",
-        angular_speed=(angular_speed, -np.inf, np.inf),
-        inner_radius=(inner_radius, tiny, np.inf),
-        gap=(gap, tiny, np.inf),
-        kinematic_viscosity=(kinematic_viscosity, tiny, np.inf),
+        angular_speed=(angular_speed, -POSITIVE[1], POSITIVE[1]),
+        inner_radius=(inner_radius, *POSITIVE),
+        gap=(gap, *POSITIVE),
+        kinematic_viscosity=(kinematic_viscosity, *POSITIVE),
         how_to_fix="Give SI values, speed in rad/s.",
     )
     mean_radius = inner_radius + 0.5 * gap
@@ -165,11 +164,11 @@ def gap_coefficient_power_law(
     """
     require_range(
         "gap_coefficient_power_law",
-        angular_speed=(angular_speed, -np.inf, np.inf),
-        at_rest=(at_rest, 0.0, np.inf),
-        rise_at_reference=(rise_at_reference, 0.0, np.inf),
-        reference_speed=(reference_speed, np.finfo(float).tiny, np.inf),
-        exponent=(exponent, 0.0, np.inf),
+        angular_speed=(angular_speed, -POSITIVE[1], POSITIVE[1]),
+        at_rest=(at_rest, *NOT_NEGATIVE),
+        rise_at_reference=(rise_at_reference, *NOT_NEGATIVE),
+        reference_speed=(reference_speed, *POSITIVE),
+        exponent=(exponent, *NOT_NEGATIVE),
         how_to_fix="Give SI values, speed in rad/s.",
     )
     ratio = np.abs(np.asarray(angular_speed, float)) / reference_speed

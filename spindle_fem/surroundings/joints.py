@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.validity import require_range
-
-_POSITIVE = (float(np.finfo(np.float64).tiny), float(np.finfo(np.float64).max))
-_NOT_NEGATIVE = (0.0, float(np.finfo(np.float64).max))
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
 
 def harmonic_conductivity(conductivity_a: ArrayLike, conductivity_b: ArrayLike) -> NDArray[np.float64]:
@@ -35,8 +32,8 @@ def harmonic_conductivity(conductivity_a: ArrayLike, conductivity_b: ArrayLike) 
     a, b = np.broadcast_arrays(np.asarray(conductivity_a, float), np.asarray(conductivity_b, float))
     require_range(
         "harmonic_conductivity",
-        conductivity_a=(a, *_POSITIVE),
-        conductivity_b=(b, *_POSITIVE),
+        conductivity_a=(a, *POSITIVE),
+        conductivity_b=(b, *POSITIVE),
         how_to_fix="Give W/(m·K).",
     )
     return 2.0 * a * b / (a + b)
@@ -84,7 +81,7 @@ def joint_conductance_yovanovich(
     _require_surface("joint_conductance_yovanovich", conductivity, roughness, slope)
     require_range(
         "joint_conductance_yovanovich",
-        microhardness=(microhardness, *_POSITIVE),
+        microhardness=(microhardness, *POSITIVE),
         pressure_over_hardness=(p / microhardness, 0.0, 0.02),
         how_to_fix="Beyond this the asperities touch nearly everywhere: treat the joint as perfect.",
     )
@@ -134,7 +131,7 @@ def joint_conductance_mikic_elastic(
     _require_surface("joint_conductance_mikic_elastic", conductivity, roughness, slope)
     require_range(
         "joint_conductance_mikic_elastic",
-        contact_modulus=(contact_modulus, *_POSITIVE),
+        contact_modulus=(contact_modulus, *POSITIVE),
         relative_pressure=(np.sqrt(2.0) * p / (slope * contact_modulus), 0.0, 0.02),
         how_to_fix="Beyond this the asperities touch nearly everywhere: treat the joint as perfect.",
     )
@@ -145,9 +142,9 @@ def joint_conductance_mikic_elastic(
 def _require_surface(where: str, conductivity: float, roughness: float, slope: float) -> None:
     require_range(
         where,
-        conductivity=(conductivity, *_POSITIVE),
-        roughness=(roughness, *_POSITIVE),
-        slope=(slope, *_POSITIVE),
+        conductivity=(conductivity, *POSITIVE),
+        roughness=(roughness, *POSITIVE),
+        slope=(slope, *POSITIVE),
         how_to_fix="Give SI values: W/(m·K), m, and the slope as a tangent.",
     )
 
@@ -181,8 +178,8 @@ def mean_plane_separation(pressure: ArrayLike, roughness: float, microhardness: 
     p = np.asarray(pressure, float)
     require_range(
         "mean_plane_separation",
-        roughness=(roughness, *_POSITIVE),
-        microhardness=(microhardness, *_POSITIVE),
+        roughness=(roughness, *POSITIVE),
+        microhardness=(microhardness, *POSITIVE),
         pressure_over_hardness=(p / microhardness, 1.0e-5, 0.02),
         how_to_fix="Without pressure give the clearance as separation.",
     )
@@ -223,10 +220,10 @@ def gap_conductance(
     distance = np.asarray(separation, float)
     require_range(
         "gap_conductance",
-        separation=(distance, *_NOT_NEGATIVE),
-        gas_conductivity=(gas_conductivity, *_POSITIVE),
-        rarefaction_length=(rarefaction_length, *_NOT_NEGATIVE),
-        heat_path=(distance + rarefaction_length, *_POSITIVE),
+        separation=(distance, *NOT_NEGATIVE),
+        gas_conductivity=(gas_conductivity, *POSITIVE),
+        rarefaction_length=(rarefaction_length, *NOT_NEGATIVE),
+        heat_path=(distance + rarefaction_length, *POSITIVE),
         how_to_fix="Give metres.",
     )
     return gas_conductivity / (distance + rarefaction_length)
@@ -306,12 +303,12 @@ def interference_fit(
     require_range(
         "interference_fit",
         shaft_bore=(shaft_bore, 0.0, seat_diameter * (1.0 - 1.0e-9)),
-        seat_diameter=(seat_diameter, *_POSITIVE),
-        ring_outer_diameter=(ring_outer_diameter, seat_diameter * (1.0 + 1.0e-9), _POSITIVE[1]),
-        young_modulus=(young_modulus, *_POSITIVE),
-        density=(density, *_POSITIVE),
+        seat_diameter=(seat_diameter, *POSITIVE),
+        ring_outer_diameter=(ring_outer_diameter, seat_diameter * (1.0 + 1.0e-9), POSITIVE[1]),
+        young_modulus=(young_modulus, *POSITIVE),
+        density=(density, *POSITIVE),
         poisson_ratio=(poisson_ratio, 0.0, 0.5),
-        expansion_coefficient=(expansion_coefficient, *_NOT_NEGATIVE),
+        expansion_coefficient=(expansion_coefficient, *NOT_NEGATIVE),
         how_to_fix="Diameters must grow from bore to seat to outside; SI values.",
     )
     thermal = (

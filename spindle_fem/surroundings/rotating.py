@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.errors import OutOfValidityError, did_you_mean
-from spindle_fem.validity import CodedWarning, range_fault, require_range
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, CodedWarning, range_fault, require_range
 
 ROTATING_MODELS = ("becker", "dropkin_carmi", "mixed", "disc")
 
@@ -49,12 +49,11 @@ def rotational_reynolds(
     >>> float(rotational_reynolds(100.0, 0.1, 1.55e-5).round(0))
     32258.0
     """
-    tiny = np.finfo(float).tiny
     require_range(
         "rotational_reynolds",
-        diameter=(diameter, tiny, np.inf),
-        kinematic_viscosity=(kinematic_viscosity, tiny, np.inf),
-        angular_speed=(angular_speed, -np.inf, np.inf),
+        diameter=(diameter, *POSITIVE),
+        kinematic_viscosity=(kinematic_viscosity, *POSITIVE),
+        angular_speed=(angular_speed, -POSITIVE[1], POSITIVE[1]),
         how_to_fix="Give SI values, speed in rad/s.",
     )
     return np.abs(np.asarray(angular_speed, float)) * diameter**2 / (2.0 * kinematic_viscosity)
@@ -171,7 +170,7 @@ def nusselt_rotating_mixed(
         require_range(
             "nusselt_rotating_mixed",
             reynolds=(re, *RANGES["mixed"]),
-            grashof=(gr, 0.0, np.inf),
+            grashof=(gr, *NOT_NEGATIVE),
             how_to_fix=_HOW_TO_FIX,
         )
     return 0.11 * ((0.5 * re**2 + gr) * pr) ** 0.35
@@ -286,7 +285,7 @@ def rotating_film(
         raise OutOfValidityError(
             "rotating film", f'"{model}" is not known.', did_you_mean(model, ROTATING_MODELS)
         )
-    require_range("rotating film", minimum=(minimum, 0.0, np.inf), how_to_fix="Give it in W/(m²·K).")
+    require_range("rotating film", minimum=(minimum, *NOT_NEGATIVE), how_to_fix="Give it in W/(m²·K).")
     reynolds = rotational_reynolds(angular_speed, diameter, kinematic_viscosity)
     length = diameter
     if model == "becker":
