@@ -1,0 +1,144 @@
+"""What a model says beside what was read: errors by channel and condition, result files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from spindle_fem.errors import RecordingError
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.conditions import Conditions, operating_conditions
+from spindle_fem.units import ZERO_CELSIUS_K
+
+ALL = "all"
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorRow:
+    """Errors of one channel in one operating condition, predicted minus read.
+
+    Attributes
+    ----------
+    channel, condition : str
+    readings : int
+        Readings in use.
+    rmse, mean, largest : float, [K]
+        ``largest`` keeps its sign.
+    noise : float, [K]
+        White noise of the channel.
+    """
+
+    channel: str
+    condition: str
+    readings: int
+    rmse: float
+    mean: float
+    largest: float
+    noise: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data with units in the keys."""
+        return {
+            "channel": self.channel,
+            "condition": self.condition,
+            "readings": self.readings,
+            "rmse_K": self.rmse,
+            "mean_K": self.mean,
+            "max_K": self.largest,
+            "noise_K": self.noise,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Residuals of a prediction on a recording's grid.
+
+    Attributes
+    ----------
+    residual : (N, c) float64 ndarray, [K]
+        Predicted minus read; NaN where the reading is missing or flagged.
+    rows : tuple of ErrorRow
+        Condition "all" first for each channel; conditions without readings are left out.
+    conditions : Conditions
+    """
+
+    residual: NDArray[np.float64]
+    rows: tuple[ErrorRow, ...]
+    conditions: Conditions
+
+    def row(self, channel: str, condition: str = ALL) -> ErrorRow:
+        """One row of the table."""
+        return next(row for row in self.rows if (row.channel, row.condition) == (channel, condition))
+
+
+def compare(recording: Recording, predicted: NDArray[np.float64]) -> Comparison:
+    """Errors of a prediction by channel and operating condition.
+
+    Parameters
+    ----------
+    recording : Recording
+    predicted : (N, c) ndarray, [K]
+        At every stamp, for every temperature channel.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    RecordingError
+        The prediction has another shape, or is not finite.
+    """
+    if predicted.shape != recording.temperature.shape:
+        raise RecordingError(
+            recording.name,
+            f"prediction of shape {predicted.shape} for readings {recording.temperature.shape}.",
+        )
+    if not np.all(np.isfinite(predicted)):
+        raise RecordingError(recording.name, "the prediction is not finite.")
+    residual = np.where(recording.usable, predicted - recording.temperature, np.nan)
+    conditions = operating_conditions(recording)
+    rows: list[ErrorRow] = []
+    for column, channel in enumerate(recording.temperature_names):
+        everywhere = np.ones(recording.times.size, dtype=bool)
+        kinds = [(ALL, everywhere), *((name, conditions.of(name)) for name in conditions.names)]
+        for name, marks in kinds:
+            values = residual[marks, column]
+            values = values[np.isfinite(values)]
+            if values.size:
+                rows.append(
+                    ErrorRow(
+                        channel=channel,
+                        condition=name,
+                        readings=int(values.size),
+                        rmse=float(np.sqrt(np.mean(values**2))),
+                        mean=float(values.mean()),
+                        largest=float(values[np.abs(values).argmax()]),
+                        noise=float(recording.sigma[column]),
+                    )
+                )
+    return Comparison(residual, tuple(rows), conditions)
+
+
+def simulation_summary(comparison: Comparison) -> dict[str, Any]:
+    """Content of ``simulation.json``: errors by channel, and by channel and condition."""
+    overall = [row.to_json() for row in comparison.rows if row.condition == ALL]
+    return {
+        "schema": "spindle-fem/simulation/1",
+        "channels": [{key: value for key, value in row.items() if key != "condition"} for row in overall],
+        "conditions": [row.to_json() for row in comparison.rows if row.condition != ALL],
+    }
+
+
+def write_simulated(path: Path, recording: Recording, predicted: NDArray[np.float64]) -> None:
+    """Write ``simulated.csv``: ``time_s`` and one column in °C for each temperature channel."""
+    frame = pd.DataFrame(predicted - ZERO_CELSIUS_K, columns=list(recording.temperature_names))
+    times = recording.times
+    whole = bool(np.all(times == np.round(times)))
+    frame.insert(0, "time_s", times.astype(np.int64) if whole else np.round(times, 6))
+    frame.to_csv(path, index=False, float_format="%.6g" if not whole else "%.4f", lineterminator="\n")
