@@ -278,7 +278,7 @@ def march_channel(
     inlet_temperature : float, [K]
     wall_temperature : (..., n) array_like, [K]
         Area mean in each cell, from inlet to outlet; an axis before the last
-        one counts the starts.
+        one counts the starts. Without it the result is that of one start.
     wetted_area : (..., n) array_like, [m²]
         Of each cell.
     model : str
@@ -323,9 +323,15 @@ def march_channel(
     )
     at_inlet = coolant.properties(inlet_temperature)
     mass_flow = float(at_inlet.density) * volume_flow / section.starts
-    parallel = wall[..., 0].size
-    total_area = float(area.sum())
-    pumping = pumping_power * area / total_area * (section.starts / parallel) if pumping_power else 0.0
+    given = wall[..., 0].size
+    if given not in (1, section.starts):
+        raise OutOfValidityError(
+            "coolant march",
+            f"walls of {given} starts are given, the channel has {section.starts}.",
+            "Give every start, or one that stands for all.",
+        )
+    # Friction makes the same heat in every start.
+    pumping = pumping_power / section.starts * area / area.sum(axis=-1, keepdims=True)
 
     def film_at(bulk: ArrayLike) -> FilmCoefficient:
         state = ChannelState(coolant, volume_flow, bulk, wall if wall_correction else None)
