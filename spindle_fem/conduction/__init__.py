@@ -1,0 +1,1 @@
+"""Heat conduction: operators, problems, solvers, steps in time, evaluation."""

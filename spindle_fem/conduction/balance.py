@@ -1,0 +1,168 @@
+"""Heat that leaves and enters a solved problem, consistent with its equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.conduction.operators import spread
+from spindle_fem.conduction.problem import ConductionProblem, ThermalSystem, heat_flux
+from spindle_fem.errors import EnergyBalanceError
+
+BALANCE_TOLERANCE = 1e-8
+LINEAR_BALANCE_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, slots=True)
+class HeatBalance:
+    """Heat flows of a temperature field, [W].
+
+    Attributes
+    ----------
+    heat_in : mapping of str to float
+        Heat put into each surface, part and lumped node.
+    films : mapping of str to float
+        Heat that leaves through each film (negative where it enters).
+    links : mapping of str to float
+        Heat along each lumped link, from its node to the other end.
+    connections : mapping of str to float
+        ``"surface>node"``: heat from a surface into a lumped node.
+    joints : mapping of str to float
+        Heat from part a to part b of each joint.
+    stored : float
+        Rate of heat storage; 0 when steady.
+    imbalance : float, [W]
+        Heat in − heat out − stored.
+    imbalance_relative : float, [-]
+        Relative to the sum of absolute flows across the boundary.
+    """
+
+    heat_in: Mapping[str, float]
+    films: Mapping[str, float]
+    links: Mapping[str, float]
+    connections: Mapping[str, float]
+    joints: Mapping[str, float]
+    stored: float
+    imbalance: float
+    imbalance_relative: float
+
+    @property
+    def total_in(self) -> float:
+        """Sum of the heat put in, [W]."""
+        return float(sum(self.heat_in.values()))
+
+
+def compute_balance(
+    problem: ConductionProblem,
+    system: ThermalSystem,
+    rise: NDArray[np.float64],
+    lumped_rise: NDArray[np.float64],
+    stored: float = 0.0,
+) -> HeatBalance:
+    """Flows through every film, connection, link and joint.
+
+    Parameters
+    ----------
+    problem : ConductionProblem
+    system : ThermalSystem
+        Of the same problem, before perfect joints are tied.
+    rise, lumped_rise : (n,), (m,) ndarray, [K]
+        Temperatures above the system's reference.
+    stored : float, [W]
+        Rate of heat storage.
+    """
+    operators = problem.operators
+    reference = system.reference_temperature
+    heat_in = {
+        surface: float(heat_flux(operators, surface, heat) @ operators.facet_areas(surface))
+        for surface, heat in problem.surface_heat.items()
+    }
+    for part, heat in problem.part_heat.items():
+        heat_in[part] = heat_in.get(part, 0.0) + float(heat)
+    for node in problem.lumped_nodes:
+        if node.heat:
+            heat_in[node.name] = float(node.heat)
+    films = {}
+    for film in problem.films:
+        rows = operators.surface_rows[film.surface]
+        values = operators.per_facet(film.surface, film.coefficient, film.label)
+        ambient = operators.per_facet(film.surface, film.ambient_temperature, film.label) - reference
+        excess = operators.facet_integral(rise, rows) - ambient * operators.facet_area[rows]
+        films[film.label] = float(values @ excess)
+    connections = {}
+    for index, node in enumerate(problem.lumped_nodes):
+        for surface, value in node.connections:
+            rows = operators.surface_rows[surface]
+            values = operators.per_facet(surface, value, node.name)
+            excess = operators.facet_integral(rise, rows) - lumped_rise[index] * operators.facet_area[rows]
+            key = f"{surface}>{node.name}"
+            connections[key] = connections.get(key, 0.0) + float(values @ excess)
+    links, to_surroundings = {}, []
+    for link in problem.lumped_links:
+        here = lumped_rise[problem.lumped_names.index(link.node)]
+        if link.other is None:
+            there = link.temperature - reference
+            to_surroundings.append(link.conductance * (here - there))
+        else:
+            there = lumped_rise[problem.lumped_names.index(link.other)]
+        links[link.label] = links.get(link.label, 0.0) + float(link.conductance * (here - there))
+    imbalance = sum(heat_in.values()) - sum(films.values()) - sum(to_surroundings) - stored
+    turnover = sum(map(abs, (*heat_in.values(), *films.values(), *to_surroundings, stored))) / 2.0
+    return HeatBalance(
+        heat_in,
+        films,
+        links,
+        connections,
+        _joint_heat(problem, system, rise, lumped_rise),
+        stored,
+        float(imbalance),
+        abs(float(imbalance)) / turnover if turnover else 0.0,
+    )
+
+
+def require_balance(balance: HeatBalance, tolerance: float) -> None:
+    """Refuse a balance that does not close.
+
+    Raises
+    ------
+    EnergyBalanceError
+    """
+    if not balance.imbalance_relative <= tolerance:
+        raise EnergyBalanceError(
+            "heat balance",
+            f"in and out differ by {balance.imbalance:.3g} W ({balance.imbalance_relative:.2e} relative).",
+            f"Allowed: {tolerance:.0e}. Tighten the linear solver's tolerance.",
+        )
+
+
+def _joint_heat(
+    problem: ConductionProblem,
+    system: ThermalSystem,
+    rise: NDArray[np.float64],
+    lumped_rise: NDArray[np.float64],
+) -> dict[str, float]:
+    operators = problem.operators
+    perfect = [
+        joint for joint, value in problem.joint_conductance.items() if np.ndim(value) == 0 and np.isinf(value)
+    ]
+    reaction, sharing = np.zeros(0), np.zeros(0)
+    if perfect:
+        # what a tied node's own equation lacks arrives through its joints, in equal shares
+        reaction = system.matrix @ rise - system.exchange @ lumped_rise - system.load
+        sharing = np.zeros(operators.n_unknowns)
+        for joint in perfect:
+            sharing[np.unique(operators.facet_nodes[operators.joint_rows[joint][1]])] += 1.0
+    flows = {}
+    for joint, value in problem.joint_conductance.items():
+        side_a, side_b = operators.joint_rows[joint]
+        if joint in perfect:
+            nodes = np.unique(operators.facet_nodes[side_b])
+            flows[joint] = float(np.sum(reaction[nodes] / sharing[nodes]))
+        else:
+            conductance = spread(value, side_a.stop - side_a.start, joint)
+            jump = operators.facet_integral(rise, side_a) - operators.facet_integral(rise, side_b)
+            flows[joint] = float(conductance @ jump)
+    return flows

@@ -1,0 +1,533 @@
+"""What is asked of a mesh: coefficients, heat, films, lumped nodes; and its equations."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from spindle_fem.conduction.operators import ThermalOperators, spread
+from spindle_fem.errors import MeshTagError, NoSteadyStateError, SpecError, did_you_mean
+
+PERFECT_CONTACT = np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """Heat exchange of a surface with surroundings of given temperature.
+
+    Attributes
+    ----------
+    surface : str
+    coefficient : float or (n,) ndarray, [W/(m²·K)]
+        One value, or one for each facet.
+    ambient_temperature : float or (n,) ndarray, [K]
+        Absolute; one value, or one for each facet.
+    name : str
+        Name in the heat balance; the surface's when empty. Must be unique.
+    """
+
+    surface: str
+    coefficient: ArrayLike
+    ambient_temperature: ArrayLike
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name in the heat balance."""
+        return self.name or self.surface
+
+
+@dataclass(frozen=True, slots=True)
+class LumpedNode:
+    """A body or volume of one temperature, joined to surfaces by films.
+
+    Used for ball rows (between two raceways) and for the air of a gap (z-bands
+    between a rotating and a stationary surface; the band's one temperature is
+    the mean that a rotating part sees in one turn).
+
+    Attributes
+    ----------
+    name : str
+    connections : tuple of (surface, coefficient)
+        Coefficient in W/(m²·K), one value or one for each facet (zero outside
+        a band).
+    capacity : float, [J/K]
+    heat : float, [W]
+    """
+
+    name: str
+    connections: tuple[tuple[str, ArrayLike], ...]
+    capacity: float = 0.0
+    heat: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LumpedLink:
+    """Conductance between two lumped nodes, or from one to a given temperature.
+
+    Attributes
+    ----------
+    node : str
+    conductance : float, [W/K]
+    other : str or None
+        The other lumped node; None when ``temperature`` is given.
+    temperature : float or None, [K]
+    """
+
+    node: str
+    conductance: float
+    other: str | None = None
+    temperature: float | None = None
+
+    @property
+    def label(self) -> str:
+        """Name in the heat balance."""
+        return f"{self.node}|{self.other if self.other is not None else 'surroundings'}"
+
+
+@dataclass(frozen=True, slots=True)
+class ConductionProblem:
+    """Coefficients and loads on a mesh's operators.
+
+    Attributes
+    ----------
+    operators : ThermalOperators
+    conductivity : mapping of str to float, [W/(m·K)]
+        Of each part.
+    films : tuple of Film
+        Several may act on one surface.
+    joint_conductance : mapping of str to float or (n,) ndarray, [W/(m²·K)]
+        Of each joint, one value or one for each facet pair. 0 separates,
+        ``inf`` ties the nodes of both sides exactly.
+    surface_heat : mapping of str to float or (n,) ndarray, [W]
+        Total, spread evenly over the surface's area; or one for each facet.
+    part_heat : mapping of str to float, [W]
+        Total, spread evenly over the part's volume.
+    lumped_nodes : tuple of LumpedNode
+    lumped_links : tuple of LumpedLink
+    volumetric_capacity : mapping of str to float, [J/(m³·K)]
+        Needed for transients only.
+    circumferential_factor : mapping of str to float, [-]
+        Conductivity around the axis relative to the other directions; 1 when
+        absent. Only for parts that the operators were built with.
+    adiabatic : collection of str, or "rest"
+        Surfaces that exchange nothing: each surface must be named in a film,
+        a heat, a connection or here.
+    """
+
+    operators: ThermalOperators
+    conductivity: Mapping[str, float]
+    films: tuple[Film, ...] = ()
+    joint_conductance: Mapping[str, ArrayLike] = field(default_factory=dict)
+    surface_heat: Mapping[str, ArrayLike] = field(default_factory=dict)
+    part_heat: Mapping[str, float] = field(default_factory=dict)
+    lumped_nodes: tuple[LumpedNode, ...] = ()
+    lumped_links: tuple[LumpedLink, ...] = ()
+    volumetric_capacity: Mapping[str, float] = field(default_factory=dict)
+    circumferential_factor: Mapping[str, float] = field(default_factory=dict)
+    adiabatic: Collection[str] | Literal["rest"] = ()
+
+    def __post_init__(self) -> None:
+        require_sound(self)
+
+    @property
+    def lumped_names(self) -> tuple[str, ...]:
+        """Names of the lumped nodes, in the order of their unknowns."""
+        return tuple(node.name for node in self.lumped_nodes)
+
+
+@dataclass(frozen=True, slots=True)
+class ThermalSystem:
+    """Equations ``[K −B; −Bᵀ D] [T; T_l] = [f; f_l]`` of a problem.
+
+    Temperatures count from ``reference_temperature``, so that round-off is
+    relative to the rise and not to absolute zero.
+
+    Attributes
+    ----------
+    matrix : (n, n) csr_array, [W/K]
+    load : (n,) ndarray, [W]
+    exchange : (n, m) csc_array, [W/K]
+        Coupling of unknowns with lumped nodes.
+    lumped_matrix : (m, m) ndarray, [W/K]
+    lumped_load : (m,) ndarray, [W]
+    reference_temperature : float, [K]
+    heat_in : float, [W]
+        Heat put in by surfaces, parts and lumped nodes.
+    tie : (n, n_tied) csr_array or None
+        Unknowns from those left when perfect joints tie node pairs.
+    """
+
+    matrix: sparse.csr_array
+    load: NDArray[np.float64]
+    exchange: sparse.csc_array
+    lumped_matrix: NDArray[np.float64]
+    lumped_load: NDArray[np.float64]
+    reference_temperature: float
+    heat_in: float
+    tie: sparse.csr_array | None
+
+    @property
+    def n_lumped(self) -> int:
+        """Number of lumped nodes."""
+        return len(self.lumped_load)
+
+    def full_matrix(self) -> sparse.csr_array:
+        """``[K −B; −Bᵀ D]`` as one sparse matrix."""
+        if not self.n_lumped:
+            return self.matrix
+        return sparse.block_array(
+            [[self.matrix, -self.exchange], [-self.exchange.T, sparse.csr_array(self.lumped_matrix)]],
+            format="csr",
+        )
+
+    def full_load(self) -> NDArray[np.float64]:
+        """``[f; f_l]``."""
+        return np.concatenate((self.load, self.lumped_load))
+
+    def tied(self) -> ThermalSystem:
+        """The same equations with perfect joints eliminated."""
+        if self.tie is None:
+            return self
+        tie = self.tie
+        return ThermalSystem(
+            (tie.T @ self.matrix @ tie).tocsr(),
+            tie.T @ self.load,
+            (tie.T @ self.exchange).tocsc(),
+            self.lumped_matrix,
+            self.lumped_load,
+            self.reference_temperature,
+            self.heat_in,
+            None,
+        )
+
+
+def assemble_system(problem: ConductionProblem) -> ThermalSystem:
+    """Equations of a problem; the unit integrals are only re-summed.
+
+    Parameters
+    ----------
+    problem : ConductionProblem
+
+    Returns
+    -------
+    ThermalSystem
+    """
+    operators = problem.operators
+    reference = reference_temperature(problem)
+    upper = operators.sum_conduction(conductivity_of_parts(problem), _factors(problem))
+    coefficient = np.zeros(len(operators.facet_area))
+    flux = np.zeros(len(operators.facet_area))
+    heat_in = 0.0
+    for film in problem.films:
+        rows = operators.surface_rows[film.surface]
+        values = operators.per_facet(film.surface, film.coefficient, film.label)
+        ambient = operators.per_facet(film.surface, film.ambient_temperature, film.label)
+        coefficient[rows] += values
+        flux[rows] += values * (ambient - reference)
+    for surface, heat in problem.surface_heat.items():
+        rows = operators.surface_rows[surface]
+        density = heat_flux(operators, surface, heat)
+        flux[rows] += density
+        heat_in += float(density @ operators.facet_area[rows])
+    columns, diagonal = [], []
+    for node in problem.lumped_nodes:
+        column = np.zeros(operators.n_unknowns)
+        total = 0.0
+        for surface, value in node.connections:
+            rows = operators.surface_rows[surface]
+            values = operators.per_facet(surface, value, node.name)
+            coefficient[rows] += values
+            column += operators.facet_vector(values, rows)
+            total += float(values @ operators.facet_area[rows])
+        columns.append(sparse.csc_array(column[:, None]))
+        diagonal.append(total)
+    ties = []
+    for joint, value in problem.joint_conductance.items():
+        side_a, side_b = operators.joint_rows[joint]
+        if np.ndim(value) == 0 and np.isinf(value):
+            ties.append(joint)
+            continue
+        conductance = spread(value, side_a.stop - side_a.start, joint)
+        coefficient[side_a] += conductance
+        coefficient[side_b] += conductance
+        operators.add_joint(upper, joint, conductance)
+    operators.add_films(upper, coefficient)
+    load = operators.facet_vector(flux, slice(0, len(flux)))
+    for part, heat in problem.part_heat.items():
+        own = operators.part_of_unknown == operators.part_index(part, "part_heat")
+        load[own] += heat / operators.part_volume[part] * operators.part_load[own]
+        heat_in += heat
+    lumped_matrix, lumped_load = _lumped_equations(problem, np.array(diagonal), reference)
+    exchange = (
+        sparse.hstack(columns, format="csc")
+        if columns
+        else sparse.csc_array((operators.n_unknowns, 0), dtype=float)
+    )
+    heat_in += float(sum(node.heat for node in problem.lumped_nodes))
+    return ThermalSystem(
+        operators.matrix(upper),
+        load,
+        exchange,
+        lumped_matrix,
+        lumped_load,
+        reference,
+        heat_in,
+        _tie_matrix(operators, ties),
+    )
+
+
+def assemble_capacity(problem: ConductionProblem) -> tuple[sparse.csr_array, NDArray[np.float64]]:
+    """Capacity matrix (n, n) and capacities of the lumped nodes (m,), [J/K].
+
+    Raises
+    ------
+    SpecError
+        A part without volumetric capacity.
+    """
+    operators = problem.operators
+    missing = [part for part in operators.mesh.part_names if part not in problem.volumetric_capacity]
+    if missing:
+        raise SpecError("volumetric_capacity", f"no value for {', '.join(missing)}.", "Name every part.")
+    capacity = np.array([problem.volumetric_capacity[part] for part in operators.mesh.part_names])
+    matrix = operators.matrix(operators.sum_storage(capacity))
+    return matrix, np.array([node.capacity for node in problem.lumped_nodes])
+
+
+def conductivity_of_parts(problem: ConductionProblem) -> NDArray[np.float64]:
+    """Conductivity of each part in the mesh's order, (n_parts,) [W/(m·K)]."""
+    return np.array([problem.conductivity[part] for part in problem.operators.mesh.part_names], dtype=float)
+
+
+def heat_flux(operators: ThermalOperators, surface: str, heat: ArrayLike) -> NDArray[np.float64]:
+    """Heat flux into a surface, (n_facets,) [W/m²], of a total or per-facet heat in W."""
+    areas = operators.facet_areas(surface)
+    if np.ndim(heat) == 0:
+        return np.full(len(areas), float(heat) / areas.sum())
+    return operators.per_facet(surface, heat, f"heat on {surface}") / areas
+
+
+def reference_temperature(problem: ConductionProblem) -> float:
+    """Mean temperature of the surroundings that the problem names, [K]."""
+    given = [float(np.mean(film.ambient_temperature)) for film in problem.films]
+    given += [link.temperature for link in problem.lumped_links if link.temperature is not None]
+    return float(np.mean(given)) if given else 0.0
+
+
+def _factors(problem: ConductionProblem) -> NDArray[np.float64] | None:
+    if not problem.circumferential_factor:
+        return None
+    return np.array(
+        [problem.circumferential_factor.get(part, 1.0) for part in problem.operators.mesh.part_names],
+        dtype=float,
+    )
+
+
+def _lumped_equations(
+    problem: ConductionProblem, diagonal: NDArray[np.float64], reference: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    names = problem.lumped_names
+    matrix = np.diag(diagonal) if len(diagonal) else np.zeros((0, 0))
+    load = np.array([node.heat for node in problem.lumped_nodes], dtype=float)
+    for link in problem.lumped_links:
+        i = names.index(link.node)
+        matrix[i, i] += link.conductance
+        if link.other is None:
+            load[i] += link.conductance * (link.temperature - reference)
+        else:
+            j = names.index(link.other)
+            matrix[j, j] += link.conductance
+            matrix[i, j] -= link.conductance
+            matrix[j, i] -= link.conductance
+    return matrix, load
+
+
+def _tie_matrix(operators: ThermalOperators, joints: list[str]) -> sparse.csr_array | None:
+    if not joints:
+        return None
+    sides = [operators.joint_rows[joint] for joint in joints]
+    nodes_a = np.concatenate([operators.facet_nodes[a].ravel() for a, _ in sides])
+    nodes_b = np.concatenate([operators.facet_nodes[b].ravel() for _, b in sides])
+    n = operators.n_unknowns
+    graph = sparse.coo_array((np.ones(len(nodes_a)), (nodes_a, nodes_b)), shape=(n, n))
+    count, label = connected_components(graph, directed=False)
+    return sparse.csr_array((np.ones(n), (np.arange(n), label)), shape=(n, count))
+
+
+# ------------------------------------------------------------------ validation
+def require_sound(problem: ConductionProblem) -> None:
+    """Refuse unknown names, missing parts, impossible values.
+
+    Raises
+    ------
+    UnknownSurfaceError, SpecError, MeshTagError
+    """
+    operators = problem.operators
+    for part in (*problem.conductivity, *problem.part_heat, *problem.volumetric_capacity):
+        operators.part_index(part, "problem")
+    for part in operators.mesh.part_names:
+        if part not in problem.conductivity:
+            raise SpecError("conductivity", f'no value for part "{part}".', "Name every part.")
+        _require(
+            problem.conductivity[part] > 0.0,
+            f'conductivity of "{part}"',
+            problem.conductivity[part],
+            "above 0",
+        )
+    for part, capacity in problem.volumetric_capacity.items():
+        _require(capacity > 0.0, f'volumetric capacity of "{part}"', capacity, "above 0")
+    for part, factor in problem.circumferential_factor.items():
+        operators.part_index(part, "circumferential_factor")
+        _require(factor > 0.0, f'circumferential factor of "{part}"', factor, "above 0")
+        if factor != 1.0 and part not in operators.circumferential_parts:
+            raise SpecError(
+                "circumferential_factor",
+                f'part "{part}" has no circumferential conduction in these operators.',
+                "Name it in build_operators(circumferential_parts=...).",
+            )
+    _require_films(problem)
+    _require_joints(problem)
+    _require_lumped(problem)
+    _require_every_surface_named(problem)
+
+
+def _require(holds: bool, where: str, value: object, allowed: str) -> None:
+    if not holds:
+        raise SpecError(where, f"{value!r}.", f"Allowed: {allowed}.")
+
+
+def _require_films(problem: ConductionProblem) -> None:
+    operators = problem.operators
+    labels = set()
+    for film in problem.films:
+        values = operators.per_facet(film.surface, film.coefficient, f"film {film.label}")
+        ambient = operators.per_facet(film.surface, film.ambient_temperature, f"film {film.label}")
+        _require(bool(np.all(values >= 0.0)), f"film {film.label}: coefficient", values.min(), "0 or more")
+        _require(
+            bool(np.all(ambient >= 0.0)),
+            f"film {film.label}: ambient temperature",
+            ambient.min(),
+            "kelvin, 0 or more",
+        )
+        _require(film.label not in labels, "films", film.label, "each name once; give the second film a name")
+        labels.add(film.label)
+    for surface, heat in problem.surface_heat.items():
+        operators.per_facet(surface, heat, f"heat on {surface}")
+    for part, heat in problem.part_heat.items():
+        _require(bool(np.isfinite(heat)), f"heat of {part}", heat, "finite")
+
+
+def _require_joints(problem: ConductionProblem) -> None:
+    operators = problem.operators
+    for joint, value in problem.joint_conductance.items():
+        side_a, _ = operators.joint_sides(joint, "joint_conductance")
+        if np.ndim(value) == 0 and value == PERFECT_CONTACT:
+            continue
+        values = spread(value, side_a.stop - side_a.start, f"joint {joint}")
+        _require(bool(np.all(values >= 0.0)), f"conductance of joint {joint}", values.min(), "0 or more")
+    missing = [joint for joint in operators.joint_rows if joint not in problem.joint_conductance]
+    if missing:
+        raise SpecError(
+            "joint_conductance", f"no value for {', '.join(missing)}.", "Name every joint; 0 separates."
+        )
+
+
+def _require_lumped(problem: ConductionProblem) -> None:
+    names = problem.lumped_names
+    _require(len(set(names)) == len(names), "lumped nodes", names, "each name once")
+    for node in problem.lumped_nodes:
+        for surface, value in node.connections:
+            values = problem.operators.per_facet(surface, value, f"lumped node {node.name}")
+            _require(
+                bool(np.all(values >= 0.0)),
+                f"lumped node {node.name}: coefficient",
+                values.min(),
+                "0 or more",
+            )
+        _require(node.capacity >= 0.0, f"lumped node {node.name}: capacity", node.capacity, "0 or more")
+    for link in problem.lumped_links:
+        for name in (link.node, *([link.other] if link.other is not None else [])):
+            if name not in names:
+                raise SpecError("lumped_links", f'names "{name}", no lumped node.', did_you_mean(name, names))
+        _require(link.conductance >= 0.0, f"link {link.label}: conductance", link.conductance, "0 or more")
+        _require(
+            (link.other is None) != (link.temperature is None),
+            f"link of {link.node}",
+            (link.other, link.temperature),
+            "another node or a temperature, one of both",
+        )
+
+
+def _require_every_surface_named(problem: ConductionProblem) -> None:
+    surfaces = problem.operators.surface_rows
+    used = {film.surface for film in problem.films} | set(problem.surface_heat)
+    used |= {surface for node in problem.lumped_nodes for surface, _ in node.connections}
+    if problem.adiabatic == "rest":
+        return
+    for surface in problem.adiabatic:
+        problem.operators.rows_of(surface, "adiabatic")
+    both = sorted({film.surface for film in problem.films} & set(problem.adiabatic))
+    if both:
+        raise MeshTagError("adiabatic", f"{', '.join(both)} also has a film.", "Name it in one of both.")
+    left = sorted(set(surfaces) - used - set(problem.adiabatic))
+    if left:
+        raise MeshTagError(
+            "problem",
+            f"nothing is said about {', '.join(left)}.",
+            "Give a film or heat, or name it in adiabatic.",
+        )
+
+
+def require_surroundings(problem: ConductionProblem) -> None:
+    """Refuse a steady problem with a part that heat cannot leave.
+
+    Raises
+    ------
+    NoSteadyStateError
+        Names the parts and lumped nodes without a path to the surroundings.
+    """
+    operators = problem.operators
+    parts = operators.mesh.part_names
+    names = (*parts, *problem.lumped_names, "surroundings")
+    ends: list[tuple[int, int]] = []
+    part_of = operators.mesh.part_of_surface
+    for film in problem.films:
+        if np.any(np.asarray(film.coefficient) > 0.0):
+            ends.append((parts.index(part_of[film.surface]), len(names) - 1))
+    for joint, value in problem.joint_conductance.items():
+        if np.any(np.asarray(value) > 0.0):
+            side_a, side_b = operators.joint_rows[joint]
+            ends.append(
+                tuple(
+                    int(operators.part_of_unknown[operators.facet_nodes[side][0, 0]])
+                    for side in (side_a, side_b)
+                )
+            )
+    for index, node in enumerate(problem.lumped_nodes):
+        ends += [
+            (parts.index(part_of[surface]), len(parts) + index)
+            for surface, value in node.connections
+            if np.any(np.asarray(value) > 0.0)
+        ]
+    for link in problem.lumped_links:
+        if link.conductance > 0.0:
+            other = (
+                len(names) - 1 if link.other is None else len(parts) + problem.lumped_names.index(link.other)
+            )
+            ends.append((len(parts) + problem.lumped_names.index(link.node), other))
+    rows, columns = np.array(ends, dtype=int).reshape(-1, 2).T
+    graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(names), len(names)))
+    _, label = connected_components(graph, directed=False)
+    floating = [name for name, group in zip(names, label, strict=True) if group != label[-1]]
+    if floating:
+        raise NoSteadyStateError(
+            "problem",
+            f"heat cannot leave {', '.join(floating)}.",
+            "Give it a film, or a joint to a part with one.",
+        )

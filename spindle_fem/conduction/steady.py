@@ -1,0 +1,156 @@
+"""Steady temperature of a conduction problem, with its heat balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.conduction.balance import (
+    LINEAR_BALANCE_TOLERANCE,
+    HeatBalance,
+    compute_balance,
+    require_balance,
+)
+from spindle_fem.conduction.linear_solvers import (
+    RELATIVE_TOLERANCE,
+    Method,
+    Preconditioner,
+    build_preconditioner,
+    solve_linear,
+)
+from spindle_fem.conduction.problem import (
+    ConductionProblem,
+    ThermalSystem,
+    assemble_system,
+    require_surroundings,
+)
+from spindle_fem.errors import SpecError
+
+
+@dataclass(frozen=True, slots=True)
+class ConductionSolution:
+    """Temperatures that satisfy a problem, and how well.
+
+    Attributes
+    ----------
+    problem : ConductionProblem
+        With the coefficients that were used.
+    temperature : (n_unknowns,) ndarray, [K]
+    lumped_temperature : (m,) ndarray, [K]
+        In the order of ``problem.lumped_names``.
+    balance : HeatBalance
+    iterations : int
+        Of the linear solver, summed over nonlinear iterations.
+    residual : float, [-]
+    preconditioner : Preconditioner
+        To pass on to the next similar problem.
+    nonlinear_iterations : int
+        0 for a linear problem.
+    """
+
+    problem: ConductionProblem
+    temperature: NDArray[np.float64]
+    lumped_temperature: NDArray[np.float64]
+    balance: HeatBalance
+    iterations: int
+    residual: float
+    preconditioner: Preconditioner
+    nonlinear_iterations: int = 0
+
+    def lumped(self, name: str) -> float:
+        """Temperature of one lumped node, [K]."""
+        if name not in self.problem.lumped_names:
+            raise SpecError("lumped node", f'"{name}" is none.', f"Allowed: {self.problem.lumped_names}.")
+        return float(self.lumped_temperature[self.problem.lumped_names.index(name)])
+
+
+def solve_steady(
+    problem: ConductionProblem,
+    guess: ConductionSolution | None = None,
+    preconditioner: Preconditioner | None = None,
+    *,
+    method: Method | None = None,
+    relative_tolerance: float = RELATIVE_TOLERANCE,
+    balance_tolerance: float = LINEAR_BALANCE_TOLERANCE,
+) -> ConductionSolution:
+    """Solve a linear steady problem.
+
+    Parameters
+    ----------
+    problem : ConductionProblem
+    guess : ConductionSolution, optional
+        Of a similar problem on the same mesh.
+    preconditioner : Preconditioner, optional
+        Of a similar problem on the same mesh; built when absent.
+    method : {"direct", "multigrid"}, optional
+        When a preconditioner is built; by size when absent.
+    relative_tolerance : float, [-]
+        Of the linear residual.
+    balance_tolerance : float, [-]
+        Largest relative difference of heat in and out.
+
+    Raises
+    ------
+    NoSteadyStateError
+        Heat cannot leave some part.
+    ConvergenceError, EnergyBalanceError
+    """
+    require_surroundings(problem)
+    system = assemble_system(problem)
+    tied = system.tied()
+    if preconditioner is None:
+        preconditioner = build_preconditioner(tied, method)
+    start = None if guess is None else _start_values(system, guess)
+    matrix, load = tied.full_matrix(), tied.full_load()
+    solution = solve_linear(matrix, load, preconditioner, start, relative_tolerance=relative_tolerance)
+    unknowns = close_balance(matrix, load, solution.unknowns)
+    rise, lumped_rise = split_unknowns(system, unknowns)
+    balance = compute_balance(problem, system, rise, lumped_rise)
+    require_balance(balance, balance_tolerance)
+    return ConductionSolution(
+        problem,
+        _frozen(rise + system.reference_temperature),
+        _frozen(lumped_rise + system.reference_temperature),
+        balance,
+        solution.iterations,
+        solution.residual,
+        preconditioner,
+    )
+
+
+def close_balance(
+    matrix: object, load: NDArray[np.float64], unknowns: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Galerkin correction by a constant: what is left of the residual sums to zero.
+
+    The sum of all equations is the heat balance, so one uniform shift (far
+    below the solver's tolerance) closes it to round-off.
+    """
+    ones = np.ones_like(load)
+    image = matrix @ ones
+    return unknowns + float(np.sum(load - matrix @ unknowns)) / float(ones @ image)
+
+
+def split_unknowns(
+    system: ThermalSystem, unknowns: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rises of the mesh's unknowns and of the lumped nodes, ties undone."""
+    n = len(unknowns) - system.n_lumped
+    rise = unknowns[:n] if system.tie is None else system.tie @ unknowns[:n]
+    return rise, unknowns[n:]
+
+
+def _start_values(system: ThermalSystem, guess: ConductionSolution) -> NDArray[np.float64]:
+    if len(guess.temperature) != len(system.load) or len(guess.lumped_temperature) != system.n_lumped:
+        raise SpecError("guess", "it belongs to another mesh or other lumped nodes.")
+    rise = guess.temperature - system.reference_temperature
+    if system.tie is not None:
+        rise = (system.tie.T @ rise) / system.tie.sum(axis=0)
+    return np.concatenate((rise, guess.lumped_temperature - system.reference_temperature))
+
+
+def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    array.setflags(write=False)
+    return array
