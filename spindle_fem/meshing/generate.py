@@ -12,7 +12,7 @@ from spindle_fem.errors import MeshQualityError
 from spindle_fem.geometry.assembly import AssemblyGeometry
 from spindle_fem.geometry.solids import SolidModel, build_solids, gmsh_session
 from spindle_fem.meshing.classify import EXACT, FaceClass, classify_face
-from spindle_fem.meshing.sizes import MeshSizes
+from spindle_fem.meshing.sizes import MeshSizes, edge_sizes
 
 LOGGER = logging.getLogger(__name__)
 
@@ -151,11 +151,8 @@ def _set_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
     """Sizes at the corners of the model; gmsh carries them inwards."""
     import gmsh
 
-    strip = sizes.smallest_strip_edges
     wanted: dict[tuple[int, int], float] = {}
-    for edge in assembly.edges:
-        length = (edge.z[1] - edge.z[0]) + (edge.r[1] - edge.r[0])
-        size = min(min(sizes.part[part] for part in edge.parts), strip * length)
+    for edge, size in zip(assembly.edges, edge_sizes(assembly, sizes), strict=True):
         for z, r in ((edge.z[0], edge.r[0]), (edge.z[1], edge.r[1])):
             key = round(z * 1e6), round(r * 1e6)
             wanted[key] = min(wanted.get(key, size), size)
@@ -169,6 +166,44 @@ def _set_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
             if u > 0.99 * port.start_radius and np.hypot(v, z - port.z) < 1.05 * port.radius:
                 size = min(size, 2.0 * np.pi * port.radius / sizes.port_segments)
         gmsh.model.mesh.setSize([(0, tag)], size)
+    _grade_around_ports(assembly, sizes)
+
+
+def _grade_around_ports(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
+    """Let sizes grow steadily away from the drillings."""
+    import gmsh
+
+    if assembly.channel is None or not assembly.channel.ports:
+        return
+    bulk = max(sizes.part.values())
+    fields = []
+    for port in assembly.channel.ports:
+        fine = 2.0 * np.pi * port.radius / sizes.port_segments
+        reach = port.radius + (bulk - fine) / sizes.port_growth
+        x, y = port.direction
+        tag = gmsh.model.mesh.field.add("Frustum")
+        values = {
+            "X1": x * (port.start_radius - port.radius),
+            "Y1": y * (port.start_radius - port.radius),
+            "Z1": port.z,
+            "X2": x * port.end_radius,
+            "Y2": y * port.end_radius,
+            "Z2": port.z,
+            "InnerR1": port.radius,
+            "InnerR2": port.radius,
+            "OuterR1": reach,
+            "OuterR2": reach,
+            "InnerV1": fine,
+            "InnerV2": fine,
+            "OuterV1": bulk,
+            "OuterV2": bulk,
+        }
+        for name, value in values.items():
+            gmsh.model.mesh.field.setNumber(tag, name, value)
+        fields.append(tag)
+    smallest = gmsh.model.mesh.field.add("Min")
+    gmsh.model.mesh.field.setNumbers(smallest, "FieldsList", fields)
+    gmsh.model.mesh.field.setAsBackgroundMesh(smallest)
 
 
 def _read(assembly: AssemblyGeometry, solids: SolidModel) -> LinearMesh:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
 from spindle_fem.errors import BadInputError, did_you_mean
 from spindle_fem.geometry.assembly import AssemblyGeometry, PartGeometry
+from spindle_fem.geometry.meridian import MeridianEdge
 
 Preset = Literal["coarse", "normal", "fine"]
 
@@ -27,6 +29,10 @@ class MeshSizes:
         On the four walls.
     port_segments : int
         Edges around a port.
+    port_growth : float
+        Increase of size per distance from a port.
+    circle_segments : int
+        Least number of edges around any circle about the axis.
     smallest_strip_edges : float
         How many times longer than its width the edges of a narrow face may be.
     """
@@ -34,7 +40,9 @@ class MeshSizes:
     part: Mapping[str, float]
     channel: float
     port_segments: int = 18
-    smallest_strip_edges: float = 2.5
+    port_growth: float = 0.4
+    circle_segments: int = 16
+    smallest_strip_edges: float = 3.0
 
     def key(self) -> dict[str, object]:
         """Plain values for the hash of a mesh."""
@@ -43,15 +51,18 @@ class MeshSizes:
             "channel": float(self.channel),
             "port_segments": self.port_segments,
             "smallest_strip_edges": self.smallest_strip_edges,
+            "port_growth": self.port_growth,
+            "circle_segments": self.circle_segments,
         }
 
     def scaled(self, factor: float) -> MeshSizes:
         """All lengths times ``factor``; half the length is eight times the elements."""
-        return MeshSizes(
-            MappingProxyType({name: factor * size for name, size in self.part.items()}),
-            factor * self.channel,
-            max(8, round(self.port_segments / min(factor, 1.0))),
-            self.smallest_strip_edges,
+        return replace(
+            self,
+            part=MappingProxyType({name: factor * size for name, size in self.part.items()}),
+            channel=factor * self.channel,
+            port_segments=max(self.port_segments, round(self.port_segments / factor)),
+            circle_segments=max(self.circle_segments, round(self.circle_segments / factor)),
         )
 
 
@@ -62,16 +73,19 @@ class _Preset:
     bulk: float
     wall_fraction: float
     channel_fraction: float
-    smallest: float = field(default=1.0e-3)
+    port_segments: int
+    circle_segments: int
+    smallest_strip_edges: float
+    smallest: float = 1.0e-3
 
 
 # Edge length = wall_fraction * thickest wall of the part, at most bulk; at the
 # channel channel_fraction * the shorter side of its section, at most half bulk.
 _PRESETS: Mapping[str, _Preset] = MappingProxyType(
     {
-        "coarse": _Preset(bulk=0.032, wall_fraction=1.5, channel_fraction=1.3),
-        "normal": _Preset(bulk=0.022, wall_fraction=1.0, channel_fraction=0.8),
-        "fine": _Preset(bulk=0.009, wall_fraction=0.42, channel_fraction=0.36),
+        "coarse": _Preset(0.050, 2.0, 1.8, 14, 12, 5.0),
+        "normal": _Preset(0.020, 1.0, 0.75, 18, 16, 3.0),
+        "fine": _Preset(0.010, 0.5, 0.38, 24, 24, 2.0),
     }
 )
 
@@ -106,7 +120,7 @@ def build_sizes(
     >>> from spindle_fem.geometry.assembly import AnnularSegment, PartGeometry, assemble
     >>> ring = PartGeometry("ring", (AnnularSegment(0.0, 0.02, 0.05, 0.06),))
     >>> build_sizes(assemble([ring]), "normal").part["ring"]
-    0.0075
+    0.01
     """
     if preset not in _PRESETS:
         raise BadInputError("mesh.preset", f'"{preset}" does not exist.', did_you_mean(preset, _PRESETS))
@@ -134,8 +148,56 @@ def build_sizes(
             channel = size
         else:
             part[name] = size
-    segments = max(8, round(18 / min(size_factor, 1.0))) if preset != "fine" else 24
-    return MeshSizes(MappingProxyType(part), channel, segments)
+    segments = max(settings.port_segments, round(settings.port_segments / size_factor))
+    return MeshSizes(
+        MappingProxyType(part),
+        channel,
+        port_segments=segments,
+        circle_segments=settings.circle_segments,
+        smallest_strip_edges=settings.smallest_strip_edges * min(1.0, size_factor),
+    )
+
+
+# Largest sagitta h² / 8 r of a chord over the clearance to the next cylinder, and
+# over the width of a plane face beside it, where curving must not flatten elements.
+_CLEARANCE_SHARE = 1.0 / 3.0
+_STRIP_SHARE = 0.10
+
+
+def edge_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> list[float]:
+    """Element size at each meridian edge, m.
+
+    That of its parts, less where a face is narrow, where its circle would have
+    too few segments, or where chords would cut into a face close by.
+    """
+    chosen = []
+    for edge in assembly.edges:
+        size = min(sizes.part[part] for part in edge.parts)
+        length = (edge.z[1] - edge.z[0]) + (edge.r[1] - edge.r[0])
+        size = min(size, sizes.smallest_strip_edges * length)
+        if not edge.is_axis:
+            size = min(size, 2.0 * math.pi * max(edge.r[0], 1e-3 * edge.r[1]) / sizes.circle_segments)
+        if edge.is_cylinder and not edge.is_axis:
+            clearance = _radial_clearance(edge, assembly)
+            size = min(size, math.sqrt(8.0 * edge.r[0] * _CLEARANCE_SHARE * clearance))
+        elif not edge.is_axis and edge.r[0] > 0.0:
+            size = min(size, math.sqrt(8.0 * edge.r[0] * _STRIP_SHARE * length))
+        chosen.append(size)
+    return chosen
+
+
+def _radial_clearance(edge: MeridianEdge, assembly: AssemblyGeometry) -> float:
+    """Distance to the nearest other cylinder at the same z, at most the radius."""
+    distances = [
+        abs(other.r[0] - edge.r[0])
+        for other in assembly.edges
+        if other.is_cylinder
+        and other.r[0] != edge.r[0]
+        and not other.is_axis
+        and other.z[0] < edge.z[1]
+        and edge.z[0] < other.z[1]
+    ]
+    return min([*distances, edge.r[0]])
 
 
 def _wall(part: PartGeometry) -> float:

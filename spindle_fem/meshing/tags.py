@@ -12,6 +12,7 @@ from spindle_fem.errors import MeshTagError
 from spindle_fem.geometry.assembly import AssemblyGeometry
 from spindle_fem.meshing.curving import curved_middles, edge_key
 from spindle_fem.meshing.generate import LinearMesh, MeshedFace
+from spindle_fem.meshing.improve import improve_elements
 from spindle_fem.meshing.quality import TETRAHEDRON_EDGES, gmsh_quality, linear_quality, sampled_quality
 from spindle_fem.meshing.tagged_mesh import Joint, TaggedMesh
 
@@ -103,6 +104,13 @@ def tag_mesh(assembly: AssemblyGeometry, linear: LinearMesh, digest: str = "") -
         name: Joint(name, *(np.concatenate(side) for side in zip(*joints[name], strict=True)))
         for name in sorted(joints)
     }
+    fixed = np.zeros(len(points), dtype=bool)
+    for facets in mesh_surfaces.values():
+        fixed[facets] = True
+    for joint in mesh_joints.values():
+        fixed[joint.facets_a] = True
+        fixed[joint.facets_b] = True
+    points, worst = _improved(points, elements, n_corners, fixed, is_curved[edges].any(axis=1))
     mesh = TaggedMesh(
         points=points,
         n_corners=n_corners,
@@ -115,7 +123,7 @@ def tag_mesh(assembly: AssemblyGeometry, linear: LinearMesh, digest: str = "") -
         cad_area=MappingProxyType({name: area[name] for name in (*mesh_surfaces, *mesh_joints)}),
         cad_volume=MappingProxyType(dict(zip(assembly.part_names, linear.volume.tolist(), strict=True))),
         rotating=assembly.rotating,
-        min_quality=_worst_quality(points, elements, is_curved[edges].any(axis=1)),
+        min_quality=worst,
         digest=digest,
         notes=(*assembly.notes, *linear.notes),
     )
@@ -213,14 +221,19 @@ def _require_names(assembly: AssemblyGeometry, surfaces: dict, joints: dict) -> 
             raise MeshTagError("mesh", f"{kind} {', '.join(missing)} has no facets.")
 
 
-def _worst_quality(
-    points: NDArray[np.float64], elements: NDArray[np.int64], is_curved: NDArray[np.bool_]
-) -> float:
-    straight = linear_quality(points, elements[~is_curved])
-    curved = elements[is_curved]
-    sampled = sampled_quality(points, curved)
-    doubtful = sampled < max(_MEASURE_BELOW, float(sampled.min(initial=1.0)) + 0.1)
-    measured = gmsh_quality(points, curved[doubtful])
-    return float(
-        min(straight.min(initial=1.0), sampled[~doubtful].min(initial=1.0), measured.min(initial=1.0))
-    )
+def _improved(
+    points: NDArray[np.float64],
+    elements: NDArray[np.int64],
+    n_corners: int,
+    fixed: NDArray[np.bool_],
+    is_curved: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], float]:
+    """Points with the worst elements relaxed, and the worst quality as gmsh measures it."""
+    quality = np.empty(len(elements))
+    quality[~is_curved] = linear_quality(points, elements[~is_curved])
+    quality[is_curved] = sampled_quality(points[elements[is_curved]])
+    points, quality = improve_elements(points, elements, n_corners, fixed, quality)
+    # Between its samples an element may be worse: measure whichever may be the worst.
+    doubtful = quality < max(_MEASURE_BELOW, float(quality.min()) + 0.1)
+    measured = gmsh_quality(points, elements[doubtful])
+    return points, float(min(quality[~doubtful].min(initial=1.0), measured.min(initial=1.0)))
