@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import GeometryError
-from spindle_fem.loads.facets import facet_areas_and_centres
+from spindle_fem.loads.facets import facet_centres
 from spindle_fem.loads.gap_bands import angle_of
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.spec.model import Channel
@@ -66,10 +67,19 @@ def helix_coordinates(points: NDArray[np.float64], channel: Channel) -> tuple[ND
     return start, angles[start, np.arange(len(points))]
 
 
-def build_channel_cells(mesh: TaggedMesh, channel: Channel, cells_per_turn: int = 12) -> ChannelCells:
+def build_channel_cells(
+    mesh: TaggedMesh,
+    facet_area: Mapping[str, NDArray[np.float64]],
+    channel: Channel,
+    cells_per_turn: int = 12,
+) -> ChannelCells:
     """Sort the wetted facets into cells along the helix.
 
     Ports, where the channel has wetted ones, make a first and a last cell.
+
+    Parameters
+    ----------
+    facet_area : mapping of surface to (n_facets,) ndarray, [m²]
 
     Raises
     ------
@@ -79,7 +89,7 @@ def build_channel_cells(mesh: TaggedMesh, channel: Channel, cells_per_turn: int 
     wall = f"{channel.part}.channel_wall"
     ports = f"{channel.part}.channel_ports"
     where = "channel"
-    areas, centres = facet_areas_and_centres(mesh.points, mesh.require_surface(wall, where))
+    centres = facet_centres(mesh.points, mesh.require_surface(wall, where))
     start, angle = helix_coordinates(centres, channel)
     total = 2.0 * np.pi * channel.turns
     tolerance = 2.0 * np.pi / cells_per_turn
@@ -90,12 +100,12 @@ def build_channel_cells(mesh: TaggedMesh, channel: Channel, cells_per_turn: int 
     with_ports = channel.ports is not None and channel.ports.wetted
     n_along = n_cells + 2 * with_ports
     facet_cell = {wall: start * n_along + cell + with_ports}
-    facet_areas = {wall: areas}
+    facet_areas = {wall: facet_area[wall]}
     if with_ports:
-        port_areas, port_centres = facet_areas_and_centres(mesh.points, mesh.require_surface(ports, where))
+        port_centres = facet_centres(mesh.points, mesh.require_surface(ports, where))
         port_start, port_cell = _port_cells(port_centres, channel, n_along)
         facet_cell[ports] = port_start * n_along + port_cell
-        facet_areas[ports] = port_areas
+        facet_areas[ports] = facet_area[ports]
     cell_area = np.zeros(channel.starts * n_along)
     for name, cells in facet_cell.items():
         cell_area += np.bincount(cells, facet_areas[name], channel.starts * n_along)

@@ -1,4 +1,4 @@
-"""Centres and areas of curved (six-node) boundary triangles."""
+"""Centres of curved (six-node) boundary triangles."""
 
 from __future__ import annotations
 
@@ -24,10 +24,8 @@ def _shapes(points: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
     return values, along_x, along_y
 
 
-def facet_areas_and_centres(
-    points: NDArray[np.float64], facets: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Area and centroid of every curved triangle.
+def facet_centres(points: NDArray[np.float64], facets: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Centroid of every curved triangle.
 
     Parameters
     ----------
@@ -37,24 +35,13 @@ def facet_areas_and_centres(
 
     Returns
     -------
-    areas : (n,) ndarray, [m²]
-    centres : (n, 3) ndarray, [m]
+    (n, 3) ndarray, [m]
     """
     values, along_x, along_y = _shapes(_POINTS)
     corners = points[facets]
     tangent_x = np.einsum("qk,fkd->fqd", along_x, corners)
     tangent_y = np.einsum("qk,fkd->fqd", along_y, corners)
     jacobian = 0.5 * np.linalg.norm(np.cross(tangent_x, tangent_y), axis=2) * _WEIGHTS
-    areas = jacobian.sum(axis=1)
     places = np.einsum("qk,fkd->fqd", values, corners)
-    return areas, np.einsum("fq,fqd->fd", jacobian, places) / areas[:, None]
+    return np.einsum("fq,fqd->fd", jacobian, places) / jacobian.sum(axis=1)[:, None]
 
-
-def mean_over_facets(values: NDArray[np.float64], facets: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Mean of a quadratic field over each triangle, (n,) ndarray.
-
-    On a straight triangle the integral of a quadratic field is the mean of its
-    three edge middles; the curvature of a facet changes that by far less than
-    the film laws that use it.
-    """
-    return values[facets[:, 3:]].mean(axis=1)

@@ -8,13 +8,14 @@ every angle and its own temperature comes out uniform around the axis.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import GeometryError
-from spindle_fem.loads.facets import facet_areas_and_centres
+from spindle_fem.loads.facets import facet_centres
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
 
@@ -52,12 +53,18 @@ def angle_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def build_gap_bands(
-    mesh: TaggedMesh, rotating: str, standing: tuple[str, ...], band_width: float, n_sectors: int
+    mesh: TaggedMesh,
+    facet_area: Mapping[str, NDArray[np.float64]],
+    rotating: str,
+    standing: tuple[str, ...],
+    band_width: float,
+    n_sectors: int,
 ) -> GapBands:
     """Sort the facets of a gap into cells.
 
     Parameters
     ----------
+    facet_area : mapping of surface to (n_facets,) ndarray, [m²]
     band_width : float, [m]
         Wanted axial width of a band; widened until every cell owns facets of
         both sides.
@@ -70,10 +77,12 @@ def build_gap_bands(
         The two sides do not face each other along z.
     """
     where = f"gap between {rotating} and {', '.join(standing)}"
-    turning_areas, turning_centres = facet_areas_and_centres(mesh.points, mesh.require_surface(rotating, where))
-    sides = {name: facet_areas_and_centres(mesh.points, mesh.require_surface(name, where)) for name in standing}
-    standing_areas = np.concatenate([areas for areas, _ in sides.values()])
-    standing_centres = np.concatenate([centres for _, centres in sides.values()])
+    turning_areas = facet_area[rotating]
+    turning_centres = facet_centres(mesh.points, mesh.require_surface(rotating, where))
+    standing_areas = np.concatenate([facet_area[name] for name in standing])
+    standing_centres = np.concatenate(
+        [facet_centres(mesh.points, mesh.require_surface(name, where)) for name in standing]
+    )
     turning_nodes = mesh.points[mesh.surfaces[rotating]].reshape(-1, 3)
     low, high = turning_nodes[:, 2].min(), turning_nodes[:, 2].max()
     if standing_centres[:, 2].max() < low or standing_centres[:, 2].min() > high:
@@ -90,12 +99,12 @@ def build_gap_bands(
         if n_bands == 1 and n_sectors == 1:
             raise GeometryError(where, "one side has no facets.")
         n_bands, n_sectors = (n_bands - 1, n_sectors) if n_bands > 1 else (1, n_sectors - 1)
-    starts = np.cumsum([0, *(len(areas) for areas, _ in sides.values())])
+    starts = np.cumsum([0, *(len(facet_area[name]) for name in standing)])
     return GapBands(
         conductance_share=np.full(n_cells, turning_areas.sum() / n_cells),
         rotating_cell=cells_turning,
         standing_cells={
-            name: cells_standing[starts[i] : starts[i + 1]] for i, name in enumerate(sides)
+            name: cells_standing[starts[i] : starts[i + 1]] for i, name in enumerate(standing)
         },
         rotating_area=rotating_area,
         standing_area=standing_area,

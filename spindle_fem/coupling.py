@@ -1,0 +1,271 @@
+"""A solved machine: heat, films, coolant and temperature made to agree."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.checks import run_checks
+from spindle_fem.conduction.operators import ThermalOperators, build_operators
+from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.conduction.steady import ConductionSolution, solve_steady
+from spindle_fem.errors import ConvergenceError, NoSteadyStateError
+from spindle_fem.geometry.assembly import build_assembly
+from spindle_fem.loads.bearing_heat import heat_model_of
+from spindle_fem.loads.build import FieldState, LoadsBuilder
+from spindle_fem.loads.coolant_loop import CoolantState
+from spindle_fem.loads.joints import group_of_contacts
+from spindle_fem.loads.model import Loads
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.meshing.build import build_mesh
+from spindle_fem.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.results.build import build_result
+from spindle_fem.results.thermal_result import ThermalResult
+from spindle_fem.spec.model import MachineSpec
+
+# The coolant's energy closes to 1e-8 only when the wall is known to about 1e-7 K.
+FIELD_TOLERANCE = 1.0e-8
+HEAT_TOLERANCE = 1.0e-7
+MAXIMUM_ITERATIONS = 60
+ANDERSON_DEPTH = 6
+# Greases and seals are gone long before; a field beyond this is running away.
+RUNAWAY_TEMPERATURE = 600.0
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedMachine:
+    """A machine with mesh, operators and sorted loads, ready to be solved at any operating point."""
+
+    spec: MachineSpec
+    mesh: TaggedMesh
+    operators: ThermalOperators
+    builder: LoadsBuilder
+    joint_conductance: Mapping[str, float]
+    conductivity: Mapping[str, float]
+    volumetric_capacity: Mapping[str, float]
+    timings: Mapping[str, float] = field(default_factory=dict)
+
+    def field_state(self, unknowns: NDArray[np.float64], lumped: Mapping[str, float]) -> FieldState:
+        """What the loads see of a field: the mean over each facet, and the lumped nodes."""
+        facets = {
+            surface: self.operators.facet_integral(unknowns, rows) / self.operators.facet_area[rows]
+            for surface, rows in self.operators.surface_rows.items()
+        }
+        return FieldState(facets, lumped)
+
+    def problem(self, loads: Loads) -> ConductionProblem:
+        """Conduction problem of given loads."""
+        films = tuple(
+            Film(surface, film.coefficient, film.temperature, film.name) for surface, film in loads.films.items()
+        )
+        lumped = tuple(
+            LumpedNode(node.name, tuple(node.connections.items()), node.capacity, node.heat) for node in loads.lumped
+        )
+        return ConductionProblem(
+            self.operators,
+            self.conductivity,
+            films=films,
+            joint_conductance=self.joint_conductance,
+            surface_heat=loads.surface_heat,
+            lumped_nodes=lumped,
+            volumetric_capacity=self.volumetric_capacity,
+            adiabatic="rest",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CoupledState:
+    """A converged fixed point: field, the loads that made it, and the coolant."""
+
+    solution: ConductionSolution
+    loads: Loads
+    coolant: CoolantState | None
+    iterations: int
+    change: float
+
+
+def prepare_machine(
+    spec: MachineSpec, *, size_factor: float | None = None, progress: Progress = lambda stage: None
+) -> PreparedMachine:
+    """Mesh a machine and integrate what every solve shares.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    size_factor : float, optional
+        In place of the machine's own, for mesh-refinement estimates.
+    progress : callable
+        Told each stage by name as it begins.
+    """
+    clock = _Clock(progress)
+    clock.begin("geometry")
+    assembly = build_assembly(spec)
+    clock.begin("mesh")
+    mesh = build_mesh(
+        assembly,
+        preset=spec.mesh.preset,
+        size_factor=spec.mesh.size_factor if size_factor is None else size_factor,
+        sizes=spec.mesh.size,
+    )
+    clock.begin("assembly")
+    operators = build_operators(mesh, spec.mesh.order)
+    groups = group_of_contacts(spec, mesh.joints)
+    facet_area = {surface: operators.facet_areas(surface) for surface in mesh.surfaces}
+    builder = LoadsBuilder(spec, mesh, facet_area, heat_model_of(spec))
+    materials = {part: spec.part_material(part) for part in mesh.part_names}
+    capacity_factor = spec.heat_capacity_factor.value
+    clock.end()
+    return PreparedMachine(
+        spec=spec,
+        mesh=mesh,
+        operators=operators,
+        builder=builder,
+        joint_conductance={
+            contact: np.inf if group.conductance == "perfect" else group.conductance.value
+            for contact, group in groups.items()
+        },
+        conductivity={part: material.thermal_conductivity for part, material in materials.items()},
+        volumetric_capacity={
+            part: capacity_factor * material.volumetric_heat_capacity for part, material in materials.items()
+        },
+        timings=clock.timings,
+    )
+
+
+def solve_coupled(
+    machine: PreparedMachine, point: OperatingPoint, start: NDArray[np.float64] | None = None
+) -> CoupledState:
+    """Steady field at which heat, films and coolant are those of the field itself.
+
+    A fixed-point iteration with Anderson mixing over the whole field; the map
+    is nearly affine, so the mixing finds the fixed point in a few solves even
+    where friction heat falls steeply with temperature.
+
+    Raises
+    ------
+    NoSteadyStateError
+        The temperatures run away.
+    ConvergenceError
+        No fixed point within the iterations.
+
+    Source: Walker & Ni (2011), SIAM J. Numer. Anal. 49, 1715-1735 (mixing).
+    """
+    unknowns = np.full(machine.operators.n_unknowns, point.ambient_temperature) if start is None else start
+    lumped: dict[str, float] = {}
+    mixing = _AndersonMixing(ANDERSON_DEPTH)
+    solution: ConductionSolution | None = None
+    heat_before = np.inf
+    change = np.inf
+    for iteration in range(1, MAXIMUM_ITERATIONS + 1):
+        loads, coolant = machine.builder.at(point, machine.field_state(unknowns, lumped))
+        solution = solve_steady(
+            machine.problem(loads),
+            guess=solution,
+            preconditioner=None if solution is None else solution.preconditioner,
+        )
+        hottest = float(solution.temperature.max())
+        if not np.isfinite(hottest) or hottest > RUNAWAY_TEMPERATURE:
+            raise NoSteadyStateError(
+                machine.spec.name,
+                f"the temperature runs away (over {RUNAWAY_TEMPERATURE - 273.15:.0f} °C in iteration {iteration}) "
+                f"at {point.speed * 30 / np.pi:.0f} rpm with {loads.total_heat:.0f} W of friction heat.",
+                "Lower the speed or the preload, or cool more.",
+            )
+        change = float(np.abs(solution.temperature - unknowns).max())
+        heat = loads.total_heat
+        settled = abs(heat - heat_before) <= HEAT_TOLERANCE * max(abs(heat), 1.0e-12)
+        if settled and change < FIELD_TOLERANCE * max(1.0, hottest - point.coldest):
+            return CoupledState(solution, loads, coolant, iteration, change)
+        heat_before = heat
+        names = solution.problem.lumped_names
+        given = np.concatenate([unknowns, [lumped.get(name, value) for name, value in
+                                           zip(names, solution.lumped_temperature, strict=True)]])
+        mixed = mixing.next(given, np.concatenate([solution.temperature, solution.lumped_temperature]))
+        unknowns = mixed[: machine.operators.n_unknowns]
+        lumped = dict(zip(names, mixed[machine.operators.n_unknowns :].tolist(), strict=True))
+    raise ConvergenceError(
+        machine.spec.name,
+        f"field and loads still change by {change:.2g} K after {MAXIMUM_ITERATIONS} iterations.",
+        "Friction heat may rise with temperature faster than the machine can carry it away; lower speed or preload.",
+    )
+
+
+def solve(
+    spec: MachineSpec, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
+) -> ThermalResult:
+    """Steady temperatures of a machine, checked.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    point : OperatingPoint, optional
+        The definition's own by default.
+    progress : callable
+        Told each stage by name as it begins.
+
+    Returns
+    -------
+    ThermalResult
+        With every self-check; :func:`spindle_fem.checks.require_checks` raises
+        on one that failed.
+    """
+    return solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress)
+
+
+def solve_prepared(
+    machine: PreparedMachine, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
+) -> ThermalResult:
+    """Steady temperatures of a prepared machine."""
+    clock = _Clock(progress)
+    clock.begin("solve")
+    point = point or OperatingPoint.of(machine.spec)
+    coupled = solve_coupled(machine, point)
+    clock.begin("evaluate")
+    result = build_result(machine, point, coupled)
+    clock.end()
+    return run_checks(result, machine, point, coupled, {**machine.timings, **clock.timings})
+
+
+class _AndersonMixing:
+    """Combines past iterates so that their residuals cancel in the least-squares sense."""
+
+    def __init__(self, depth: int) -> None:
+        self.depth = depth
+        self.inputs: list[NDArray[np.float64]] = []
+        self.outputs: list[NDArray[np.float64]] = []
+
+    def next(self, given: NDArray[np.float64], mapped: NDArray[np.float64]) -> NDArray[np.float64]:
+        self.inputs = [*self.inputs, given][-self.depth - 1 :]
+        self.outputs = [*self.outputs, mapped][-self.depth - 1 :]
+        if len(self.inputs) == 1:
+            return mapped
+        residuals = np.array([out - into for into, out in zip(self.inputs, self.outputs, strict=True)])
+        steps = np.diff(residuals, axis=0)
+        weights, *_ = np.linalg.lstsq(steps.T, residuals[-1], rcond=1.0e-10)
+        return mapped - np.diff(np.array(self.outputs), axis=0).T @ weights
+
+
+class _Clock:
+    """Seconds of each stage; tells the progress callback as stages begin."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.progress = progress
+        self.timings: dict[str, float] = {}
+        self._stage = ""
+        self._since = 0.0
+
+    def begin(self, stage: str) -> None:
+        self.end()
+        self._stage, self._since = stage, time.perf_counter()
+        self.progress(stage)
+
+    def end(self) -> None:
+        if self._stage:
+            self.timings[self._stage] = time.perf_counter() - self._since
+        self._stage = ""
