@@ -240,7 +240,8 @@ class ChannelMarch:
     ----------
     march : MarchResult
     film : FilmCoefficient
-        Values of shape (..., n), or floats when nothing varies along the channel.
+        Before ``film_factor``; values of shape (..., n), or floats when
+        nothing varies along the channel.
     linearisation : MarchLinearisation
         At the final film coefficients and heat capacities.
     mass_flow : float, [kg/s]
@@ -264,7 +265,7 @@ def march_channel(
     model: str = "helical",
     properties_at: str = "local",
     wall_correction: bool = True,
-    film_factor: float = 1.0,
+    film_factor: ArrayLike = 1.0,
     pumping_power: float = 0.0,
 ) -> ChannelMarch:
     """March with film coefficients by a named model, at given wall temperatures.
@@ -287,8 +288,8 @@ def march_channel(
         Bulk temperature of each cell, or the inlet's everywhere.
     wall_correction : bool
         Whether the viscosity at the wall corrects the film coefficient.
-    film_factor : float
-        Multiplies the film coefficient (fouling, calibration).
+    film_factor : (..., n) array_like or float, [-]
+        Multiplies the film coefficient (fouling, calibration, ports).
     pumping_power : float, [W]
         Friction heat of all starts, spread over the wetted area.
 
@@ -341,7 +342,7 @@ def march_channel(
     capacity: ArrayLike = at_inlet.specific_heat_capacity
     for _ in range(_ITERATIONS):
         film = film_at(bulk)
-        coefficient = film_factor * np.asarray(film.value)
+        coefficient = np.asarray(film_factor, dtype=np.float64) * np.asarray(film.value)
         march = march_enthalpy(inlet_temperature, mass_flow, capacity, wall, area, coefficient, pumping)
         if properties_at == "inlet":
             break

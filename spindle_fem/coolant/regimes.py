@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.coolant import nusselt
+from spindle_fem.coolant.helical_band import OIL_BLEND_PRANDTL, FlowGroups, helical_band, is_covered
 from spindle_fem.coolant.properties import Coolant
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.coolant.transition import (
     TURBULENT_FROM_REYNOLDS,
     critical_reynolds_ito,
     critical_reynolds_schmidt,
-    transition_weight,
 )
 from spindle_fem.errors import OutOfValidityError, did_you_mean
 from spindle_fem.validity import POSITIVE, CodedWarning, range_fault, require_range
@@ -37,12 +37,6 @@ PAPER_CRITICAL_REYNOLDS = 2300.0
 
 # Low and high move away from the value by this factor when its source is extrapolated.
 EXTRAPOLATION_WIDENING = 1.25
-
-# Scatter of the measurements behind Gnielinski's equation.
-_TURBULENT_SCATTER = 1.15
-
-# Below the first Prandtl number theory, above the second measurements with oil.
-_OIL_BLEND_PRANDTL = (30.0, 100.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,33 +96,6 @@ class FilmCoefficient:
     candidates: Mapping[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
-class _Flow:
-    """Dimensionless groups of a state, all of one shape."""
-
-    reynolds: NDArray[np.float64]
-    prandtl: NDArray[np.float64]
-    graetz: NDArray[np.float64]
-    viscosity_ratio: NDArray[np.float64]
-    prandtl_ratio: NDArray[np.float64]
-    conductance: NDArray[np.float64]
-    delta: float
-    critical: float
-    warnings: tuple[CodedWarning, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class _Band:
-    """Nusselt numbers of the helical set on the hydraulic diameter."""
-
-    value: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    faults: tuple[str, ...]
-    in_range: NDArray[np.bool_]
-    candidates: dict[str, NDArray[np.float64]]
-
-
 def select_film(model: str, section: ChannelSection, state: ChannelState) -> FilmCoefficient:
     """Film coefficient of a helical rectangular channel by a named model.
 
@@ -180,7 +147,7 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
             "coolant film model", f'"{model}" is not known.', did_you_mean(model, FILM_MODELS)
         )
     flow = _flow_groups(section, state)
-    band = _helical_band(section, flow)
+    band = helical_band(section, flow)
     conductance = flow.conductance
 
     if model == "helical":
@@ -228,7 +195,7 @@ def _unwrap(array: NDArray[Any]) -> Any:
     return array.item()
 
 
-def _flow_groups(section: ChannelSection, state: ChannelState) -> _Flow:
+def _flow_groups(section: ChannelSection, state: ChannelState) -> FlowGroups:
     require_range(
         "select_film",
         volume_flow=(state.volume_flow, *POSITIVE),
@@ -248,7 +215,7 @@ def _flow_groups(section: ChannelSection, state: ChannelState) -> _Flow:
     reynolds = velocity * diameter / at_bulk.kinematic_viscosity
     prandtl = at_bulk.prandtl
     delta = section.curvature_ratio
-    return _Flow(
+    return FlowGroups(
         reynolds=reynolds,
         prandtl=prandtl,
         graetz=reynolds * prandtl * diameter / section.length,
@@ -273,113 +240,16 @@ def _wall_in_range(
     return np.clip(wall, lowest, highest), (CodedWarning("coolant_wall_temperature_out_of_range", text),)
 
 
-def _laminar_band(section: ChannelSection, flow: _Flow, reynolds: NDArray[np.float64]) -> _Band:
-    """Laminar Nusselt numbers at a Reynolds number that may differ from the flow's."""
-    prandtl, delta = flow.prandtl, flow.delta
-    dean = reynolds * np.sqrt(delta)
-    graetz = flow.graetz * reynolds / flow.reynolds
-    floor = nusselt.nusselt_hausen(graetz, nusselt.nusselt_rectangle(section.aspect_ratio))
-    candidates = {
-        "straight_developing": floor,
-        "sieder_tate": nusselt.nusselt_sieder_tate(graetz, flow.viscosity_ratio, extrapolate=True),
-        "manlapaz_churchill": nusselt.nusselt_manlapaz_churchill(dean, prandtl),
-        "schmidt": nusselt.nusselt_schmidt(reynolds, prandtl, delta, flow.viscosity_ratio, extrapolate=True),
-        "seban_mclaughlin": nusselt.nusselt_seban_mclaughlin(reynolds, prandtl, delta, extrapolate=True),
-        "janssen_hoogendoorn": nusselt.nusselt_janssen_hoogendoorn(
-            reynolds, prandtl, delta, extrapolate=True
-        ),
-    }
-    oil_from, oil_to = np.log(_OIL_BLEND_PRANDTL)
-    oil = np.clip((np.log(prandtl) - oil_from) / (oil_to - oil_from), 0.0, 1.0)
-    developed = candidates["manlapaz_churchill"] ** (1.0 - oil) * candidates["seban_mclaughlin"] ** oil
-    value = np.maximum(developed, floor)
-
-    # Correlations from round-tube experiments count only where their source covers the state;
-    # Schmidt and Manlapaz-Churchill carry no upper Prandtl number and always count.
-    applicable = [floor, value, np.maximum(candidates["manlapaz_churchill"], floor)]
-    applicable.append(np.maximum(candidates["schmidt"], floor))
-    for name, quantities in (
-        ("sieder_tate", {"graetz": graetz}),
-        ("seban_mclaughlin", {"reynolds": reynolds, "prandtl": prandtl, "curvature_ratio": delta}),
-        ("janssen_hoogendoorn", {"dean": dean, "prandtl": prandtl, "curvature_ratio": delta}),
-    ):
-        covered = _covered(f"nusselt_{name}", **quantities)
-        applicable.append(np.where(covered, np.maximum(candidates[name], floor), value))
-
-    uses_oil = oil > 0.0
-    shapes = {"reynolds": reynolds, "prandtl": np.maximum(prandtl, 100.0), "curvature_ratio": delta}
-    covered = ~uses_oil | _covered("nusselt_seban_mclaughlin", **shapes) | (floor >= developed)
-    faults: tuple[str, ...] = ()
-    if not covered.all():
-        faults = tuple(
-            f"Seban & McLaughlin: {text}"
-            for text in nusselt.range_faults("nusselt_seban_mclaughlin", **shapes)
-        )
-    return _Band(
-        value=value,
-        low=np.minimum.reduce(np.broadcast_arrays(*applicable)),
-        high=np.maximum.reduce(np.broadcast_arrays(*applicable)),
-        faults=faults,
-        in_range=covered,
-        candidates=candidates,
-    )
-
-
-def _turbulent_band(flow: _Flow, reynolds: NDArray[np.float64]) -> _Band:
-    prandtl, delta = flow.prandtl, flow.delta
-    value = nusselt.nusselt_gnielinski_helical(reynolds, prandtl, delta, flow.prandtl_ratio, extrapolate=True)
-    straight = nusselt.nusselt_gnielinski_helical(
-        reynolds, prandtl, 0.0, flow.prandtl_ratio, extrapolate=True
-    )
-    ranges = {"reynolds": reynolds, "prandtl": prandtl, "curvature_ratio": delta}
-    faults = nusselt.range_faults("nusselt_gnielinski_helical", **ranges)
-    return _Band(
-        value=value,
-        low=np.minimum(straight, value / _TURBULENT_SCATTER),
-        high=value * _TURBULENT_SCATTER,
-        faults=tuple(f"Gnielinski: {text}" for text in faults),
-        in_range=_covered("nusselt_gnielinski_helical", **ranges),
-        candidates={"gnielinski_helical": value, "gnielinski_straight": straight},
-    )
-
-
-def _helical_band(section: ChannelSection, flow: _Flow) -> _Band:
-    """Laminar and turbulent bands joined by the same linear weight: no jump anywhere."""
-    weight = transition_weight(flow.reynolds, flow.critical)
-    has_laminar, has_turbulent = bool((weight > 0.0).any()), bool((weight < 1.0).any())
-    bands: list[tuple[NDArray[np.float64], _Band]] = []
-    if has_laminar:
-        bands.append((weight, _laminar_band(section, flow, np.minimum(flow.reynolds, flow.critical))))
-    if has_turbulent:
-        upper = np.maximum(flow.reynolds, TURBULENT_FROM_REYNOLDS)
-        bands.append((1.0 - weight, _turbulent_band(flow, upper)))
-    in_range = np.ones(weight.shape, dtype=bool)
-    candidates: dict[str, NDArray[np.float64]] = {}
-    faults: tuple[str, ...] = ()
-    for share, band in bands:
-        in_range &= band.in_range | (share == 0.0)
-        faults += band.faults
-        candidates |= band.candidates
-    return _Band(
-        value=sum(share * band.value for share, band in bands),
-        low=sum(share * band.low for share, band in bands),
-        high=sum(share * band.high for share, band in bands),
-        faults=faults,
-        in_range=in_range,
-        candidates=candidates,
-    )
-
-
-def _sieder_tate(flow: _Flow) -> tuple[NDArray[np.float64], NDArray[np.bool_], tuple[str, ...]]:
+def _sieder_tate(flow: FlowGroups) -> tuple[NDArray[np.float64], NDArray[np.bool_], tuple[str, ...]]:
     value = nusselt.nusselt_sieder_tate(flow.graetz, flow.viscosity_ratio, extrapolate=True)
     faults = nusselt.range_faults("nusselt_sieder_tate", graetz=flow.graetz)
-    in_range = _covered("nusselt_sieder_tate", graetz=flow.graetz) & (flow.reynolds <= flow.critical)
+    in_range = is_covered("nusselt_sieder_tate", graetz=flow.graetz) & (flow.reynolds <= flow.critical)
     not_laminar = range_fault("laminar Reynolds number", flow.reynolds, 0.0, flow.critical)
     return value, in_range, faults + ((not_laminar,) if not_laminar else ())
 
 
 def _paper(
-    section: ChannelSection, flow: _Flow
+    section: ChannelSection, flow: FlowGroups
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], tuple[str, ...], NDArray[np.str_]]:
     """Equations 30 and 31 on the channel depth, in W/(m²·K)."""
     scale = section.depth / section.hydraulic_diameter
@@ -393,8 +263,8 @@ def _paper(
     )
     in_range = np.where(
         turbulent,
-        _covered("nusselt_paper_turbulent", reynolds=reynolds, prandtl=flow.prandtl),
-        _covered("nusselt_sieder_tate", graetz=graetz),
+        is_covered("nusselt_paper_turbulent", reynolds=reynolds, prandtl=flow.prandtl),
+        is_covered("nusselt_sieder_tate", graetz=graetz),
     )
     faults: tuple[str, ...] = ()
     if turbulent.any():
@@ -410,21 +280,12 @@ def _paper(
     return number / scale * flow.conductance, in_range, faults, regime
 
 
-def _covered(correlation: str, **quantities: ArrayLike) -> NDArray[np.bool_]:
-    inside = [
-        (np.asarray(value) >= low) & (np.asarray(value) <= high)
-        for name, value in quantities.items()
-        for low, high in [nusselt.RANGES[correlation][name]]
-    ]
-    return np.logical_and.reduce(np.broadcast_arrays(*inside))
-
-
-def _helical_source(flow: _Flow) -> str:
+def _helical_source(flow: FlowGroups) -> str:
     names = []
     if (flow.reynolds < TURBULENT_FROM_REYNOLDS).any():
-        if (flow.prandtl > _OIL_BLEND_PRANDTL[0]).any():
+        if (flow.prandtl > OIL_BLEND_PRANDTL[0]).any():
             names.append("Seban & McLaughlin 1963")
-        if (flow.prandtl < _OIL_BLEND_PRANDTL[1]).any():
+        if (flow.prandtl < OIL_BLEND_PRANDTL[1]).any():
             names.append("Manlapaz & Churchill 1981")
         names.append("not below Shah & London 1978 with Hausen 1943")
     if (flow.reynolds > flow.critical).any():

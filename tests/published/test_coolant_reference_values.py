@@ -7,6 +7,11 @@ on an inner radius of 108 mm, 5 turns of pitch 24 mm, 20 L/min.
 
 import numpy as np
 import pytest
+from fluids.friction import (
+    helical_laminar_fd_White,
+    helical_transition_Re_Ito,
+    helical_transition_Re_Schmidt,
+)
 
 from spindle_fem.coolant import nusselt
 from spindle_fem.coolant.friction import (
@@ -15,7 +20,12 @@ from spindle_fem.coolant.friction import (
     friction_factor_curved_laminar,
 )
 from spindle_fem.coolant.properties import OilIsoVg32
-from spindle_fem.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
+from spindle_fem.coolant.regimes import (
+    ChannelState,
+    critical_reynolds_ito,
+    critical_reynolds_schmidt,
+    select_film,
+)
 from spindle_fem.coolant.section import ChannelSection
 
 FLOW = 20.0e-3 / 60.0
@@ -123,6 +133,22 @@ def test_turbulence_in_the_coil_needs_345_litres_a_minute():
     speed = 8000.0 * float(properties.kinematic_viscosity) / channel.hydraulic_diameter
     assert speed == pytest.approx(25.0, rel=2e-2)
     assert channel.volume_flow(speed) * 60e3 == pytest.approx(345.0, rel=1e-2)
+
+
+@pytest.mark.parametrize("curvature", [0.005, 0.02, 0.05])
+def test_curved_friction_and_critical_reynolds_against_another_implementation(curvature):
+    # The library fluids holds the same published formulas, written by others; agreement is to
+    # rounding but for its own constants (Ito 20000, Schmidt 2300).
+    assert float(critical_reynolds_schmidt(curvature)) == pytest.approx(
+        helical_transition_Re_Schmidt(curvature, 1.0), rel=1e-12
+    )
+    assert float(critical_reynolds_ito(curvature)) == pytest.approx(
+        helical_transition_Re_Ito(curvature, 1.0), rel=1e-12
+    )
+    for reynolds in (200.0, 2000.0):
+        white = helical_laminar_fd_White(reynolds, curvature, 1.0)
+        ratio = float(friction_factor_curved_laminar(reynolds * np.sqrt(curvature)))
+        assert 64.0 / reynolds * ratio == pytest.approx(white, rel=1e-12)
 
 
 def test_shah_london_limits():

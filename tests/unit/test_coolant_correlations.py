@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spindle_fem.coolant import nusselt
+from spindle_fem.coolant import nusselt, nusselt_helical
 from spindle_fem.coolant.friction import (
     channel_pressure_drop,
     friction_factor_channel,
@@ -31,12 +31,20 @@ REFUSALS = [
     (nusselt.nusselt_sieder_tate, (50.0, 12.0), "viscosity_ratio is 12"),
     (nusselt.nusselt_rectangle, (1.2,), "aspect_ratio is 1.2, allowed 0 to 1"),
     (nusselt.nusselt_hausen, (-1.0, 3.0), "graetz is -1"),
-    (nusselt.nusselt_schmidt, (50.0, 10.0, 0.05), "reynolds is 50, allowed 100 to 22000"),
-    (nusselt.nusselt_schmidt, (500.0, 10.0, 0.5), "curvature_ratio is 0.5, allowed 0.012 to 0.2"),
-    (nusselt.nusselt_manlapaz_churchill, (-1.0, 10.0), "dean is -1"),
-    (nusselt.nusselt_seban_mclaughlin, (292.0, 1214.0, 0.048), "prandtl is 1214, allowed 100 to 657"),
-    (nusselt.nusselt_janssen_hoogendoorn, (292.0, 300.0, 0.048), "dean is 63.974, allowed 100 to 830"),
-    (nusselt.nusselt_gnielinski_helical, (290.0, 200.0, 0.05), "reynolds is 290, allowed 22000 to 150000"),
+    (nusselt_helical.nusselt_schmidt, (50.0, 10.0, 0.05), "reynolds is 50, allowed 100 to 22000"),
+    (nusselt_helical.nusselt_schmidt, (500.0, 10.0, 0.5), "curvature_ratio is 0.5, allowed 0.012 to 0.2"),
+    (nusselt_helical.nusselt_manlapaz_churchill, (-1.0, 10.0), "dean is -1"),
+    (nusselt_helical.nusselt_seban_mclaughlin, (292.0, 1214.0, 0.048), "prandtl is 1214, allowed 100 to 657"),
+    (
+        nusselt_helical.nusselt_janssen_hoogendoorn,
+        (292.0, 300.0, 0.048),
+        "dean is 63.974, allowed 100 to 830",
+    ),
+    (
+        nusselt_helical.nusselt_gnielinski_helical,
+        (290.0, 200.0, 0.05),
+        "reynolds is 290, allowed 22000 to 150000",
+    ),
     (friction_factor_curved_laminar, (2500.0,), "dean is 2500, allowed 0 to 2000"),
     (friction_factor_helical_turbulent, (1000.0, 0.05), "reynolds is 1000, allowed 4500 to 100000"),
     (critical_reynolds_schmidt, (0.3,), "curvature_ratio is 0.3, allowed 0 to 0.2"),
@@ -56,8 +64,8 @@ def test_refuses_outside_the_range_of_its_source(correlation, arguments, message
 
 def test_extrapolation_must_be_asked_for():
     with pytest.raises(OutOfValidityError):
-        nusselt.nusselt_seban_mclaughlin(292.0, 1214.0, 0.048)
-    assert float(nusselt.nusselt_seban_mclaughlin(292.0, 1214.0, 0.048, extrapolate=True)) > 0.0
+        nusselt_helical.nusselt_seban_mclaughlin(292.0, 1214.0, 0.048)
+    assert float(nusselt_helical.nusselt_seban_mclaughlin(292.0, 1214.0, 0.048, extrapolate=True)) > 0.0
 
 
 def test_expanded_equation_30_equals_its_dimensionless_form():
@@ -91,7 +99,7 @@ def test_expanded_equation_31_equals_its_dimensionless_form():
 
 
 def test_straight_limits_of_the_curved_correlations():
-    assert float(nusselt.nusselt_manlapaz_churchill(0.0, 100.0)) == pytest.approx(3.657, rel=1e-12)
+    assert float(nusselt_helical.nusselt_manlapaz_churchill(0.0, 100.0)) == pytest.approx(3.657, rel=1e-12)
     assert float(friction_factor_curved_laminar(0.0)) == 1.0
     # Blasius.
     assert float(friction_factor_helical_turbulent(1.0e4, 0.0)) == pytest.approx(0.03164, rel=1e-12)
@@ -99,12 +107,14 @@ def test_straight_limits_of_the_curved_correlations():
 
 def test_gnielinski_straight_limit_is_the_petukhov_form():
     # f = 0.3164 Re^-0.25 at Re 5e4, Pr 7, by hand: f/8 = 0.0026449, Nu = 925.7/2.7369.
-    assert float(nusselt.nusselt_gnielinski_helical(5.0e4, 7.0, 0.0)) == pytest.approx(338.2, rel=1e-3)
+    assert float(nusselt_helical.nusselt_gnielinski_helical(5.0e4, 7.0, 0.0)) == pytest.approx(
+        338.2, rel=1e-3
+    )
 
 
 def test_wall_correction_has_the_exponent_of_its_source():
-    plain = nusselt.nusselt_schmidt(500.0, 300.0, 0.05) - 3.66
-    corrected = nusselt.nusselt_schmidt(500.0, 300.0, 0.05, 2.0) - 3.66
+    plain = nusselt_helical.nusselt_schmidt(500.0, 300.0, 0.05) - 3.66
+    corrected = nusselt_helical.nusselt_schmidt(500.0, 300.0, 0.05, 2.0) - 3.66
     assert float(corrected / plain) == pytest.approx(2.0**0.14, rel=1e-12)
     ratio = nusselt.nusselt_sieder_tate(500.0, 2.0) / nusselt.nusselt_sieder_tate(500.0)
     assert float(ratio) == pytest.approx(2.0**0.14, rel=1e-12)
@@ -161,6 +171,13 @@ def test_port_loss_limits():
     slender = port_loss_coefficient(1000.0, 0.0254, 10.0, outlet=True)
     short = port_loss_coefficient(1000.0, 0.0254, 0.0, outlet=True)
     assert float(slender - short) == pytest.approx(64.0 / 1000.0 * 10.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("reynolds", "friction"), [(2300.0, 64 / 2300), (4e4, 0.3164 * 4e4**-0.25)])
+def test_friction_along_a_port(reynolds, friction):
+    slender = port_loss_coefficient(reynolds, 0.01, 10.0, outlet=False)
+    short = port_loss_coefficient(reynolds, 0.01, 0.0, outlet=False)
+    assert float(slender - short) == pytest.approx(10.0 * friction, rel=1e-9)
 
 
 def test_extrapolated_friction_warns():
