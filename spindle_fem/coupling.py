@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.checks import run_checks
 from spindle_fem.conduction.operators import ThermalOperators, build_operators
 from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.conduction.steady import ConductionSolution, solve_steady
@@ -23,8 +22,6 @@ from spindle_fem.loads.model import Loads
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.meshing.build import build_mesh
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
-from spindle_fem.results.build import build_result
-from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.spec.model import MachineSpec
 
 # The coolant's energy closes to 1e-8 only when the wall is known to about 1e-7 K.
@@ -103,7 +100,7 @@ def prepare_machine(
     progress : callable
         Told each stage by name as it begins.
     """
-    clock = _Clock(progress)
+    clock = Clock(progress)
     clock.begin("geometry")
     assembly = build_assembly(spec)
     clock.begin("mesh")
@@ -196,42 +193,6 @@ def solve_coupled(
     )
 
 
-def solve(
-    spec: MachineSpec, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
-) -> ThermalResult:
-    """Steady temperatures of a machine, checked.
-
-    Parameters
-    ----------
-    spec : MachineSpec
-    point : OperatingPoint, optional
-        The definition's own by default.
-    progress : callable
-        Told each stage by name as it begins.
-
-    Returns
-    -------
-    ThermalResult
-        With every self-check; :func:`spindle_fem.checks.require_checks` raises
-        on one that failed.
-    """
-    return solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress)
-
-
-def solve_prepared(
-    machine: PreparedMachine, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
-) -> ThermalResult:
-    """Steady temperatures of a prepared machine."""
-    clock = _Clock(progress)
-    clock.begin("solve")
-    point = point or OperatingPoint.of(machine.spec)
-    coupled = solve_coupled(machine, point)
-    clock.begin("evaluate")
-    result = build_result(machine, point, coupled)
-    clock.end()
-    return run_checks(result, machine, point, coupled, {**machine.timings, **clock.timings})
-
-
 class _AndersonMixing:
     """Combines past iterates so that their residuals cancel in the least-squares sense."""
 
@@ -251,7 +212,7 @@ class _AndersonMixing:
         return mapped - np.diff(np.array(self.outputs), axis=0).T @ weights
 
 
-class _Clock:
+class Clock:
     """Seconds of each stage; tells the progress callback as stages begin."""
 
     def __init__(self, progress: Progress) -> None:

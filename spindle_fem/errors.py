@@ -108,6 +108,10 @@ class EnergyBalanceError(SpindleFemError):
     """Heat in and heat out differ by more than the tolerance."""
 
 
+class CheckFailedError(SpindleFemError):
+    """A solved machine did not pass one of its self-checks."""
+
+
 class RecordingError(BadInputError):
     """A recording or its manifest cannot be used."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -151,3 +151,7 @@ class ThermalResult:
     iterations: Mapping[str, int]
     timings: Mapping[str, float]
     extra: Mapping[str, Any] = field(default_factory=dict)
+
+    def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
+        """The same result with the seconds of each stage."""
+        return replace(self, timings=dict(timings))

@@ -1,0 +1,86 @@
+"""Self-checks of every run: what must hold, and what happens when it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from spindle_fem.errors import CheckFailedError
+from spindle_fem.results.thermal_result import Check, EnergyBalance
+from spindle_fem.units import ZERO_CELSIUS_K
+
+BALANCE_LIMIT = 1.0e-8
+MEASURE_LIMIT = 1.0e-3
+BELOW_COLDEST_LIMIT = 0.01
+
+
+def check_energy(energy: EnergyBalance) -> Check:
+    """Heat in equals heat out."""
+    return _within(
+        "energy balance", abs(energy.imbalance_relative), BALANCE_LIMIT, "", "Heat in less heat out, relative."
+    )
+
+
+def check_coolant(film_heat: float, enthalpy_rise: float, moved: float) -> Check:
+    """What the walls give equals what the oil carries away."""
+    value = abs(film_heat - enthalpy_rise) / max(moved, 1.0e-12)
+    return _within("coolant enthalpy", value, BALANCE_LIMIT, "", "Film heat less enthalpy rise of the oil, relative.")
+
+
+def check_measures(kind: str, errors: dict[str, float]) -> Check:
+    """Meshed areas or volumes against the solid model; the worst is named."""
+    worst = max(errors, key=lambda name: abs(errors[name]))
+    return _within(f"{kind} against CAD", abs(errors[worst]), MEASURE_LIMIT, "", f"Worst: {worst}.")
+
+
+def check_coldest(coldest_inside: float, coldest_outside: float) -> Check:
+    """Without a heat sink nothing inside is colder than all its surroundings."""
+    return _within(
+        "below coldest surroundings",
+        max(0.0, coldest_outside - coldest_inside),
+        BELOW_COLDEST_LIMIT,
+        "K",
+        f"Coldest surroundings {coldest_outside - ZERO_CELSIUS_K:.2f} °C.",
+    )
+
+
+def check_grease(temperatures: dict[str, float], limit: float) -> Check:
+    """Grease stays below its limit; ``temperatures`` is the warmer raceway of each bearing, K."""
+    hottest = max(temperatures, key=temperatures.get)
+    return _within(
+        "grease temperature",
+        temperatures[hottest] - ZERO_CELSIUS_K,
+        limit - ZERO_CELSIUS_K,
+        "degC",
+        f"Warmest raceway: {hottest}.",
+    )
+
+
+def check_residual(residual: float, limit: float) -> Check:
+    """Relative residual of the linear equations."""
+    return _within("linear residual", residual, limit, "", "Norm of residual over norm of load.")
+
+
+def check_fixed_point(change: float, limit: float, iterations: int) -> Check:
+    """Heat, films and coolant are those of the field itself."""
+    return _within("coupling change", change, limit, "K", f"Last change of {iterations} iterations.")
+
+
+def _within(name: str, value: float, limit: float, unit: str, explanation: str) -> Check:
+    return Check(name, float(value), float(limit), unit, bool(value <= limit), explanation)
+
+
+def require_checks(checks: Iterable[Check], where: str) -> None:
+    """Raise when a check failed.
+
+    Raises
+    ------
+    CheckFailedError
+        Names every failed check with value and limit.
+    """
+    failed = [check for check in checks if not check.passed]
+    if failed:
+        listing = "; ".join(
+            f"{check.name} {check.value:.4g} {check.unit} (limit {check.limit:.4g}). {check.explanation}"
+            for check in failed
+        )
+        raise CheckFailedError(where, f"a self-check failed: {listing}", "The results are written, do not rely on them.")

@@ -1,0 +1,208 @@
+"""From a definition to a checked result: the one call behind ``spindle-fem run``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from spindle_fem import checks
+from spindle_fem.conduction.evaluate import probe_matrix, temperature_at_nodes
+from spindle_fem.coupling import FIELD_TOLERANCE, Clock, CoupledState, PreparedMachine, Progress, prepare_machine, solve_coupled
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.results.thermal_result import BearingResult, Check, CoolantResult, EnergyBalance, ThermalResult
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.validity import CodedWarning
+
+LINEAR_RESIDUAL_LIMIT = 1.0e-9
+
+
+def solve(
+    spec: MachineSpec, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
+) -> ThermalResult:
+    """Steady temperatures of a machine, with its self-checks.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    point : OperatingPoint, optional
+        The definition's own by default.
+    progress : callable
+        Told each stage by name as it begins.
+
+    Returns
+    -------
+    ThermalResult
+        :func:`spindle_fem.checks.require_checks` raises on a check that failed.
+
+    Raises
+    ------
+    GeometryError, MeshQualityError, NoSteadyStateError, ConvergenceError, EnergyBalanceError
+    """
+    return solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress)
+
+
+def solve_prepared(
+    machine: PreparedMachine, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
+) -> ThermalResult:
+    """Steady temperatures of a prepared machine; see :func:`solve`."""
+    clock = Clock(progress)
+    clock.begin("solve")
+    point = point or OperatingPoint.of(machine.spec)
+    coupled = solve_coupled(machine, point)
+    clock.begin("evaluate")
+    result = _build_result(machine, point, coupled)
+    clock.end()
+    return result.with_timings({**machine.timings, **clock.timings})
+
+
+def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState) -> ThermalResult:
+    spec, operators, solution = machine.spec, machine.operators, coupled.solution
+    nodes = temperature_at_nodes(operators, solution.temperature)
+    hottest = int(np.argmax(nodes))
+    balance = solution.balance
+    energy = EnergyBalance(
+        heat_in=balance.total_in, heat_in_by=dict(balance.heat_in), heat_out=dict(balance.films)
+    )
+    lumped = dict(zip(solution.problem.lumped_names, solution.lumped_temperature.tolist(), strict=True))
+    bearings = _bearings(machine, coupled, lumped)
+    coolant = _coolant(machine, point, coupled)
+    area_error, volume_error = operators.area_error(), operators.volume_error()
+    warnings = list(coupled.loads.warnings)
+    done = [
+        checks.check_energy(energy),
+        checks.check_measures("areas", area_error),
+        checks.check_measures("volumes", volume_error),
+        checks.check_coldest(float(nodes.min()), point.coldest),
+        checks.check_residual(solution.residual, LINEAR_RESIDUAL_LIMIT),
+        checks.check_fixed_point(
+            coupled.change, FIELD_TOLERANCE * max(1.0, float(nodes.max()) - point.coldest), coupled.iterations
+        ),
+    ]
+    done += _coolant_checks(machine, coupled)
+    if spec.grease is not None and bearings:
+        grease = checks.check_grease(
+            {name: max(item.temperature_inner, item.temperature_outer) for name, item in bearings.items()},
+            spec.grease.temperature_limit,
+        )
+        done.append(grease)
+        if not grease.passed:
+            text = f"Grease reaches {grease.value:.1f} °C, its limit is {grease.limit:.1f} °C. {grease.explanation}"
+            warnings.append(CodedWarning("grease_temperature", text))
+    films = coupled.loads.films
+    return ThermalResult(
+        spec=spec,
+        mesh=machine.mesh,
+        order=operators.order,
+        n_unknowns=operators.n_unknowns,
+        temperature=nodes,
+        air_temperature={name: value for name, value in lumped.items() if ".balls" not in name},
+        film_coefficient={name: film.coefficient for name, film in films.items()},
+        fluid_temperature={name: film.temperature for name, film in films.items()},
+        bearings=bearings,
+        coolant=coolant,
+        probes=_probes(machine, coupled, coolant),
+        energy=energy,
+        heat_flows=dict(balance.joints),
+        area_error_relative=area_error,
+        volume_error_relative=volume_error,
+        temperature_minimum=float(nodes.min()),
+        temperature_maximum=float(nodes[hottest]),
+        temperature_maximum_at=machine.mesh.points[hottest].copy(),
+        checks=tuple(done),
+        warnings=tuple(warnings),
+        iterations={"coupling": coupled.iterations, "linear": solution.iterations},
+        timings={},
+    )
+
+
+def _bearings(machine: PreparedMachine, coupled: CoupledState, lumped: Mapping[str, float]) -> dict[str, BearingResult]:
+    state = machine.field_state(coupled.solution.temperature, lumped)
+    found = {}
+    for name, temperatures in machine.builder.bearing_temperatures(state).items():
+        heat = coupled.loads.bearing_heat[name]
+        found[name] = BearingResult(
+            heat=heat.total,
+            terms=dict(heat.terms),
+            heat_to=dict(coupled.loads.heat_to[name]),
+            temperature_inner=temperatures.inner,
+            temperature_outer=temperatures.outer,
+            temperature_ball=temperatures.ball,
+            contact_angle_inner=heat.contact_angle_inner,
+            contact_angle_outer=heat.contact_angle_outer,
+            preload=heat.preload,
+            film_thickness=heat.film_thickness,
+            film_thickness_ratio=heat.film_thickness_ratio,
+        )
+    return found
+
+
+def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState) -> CoolantResult | None:
+    if coupled.coolant is None:
+        return None
+    state, loop, cells = coupled.coolant, machine.builder.coolant_loop, machine.builder.cells
+    march, section = state.march, loop.section
+    at_inlet = loop.coolant.properties(point.coolant_inlet_temperature)
+    velocity = section.velocity(point.coolant_flow)
+    area = cells.cell_area
+    field = machine.field_state(coupled.solution.temperature, {})
+    wall = machine.builder.wall_temperature(field)
+    regimes = np.atleast_1d(march.film.regime).ravel()
+    order = ("laminar", "transition", "turbulent")
+
+    def mean(values: np.ndarray) -> float:
+        return float((values * area).sum() / area.sum())
+
+    return CoolantResult(
+        flow=point.coolant_flow,
+        inlet_temperature=point.coolant_inlet_temperature,
+        outlet_temperature=march.march.mixed_outlet_temperature,
+        heat=march.march.enthalpy_rise,
+        reynolds=velocity * section.hydraulic_diameter / float(at_inlet.kinematic_viscosity),
+        prandtl=float(at_inlet.prandtl),
+        velocity=velocity,
+        regime=max(regimes.tolist(), key=order.index),
+        source=march.film.source,
+        pressure_drop=state.pressure.total,
+        pumping_power=state.pressure.pumping_power,
+        hydraulic_diameter=section.hydraulic_diameter,
+        length=section.length,
+        wetted_area=float(area.sum()),
+        position=cells.position,
+        angle=cells.angle,
+        bulk_temperature=np.atleast_2d(march.march.bulk_temperature)[0],
+        wall_temperature=wall[0],
+        film_coefficient=state.film_coefficient[0],
+        film_low=state.film_low[0],
+        film_high=state.film_high[0],
+        mean_film_coefficient=mean(state.film_coefficient),
+        mean_film_low=mean(state.film_low),
+        mean_film_high=mean(state.film_high),
+    )
+
+
+def _coolant_checks(machine: PreparedMachine, coupled: CoupledState) -> list[Check]:
+    if coupled.coolant is None:
+        return []
+    films = coupled.solution.balance.films
+    film_heat = sum(films[surface] for surface in machine.builder.cells.surfaces)
+    march = coupled.coolant.march.march
+    pumping = float(march.pumping_heat.sum())
+    moved = float(np.abs(march.heat).sum() + np.abs(march.pumping_heat).sum())
+    return [checks.check_coolant(film_heat + pumping, march.enthalpy_rise, moved)]
+
+
+def _probes(machine: PreparedMachine, coupled: CoupledState, coolant: CoolantResult | None) -> dict[str, float]:
+    points = [probe for probe in machine.spec.probe if probe.kind == "point"]
+    readings: dict[str, float] = {}
+    if points:
+        places = [
+            (-probe.r * np.sin(probe.angle), probe.r * np.cos(probe.angle), probe.z) for probe in points
+        ]
+        rows = probe_matrix(machine.operators, places, [probe.part for probe in points])
+        values = rows @ coupled.solution.temperature
+        readings = {probe.name: float(value) for probe, value in zip(points, values, strict=True)}
+    return {
+        probe.name: coolant.outlet_temperature if probe.kind == "coolant_outlet" else readings[probe.name]
+        for probe in machine.spec.probe
+    }
