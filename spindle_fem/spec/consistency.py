@@ -55,7 +55,9 @@ class Declared:
         names["bearing"] = tuple(
             name for group in _tables(content, "bearing_set") for name in names_of(group.get("bearing"))
         )
-        rotating = {str(part.get("name")): part.get("rotating") is True for part in _tables(content, "part")}
+        rotating: dict[str, bool] = {}
+        for part in _tables(content, "part"):
+            rotating.setdefault(str(part.get("name")), part.get("rotating") is True)
         for name in names["bearing"]:
             rotating |= {f"{name}.inner_ring": True, f"{name}.outer_ring": False}
         return cls(
