@@ -29,9 +29,11 @@ ERROR_WEIGHTS = (
     WEIGHT - (3.0 * WEIGHT + 1.0) / 3.0,
     DIAGONAL - DIAGONAL / 3.0,
 )
-NEWTON_TOLERANCE = 1.0e-9
-MAX_NEWTON = 12
-SLOWEST_STEP_FRACTION = 1.0e-9
+NEWTON_TOLERANCE = 1.0e-10
+SLOW_CONTRACTION = 0.1
+MAX_NEWTON = 15
+# Of an interval; also what rounding may leave of one.
+SHORTEST_STEP = 1.0e-9
 
 
 @dataclass(slots=True)
@@ -158,54 +160,52 @@ class _Stepper:
         self.times = history.times
         self.parameters = parameters
         self.step_error, self.max_step = step_error, max_step
-        self.next_step = np.inf
+        self.wanted_step = np.inf
+        self._rate = np.zeros(network.n_nodes)
         self.counts = StepCounts()
         self._matrix_step = np.nan
         self._inverse = np.empty(0)
 
     def cross(self, interval: int, state: Array, slope: Array) -> tuple[Array, Array]:
         """From one time of the history to the next."""
-        start, length = self.times[interval], self.times[interval + 1] - self.times[interval]
+        length = self.times[interval + 1] - self.times[interval]
+        shortest = SHORTEST_STEP * length
         done = 0.0
-        shortest = SLOWEST_STEP_FRACTION * length
-        if self.step_error is None:
-            self.next_step = length / np.ceil(length / self.max_step) if self.max_step < length else length
-        while done < length:
-            step = min(self.next_step, self.max_step, length - done)
-            remaining = length - done - step
-            if 0.0 < remaining < 0.5 * step:
-                # two even steps rather than a long one and a sliver
-                step = 0.5 * (length - done) if remaining > 1.0e-12 * length else length - done
+        while length - done > shortest:
+            step = self._next_length(length, length - done)
             outcome = self._try(interval, done / length, step, length, state)
-            if outcome is None:
+            ratio = np.inf
+            if outcome is not None:
+                stages, error = outcome
+                ratio = 0.0 if self.step_error is None else error / self.step_error
+            if ratio > 1.0:
                 self.counts.rejected += 1
-                self.next_step = 0.25 * step
-                if self.next_step < shortest or self.step_error is None:
+                shrunk = 0.25 if outcome is None else max(0.2, 0.9 * ratio ** (-1.0 / 3.0))
+                self.wanted_step = shrunk * step
+                if self.wanted_step < shortest or self.step_error is None:
                     raise ConvergenceError(
                         "network",
-                        f"no step succeeds at {start + done:.6g} s.",
-                        "Heat may grow with temperature without limit; check the laws.",
+                        f"no step succeeds at {self.times[interval] + done:.6g} s.",
+                        "Heat may grow with temperature without limit, or a law and its derivative disagree.",
                     )
                 continue
-            stages, error = outcome
-            if self.step_error is not None:
-                ratio = error / self.step_error
-                factor = 0.9 * max(ratio, 1.0e-6) ** (-1.0 / 3.0)
-                if ratio > 1.0 and step > shortest:
-                    self.counts.rejected += 1
-                    self.next_step = step * max(0.2, factor)
-                    continue
-                proposal = step * min(4.0, factor)
-                # a step cut short by the end of an interval says nothing against the longer one
-                self.next_step = proposal if proposal > step else min(self.next_step, proposal)
-                if proposal > step:
-                    self.next_step = max(proposal, self.next_step if step < self.next_step else 0.0)
+            growth = min(4.0, 0.9 * max(ratio, 1.0e-6) ** (-1.0 / 3.0))
+            # a step cut short by the end of an interval says nothing against the longer one before it
+            self.wanted_step = max(growth * step, self.wanted_step if step < self.wanted_step else 0.0)
             if self.parameters:
                 slope = self._slope(interval, done / length, step, length, state, stages, slope)
             self._account(step, stages)
+            self._rate = (stages[1][0] - state) / step
             state = stages[1][0]
-            done = length if length - done - step <= 1.0e-12 * length else done + step
+            done += step
         return state, slope
+
+    def _next_length(self, length: float, remaining: float) -> float:
+        """Length of the next step: even parts of what remains, none above what is wanted."""
+        if self.step_error is None:
+            # equal steps over the whole interval, whatever came before
+            return length / max(1.0, np.ceil(length / self.max_step * (1.0 - 1.0e-12)))
+        return remaining / max(1.0, np.ceil(remaining / min(self.wanted_step, self.max_step)))
 
     def _try(self, interval, fraction, step, length, state):
         """Both stages as (temperature, net heat, inputs) and the error, or None if Newton fails."""
@@ -213,7 +213,7 @@ class _Stepper:
         end = fraction + step / length
         first_net = self.balance.net_heat(state, *self.forcing.at(interval, fraction))
         capacity = self.network.capacity
-        guess = state + GAMMA * step * first_net / capacity if step * self._stiffness() < 1.0 else state
+        guess = state + GAMMA * step * self._rate
         stage = self._solve(capacity * state + step * DIAGONAL * first_net, step, interval, middle, guess)
         if stage is None:
             return None
@@ -231,39 +231,25 @@ class _Stepper:
             error = float(np.abs(self._inverse @ defect).max(initial=0.0))
         return ((two, two_net, first_net), (three, three_net)), error
 
-    def _stiffness(self) -> float:
-        return float((np.diag(self.balance.node_matrix) / self.network.capacity).max(initial=0.0))
-
     def _solve(self, known, step, interval, fraction, guess):
         """Solve ``C T - dt d F(T) = known`` by Newton; the inverse is kept while it converges."""
         capacity, scaled = self.network.capacity, step * DIAGONAL
         forcing = self.forcing.at(interval, fraction)
-        temperature = guess
-        fresh = False
+        temperature, previous = guess, np.inf
         if step != self._matrix_step:
-            self._refactor(guess, forcing, step)
-            fresh = True
-        previous = np.inf
-        for _ in range(MAX_NEWTON):
+            self._refactor(temperature, forcing, step)
+        for iteration in range(MAX_NEWTON):
             self.counts.newton += 1
             net = self.balance.net_heat(temperature, *forcing)
             change = self._inverse @ (known - capacity * temperature + scaled * net)
             size = float(np.abs(change).max(initial=0.0))
-            if not np.isfinite(size):
-                return None
-            if size > 0.3 * previous and size > NEWTON_TOLERANCE:
-                if fresh and size > 2.0 * previous:
-                    return None
-                self._refactor(temperature, forcing, step)
-                fresh = True
-                change = self._inverse @ (known - capacity * temperature + scaled * net)
-                size = float(np.abs(change).max(initial=0.0))
             temperature = temperature + change
-            if np.any(temperature <= 0.0):
+            if not np.isfinite(size) or np.any(temperature <= 0.0):
                 return None
             if size <= NEWTON_TOLERANCE:
-                # the stage equation itself gives the net heat: exact energy bookkeeping
-                return temperature, (capacity * temperature - known) / scaled
+                return temperature, self.balance.net_heat(temperature, *forcing)
+            if iteration and size > SLOW_CONTRACTION * previous:
+                self._refactor(temperature, forcing, step)
             previous = size
         return None
 

@@ -129,7 +129,7 @@ def solve_steady(
                     "network",
                     f"no step lowers the imbalance of {norm:.3g} W at node "
                     f'"{network.node_names[int(np.abs(net).argmax())]}".',
-                    "Heat grows with temperature faster than it is lost, or a law and its derivative disagree.",
+                    "Heat grows faster than it is lost, or a law and its derivative disagree.",
                 )
         moved = float(np.abs(trial - temperature).max(initial=0.0))
         temperature, net, derivative, norm = trial, trial_net, trial_derivative, trial_norm

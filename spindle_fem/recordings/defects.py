@@ -112,8 +112,8 @@ class DefectReport:
     def lines(self) -> list[str]:
         """The report as lines of text."""
         text = [
-            f"{self.name}: {self.rows} rows, {self.stamps} distinct stamps over {_duration(self.duration_s)}, "
-            f"median step {self.median_step_s:g} s"
+            f"{self.name}: {self.rows} rows, {self.stamps} distinct stamps over "
+            f"{_duration(self.duration_s)}, median step {self.median_step_s:g} s"
         ]
         rows = {
             "without time": self.rows_without_time,
@@ -147,11 +147,7 @@ class DefectReport:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; what could not be measured is null."""
-        names = (
-            "name rows stamps duration_s rows_without_time blank_rows short_rows truncated_last_row "
-            "unordered_rows repeated_rows conflicting_stamps median_step_s non_uniform_steps long_gap_s segments"
-        ).split()
-        content: dict[str, Any] = {name: getattr(self, name) for name in names}
+        content: dict[str, Any] = {name: getattr(self, name) for name in _PLAIN}
         content["gaps"] = [{"start_s": gap.start, "end_s": gap.end} for gap in self.gaps]
         content["unused_columns"] = list(self.unused_columns)
         content["channels"] = [
@@ -170,6 +166,25 @@ class DefectReport:
             for item in self.channels
         ]
         return content
+
+
+_PLAIN = (
+    "name",
+    "rows",
+    "stamps",
+    "duration_s",
+    "rows_without_time",
+    "blank_rows",
+    "short_rows",
+    "truncated_last_row",
+    "unordered_rows",
+    "repeated_rows",
+    "conflicting_stamps",
+    "median_step_s",
+    "non_uniform_steps",
+    "long_gap_s",
+    "segments",
+)
 
 
 def _finite(value: float) -> float | None:

@@ -130,8 +130,8 @@ def _gain_unit_faults(network: ThermalNetwork, units: dict[str, str], where: str
             faults.append(
                 UnitError(
                     f'{where}: source "{network.source_names[position]}"',
-                    f'gain in "{gain or "a pure number"}" times "{name}" in "{units[name] or "a pure number"}"'
-                    f" to the power {exponent:g} is no power.",
+                    f'gain in "{gain or "1"}" times "{name}" in "{units[name] or "1"}"'
+                    f" to the power {exponent:g} is no heat.",
                     "Give the gain in W over the input's unit, or in W with a reference.",
                 )
             )

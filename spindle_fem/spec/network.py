@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import pint
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError
 
 from spindle_fem.errors import (
@@ -22,6 +23,7 @@ from spindle_fem.spec.fields import Name, SpecModel, uncertain_field
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain, registry, to_si, uncertain_to_si
 
 NETWORK_SCHEMA = "spindle-fem/machine/1"
+_NUMBER_AND_UNIT = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(.*?)\s*")
 _INPUT_NAME = re.compile(r"^[A-Za-z_][A-Za-z0-9_.]*$")
 
 
@@ -42,16 +44,20 @@ class Gain:
 
 
 def _base_unit(text: Any) -> str:
-    """SI base unit of a quantity's text, ``""`` for a pure number."""
+    """SI unit of a quantity's text in a form that reads back, ``""`` for a pure number."""
+    match = _NUMBER_AND_UNIT.fullmatch(str(text))
+    if match is None or not match[1]:
+        return ""
     units = registry()
     try:
-        quantity = units.parse_expression(str(text).strip())
-    except Exception as error:  # pint's tokenizer raises its own undocumented classes on garbage
-        raise UnitError("", f"{text!r} cannot be read as a quantity.", 'Write it as "0.9 W/W".') from error
-    if not isinstance(quantity, units.Quantity):
-        return ""
-    base = quantity.to_base_units().units
-    return "" if base.dimensionless else str(base)
+        base = units.Quantity(1.0, units.parse_units(match[1])).to_base_units().units
+    except (pint.errors.PintError, TypeError, ValueError) as error:
+        raise UnitError(
+            "", f'"{text}" has the unknown unit "{match[1]}".', 'Write it as "0.9 W/W".'
+        ) from error
+    if base.dimensionality == units.Unit("W").dimensionality:
+        return "W"
+    return "" if str(base) == "dimensionless" else f"{base:~C}"
 
 
 def _read_gain(value: Any) -> Any:
@@ -64,7 +70,8 @@ def _read_gain(value: Any) -> Any:
         unit = _base_unit(sample)
         return Gain(uncertain_to_si(value, unit, where=""), unit)
     except SpindleFemError as error:
-        raise ValueError(f"{error.what} {error.how_to_fix}".strip()) from error
+        offer = "Where the exponent is not whole, give the gain in W and a reference."
+        raise ValueError(f"{error.what} {error.how_to_fix} {offer}") from error
 
 
 def _write_gain(gain: Gain) -> Any:
