@@ -69,7 +69,8 @@ class FilmCoefficient:
         What the model answers, and the spread of what the applicable
         correlations for helical channels answer (it always contains the value).
     regime : str or (n,) ndarray of str
-        ``laminar``, ``transition`` or ``turbulent``.
+        ``laminar``, ``transition`` or ``turbulent`` flow in the coil; with the
+        model ``paper`` what the paper takes it for.
     source : str
         Correlations behind the value.
     in_range : bool or (n,) ndarray of bool
@@ -133,7 +134,7 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
     Range: what leaves a source's range is answered, marked ``in_range`` false,
     widened in ``low`` and ``high`` and said in ``warnings``.
 
-    Source: the correlations in ``coolant.nusselt``.
+    Source: the correlations in ``coolant.nusselt`` and ``coolant.nusselt_helical``.
 
     >>> from spindle_fem.coolant.properties import OilIsoVg32
     >>> channel = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
@@ -150,18 +151,17 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
     band = helical_band(section, flow)
     conductance = flow.conductance
 
+    regime = np.where(
+        flow.reynolds <= flow.critical,
+        "laminar",
+        np.where(flow.reynolds < TURBULENT_FROM_REYNOLDS, "transition", "turbulent"),
+    )
     if model == "helical":
         value, in_range, faults = band.value * conductance, band.in_range, band.faults
-        regime = np.where(
-            flow.reynolds <= flow.critical,
-            "laminar",
-            np.where(flow.reynolds < TURBULENT_FROM_REYNOLDS, "transition", "turbulent"),
-        )
         source = _helical_source(flow)
     elif model == "sieder_tate":
         value, in_range, faults = _sieder_tate(flow)
         value = value * conductance
-        regime = np.full(value.shape, "laminar")
         source = "Sieder & Tate 1936"
     else:
         value, in_range, faults, regime = _paper(section, flow)

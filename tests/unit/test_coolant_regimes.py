@@ -83,6 +83,19 @@ def test_slow_flow_in_a_short_channel_develops_as_in_a_straight_duct():
 )
 def test_regimes_of_the_coil(litres, regime):
     assert film("helical", litres).regime == regime
+    # The laminar formula does not make the flow laminar.
+    assert film("sieder_tate", litres).regime == regime
+
+
+def test_turbulent_band_holds_the_straight_duct_and_the_scatter_of_the_data():
+    tight = film("helical", 1300.0)
+    straight, curved = tight.candidates["gnielinski_straight"], tight.candidates["gnielinski_helical"]
+    assert tight.value == curved
+    assert tight.low == pytest.approx(min(straight, curved / 1.15), rel=1e-12)
+    assert tight.high == pytest.approx(1.15 * curved, rel=1e-12)
+    # On a wide coil curvature adds little and the scatter alone sets the low end.
+    wide = film("helical", 1300.0, channel=ChannelSection(2.0, 0.010, 0.012, 0.024, 5.0))
+    assert wide.low == pytest.approx(wide.value / 1.15, rel=1e-12)
 
 
 def test_paper_switches_on_the_channel_depth_with_a_jump():
