@@ -34,6 +34,8 @@ class MarchResult:
     ----------
     edge_temperature : (..., n + 1) ndarray, [K]
         Bulk temperature at the cell ends, the inlet first.
+    edge_rise : (..., n + 1) ndarray, [K]
+        The same above the inlet, without the rounding of absolute temperatures.
     bulk_temperature : (..., n) ndarray, [K]
         Mean of the exact profile in each cell: heat = h A (T_wall − T_bulk).
     heat : (..., n) ndarray, [W]
@@ -51,6 +53,7 @@ class MarchResult:
     """
 
     edge_temperature: NDArray[np.float64]
+    edge_rise: NDArray[np.float64]
     bulk_temperature: NDArray[np.float64]
     heat: NDArray[np.float64]
     pumping_heat: NDArray[np.float64]
@@ -161,6 +164,7 @@ def march_enthalpy(
     outlet = inlet_temperature + edges[..., -1]
     return MarchResult(
         edge_temperature=_frozen(inlet_temperature + edges),
+        edge_rise=_frozen(edges),
         bulk_temperature=_frozen(inlet_temperature + bulk),
         heat=_frozen(heat),
         pumping_heat=_frozen(pumping),
@@ -351,7 +355,8 @@ def march_channel(
             march = _with_true_enthalpy(march, coolant, mass_flow)
             break
         bulk = march.bulk_temperature
-        capacity = _mean_heat_capacity(coolant, march.edge_temperature)
+        edges = march.edge_rise
+        capacity = _mean_heat_capacity(coolant, inlet_temperature, edges[..., :-1], edges[..., 1:])
     else:
         raise ConvergenceError(
             "coolant march",
@@ -366,9 +371,10 @@ def march_channel(
 
 def _with_true_enthalpy(march: MarchResult, coolant: Coolant, mass_flow: float) -> MarchResult:
     """Replace the enthalpy rise by that of the coolant itself, and mix by enthalpy."""
-    enthalpy = coolant.specific_enthalpy(march.edge_temperature)
-    rise = mass_flow * float(np.sum(enthalpy[..., -1] - enthalpy[..., 0]))
-    mixed_enthalpy = float(np.mean(enthalpy[..., -1]))
+    inlet, outlet_rise = float(march.edge_temperature.flat[0]), march.edge_rise[..., -1:]
+    capacity = _mean_heat_capacity(coolant, inlet, np.zeros_like(outlet_rise), outlet_rise)
+    rise = mass_flow * float(np.sum(capacity * outlet_rise))
+    mixed_enthalpy = float(np.mean(coolant.specific_enthalpy(march.outlet_temperature)))
     mixed = march.mixed_outlet_temperature
     for _ in range(3):
         error = float(coolant.specific_enthalpy(mixed)) - mixed_enthalpy
@@ -376,12 +382,13 @@ def _with_true_enthalpy(march: MarchResult, coolant: Coolant, mass_flow: float) 
     return replace(march, enthalpy_rise=rise, mixed_outlet_temperature=mixed)
 
 
-def _mean_heat_capacity(coolant: Coolant, edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over each cell's rise, by Gauss points: no division by a small rise."""
+def _mean_heat_capacity(
+    coolant: Coolant, inlet: float, start: NDArray[np.float64], end: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean between two rises above the inlet, by Gauss points: no division by a small rise."""
     points, weights = np.polynomial.legendre.leggauss(5)
-    start, end = edges[..., :-1, None], edges[..., 1:, None]
-    temperature = 0.5 * (start + end) + 0.5 * (end - start) * points
-    return coolant.properties(temperature).specific_heat_capacity @ (0.5 * weights)
+    rise = 0.5 * (start + end)[..., None] + 0.5 * (end - start)[..., None] * points
+    return coolant.properties(inlet + rise).specific_heat_capacity @ (0.5 * weights)
 
 
 def _exponential_shares(

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from spindle_fem.coolant.friction import channel_pressure_drop
@@ -126,7 +126,8 @@ def test_march_closes_and_obeys_the_maximum_principle(seed, number, inlet, sprea
     np.testing.assert_allclose(line.constant + line.matrix @ wall, march.heat, atol=1e-8 * scale)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None)
+@example(inlet=12.0, difference=0.03125, litres=2.0, model="helical", number=1)
 @given(
     inlet=st.floats(12.0, 30.0),
     difference=st.floats(-10.0, 20.0),
