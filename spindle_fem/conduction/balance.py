@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,9 @@ class HeatBalance:
     imbalance : float, [W]
         Heat in − heat out − stored.
     imbalance_relative : float, [-]
-        Relative to the sum of absolute flows across the boundary.
+        Relative to the turnover.
+    turnover : float, [W]
+        Half the sum of absolute flows across the boundary.
     """
 
     heat_in: Mapping[str, float]
@@ -48,6 +50,7 @@ class HeatBalance:
     stored: float
     imbalance: float
     imbalance_relative: float
+    turnover: float
 
     @property
     def total_in(self) -> float:
@@ -120,6 +123,20 @@ def compute_balance(
         stored,
         float(imbalance),
         abs(float(imbalance)) / turnover if turnover else 0.0,
+        float(turnover),
+    )
+
+
+def with_law_heat(balance: HeatBalance, law_heat: Mapping[str, float]) -> HeatBalance:
+    """The balance with the heat of film laws as the laws give it, not their linearisation."""
+    films = {**balance.films, **law_heat}
+    imbalance = balance.imbalance + sum(balance.films[label] - heat for label, heat in law_heat.items())
+    turnover = balance.turnover
+    return replace(
+        balance,
+        films=films,
+        imbalance=imbalance,
+        imbalance_relative=abs(imbalance) / turnover if turnover else 0.0,
     )
 
 

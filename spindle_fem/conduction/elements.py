@@ -23,7 +23,7 @@ from spindle_fem.errors import MeshQualityError
 CHUNK = 16384
 # Edge middles this close to the chord, relative to the edge, count as straight.
 STRAIGHT_TOLERANCE = 1e-10
-_TET_EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 _METRIC_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -94,7 +94,7 @@ def product_table(table: ReferenceTable) -> NDArray[np.float64]:
 
 def is_straight(points: NDArray[np.float64], tetrahedra: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which quadratic tetrahedra have every edge middle on its chord, (n_elements,)."""
-    ends = points[tetrahedra[:, _TET_EDGES]]
+    ends = points[tetrahedra[:, EDGES]]
     bow = np.abs(points[tetrahedra[:, 4:]] - 0.5 * (ends[:, :, 0] + ends[:, :, 1])).max(axis=(1, 2))
     return bow <= STRAIGHT_TOLERANCE * np.abs(ends[:, :, 1] - ends[:, :, 0]).max(axis=(1, 2))
 

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from skfem import ElementTetP1, ElementTetP2
 
 from spindle_fem.conduction.elements import evaluate_shape
-from spindle_fem.conduction.operators import ThermalOperators
+from spindle_fem.conduction.operators import ThermalOperators, prolongation_from_corners
 from spindle_fem.errors import ConvergenceError, GeometryError, SpecError
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
@@ -22,7 +22,6 @@ NEWTON_TOLERANCE = 1e-12
 # A point may lie this far outside its element, in reference coordinates,
 # because a curved wall and its quadratic mesh differ.
 OUTSIDE_TOLERANCE = 0.05
-_TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,13 +237,7 @@ def temperature_at_nodes(
     """
     if operators.order == 2:
         return temperature
-    mesh = operators.mesh
-    out = np.empty(len(mesh.points))
-    out[: mesh.n_corners] = temperature
-    for column, (i, j) in enumerate(_TET_EDGES):
-        ends = mesh.tetrahedra[:, [i, j]]
-        out[mesh.tetrahedra[:, 4 + column]] = 0.5 * (temperature[ends[:, 0]] + temperature[ends[:, 1]])
-    return out
+    return prolongation_from_corners(operators.mesh) @ temperature
 
 
 def heat_flux_at_nodes(

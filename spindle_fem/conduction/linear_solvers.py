@@ -12,11 +12,12 @@ from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
 
+from spindle_fem.conduction.multigrid import build_hierarchy
 from spindle_fem.conduction.problem import ThermalSystem
 from spindle_fem.errors import ConvergenceError, SpecError
 
 DIRECT_BELOW = 20_000
-RELATIVE_TOLERANCE = 1e-12
+RELATIVE_TOLERANCE = 1e-11
 MAX_ITERATIONS = 400
 
 Method = Literal["direct", "multigrid"]
@@ -80,23 +81,8 @@ def build_preconditioner(system: ThermalSystem, method: Method | None = None) ->
         return Preconditioner("direct", size, factor.solve)
     if chosen != "multigrid":
         raise SpecError("solver", f"{method!r}.", "Allowed: direct, multigrid.")
-    return Preconditioner("multigrid", size, with_lumped_nodes(system, build_cycle(system.matrix)))
-
-
-def build_cycle(matrix: sparse.csr_array) -> Operator:
-    """One symmetric smoothed-aggregation cycle."""
-    import pyamg
-
-    hierarchy = pyamg.smoothed_aggregation_solver(
-        sparse.csr_matrix(matrix),
-        strength=("symmetric", {"theta": 0.0}),
-        presmoother=("gauss_seidel", {"sweep": "symmetric"}),
-        postsmoother=("gauss_seidel", {"sweep": "symmetric"}),
-        improve_candidates=None,
-        max_coarse=500,
-    )
-    cycle = hierarchy.aspreconditioner(cycle="V")
-    return cycle.matvec
+    hierarchy = build_hierarchy(system.matrix, system.prolongation)
+    return Preconditioner("multigrid", size, with_lumped_nodes(system, hierarchy.cycle))
 
 
 def with_lumped_nodes(system: ThermalSystem, cycle: Operator) -> Operator:
@@ -193,7 +179,8 @@ def _conjugate_gradients(
         if np.linalg.norm(residual) <= target:
             return unknowns, iteration
         preconditioned = precondition(residual)
-        previous, energy = energy, float(residual @ preconditioned)
-        direction *= energy / previous
+        # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
+        direction *= -step * float(preconditioned @ image) / energy
         direction += preconditioned
+        energy = float(residual @ preconditioned)
     return unknowns, limit

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from spindle_fem.conduction.elements import (
+    EDGES,
     integrate_circumferential,
     integrate_elements,
     integrate_facets,
@@ -68,6 +69,8 @@ class ThermalOperators:
         Rows of side a and side b of each joint.
     joint_cross_slots : mapping of str to (n_facets, n, n) int32 ndarray
         Upper entry that couples node i of side a with node j of side b.
+    prolongation : (n_unknowns, n_corners) csr_array or None
+        Linear temperatures as quadratic ones; None for order 1.
     """
 
     mesh: TaggedMesh
@@ -91,6 +94,7 @@ class ThermalOperators:
     surface_rows: Mapping[str, slice]
     joint_rows: Mapping[str, tuple[slice, slice]]
     joint_cross_slots: Mapping[str, NDArray[np.int32]]
+    prolongation: sparse.csr_array | None
 
     # ------------------------------------------------------------- measures
     def surface_area(self, surface: str) -> float:
@@ -425,9 +429,25 @@ def build_operators(
         surface_rows=surface_rows,
         joint_rows=joint_rows,
         joint_cross_slots=dict(zip(joint_rows, cross_slots, strict=True)),
+        prolongation=None if order == 1 else prolongation_from_corners(mesh),
     )
     operators.require_measures(area_tolerance)
     return operators
+
+
+def prolongation_from_corners(mesh: TaggedMesh) -> sparse.csr_array:
+    """Linear temperatures at all nodes, (n_nodes, n_corners): edge middles take the mean of the ends."""
+    n = len(mesh.points)
+    ends = np.empty((n, 2), dtype=np.int32)
+    ends[: mesh.n_corners] = np.arange(mesh.n_corners, dtype=np.int32)[:, None]
+    for column, edge in enumerate(EDGES):
+        ends[mesh.tetrahedra[:, 4 + column]] = mesh.tetrahedra[:, edge]
+    matrix = sparse.csr_array(
+        (np.full(2 * n, 0.5), ends.ravel(), np.arange(0, 2 * n + 1, 2, dtype=np.int32)),
+        shape=(n, mesh.n_corners),
+    )
+    matrix.sum_duplicates()
+    return matrix
 
 
 def _sum_into(slots: NDArray, values: NDArray[np.float64], size: int) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -34,6 +34,32 @@ class Film:
 
     surface: str
     coefficient: ArrayLike
+    ambient_temperature: ArrayLike
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name in the heat balance."""
+        return self.name or self.surface
+
+
+@dataclass(frozen=True, slots=True)
+class FilmLaw:
+    """A film whose coefficient follows the surface temperature.
+
+    Attributes
+    ----------
+    surface : str
+    coefficient : callable
+        ``(n,)`` mean temperature of each facet [K] to ``(n,)`` coefficients
+        [W/(m²·K)], positive; for natural convection and radiation.
+    ambient_temperature : float or (n,) ndarray, [K]
+    name : str
+        Name in the heat balance; the surface's when empty.
+    """
+
+    surface: str
+    coefficient: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     ambient_temperature: ArrayLike
     name: str = ""
 
@@ -116,6 +142,8 @@ class ConductionProblem:
     circumferential_factor : mapping of str to float, [-]
         Conductivity around the axis relative to the other directions; 1 when
         absent. Only for parts that the operators were built with.
+    film_laws : tuple of FilmLaw
+        Films that depend on temperature.
     adiabatic : collection of str, or "rest"
         Surfaces that exchange nothing: each surface must be named in a film,
         a heat, a connection or here.
@@ -131,6 +159,7 @@ class ConductionProblem:
     lumped_links: tuple[LumpedLink, ...] = ()
     volumetric_capacity: Mapping[str, float] = field(default_factory=dict)
     circumferential_factor: Mapping[str, float] = field(default_factory=dict)
+    film_laws: tuple[FilmLaw, ...] = ()
     adiabatic: Collection[str] | Literal["rest"] = ()
 
     def __post_init__(self) -> None:
@@ -158,10 +187,10 @@ class ThermalSystem:
     lumped_matrix : (m, m) ndarray, [W/K]
     lumped_load : (m,) ndarray, [W]
     reference_temperature : float, [K]
-    heat_in : float, [W]
-        Heat put in by surfaces, parts and lumped nodes.
     tie : (n, n_tied) csr_array or None
         Unknowns from those left when perfect joints tie node pairs.
+    prolongation : (n, n_corners) csr_array or None
+        From linear to quadratic temperatures, for multigrid.
     """
 
     matrix: sparse.csr_array
@@ -170,8 +199,8 @@ class ThermalSystem:
     lumped_matrix: NDArray[np.float64]
     lumped_load: NDArray[np.float64]
     reference_temperature: float
-    heat_in: float
     tie: sparse.csr_array | None
+    prolongation: sparse.csr_array | None
 
     @property
     def n_lumped(self) -> int:
@@ -203,8 +232,8 @@ class ThermalSystem:
             self.lumped_matrix,
             self.lumped_load,
             self.reference_temperature,
-            self.heat_in,
             None,
+            _tied_prolongation(tie, self.prolongation),
         )
 
 
@@ -214,28 +243,19 @@ def assemble_system(problem: ConductionProblem) -> ThermalSystem:
     Parameters
     ----------
     problem : ConductionProblem
+        Without film laws: these are linearised first.
 
     Returns
     -------
     ThermalSystem
     """
+    if problem.film_laws:
+        raise SpecError("problem", "film laws must be linearised before assembly.", "Use linearise_films.")
     operators = problem.operators
-    reference = reference_temperature(problem)
     upper = operators.sum_conduction(conductivity_of_parts(problem), _factors(problem))
     coefficient = np.zeros(len(operators.facet_area))
-    flux = np.zeros(len(operators.facet_area))
-    heat_in = 0.0
     for film in problem.films:
-        rows = operators.surface_rows[film.surface]
-        values = operators.per_facet(film.surface, film.coefficient, film.label)
-        ambient = operators.per_facet(film.surface, film.ambient_temperature, film.label)
-        coefficient[rows] += values
-        flux[rows] += values * (ambient - reference)
-    for surface, heat in problem.surface_heat.items():
-        rows = operators.surface_rows[surface]
-        density = heat_flux(operators, surface, heat)
-        flux[rows] += density
-        heat_in += float(density @ operators.facet_area[rows])
+        coefficient[operators.surface_rows[film.surface]] += np.asarray(film.coefficient)
     columns, diagonal = [], []
     for node in problem.lumped_nodes:
         column = np.zeros(operators.n_unknowns)
@@ -259,28 +279,48 @@ def assemble_system(problem: ConductionProblem) -> ThermalSystem:
         coefficient[side_b] += conductance
         operators.add_joint(upper, joint, conductance)
     operators.add_films(upper, coefficient)
+    reference = reference_temperature(problem)
+    load, lumped_load = assemble_load(problem, reference)
+    return ThermalSystem(
+        operators.matrix(upper),
+        load,
+        sparse.hstack(columns, format="csc") if columns else sparse.csc_array((operators.n_unknowns, 0)),
+        _lumped_matrix(problem, diagonal),
+        lumped_load,
+        reference,
+        _tie_matrix(operators, ties),
+        operators.prolongation,
+    )
+
+
+def assemble_load(
+    problem: ConductionProblem, reference: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Right-hand sides of the mesh's unknowns (n,) and of the lumped nodes (m,), [W].
+
+    Parameters
+    ----------
+    problem : ConductionProblem
+    reference : float, [K]
+        Temperature that unknowns count from.
+    """
+    operators = problem.operators
+    flux = np.zeros(len(operators.facet_area))
+    for film in problem.films:
+        rows = operators.surface_rows[film.surface]
+        flux[rows] += np.asarray(film.coefficient) * (np.asarray(film.ambient_temperature) - reference)
+    for surface, heat in problem.surface_heat.items():
+        flux[operators.surface_rows[surface]] += heat_flux(operators, surface, heat)
     load = operators.facet_vector(flux, slice(0, len(flux)))
     for part, heat in problem.part_heat.items():
         own = operators.part_of_unknown == operators.part_index(part, "part_heat")
         load[own] += heat / operators.part_volume[part] * operators.part_load[own]
-        heat_in += heat
-    lumped_matrix, lumped_load = _lumped_equations(problem, np.array(diagonal), reference)
-    exchange = (
-        sparse.hstack(columns, format="csc")
-        if columns
-        else sparse.csc_array((operators.n_unknowns, 0), dtype=float)
-    )
-    heat_in += float(sum(node.heat for node in problem.lumped_nodes))
-    return ThermalSystem(
-        operators.matrix(upper),
-        load,
-        exchange,
-        lumped_matrix,
-        lumped_load,
-        reference,
-        heat_in,
-        _tie_matrix(operators, ties),
-    )
+    lumped_load = np.array([node.heat for node in problem.lumped_nodes], dtype=float)
+    for link in problem.lumped_links:
+        if link.other is None:
+            rise = link.temperature - reference
+            lumped_load[problem.lumped_names.index(link.node)] += link.conductance * rise
+    return load, lumped_load
 
 
 def assemble_capacity(problem: ConductionProblem) -> tuple[sparse.csr_array, NDArray[np.float64]]:
@@ -315,7 +355,7 @@ def heat_flux(operators: ThermalOperators, surface: str, heat: ArrayLike) -> NDA
 
 def reference_temperature(problem: ConductionProblem) -> float:
     """Mean temperature of the surroundings that the problem names, [K]."""
-    given = [float(np.mean(film.ambient_temperature)) for film in problem.films]
+    given = [float(np.mean(film.ambient_temperature)) for film in (*problem.films, *problem.film_laws)]
     given += [link.temperature for link in problem.lumped_links if link.temperature is not None]
     return float(np.mean(given)) if given else 0.0
 
@@ -329,23 +369,18 @@ def _factors(problem: ConductionProblem) -> NDArray[np.float64] | None:
     )
 
 
-def _lumped_equations(
-    problem: ConductionProblem, diagonal: NDArray[np.float64], reference: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _lumped_matrix(problem: ConductionProblem, diagonal: list[float]) -> NDArray[np.float64]:
     names = problem.lumped_names
-    matrix = np.diag(diagonal) if len(diagonal) else np.zeros((0, 0))
-    load = np.array([node.heat for node in problem.lumped_nodes], dtype=float)
+    matrix = np.diag(np.array(diagonal, dtype=float)) if diagonal else np.zeros((0, 0))
     for link in problem.lumped_links:
         i = names.index(link.node)
         matrix[i, i] += link.conductance
-        if link.other is None:
-            load[i] += link.conductance * (link.temperature - reference)
-        else:
+        if link.other is not None:
             j = names.index(link.other)
             matrix[j, j] += link.conductance
             matrix[i, j] -= link.conductance
             matrix[j, i] -= link.conductance
-    return matrix, load
+    return matrix
 
 
 def _tie_matrix(operators: ThermalOperators, joints: list[str]) -> sparse.csr_array | None:
@@ -358,6 +393,21 @@ def _tie_matrix(operators: ThermalOperators, joints: list[str]) -> sparse.csr_ar
     graph = sparse.coo_array((np.ones(len(nodes_a)), (nodes_a, nodes_b)), shape=(n, n))
     count, label = connected_components(graph, directed=False)
     return sparse.csr_array((np.ones(n), (np.arange(n), label)), shape=(n, count))
+
+
+def _tied_prolongation(
+    tie: sparse.csr_array, prolongation: sparse.csr_array | None
+) -> sparse.csr_array | None:
+    """Prolongation between tied unknowns: corners tie with corners, middles with middles."""
+    if prolongation is None:
+        return None
+    n_corners = prolongation.shape[1]
+    labels, group = np.unique(tie.indices[:n_corners], return_inverse=True)
+    tie_corners = sparse.csr_array(
+        (np.ones(n_corners), (np.arange(n_corners), group)), shape=(n_corners, len(labels))
+    )
+    first = np.unique(tie.indices, return_index=True)[1]
+    return (prolongation[first] @ tie_corners).tocsr()
 
 
 # ------------------------------------------------------------------ validation
@@ -417,6 +467,12 @@ def _require_films(problem: ConductionProblem) -> None:
         )
         _require(film.label not in labels, "films", film.label, "each name once; give the second film a name")
         labels.add(film.label)
+    for law in problem.film_laws:
+        operators.per_facet(law.surface, law.ambient_temperature, f"film law {law.label}")
+        _require(
+            law.label not in labels, "film laws", law.label, "each name once; give the second film a name"
+        )
+        labels.add(law.label)
     for surface, heat in problem.surface_heat.items():
         operators.per_facet(surface, heat, f"heat on {surface}")
     for part, heat in problem.part_heat.items():
@@ -466,13 +522,14 @@ def _require_lumped(problem: ConductionProblem) -> None:
 
 def _require_every_surface_named(problem: ConductionProblem) -> None:
     surfaces = problem.operators.surface_rows
-    used = {film.surface for film in problem.films} | set(problem.surface_heat)
+    filmed = {film.surface for film in (*problem.films, *problem.film_laws)}
+    used = filmed | set(problem.surface_heat)
     used |= {surface for node in problem.lumped_nodes for surface, _ in node.connections}
     if problem.adiabatic == "rest":
         return
     for surface in problem.adiabatic:
         problem.operators.rows_of(surface, "adiabatic")
-    both = sorted({film.surface for film in problem.films} & set(problem.adiabatic))
+    both = sorted(filmed & set(problem.adiabatic))
     if both:
         raise MeshTagError("adiabatic", f"{', '.join(both)} also has a film.", "Name it in one of both.")
     left = sorted(set(surfaces) - used - set(problem.adiabatic))
@@ -500,6 +557,7 @@ def require_surroundings(problem: ConductionProblem) -> None:
     for film in problem.films:
         if np.any(np.asarray(film.coefficient) > 0.0):
             ends.append((parts.index(part_of[film.surface]), len(names) - 1))
+    ends += [(parts.index(part_of[law.surface]), len(names) - 1) for law in problem.film_laws]
     for joint, value in problem.joint_conductance.items():
         if np.any(np.asarray(value) > 0.0):
             side_a, side_b = operators.joint_rows[joint]

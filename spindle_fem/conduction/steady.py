@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.conduction.balance import (
+    BALANCE_TOLERANCE,
     LINEAR_BALANCE_TOLERANCE,
     HeatBalance,
     compute_balance,
     require_balance,
+    with_law_heat,
 )
 from spindle_fem.conduction.linear_solvers import (
     RELATIVE_TOLERANCE,
@@ -20,13 +22,20 @@ from spindle_fem.conduction.linear_solvers import (
     build_preconditioner,
     solve_linear,
 )
+from spindle_fem.conduction.nonlinear import law_heat, linearise_films
 from spindle_fem.conduction.problem import (
     ConductionProblem,
     ThermalSystem,
     assemble_system,
+    reference_temperature,
     require_surroundings,
 )
-from spindle_fem.errors import SpecError
+from spindle_fem.errors import ConvergenceError, SpecError
+
+NONLINEAR_TOLERANCE_K = 1e-6
+MAX_NONLINEAR_STEPS = 40
+# Natural convection has no heat at no difference: start off the ambient.
+START_RISE_K = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +82,10 @@ def solve_steady(
     *,
     method: Method | None = None,
     relative_tolerance: float = RELATIVE_TOLERANCE,
-    balance_tolerance: float = LINEAR_BALANCE_TOLERANCE,
+    nonlinear_tolerance: float = NONLINEAR_TOLERANCE_K,
+    balance_tolerance: float | None = None,
 ) -> ConductionSolution:
-    """Solve a linear steady problem.
+    """Solve a steady problem; film laws by Newton's method.
 
     Parameters
     ----------
@@ -88,8 +98,11 @@ def solve_steady(
         When a preconditioner is built; by size when absent.
     relative_tolerance : float, [-]
         Of the linear residual.
-    balance_tolerance : float, [-]
-        Largest relative difference of heat in and out.
+    nonlinear_tolerance : float, [K]
+        Largest change of temperature in the last Newton step.
+    balance_tolerance : float, optional, [-]
+        Largest relative difference of heat in and out; 1e-10 when linear and
+        1e-8 with film laws unless given.
 
     Raises
     ------
@@ -98,6 +111,10 @@ def solve_steady(
     ConvergenceError, EnergyBalanceError
     """
     require_surroundings(problem)
+    if problem.film_laws:
+        return _solve_nonlinear(
+            problem, guess, preconditioner, method, relative_tolerance, nonlinear_tolerance, balance_tolerance
+        )
     system = assemble_system(problem)
     tied = system.tied()
     if preconditioner is None:
@@ -108,7 +125,7 @@ def solve_steady(
     unknowns = close_balance(matrix, load, solution.unknowns)
     rise, lumped_rise = split_unknowns(system, unknowns)
     balance = compute_balance(problem, system, rise, lumped_rise)
-    require_balance(balance, balance_tolerance)
+    require_balance(balance, LINEAR_BALANCE_TOLERANCE if balance_tolerance is None else balance_tolerance)
     return ConductionSolution(
         problem,
         _frozen(rise + system.reference_temperature),
@@ -117,6 +134,42 @@ def solve_steady(
         solution.iterations,
         solution.residual,
         preconditioner,
+    )
+
+
+def _solve_nonlinear(
+    problem: ConductionProblem,
+    guess: ConductionSolution | None,
+    preconditioner: Preconditioner | None,
+    method: Method | None,
+    relative_tolerance: float,
+    nonlinear_tolerance: float,
+    balance_tolerance: float | None,
+) -> ConductionSolution:
+    if guess is None:
+        temperature = np.full(problem.operators.n_unknowns, reference_temperature(problem) + START_RISE_K)
+    else:
+        temperature = guess.temperature
+    solution, iterations = guess, 0
+    for step in range(1, MAX_NONLINEAR_STEPS + 1):
+        linear = linearise_films(problem, temperature)
+        solution = solve_steady(
+            linear, solution, preconditioner, method=method, relative_tolerance=relative_tolerance
+        )
+        preconditioner = solution.preconditioner
+        iterations += solution.iterations
+        change = float(np.abs(solution.temperature - temperature).max())
+        temperature = solution.temperature
+        if change <= nonlinear_tolerance:
+            balance = with_law_heat(solution.balance, law_heat(problem, temperature))
+            require_balance(balance, BALANCE_TOLERANCE if balance_tolerance is None else balance_tolerance)
+            return replace(
+                solution, problem=problem, balance=balance, iterations=iterations, nonlinear_iterations=step
+            )
+    raise ConvergenceError(
+        "film laws",
+        f"temperatures still change by {change:.3g} K after {MAX_NONLINEAR_STEPS} Newton steps.",
+        f"Asked: {nonlinear_tolerance:g} K. Check that each film's heat rises with temperature.",
     )
 
 
