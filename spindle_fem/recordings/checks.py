@@ -25,9 +25,11 @@ class Flag(IntFlag):
 
 # Lengths are in samples, temperatures in K.
 SPIKE_WINDOW = 5
+SPIKE_PASSES = 4
 SPIKE_SIGMAS = 6.0
 SPIKE_FLOOR = 0.5
 SPIKE_STANDS_OUT = 3.0
+SPIKE_EDGE_FACTOR = 4.0
 DROPOUT_SIGMAS = 12.0
 DROPOUT_FLOOR = 3.0
 DROPOUT_LONGEST = 200
@@ -37,9 +39,10 @@ QUIET_SHARE = 0.25
 # An open thermocouple reads above or below this; no spindle sensor does in earnest.
 PLAUSIBLE_KELVIN = (213.15, 673.15)
 
-# The standard deviation of a normal sample cut at its 98 % smallest magnitudes is this fraction.
-_KEPT_FRACTION = 0.98
-_TRIMMED_NORMAL = 0.93463
+# The standard deviation of a normal sample cut to its 95 % smallest magnitudes is this fraction:
+# sqrt(1 - 2 z phi(z) / 0.95) at z = 1.959964.
+_KEPT_FRACTION = 0.95
+_TRIMMED_NORMAL = 0.87112
 _RESOLUTIONS = [factor * 10.0**power for power in range(2, -5, -1) for factor in (5.0, 2.5, 2.0, 1.0)]
 _SAMPLE_FOR_RESOLUTION = 20_000
 
@@ -53,9 +56,8 @@ class ChannelNoise:
     white : float
         One standard deviation of independent noise, rounding included.
     slow : float
-        One standard deviation of errors that last many samples: an upper
-        estimate, since slow changes of the machine that a parabola does not
-        follow count as errors too; half steps of a coarse sensor included.
+        One standard deviation of errors that last many samples, see
+        :func:`slow_error`; half steps of a coarse sensor included.
     resolution : float
         Largest step that 99 % of the readings are multiples of, 0 if none.
     coarse_step : float
@@ -77,7 +79,7 @@ def resolution(values: Array, share: float = 0.99) -> float:
     finite = values[np.isfinite(values)]
     if finite.size > _SAMPLE_FOR_RESOLUTION:
         finite = finite[:: -(-finite.size // _SAMPLE_FOR_RESOLUTION)]
-    if finite.size < 2 or np.all(finite == finite[0]):
+    if np.unique(finite[:: max(1, finite.size // 1000)]).size < 3:
         return 0.0
     for step in _RESOLUTIONS:
         quotient = finite / step
@@ -99,7 +101,7 @@ def white_noise(values: Array) -> float:
     Returns
     -------
     float
-        Linear drift drops out; the largest 2 % (curvature, spikes) are cut and
+        Linear drift drops out; the largest 5 % (curvature, spikes) are cut and
         the cut is corrected for a normal distribution. NaN below 8 readings.
 
     >>> rng = np.random.default_rng(1)
@@ -115,12 +117,13 @@ def white_noise(values: Array) -> float:
 
 
 def slow_error(times: Array, values: Array, white: float, block: int = 16, blocks: int = 12) -> float:
-    """Upper estimate of errors that last many samples.
+    """Size, to a factor of two, of errors that last some 20 to 200 readings.
 
     Block means are compared with a parabola through a dozen of them; what the
     white noise does not explain is left. The quietest quarter of the windows
-    decides, where the machine itself changes least. NaN when the record is
-    shorter than three windows.
+    decides, where the machine itself changes least; where it never rests, its
+    own changes are in the figure. NaN when the record is shorter than three
+    windows.
     """
     window = block * blocks
     number = values.size // window
@@ -189,10 +192,15 @@ def temperature_flags(
     if rows.size < 2 * SPIKE_WINDOW:
         return flags
     values = kelvin[rows]
-    noise = max(white_noise(values), grid, 0.0 if sigma is None else sigma)
-    spikes = _spikes(values, noise)
-    flags[rows[spikes]] |= np.uint8(Flag.SPIKE)
-    kept = rows[~spikes]
+    # a step wider than a degree is a jump of the reading, no resolution
+    noise = max(white_noise(values), min(grid, 1.0), 0.0 if sigma is None else sigma)
+    kept = rows
+    for _ in range(SPIKE_PASSES):  # a spike beside another shows once the first is out
+        spikes = _spikes(kelvin[kept], noise)
+        flags[kept[spikes]] |= np.uint8(Flag.SPIKE)
+        if not spikes.any():
+            break
+        kept = kept[~spikes]
     flags[kept[_dropouts(kelvin[kept], noise)]] |= np.uint8(Flag.DROPOUT)
     if judge_stuck:
         kept = kept[flags[kept] == 0]
@@ -206,11 +214,14 @@ def _spikes(values: Array, noise: float) -> NDArray[np.bool_]:
     A true peak has steep flanks: the departure must stand out from the
     differences between the neighbours too.
     """
-    departures = np.abs(values - median_filter(values, SPIKE_WINDOW, mode="nearest"))
-    padded = np.pad(values, 2, mode="edge")
+    departures = np.abs(values - median_filter(values, SPIKE_WINDOW, mode="mirror"))
+    padded = np.pad(values, 2, mode="reflect")
     flanks = np.maximum(np.abs(padded[1:-3] - padded[:-4]), np.abs(padded[4:] - padded[3:-1]))
     roughness = np.maximum(flanks, np.abs(padded[3:-1] - padded[1:-3]))
-    return departures > np.maximum(max(SPIKE_SIGMAS * noise, SPIKE_FLOOR), SPIKE_STANDS_OUT * roughness)
+    least = np.full(values.size, max(SPIKE_SIGMAS * noise, SPIKE_FLOOR))
+    # the first and the last reading have neighbours on one side only: they may be the start of a change
+    least[[0, -1]] *= SPIKE_EDGE_FACTOR
+    return departures > np.maximum(least, SPIKE_STANDS_OUT * roughness)
 
 
 def _dropouts(values: Array, noise: float) -> NDArray[np.bool_]:
@@ -229,7 +240,10 @@ def _dropouts(values: Array, noise: float) -> NDArray[np.bool_]:
             (np.sign(change[later]) != np.sign(change[out]))
             & (np.abs(values[later + 1] - level) < 0.25 * size)
         ]
-        if back.size and np.ptp(values[out + 1 : back[0] + 1]) < 0.25 * size:
+        # the flanks of a true excursion are steep on both sides of each jump, those of a drop-out are not
+        before = abs(change[out - 1]) if out else 0.0
+        sudden = size > SPIKE_STANDS_OUT * before
+        if back.size and sudden and np.ptp(values[out + 1 : back[0] + 1]) < 0.25 * size:
             inside[out + 1 : back[0] + 1] = True
             position = int(np.searchsorted(jumps, back[0])) + 1
         else:

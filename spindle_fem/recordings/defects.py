@@ -139,9 +139,11 @@ class DefectReport:
             counts = ", ".join(f"{number} {name.replace('_', ' ')}" for name, number in item.counts().items())
             noise = ""
             if item.role == "temperature":
-                noise = f"; noise {item.noise.white:.3g} K, slow error up to {item.noise.slow:.2g} K"
+                noise = f"; noise {item.noise.white:.3g} K"
                 if item.noise.resolution:
                     noise += f", resolution {item.noise.resolution:g} K"
+                if item.noise.coarse_step > 10.0 * item.noise.resolution:
+                    noise += f" (half of the readings in steps of {item.noise.coarse_step:g} K)"
             text.append(f"{item.column}: {counts or 'no defect'}{noise}")
         return text
 

@@ -45,7 +45,7 @@ class Channel(_ManifestModel):
     role: Literal["temperature", "input", "covariate"]
     unit: str | None = None
     probe: str | None = None
-    sigma: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    sigma: float | None = None
     drives: str | None = None
     hold: Literal["previous", "linear"] | None = None
 
@@ -242,6 +242,8 @@ def _role_faults(channel: Channel, where: str) -> list[SpindleFemError]:
                     f"Allowed: column, role, {', '.join(allowed[role])}.",
                 )
             )
+    if channel.sigma is not None and not 0.0 < channel.sigma < float("inf"):
+        faults.append(SpecError(f"{where}.sigma", f"is {channel.sigma:g}.", "Allowed: above 0, in K."))
     if channel.unit is None:
         return faults
     expected: str | None = "K" if role == "temperature" else None

@@ -150,7 +150,6 @@ def _read_csv(data: Path, manifest: Manifest) -> tuple[pd.DataFrame, list[str], 
                 skip_blank_lines=False,
                 skipinitialspace=True,
                 low_memory=False,
-                float_precision="high",
             )
     except (pd.errors.ParserError, pd.errors.ParserWarning, pd.errors.EmptyDataError, ValueError) as error:
         raise RecordingError(str(data), f"is not a readable table ({error}).") from error
