@@ -15,7 +15,7 @@ from spindle_fem.validity import CodedWarning
 # Scatter of the measurements behind Gnielinski's equation.
 _TURBULENT_SCATTER = 1.15
 
-# Below the first Prandtl number theory, above the second measurements with oil.
+# Below the first Prandtl number theory, above the second measurements with oil and glycol.
 OIL_BLEND_PRANDTL = (30.0, 100.0)
 
 
@@ -86,42 +86,56 @@ def _laminar_band(section: ChannelSection, flow: FlowGroups, reynolds: NDArray[n
         "seban_mclaughlin": nusselt_helical.nusselt_seban_mclaughlin(
             reynolds, prandtl, delta, extrapolate=True
         ),
+        "dravid": nusselt_helical.nusselt_dravid(dean, prandtl, extrapolate=True),
         "janssen_hoogendoorn": nusselt_helical.nusselt_janssen_hoogendoorn(
             reynolds, prandtl, delta, extrapolate=True
         ),
     }
+    measured = np.sqrt(candidates["seban_mclaughlin"] * candidates["janssen_hoogendoorn"])
     oil_from, oil_to = np.log(OIL_BLEND_PRANDTL)
     oil = np.clip((np.log(prandtl) - oil_from) / (oil_to - oil_from), 0.0, 1.0)
-    developed = candidates["manlapaz_churchill"] ** (1.0 - oil) * candidates["seban_mclaughlin"] ** oil
+    developed = candidates["manlapaz_churchill"] ** (1.0 - oil) * measured**oil
     value = np.maximum(developed, floor)
 
-    # Correlations from round-tube experiments count only where their source covers the state;
-    # Schmidt and Manlapaz-Churchill carry no upper Prandtl number and always count.
-    applicable = [floor, value, np.maximum(candidates["manlapaz_churchill"], floor)]
-    applicable.append(np.maximum(candidates["schmidt"], floor))
-    for name, quantities in (
-        ("sieder_tate", {"graetz": graetz}),
-        ("seban_mclaughlin", {"reynolds": reynolds, "prandtl": prandtl, "curvature_ratio": delta}),
-        ("janssen_hoogendoorn", {"dean": dean, "prandtl": prandtl, "curvature_ratio": delta}),
-    ):
-        covered = is_covered(f"nusselt_{name}", **quantities)
-        applicable.append(np.where(covered, np.maximum(candidates[name], floor), value))
+    # Measured correlations count where their source covers the state; Schmidt and
+    # Manlapaz-Churchill carry no upper Prandtl number and always count. None goes below the
+    # straight duct, which curvature can only improve.
+    groups = {
+        "reynolds": reynolds,
+        "dean": dean,
+        "prandtl": prandtl,
+        "curvature_ratio": delta,
+        "graetz": graetz,
+    }
+    applicable = [floor, value]
+    applicable += [np.maximum(candidates[name], floor) for name in ("manlapaz_churchill", "schmidt")]
+    covered = {}
+    for name in ("sieder_tate", "seban_mclaughlin", "janssen_hoogendoorn", "dravid"):
+        ranged = {key: groups[key] for key in nusselt.RANGES[f"nusselt_{name}"] if key in groups}
+        covered[name] = is_covered(f"nusselt_{name}", **ranged)
+        applicable.append(np.where(covered[name], np.maximum(candidates[name], floor), value))
 
-    uses_oil = oil > 0.0
-    shapes = {"reynolds": reynolds, "prandtl": np.maximum(prandtl, 100.0), "curvature_ratio": delta}
-    covered = ~uses_oil | is_covered("nusselt_seban_mclaughlin", **shapes) | (floor >= developed)
+    # The oil measurements stand when one of the two covers the state; the theory of
+    # Manlapaz and Churchill and the straight duct always do.
+    in_range = (
+        (oil == 0.0) | (floor >= developed) | covered["seban_mclaughlin"] | covered["janssen_hoogendoorn"]
+    )
     faults: tuple[str, ...] = ()
-    if not covered.all():
-        faults = tuple(
-            f"Seban & McLaughlin: {text}"
-            for text in nusselt.range_faults("nusselt_seban_mclaughlin", **shapes)
-        )
+    if not in_range.all():
+        outside = {
+            "reynolds": reynolds,
+            "prandtl": prandtl,
+            "curvature_ratio": np.broadcast_to(delta, in_range.shape),
+        }
+        outside = {key: array[~in_range] for key, array in outside.items()}
+        texts = nusselt.range_faults("nusselt_seban_mclaughlin", **outside)
+        faults = tuple(f"Seban & McLaughlin: {text}" for text in texts)
     return FilmBand(
         value=value,
         low=np.minimum.reduce(np.broadcast_arrays(*applicable)),
         high=np.maximum.reduce(np.broadcast_arrays(*applicable)),
         faults=faults,
-        in_range=covered,
+        in_range=in_range,
         candidates=candidates,
     )
 

@@ -35,6 +35,7 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {
         "prandtl": (20.0, 450.0),
         "curvature_ratio": (0.010, 0.083),
     },
+    "nusselt_dravid": {"dean": (50.0, 2000.0), "prandtl": (5.0, 175.0)},
     "nusselt_gnielinski_helical": {
         "reynolds": (TURBULENT_FROM_REYNOLDS, 1.5e5),
         "prandtl": (0.6, 2000.0),

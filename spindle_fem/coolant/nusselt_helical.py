@@ -134,7 +134,8 @@ def nusselt_seban_mclaughlin(
     tubes with uniform heat flux; 0.13 is the mean over the circumference.
 
     Source: Seban & McLaughlin (1963), Int. J. Heat Mass Transfer 6, 387–395:
-    Nu = 0.13 (f/8 Re² Pr)^(1/3), f the Darcy factor of the coil.
+    Nu = 0.13 (f/8 Re² Pr)^(1/3), f the Darcy factor of the coil; as reviewed by
+    Naphon & Wongwises (2006), Renew. Sustain. Energy Rev. 10, 463–490.
 
     >>> float(nusselt_seban_mclaughlin(652.0, 562.0, 0.04827).round(1))
     22.3
@@ -172,7 +173,8 @@ def nusselt_janssen_hoogendoorn(
 
     Range: 100 <= De <= 830, 20 <= Pr <= 450, 0.01 <= D/D_c <= 0.083, round tubes.
 
-    Source: Janssen & Hoogendoorn (1978), Int. J. Heat Mass Transfer 21, 1197–1206.
+    Source: Janssen & Hoogendoorn (1978), Int. J. Heat Mass Transfer 21,
+    1197–1206; as reviewed by Naphon & Wongwises (2006).
 
     >>> float(nusselt_janssen_hoogendoorn(1000.0, 300.0, 0.048).round(1))
     28.6
@@ -188,6 +190,39 @@ def nusselt_janssen_hoogendoorn(
         curvature_ratio=delta,
     )
     return 0.7 * re**0.43 * pr ** (1.0 / 6.0) * delta**0.07
+
+
+def nusselt_dravid(dean: ArrayLike, prandtl: ArrayLike, *, extrapolate: bool = False) -> NDArray[np.float64]:
+    """Nusselt number of developed laminar flow in a helical coil, computed and measured.
+
+    Parameters
+    ----------
+    dean : (n,) array_like, [-]
+        Re √(D_h/D_c).
+    prandtl : (n,) array_like, [-]
+    extrapolate : bool
+        Compute outside Range too.
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+
+    Raises
+    ------
+    OutOfValidityError
+        Outside Range, unless ``extrapolate``.
+
+    Range: 50 <= De <= 2000, 5 <= Pr <= 175, round tubes with uniform heat flux.
+
+    Source: Dravid, Smith, Merrill & Brian (1971), AIChE J. 17, 1114–1122; as
+    reviewed by Naphon & Wongwises (2006).
+
+    >>> float(nusselt_dravid(100.0, 100.0).round(1))
+    16.3
+    """
+    de, pr = np.broadcast_arrays(np.asarray(dean, float), np.asarray(prandtl, float))
+    guard_range("nusselt_dravid", extrapolate, dean=de, prandtl=pr)
+    return (0.76 + 0.65 * np.sqrt(de)) * pr**0.175
 
 
 def nusselt_gnielinski_helical(

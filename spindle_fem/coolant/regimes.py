@@ -101,14 +101,15 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
     """Film coefficient of a helical rectangular channel by a named model.
 
     ``helical``
-        Laminar: for oil (Pr above 100) Seban & McLaughlin, who measured oil in
-        coils; below Pr 30 Manlapaz & Churchill; blended between on log Pr.
-        Never below the developing flow of a straight rectangle (Shah–London
-        with Hausen), which curvature can only improve. Low and high: the
-        lowest and highest of Manlapaz–Churchill, Schmidt, Sieder–Tate,
-        Seban–McLaughlin and Janssen–Hoogendoorn. Turbulent: Gnielinski;
-        low is the straight duct, high the scatter of the data (15 %).
-        Between the critical Reynolds number (Schmidt) and 2.2e4 linear.
+        Laminar: for oil (Pr above 100) the geometric mean of the two sets of
+        measurements with viscous liquids in coils, Seban & McLaughlin and
+        Janssen & Hoogendoorn; below Pr 30 the theory of Manlapaz & Churchill;
+        blended between on log Pr. Never below the developing flow of a straight
+        rectangle (Shah–London with Hausen), which curvature can only improve.
+        Low and high: the lowest and highest of these, Schmidt, Sieder–Tate and
+        Dravid where they apply. Turbulent: Gnielinski; low is the straight
+        duct, high the scatter of the data (15 %). Between the critical
+        Reynolds number (Schmidt) and 2.2e4 linear.
     ``paper``
         Equation 31, from Re 2300 on the channel depth equation 30, as the paper
         prints them: channel depth as length, no wall correction, a jump.
@@ -284,7 +285,7 @@ def _helical_source(flow: FlowGroups) -> str:
     names = []
     if (flow.reynolds < TURBULENT_FROM_REYNOLDS).any():
         if (flow.prandtl > OIL_BLEND_PRANDTL[0]).any():
-            names.append("Seban & McLaughlin 1963")
+            names.append("Seban & McLaughlin 1963 with Janssen & Hoogendoorn 1978")
         if (flow.prandtl < OIL_BLEND_PRANDTL[1]).any():
             names.append("Manlapaz & Churchill 1981")
         names.append("not below Shah & London 1978 with Hausen 1943")

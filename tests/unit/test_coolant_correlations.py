@@ -40,6 +40,7 @@ REFUSALS = [
         (292.0, 300.0, 0.048),
         "dean is 63.974, allowed 100 to 830",
     ),
+    (nusselt_helical.nusselt_dravid, (100.0, 562.0), "prandtl is 562, allowed 5 to 175"),
     (
         nusselt_helical.nusselt_gnielinski_helical,
         (290.0, 200.0, 0.05),
