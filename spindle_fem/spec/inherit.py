@@ -274,7 +274,13 @@ def _in_list(node: list[Any], shape: Shape, path: str, text: str, where: str, in
 
 def _in_value(node: Any, shape: Shape, path: str, text: str, where: str, inside: str) -> Any:
     rule = quantity_rule(shape.annotation)
-    if rule is not None and rule.uncertain and path in PRIOR_KEYS and node is not None:
+    if rule is not None and rule.uncertain and path in PRIOR_KEYS:
+        if node is None:
+            raise UnknownKeyError(
+                where,
+                f"{inside} is not given.",
+                f'Set {inside}={{value = "...", sigma_rel = ...}} as a whole.',
+            )
         table = dict(node) if isinstance(node, Mapping) else {"value": node}
         return {**table, path: _typed(text, Shape("value", annotation=None))}
     raise UnknownKeyError(where, f"{inside} is one value, it has no {path}.", f"Set {inside} itself.")
