@@ -81,14 +81,14 @@ def operating_conditions(recording: Recording) -> Conditions:
 
 
 def _speed_bands(speed: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:
-    largest = float(speed.max())
+    # whole numbers of turns a minute come back from rad/s with a rounding error
+    largest = float(np.round(speed.max(), 6))
     still = speed <= OFF_SHARE * largest
     bands = {"standstill": still}
     if largest == 0.0:
         return bands
     width = next((step for step in ROUND_STEPS_RPM if largest <= MOST_BANDS * step), largest / MOST_BANDS)
     for low in np.arange(0.0, largest, width):
-        # a reading of 4500.0000001 rpm belongs to the band that ends at 4500
         inside = ~still & (speed > low * (1.0 + 1.0e-6)) & (speed <= (low + width) * (1.0 + 1.0e-6))
         bands[f"{low:g}-{low + width:g} rpm"] = inside
     return bands
