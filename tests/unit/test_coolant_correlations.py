@@ -121,6 +121,19 @@ def test_wall_correction_has_the_exponent_of_its_source():
     assert float(ratio) == pytest.approx(2.0**0.14, rel=1e-12)
 
 
+def test_gnielinski_corrects_by_the_prandtl_numbers():
+    ratio = nusselt_helical.nusselt_gnielinski_helical(
+        3e4, 50.0, 0.05, 2.0
+    ) / nusselt_helical.nusselt_gnielinski_helical(3e4, 50.0, 0.05)
+    assert float(ratio) == pytest.approx(2.0**0.14, rel=1e-12)
+
+
+def test_manlapaz_churchill_in_the_printed_form():
+    # De 10, Pr 9.57: De² Pr = 957, so x3 = 4; x4 = 1 + 0.477/9.57.
+    expected = np.cbrt((3.657 + 4.343 / 4.0) ** 3 + 1.158 * (10.0 / (1.0 + 0.477 / 9.57)) ** 1.5)
+    assert float(nusselt_helical.nusselt_manlapaz_churchill(10.0, 9.57)) == pytest.approx(expected, rel=1e-12)
+
+
 def test_hausen_forgets_the_inlet_far_from_it():
     assert float(nusselt.nusselt_hausen(1e-6, 3.0)) == pytest.approx(3.0, abs=1e-6)
 

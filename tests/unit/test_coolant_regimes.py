@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.coolant.film_map import film_map
-from spindle_fem.coolant.properties import OilIsoVg32, Water
+from spindle_fem.coolant.properties import OilIsoVg32, UserCoolant, Water
 from spindle_fem.coolant.regimes import FILM_MODELS, ChannelState, select_film
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.errors import OutOfValidityError
@@ -70,6 +70,31 @@ def test_water_takes_the_theory_of_manlapaz_and_churchill():
     assert found.regime == "laminar"
     assert found.value == pytest.approx(found.candidates["manlapaz_churchill"], rel=1e-12)
     assert "Seban" not in found.source
+
+
+@pytest.mark.parametrize(
+    ("prandtl", "oil"), [(30.0, 0.0), (np.sqrt(3000.0), 0.5), (100.0, 1.0), (102.0, 1.0)]
+)
+def test_theory_and_measurements_are_blended_on_the_logarithm_of_prandtl(prandtl, oil):
+    viscosity = prandtl * 0.15 / (2000.0 * 900.0)
+    thin = UserCoolant(
+        "thin",
+        300.0,
+        900.0,
+        2000.0,
+        0.15,
+        (290.0, 310.0),
+        (viscosity,) * 2,
+        280.0,
+        330.0,
+        viscosity_law="andrade",
+    )
+    found = film("helical", 5.0, 25.0, coolant=thin)
+    assert found.prandtl == pytest.approx(prandtl)
+    known = found.candidates
+    measured = np.sqrt(known["seban_mclaughlin"] * known["janssen_hoogendoorn"])
+    expected = known["manlapaz_churchill"] ** (1.0 - oil) * measured**oil
+    assert found.value == pytest.approx(expected, rel=1e-12)
 
 
 def test_slow_flow_in_a_short_channel_develops_as_in_a_straight_duct():
