@@ -54,7 +54,15 @@ class PreparedMachine:
             surface: self.operators.facet_integral(unknowns, rows) / self.operators.facet_area[rows]
             for surface, rows in self.operators.surface_rows.items()
         }
-        return FieldState(facets, lumped)
+        sides = {
+            joint: tuple(
+                float(self.operators.facet_integral(unknowns, rows).sum() / self.operators.facet_area[rows].sum())
+                for rows in self.operators.joint_rows[joint]
+            )
+            for joint in self.operators.joint_rows
+            if not joint.endswith(":face")
+        }
+        return FieldState(facets, sides, lumped)
 
     def problem(self, loads: Loads) -> ConductionProblem:
         """Conduction problem of given loads."""

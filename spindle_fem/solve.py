@@ -9,6 +9,8 @@ import numpy as np
 from spindle_fem import checks
 from spindle_fem.conduction.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.coupling import FIELD_TOLERANCE, Clock, CoupledState, PreparedMachine, Progress, prepare_machine, solve_coupled
+from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
+from spindle_fem.loads.bearing_heat import BearingMechanics
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import BearingResult, Check, CoolantResult, EnergyBalance, ThermalResult
 from spindle_fem.spec.model import MachineSpec
@@ -80,6 +82,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         ),
     ]
     done += _coolant_checks(machine, coupled)
+    warnings += _omitted_preload(machine, point, coupled, lumped)
     if spec.grease is not None and bearings:
         grease = checks.check_grease(
             {name: max(item.temperature_inner, item.temperature_outer) for name, item in bearings.items()},
@@ -135,6 +138,32 @@ def _bearings(machine: PreparedMachine, coupled: CoupledState, lumped: Mapping[s
             film_thickness_ratio=heat.film_thickness_ratio,
         )
     return found
+
+
+def _omitted_preload(
+    machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState, lumped: Mapping[str, float]
+) -> list[CodedWarning]:
+    """What the temperatures found would do to the preload, where that is left out."""
+    spec = machine.spec
+    if spec.heat.thermal_preload or spec.heat.model == "table" or not spec.bearing_set:
+        return []
+    temperatures = machine.builder.bearing_temperatures(machine.field_state(coupled.solution.temperature, lumped))
+    hint = "heat.thermal_preload = true follows it."
+    try:
+        states = BearingMechanics(spec).states(point, temperatures, expand=True)
+    except (NoEquilibriumError, OutOfValidityError) as error:
+        text = f"Thermal expansion is left out; at these temperatures there would be no equilibrium ({error}). {hint}"
+        return [CodedWarning("thermal_preload_omitted", text)]
+    cold = coupled.loads.bearing_heat
+    name = max(states, key=lambda key: states[key].preload - cold[key].preload)
+    if not states[name].preload > 1.1 * cold[name].preload:
+        return []
+    text = (
+        f"Thermal expansion is left out: at these temperatures the preload of {name} would be "
+        f"{states[name].preload:.0f} N instead of {cold[name].preload:.0f} N, its friction heat "
+        f"{states[name].heat.total:.0f} W instead of {cold[name].total:.0f} W. {hint}"
+    )
+    return [CodedWarning("thermal_preload_omitted", text)]
 
 
 def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState) -> CoolantResult | None:

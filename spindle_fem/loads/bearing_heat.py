@@ -1,41 +1,75 @@
 """Bearing heat behind one interface, whatever model makes it.
 
-A heat model is called with the operating point and the mean temperatures of
-every bearing and answers with :class:`BearingHeat` for each. A new model is a
+A heat model is called with the operating point and the temperatures of every
+bearing and answers with :class:`BearingHeat` for each. A new model is a
 function of that form, entered in :func:`heat_model_of`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spindle_fem.loads.model import BearingHeat
 from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.spec.model import MachineSpec
+from spindle_fem.spec.model import BearingSet, MachineSpec
+from spindle_fem.tribology import mounting
+from spindle_fem.tribology.bearing import BearingGeometry
+from spindle_fem.tribology.bearing_set import solve_bearing_set
+from spindle_fem.tribology.contact_heat import ball_conductance
+from spindle_fem.tribology.grease import Lubricant
+from spindle_fem.tribology.heat import HeatOptions
+from spindle_fem.tribology.state import BearingState
 from spindle_fem.validity import CodedWarning
+
+_ORIENTATION = {"towards_rear": 1, "towards_nose": -1}
 
 
 @dataclass(frozen=True, slots=True)
 class BearingTemperatures:
-    """Mean temperatures of one bearing in K: raceways and balls."""
+    """Mean temperatures around one bearing, K.
+
+    ``shaft`` and ``housing`` are those of the seats on the other side of the
+    joints.
+    """
 
     inner: float
     outer: float
     ball: float
-
-    @property
-    def grease(self) -> float:
-        """Where the lubricant works: the mean of both raceways."""
-        return 0.5 * (self.inner + self.outer)
+    shaft: float
+    housing: float
 
 
 HeatModel = Callable[
     [OperatingPoint, Mapping[str, BearingTemperatures]],
     tuple[Mapping[str, BearingHeat], tuple[CodedWarning, ...]],
 ]
+
+
+def heat_model_of(spec: MachineSpec) -> HeatModel:
+    """The heat model that a definition asks for."""
+    if not spec.bearing_set:
+        return lambda point, temperatures: ({}, ())
+    if spec.heat.model != "table":
+        return BearingMechanics(spec)
+    needs_contacts = any(group.ball_row.kind == "contact" for group in spec.bearing_set)
+    mechanics = BearingMechanics(spec) if needs_contacts else None
+
+    def by_table(
+        point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+    ) -> tuple[Mapping[str, BearingHeat], tuple[CodedWarning, ...]]:
+        values, warnings = table_heat(spec, point)
+        if mechanics is None:
+            return {name: BearingHeat(value, {"table": value}) for name, value in values.items()}, warnings
+        states, said = mechanics(point, temperatures)
+        heat = {
+            name: replace(states[name], total=value, terms={"table": value}) for name, value in values.items()
+        }
+        return heat, warnings + said
+
+    return by_table
 
 
 def table_heat(spec: MachineSpec, point: OperatingPoint) -> tuple[dict[str, float], tuple[CodedWarning, ...]]:
@@ -64,15 +98,165 @@ def table_heat(spec: MachineSpec, point: OperatingPoint) -> tuple[dict[str, floa
     return heat, warnings
 
 
-def heat_model_of(spec: MachineSpec) -> HeatModel:
-    """The heat model that a definition asks for."""
-    if spec.heat.model == "table":
+class BearingMechanics:
+    """Equilibrium, films and friction of every bearing set of a machine.
 
-        def model(
-            point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
-        ) -> tuple[Mapping[str, BearingHeat], tuple[CodedWarning, ...]]:
-            heat, warnings = table_heat(spec, point)
-            return {name: BearingHeat(value, {"table": value}) for name, value in heat.items()}, warnings
+    The heat level is the definition's; with ``heat.model = "table"`` only the
+    mechanics are used.
+    """
 
-        return model
-    raise NotImplementedError
+    def __init__(self, spec: MachineSpec) -> None:
+        self.spec = spec
+        grease = spec.grease
+        self.lubricant = Lubricant(
+            kinematic_viscosity_40=grease.kinematic_viscosity_40,
+            kinematic_viscosity_100=grease.kinematic_viscosity_100,
+            density=grease.base_oil_density,
+            pressure_viscosity=grease.pressure_viscosity,
+            thermal_conductivity=grease.thermal_conductivity,
+            film_starvation=grease.film_starvation,
+            path_fill=grease.path_fill,
+            temperature_limit=grease.temperature_limit,
+        )
+        level = spec.heat.model
+        # Only the paper's terms need friction to decide the ball's attitude.
+        self.control = "equilibrium" if level in ("paper", "full") else "outer"
+        self.options = HeatOptions(
+            level="palmgren" if level == "table" else level,
+            palmgren_f0=spec.heat.palmgren_f0,
+            skf_friction_ehl=spec.heat.skf_mu_ehl,
+        )
+        self.sets = {group.name: _bearing_set(spec, group) for group in spec.bearing_set}
+
+    def states(
+        self, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures], *, expand: bool
+    ) -> dict[str, BearingState]:
+        """Mechanical state of every bearing.
+
+        Parameters
+        ----------
+        expand : bool
+            Whether the parts grow with their temperature, or keep the size they
+            were assembled with; the film has its temperature either way.
+
+        Raises
+        ------
+        NoEquilibriumError, OutOfValidityError
+        """
+        found: dict[str, BearingState] = {}
+        for group in self.spec.bearing_set:
+            around = [temperatures[bearing.name] for bearing in group.bearing]
+            set_temperatures = self._expanded(around) if expand else self._as_assembled(around)
+            states = solve_bearing_set(
+                self.sets[group.name],
+                point.speed,
+                point.thrust if group.carries_thrust else 0.0,
+                set_temperatures,
+                lubricant=self.lubricant,
+                control=self.control,
+                heat=self.options,
+            )
+            found |= {state.name: state for state in states}
+        return found
+
+    @staticmethod
+    def _expanded(around: list[BearingTemperatures]) -> mounting.SetTemperatures:
+        return mounting.SetTemperatures(
+            bearings=tuple(mounting.BearingTemperatures(item.inner, item.outer, item.ball) for item in around),
+            shaft=float(np.mean([item.shaft for item in around])),
+            housing=float(np.mean([item.housing for item in around])),
+        )
+
+    @staticmethod
+    def _as_assembled(around: list[BearingTemperatures]) -> mounting.SetTemperatures:
+        cold = mounting.ROOM_TEMPERATURE
+        return mounting.SetTemperatures(
+            bearings=tuple(
+                mounting.BearingTemperatures(
+                    cold, cold, cold, mounting.BearingTemperatures(item.inner, item.outer, item.ball).film
+                )
+                for item in around
+            ),
+            shaft=cold,
+            housing=cold,
+        )
+
+    def __call__(
+        self, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+    ) -> tuple[dict[str, BearingHeat], tuple[CodedWarning, ...]]:
+        """Heat, contacts and films of every bearing; the heat model's interface."""
+        states = self.states(point, temperatures, expand=self.spec.heat.thermal_preload)
+        factors = {bearing.name: group.heat_factor.value for group, bearing in self.spec.bearings}
+        kinds = {
+            bearing.name: self.spec.bearing_types[group.bearing_type] for group, bearing in self.spec.bearings
+        }
+        heat, warnings = {}, []
+        for name, state in states.items():
+            ring = self.spec.materials[kinds[name].ring_material].thermal_conductivity
+            ball = self.spec.materials[kinds[name].ball_material].thermal_conductivity
+            path = ball_conductance(
+                state,
+                self.lubricant,
+                ring_conductivity=ring,
+                ball_conductivity=ball,
+                wetted_share=self.spec.grease.free_volume_fill,
+            )
+            balls = state.balls
+            terms = {term: factors[name] * value for term, value in state.heat.terms.items()}
+            heat[name] = BearingHeat(
+                total=factors[name] * state.heat.total,
+                terms=terms,
+                contact_angle_inner=state.contact_angle_inner,
+                contact_angle_outer=state.contact_angle_outer,
+                preload=state.preload,
+                axial_load=state.axial_force,
+                film_thickness=float(np.min(balls.film_central)),
+                film_thickness_ratio=float(np.min(balls.film_thickness_ratio)),
+                conductance_inner=path.inner,
+                conductance_outer=path.outer,
+            )
+            warnings += state.warnings
+        return heat, tuple(warnings)
+
+
+def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
+    kind = spec.bearing_types[group.bearing_type]
+    geometry = BearingGeometry(
+        ball_diameter=kind.ball_diameter,
+        ball_count=kind.ball_count,
+        pitch_diameter=kind.pitch,
+        contact_angle=kind.contact_angle,
+        groove_curvature_inner=kind.groove_curvature_inner,
+        groove_curvature_outer=kind.groove_curvature_outer,
+        young_modulus=kind.young_modulus,
+        poisson_ratio=kind.poisson_ratio,
+        density=spec.materials[kind.ball_material].density,
+        bore_diameter=kind.bore_diameter,
+        outer_diameter=kind.outer_diameter,
+        width=kind.width,
+        static_load_rating=kind.basic_static_load,
+    )
+    return mounting.BearingSet(
+        bearings=tuple(
+            mounting.MountedBearing(
+                bearing.name, geometry, _ORIENTATION[bearing.takes_thrust], 0.5 * (bearing.z[0] + bearing.z[1])
+            )
+            for bearing in group.bearing
+        ),
+        preload=group.preload,
+        preload_kind=group.preload_kind,
+        shaft_bore_diameter=_shaft_bore(spec, group),
+        raceway_roughness=kind.roughness_raceway,
+        ball_roughness=kind.roughness_ball,
+    )
+
+
+def _shaft_bore(spec: MachineSpec, group: BearingSet) -> float | None:
+    """Bore of the rotating part that carries the set; None under a solid shaft."""
+    bore = spec.bearing_types[group.bearing_type].bore_diameter
+    middle = 0.5 * (group.bearing[0].z[0] + group.bearing[0].z[1])
+    for part in spec.part:
+        for segment in part.segment:
+            if part.rotating and segment.z[0] <= middle <= segment.z[1] and abs(segment.outer_diameter - bore) < 1e-6:
+                return segment.inner_diameter or None
+    return None

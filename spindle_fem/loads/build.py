@@ -33,9 +33,12 @@ class FieldState:
     facets : mapping of surface to (n_facets,) ndarray, [K]
         Mean over each facet.
     lumped : mapping of lumped-node name to float, [K]
+    joints : mapping of joint to (float, float), [K]
+        Mean of the first and of the second part's side.
     """
 
     facets: Mapping[str, NDArray[np.float64]]
+    joints: Mapping[str, tuple[float, float]]
     lumped: Mapping[str, float]
 
 
@@ -93,8 +96,18 @@ class LoadsBuilder:
             outer = self.surface_mean(f"{bearing.name}.outer_raceway", state)
             balls = [state.lumped[name] for name in self.ball_nodes(bearing.name) if name in state.lumped]
             ball = float(np.mean(balls)) if balls else 0.5 * (inner + outer)
-            found[bearing.name] = BearingTemperatures(inner, outer, ball)
+            shaft = self._seat(f"{bearing.name}.inner_ring", state, default=inner)
+            housing = self._seat(f"{bearing.name}.outer_ring", state, default=outer)
+            found[bearing.name] = BearingTemperatures(inner, outer, ball, shaft, housing)
         return found
+
+    def _seat(self, ring: str, state: FieldState, default: float) -> float:
+        """Temperature of what a ring sits on; a ring that is fused has its own."""
+        for name, (first, second) in state.joints.items():
+            parts = name.split("|")
+            if ring in parts:
+                return second if parts[0] == ring else first
+        return default
 
     def ball_nodes(self, bearing: str) -> tuple[str, ...]:
         """Names of the lumped nodes of a ball row (one, or one a sector)."""
@@ -125,7 +138,7 @@ class LoadsBuilder:
             coolant = self.coolant_loop.at(point, self.wall_temperature(state))
             films |= self._channel_films(coolant)
             warnings += [*coolant.march.film.warnings, *coolant.pressure.warnings]
-        loads = Loads(surface_heat, films, tuple(lumped), heats, heat_to, tuple(_distinct(warnings)))
+        loads = Loads(surface_heat, films, tuple(lumped), heats, heat_to, tuple(_distinct(warnings, tuple(heats))))
         return loads, coolant
 
     def _shares(self, total: float) -> dict[str, float]:
@@ -214,5 +227,20 @@ class LoadsBuilder:
         }
 
 
-def _distinct(warnings: list[CodedWarning]) -> list[CodedWarning]:
-    return list(dict.fromkeys(warnings))
+def _distinct(warnings: list[CodedWarning], bearings: tuple[str, ...]) -> list[CodedWarning]:
+    """Each warning once; what several bearings say alike is said by the first for all."""
+    first: dict[str, CodedWarning] = {}
+    likewise: dict[str, list[str]] = {}
+    for warning in warnings:
+        name = warning.text.partition(": ")[0]
+        key = warning.code if name in bearings else warning.text
+        if key not in first:
+            first[key] = warning
+        elif name in bearings:
+            likewise.setdefault(key, []).append(name)
+    return [
+        CodedWarning(warning.code, f"{warning.text} Likewise {', '.join(dict.fromkeys(likewise[key]))}.")
+        if key in likewise
+        else warning
+        for key, warning in first.items()
+    ]

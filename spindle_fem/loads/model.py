@@ -47,8 +47,8 @@ class LumpedLoad:
 class BearingHeat:
     """Friction heat of one bearing and what its contacts conduct.
 
-    Angles in rad, preload in N (axial force through the bearing at standstill
-    load), film in m; ``nan`` where a heat model does not give them.
+    Angles in rad; ``preload`` in N is the axial force at this state without the
+    external load, ``axial_load`` with it; film in m; ``nan`` where a heat model does not give them.
     ``conductance_inner`` and ``conductance_outer`` (W/K) join the balls to
     each raceway and are ``nan`` where the model has no contacts.
     """
@@ -58,6 +58,7 @@ class BearingHeat:
     contact_angle_inner: float = float("nan")
     contact_angle_outer: float = float("nan")
     preload: float = float("nan")
+    axial_load: float = float("nan")
     film_thickness: float = float("nan")
     film_thickness_ratio: float = float("nan")
     conductance_inner: float = float("nan")

@@ -124,6 +124,8 @@ class Heat(SpecModel):
     """Palmgren's lubrication factor: about 2 for grease, up to 4 with a fresh fill."""
     skf_mu_ehl: PositiveNumber = 0.04
     """Sliding friction coefficient in full film: 0.04 synthetic, 0.05 mineral oil."""
+    thermal_preload: Flag = False
+    """Whether ring, ball, shaft and housing expansion changes the preload and with it the heat."""
     table: HeatTable | None = None
 
     @model_validator(mode="after")

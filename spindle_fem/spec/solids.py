@@ -13,6 +13,7 @@ from spindle_fem.spec.fields import (
     Density,
     Fault,
     Flag,
+    Fraction,
     HeatCapacity,
     KinematicViscosity,
     Name,
@@ -266,7 +267,9 @@ class Grease(SpecModel):
     base_oil_density: Density = 890.0
     pressure_viscosity: PressureViscosity = 1.8e-8
     path_fill: PathFill = 0.01
-    """Share of the balls' path that grease fills once channelled."""
+    """Share of the balls' path that grease fills once channelled; it drags on the balls."""
+    free_volume_fill: Fraction = 0.3
+    """Share of the bearing's free volume that grease fills; it wets the balls."""
     thermal_conductivity: Conductivity = 0.14
     temperature_limit: Temperature = 393.15
     film_starvation: FilmStarvation = 1.0
