@@ -11,7 +11,7 @@ shaft displacement of a whole preloaded set) that enters every ball through
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,9 @@ class BallSystem:
         dA1/dq and dA2/dq.
     polynomials : (n, 2, 4, k) ndarray
         Of ``hertz.contact_polynomials``.
+    smoothing : float, [m]
+        Width over which contact sets in; above 0 only on the way to a
+        solution, where a free ball would leave the Newton matrix singular.
     """
 
     ball_diameter: FloatArray
@@ -53,6 +56,7 @@ class BallSystem:
     axial_map: FloatArray
     radial_map: FloatArray
     polynomials: FloatArray
+    smoothing: float = 0.0
 
     @property
     def number(self) -> int:
@@ -70,18 +74,6 @@ class BallSystem:
             self.start[:, 0] + self.axial_map @ displacement,
             self.start[:, 1] + self.radial_map @ displacement,
         )
-
-    def repeated(self, times: int) -> BallSystem:
-        """The same balls ``times`` over, for evaluating perturbed states at once."""
-        fields = (
-            "ball_diameter", "pitch_diameter", "mass", "inertia", "compliance", "weight", "groove_curvature",
-            "rest_length", "start", "axial_map", "radial_map", "polynomials",
-        )  # fmt: skip
-        return replace(self, **{name: _tile(getattr(self, name), times) for name in fields})
-
-
-def _tile(values: FloatArray, times: int) -> FloatArray:
-    return np.tile(values, (times,) + (1,) * (values.ndim - 1))
 
 
 def build_ball_rows(
@@ -199,9 +191,16 @@ def evaluate_contacts(
     length = np.sqrt(axial**2 + radial**2)
     cosine, sine = radial / length, axial / length
     deformation = length - system.rest_length
-    pressed = np.where(deformation.real > 0.0, deformation, 0.0)
+    pressed = pressed_part(system, deformation)
     load = load_constant(system, cosine) * pressed * np.sqrt(pressed)
     return Contacts(cosine, sine, deformation, load)
+
+
+def pressed_part(system: BallSystem, deformation: NDArray) -> NDArray:
+    """Deformation where the contact is closed, else 0, m."""
+    if system.smoothing > 0.0:
+        return 0.5 * (deformation + np.sqrt(deformation**2 + system.smoothing**2))
+    return np.where(deformation.real > 0.0, deformation, 0.0)
 
 
 def load_constant(system: BallSystem, cosine: NDArray) -> NDArray:

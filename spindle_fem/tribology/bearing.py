@@ -11,6 +11,8 @@ STEEL_YOUNG_MODULUS = 206.0e9
 STEEL_POISSON_RATIO = 0.3
 STEEL_DENSITY = 7800.0
 STEEL_EXPANSION = 12.5e-6
+# A shoulder of 0.29 ball diameters, higher than any groove is ground
+_LARGEST_FREE_ANGLE = math.radians(65.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +39,9 @@ class BearingGeometry:
     bore_diameter, outer_diameter, width : float or None, [m]
         Boundary dimensions; only empirical heat, ring growth and set spacing need them.
     shoulder_angle : float or None, [rad]
-        Contact angle at which the ellipse centre reaches the edge of the
-        groove; None: where the groove meets the pitch circle (90°).
+        Contact angle at which the ellipse's centre reaches the edge of the
+        groove. None: unknown; free angles up to 65° and running ones up to
+        90° pass.
     static_load_rating : float or None, [N]
         Catalogue C0; None: from the contact pressure of 4200 MPa (ISO 76).
 
@@ -135,8 +138,9 @@ def bearing_faults(geometry: BearingGeometry) -> list[tuple[str, str, str]]:
     """Every reason why a bearing cannot be assembled: (key, fault, what is allowed)."""
     faults: list[tuple[str, str, str]] = []
     for key in (
-        "ball_diameter", "pitch_diameter", "groove_curvature_inner", "groove_curvature_outer", "young_modulus",
-        "density", "ball_young_modulus", "bore_diameter", "outer_diameter", "width", "static_load_rating",
+        "ball_diameter", "pitch_diameter", "groove_curvature_inner", "groove_curvature_outer",
+        "young_modulus", "density", "ball_young_modulus", "bore_diameter", "outer_diameter", "width",
+        "static_load_rating",
     ):  # fmt: skip
         value = getattr(geometry, key)
         if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -165,14 +169,15 @@ def bearing_faults(geometry: BearingGeometry) -> list[tuple[str, str, str]]:
                 (f"groove_curvature_{ring}", f"groove radius over ball diameter is {value:g}.",
                  "It must be above 0.5 (the ball must enter the groove) and at most 0.7.")
             )  # fmt: skip
-    limit = 0.5 * math.pi if geometry.shoulder_angle is None else geometry.shoulder_angle
+    limit = _LARGEST_FREE_ANGLE if geometry.shoulder_angle is None else geometry.shoulder_angle
     if not 0.0 < limit <= 0.5 * math.pi:
         faults.append(("shoulder_angle", f"it is {math.degrees(limit):g}°.", "Allowed: above 0 to 90°."))
     elif not 0.0 <= geometry.contact_angle < limit:
         where = "the shoulder" if geometry.shoulder_angle is not None else "any shoulder"
         faults.append(
-            ("contact_angle", f"a contact angle of {math.degrees(geometry.contact_angle):g}° lies over {where} "
-             f"({math.degrees(limit):g}°) or below 0.", f"Allowed: 0 to below {math.degrees(limit):g}°.")
+            ("contact_angle", f"a contact angle of {math.degrees(geometry.contact_angle):g}° lies over "
+             f"{where} ({math.degrees(limit):g}°) or below 0.",
+             f"Allowed: 0 to below {math.degrees(limit):g}°.")
         )  # fmt: skip
     for key in ("poisson_ratio", "ball_poisson_ratio"):
         value = getattr(geometry, key)

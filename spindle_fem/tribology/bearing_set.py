@@ -1,11 +1,9 @@
-"""Preloaded sets of bearings on one shaft: common displacement, thrust, temperatures (eq. 3, thermal preload)."""
+"""Preloaded sets on one shaft: common displacement, thrust, temperatures (eq. 3, thermal preload)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,184 +11,28 @@ from scipy.optimize import brentq
 
 from spindle_fem.errors import NoEquilibriumError, SpecError
 from spindle_fem.tribology.ball_system import BallSystem, build_ball_rows, join_rows
-from spindle_fem.tribology.bearing import STEEL_EXPANSION, BearingGeometry
+from spindle_fem.tribology.bearing import BearingGeometry
 from spindle_fem.tribology.equilibrium import Equilibrium, RacewayControl, solve_equilibrium
 from spindle_fem.tribology.grease import Lubricant
 from spindle_fem.tribology.heat import HeatOptions
-from spindle_fem.tribology.preload import axial_state, require_force, tandem_approach
+from spindle_fem.tribology.hertz import mean_load_constant
+from spindle_fem.tribology.mounting import (
+    BearingSet,
+    BearingTemperatures,
+    ExternalLoad,
+    MountedBearing,
+    SetTemperatures,
+    rotation_growth,
+    uniform_temperatures,
+)
+from spindle_fem.tribology.preload import tandem_approach
 from spindle_fem.tribology.race_control import static_evaluation
 from spindle_fem.tribology.state import BearingState
 from spindle_fem.tribology.state_report import build_states, lubricant_state, require_seated
-from spindle_fem.tribology.surface import SurfaceRoughness, roughness_from_rms
-from spindle_fem.tribology.traction import TractionOptions
+from spindle_fem.tribology.traction import LubricantState, TractionOptions
+from spindle_fem.validity import CodedWarning
 
 FloatArray = NDArray[np.float64]
-ROOM_TEMPERATURE = 293.15
-
-
-@dataclass(frozen=True, slots=True)
-class MountedBearing:
-    """A bearing of a set.
-
-    Attributes
-    ----------
-    name : str
-    geometry : BearingGeometry
-    orientation : {+1, -1}
-        +1: shaft motion towards +z loads it.
-    axial_position : float, [m]
-        Of the bearing's middle along z.
-    """
-
-    name: str
-    geometry: BearingGeometry
-    orientation: int = 1
-    axial_position: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.orientation not in (1, -1):
-            raise SpecError(f"{self.name}.orientation", f"it is {self.orientation}.", "Allowed: 1, -1.")
-
-
-@dataclass(frozen=True, slots=True)
-class BearingSet:
-    """Bearings mounted against one another on one shaft.
-
-    Attributes
-    ----------
-    bearings : tuple of MountedBearing
-    preload : float, [N]
-        Force through the set at assembly, at rest: bearings in tandem share it.
-    preload_kind : {"rigid", "spring"}
-        Rigid (locknut) keeps the displacement of the rings; a spring on the
-        outer rings of the bearings with orientation -1 keeps the force.
-    shaft_expansion, housing_expansion : float, [1/K]
-    shaft_bore_diameter : float or None, [m]
-        Of a hollow shaft; with it the inner ring grows by rotation. None: no growth.
-    raceway_roughness, ball_roughness : float, [m]
-        Rq.
-    roughness : SurfaceRoughness or None
-        Composite moments from measured profiles; None: assumed from both Rq.
-
-    Raises
-    ------
-    SpecError
-        No bearing, or preload that is negative or has nothing to act against.
-    """
-
-    bearings: tuple[MountedBearing, ...]
-    preload: float = 0.0
-    preload_kind: Literal["rigid", "spring"] = "rigid"
-    shaft_expansion: float = STEEL_EXPANSION
-    housing_expansion: float = STEEL_EXPANSION
-    shaft_bore_diameter: float | None = None
-    raceway_roughness: float = 0.05e-6
-    ball_roughness: float = 0.01e-6
-    roughness: SurfaceRoughness | None = None
-
-    def __post_init__(self) -> None:
-        if not self.bearings:
-            raise SpecError("bearings", "the set has no bearing.", "Give at least one.")
-        require_force("preload", self.preload)
-        if self.preload_kind not in ("rigid", "spring"):
-            raise SpecError("preload_kind", f"{self.preload_kind!r} is unknown.", "Allowed: rigid, spring.")
-        if self.preload > 0.0 and not self.has_counter_bearings:
-            raise SpecError(
-                "preload", f"{self.preload:g} N through bearings that all face one way.",
-                "Preload needs a counter bearing; give the force as axial load instead.",
-            )  # fmt: skip
-        for key in ("raceway_roughness", "ball_roughness"):
-            if not getattr(self, key) > 0.0:
-                raise SpecError(key, f"it is {getattr(self, key):g} m.", "It must be above 0.")
-
-    @property
-    def has_counter_bearings(self) -> bool:
-        """Whether bearings of both orientations are in the set."""
-        return len({bearing.orientation for bearing in self.bearings}) == 2
-
-    @property
-    def composite_roughness(self) -> SurfaceRoughness:
-        """Moments of raceway and ball together."""
-        if self.roughness is not None:
-            return self.roughness
-        return roughness_from_rms(self.raceway_roughness) + roughness_from_rms(self.ball_roughness)
-
-    def assembly_approaches(self) -> FloatArray:
-        """Axial approach of each bearing after assembly, (n_bearings,), m."""
-        approach = {}
-        for side in (1, -1):
-            group = tuple(b.geometry for b in self.bearings if b.orientation == side)
-            approach[side] = tandem_approach(group, self.preload) if group and self.preload else 0.0
-        return np.array([approach[bearing.orientation] for bearing in self.bearings])
-
-
-@dataclass(frozen=True, slots=True)
-class BearingTemperatures:
-    """Temperatures of one bearing, K.
-
-    ``lubricant`` None: the mean of rings and balls.
-    """
-
-    inner_ring: float
-    outer_ring: float
-    ball: float
-    lubricant: float | None = None
-
-    @property
-    def film(self) -> float:
-        """Temperature at which viscosity is taken, K."""
-        if self.lubricant is not None:
-            return self.lubricant
-        return 0.25 * (self.inner_ring + self.outer_ring) + 0.5 * self.ball
-
-
-@dataclass(frozen=True, slots=True)
-class SetTemperatures:
-    """Temperatures of a set, K.
-
-    Attributes
-    ----------
-    bearings : tuple of BearingTemperatures
-    shaft, housing : float
-        Between the bearings.
-    assembly : float
-        At which the preload was set.
-    """
-
-    bearings: tuple[BearingTemperatures, ...]
-    shaft: float
-    housing: float
-    assembly: float = ROOM_TEMPERATURE
-
-
-def uniform_temperatures(number: int, temperature: float) -> SetTemperatures:
-    """A set at one temperature (K) that was assembled at it: no thermal displacement."""
-    one = BearingTemperatures(temperature, temperature, temperature)
-    return SetTemperatures((one,) * number, temperature, temperature, temperature)
-
-
-@dataclass(frozen=True, slots=True)
-class ExternalLoad:
-    """Load on the shaft at a set.
-
-    Attributes
-    ----------
-    thrust : float, [N]
-        Towards +z; loads bearings of orientation +1.
-    radial : float, [N]
-        Along azimuth 0.
-    moment : float, [N m]
-        Moves the shaft towards +z at azimuth 0.
-    """
-
-    thrust: float = 0.0
-    radial: float = 0.0
-    moment: float = 0.0
-
-    @property
-    def is_axial(self) -> bool:
-        """Whether all balls of a bearing see the same load."""
-        return self.radial == 0.0 and self.moment == 0.0
 
 
 def solve_bearing_set(
@@ -243,21 +85,45 @@ def solve_bearing_set(
         kelvin = np.repeat([entry.film for entry in temperatures.bearings], counts)
         film = lubricant_state(lubricant, kelvin, bearing_set.composite_roughness)
     solved = _solve(problem, abs(speed), control, film, options)
-    unloaded = external == ExternalLoad()
-    preloads = np.full(len(bearing_set.bearings), np.nan)
-    if bearing_set.has_counter_bearings:
-        bare = problem
-        if not unloaded:
-            bare = _build_problem(bearing_set, abs(speed), ExternalLoad(), temperatures)
-        reference = solved if unloaded else _solve(bare, abs(speed), "outer", None, options)
-        preloads = _axial_forces(bare, reference)
-    require_seated(problem.system, solved, _names_of_rows(problem, bearing_set), abs(speed))
-    return build_states(
+    names, shoulders = _rows_of_bearings(problem)
+    require_seated(solved, names, shoulders, abs(speed))
+    states = build_states(
         bearing_set.bearings, problem.rows, problem.system, solved, abs(speed),
-        lubricant=lubricant, film=film, options=options, heat=heat, control=control, preloads=preloads,
+        lubricant=lubricant, film=film, options=options, heat=heat, control=control,
         film_temperatures=[entry.film for entry in temperatures.bearings],
         roughness=(bearing_set.raceway_roughness, bearing_set.ball_roughness),
     )  # fmt: skip
+    if not bearing_set.has_counter_bearings:
+        return states
+    if external == ExternalLoad():
+        return tuple(replace(state, preload=state.axial_force) for state in states)
+    return _with_preloads(
+        states, bearing_set, speed, temperatures, lubricant=lubricant, control=control, options=options
+    )
+
+
+def _with_preloads(
+    states: tuple[BearingState, ...],
+    bearing_set: BearingSet,
+    speed: float,
+    temperatures: SetTemperatures,
+    *,
+    lubricant: Lubricant | None,
+    control: RacewayControl,
+    options: TractionOptions,
+) -> tuple[BearingState, ...]:
+    """Add the axial forces that remain without external load."""
+    if bearing_set.preload == 0.0 and speed != 0.0:
+        return states
+    try:
+        bare = solve_bearing_set(
+            bearing_set, speed, ExternalLoad(), temperatures, lubricant=lubricant, control=control,
+            heat=HeatOptions("paper"), options=options,
+        )  # fmt: skip
+    except NoEquilibriumError as error:
+        note = CodedWarning("preload_unknown", f"without external load: {error.what}")
+        return tuple(replace(state, warnings=(*state.warnings, note)) for state in states)
+    return tuple(replace(state, preload=idle.axial_force) for state, idle in zip(states, bare, strict=True))
 
 
 def solve_bearing(
@@ -382,28 +248,12 @@ def _ball_load(bearing_set: BearingSet, external: ExternalLoad) -> float:
     return max(axial, radial, tilting)
 
 
-def rotation_growth(geometry: BearingGeometry, speed: float, shaft_bore: float | None) -> float:
-    """Radial growth of the inner raceway by rotation, ring and shaft as one hollow body, m.
-
-    u = ρω²b/(4E) [(1-ν) b² + (3+ν) a²] at the outside b of a bore a.
-
-    Source: Timoshenko & Goodier, rotating discs.
-    """
-    if shaft_bore is None or speed == 0.0:
-        return 0.0
-    outside = 0.5 * (geometry.pitch_diameter - geometry.ball_diameter * math.cos(geometry.contact_angle))
-    inside = 0.5 * shaft_bore
-    if not 0.0 <= inside < outside:
-        raise SpecError(
-            "shaft_bore_diameter", f"it is {shaft_bore * 1e3:g} mm.", "It must lie inside the ring."
-        )
-    ratio = geometry.poisson_ratio
-    shape = (1.0 - ratio) * outside**2 + (3.0 + ratio) * inside**2
-    return geometry.density * speed**2 * outside / (4.0 * geometry.young_modulus) * shape
-
-
 def _solve(
-    problem: _Problem, speed: float, control: RacewayControl, film, options: TractionOptions
+    problem: _Problem,
+    speed: float,
+    control: RacewayControl,
+    film: LubricantState | None,
+    options: TractionOptions,
 ) -> Equilibrium:
     where = " ".join(bearing.name for bearing in problem.bearing_set.bearings)
     if speed > 0.0 and problem.ball_load == 0.0:
@@ -457,8 +307,6 @@ def _start(problem: _Problem, where: str) -> FloatArray:
         displacement[0] = _balanced_shift(problem, load[0], where)
     if len(load) >= 5 and load[1] != 0.0:
         geometry = problem.bearing_set.bearings[0].geometry
-        from spindle_fem.tribology.hertz import mean_load_constant
-
         count = float(system.weight.sum())
         share = 4.37 * abs(load[1]) / (count * math.cos(geometry.contact_angle))
         guess = (share / mean_load_constant(geometry)) ** (2.0 / 3.0)
@@ -503,20 +351,21 @@ def _balanced_shift(problem: _Problem, thrust: float, where: str) -> float:
     return float(brentq(excess, -reach, reach, xtol=1e-15, rtol=1e-13))
 
 
-def _axial_forces(problem: _Problem, solved: Equilibrium) -> FloatArray:
-    """Axial force of each bearing in its own load direction, N (friction across the groove left out)."""
-    contacts = solved.contacts
-    force = problem.system.weight * contacts.load[:, 0] * contacts.sine[:, 0]
-    edges = np.cumsum([0] + [len(row["weight"]) for row in problem.rows])
-    return np.array([force[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)])
-
-
-def _names_of_rows(problem: _Problem, bearing_set: BearingSet) -> Sequence[str]:
+def _rows_of_bearings(problem: _Problem) -> tuple[list[str], FloatArray]:
+    """Bearing name and largest contact angle (rad) of every ball row."""
     counts = [len(row["weight"]) for row in problem.rows]
-    return [b.name for b, number in zip(bearing_set.bearings, counts, strict=True) for _ in range(number)]
+    bearings = problem.bearing_set.bearings
+    names = [b.name for b, number in zip(bearings, counts, strict=True) for _ in range(number)]
+    return names, np.repeat([b.geometry.largest_contact_angle for b in bearings], counts)
 
 
 __all__ = [
-    "BearingSet", "BearingTemperatures", "ExternalLoad", "MountedBearing", "SetTemperatures", "axial_state",
-    "rotation_growth", "solve_bearing", "solve_bearing_set", "uniform_temperatures",
-]  # fmt: skip
+    "BearingSet",
+    "BearingTemperatures",
+    "ExternalLoad",
+    "MountedBearing",
+    "SetTemperatures",
+    "solve_bearing",
+    "solve_bearing_set",
+    "uniform_temperatures",
+]

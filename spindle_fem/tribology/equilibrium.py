@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -25,11 +25,16 @@ from spindle_fem.tribology.race_control import (
     static_centres,
     static_evaluation,
 )
-from spindle_fem.tribology.traction import LubricantState, TractionOptions
+from spindle_fem.tribology.traction import LubricantState, TractionOptions, ball_drag
 
 FloatArray = NDArray[np.float64]
 RacewayControl = Literal["outer", "inner", "equilibrium"]
 _SMALLEST_SPEED_STEP = 1.0 / 256.0
+# Widths (m) of softened contact, and softened traction, on the way to a solution
+_SMOOTHINGS = (2e-6, 3e-7, 5e-8, 1e-8, 0.0)
+_CREEP_RATIOS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
+# A ball is left to the cage below this multiple of the traction it needs
+_DRIVE_MARGIN = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +55,9 @@ class Equilibrium:
     residual : float, [-]
         Largest force residual over the largest ball load.
     iterations : int
+    carried : (n,) ndarray of bool
+        Balls that friction at the inner race is too weak to drive: the cage
+        carries them, with the speeds of outer race control.
     """
 
     displacement: FloatArray
@@ -59,6 +67,7 @@ class Equilibrium:
     tangent: FloatArray
     residual: float
     iterations: int
+    carried: NDArray[np.bool_]
 
 
 def solve_equilibrium(
@@ -105,9 +114,9 @@ def solve_equilibrium(
     magnitude = abs(speed)
     solver = _Solver(system, load, control, ball_load, lubricant, options or TractionOptions())
     if warm is not None and magnitude > 0.0:
-        solution = solver.moving(magnitude, warm.centre, warm.displacement, warm.ball_speeds)
-        if solution.converged:
-            return solver.finish(solution, magnitude)
+        attempt = solver.moving(magnitude, warm.centre, warm.displacement, warm.ball_speeds)
+        if attempt.converged:
+            return solver.finish(attempt.solution, magnitude, attempt.carried)
     rest = solver.rest(start)
     if not rest.converged:
         raise NoEquilibriumError(
@@ -117,10 +126,22 @@ def solve_equilibrium(
     if magnitude == 0.0:
         return solver.finish(rest, 0.0)
     centre = static_centres(system, *system.groove_distances(rest.displacement))
-    solution = solver.moving(magnitude, centre, rest.displacement, None)
-    if not solution.converged:
-        solution = _continue_in_speed(solver, magnitude, centre, rest.displacement, where)
-    return solver.finish(solution, magnitude)
+    attempt = solver.moving(magnitude, centre, rest.displacement, None)
+    if not attempt.converged:
+        attempt = _continue_in_speed(solver, magnitude, centre, rest.displacement, where)
+    return solver.finish(attempt.solution, magnitude, attempt.carried)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Attempt:
+    """A solution with the balls that it left to the cage."""
+
+    solution: BorderedSolution
+    carried: NDArray[np.bool_]
+
+    @property
+    def converged(self) -> bool:
+        return self.solution.converged
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,46 +153,96 @@ class _Solver:
     lubricant: LubricantState | None
     options: TractionOptions
 
+    @property
+    def nobody(self) -> NDArray[np.bool_]:
+        """No ball carried by the cage."""
+        return np.zeros(self.system.number, dtype=bool)
+
     def rest(self, start: FloatArray) -> BorderedSolution:
-        system = self.system
-        return self._newton(
-            lambda _, axial, radial: static_evaluation(system, axial, radial),
-            np.zeros((system.number, 0)), start, self._forces(0.0)[:, :0], self.ball_load,
-        )  # fmt: skip
+        """Displacements at rest, with softened contact where the plain method fails."""
+        rows = self._forces(0.0)[:, :0]
+        unknowns = np.zeros((self.system.number, 0))
+        solution = None
+        for smoothing in (0.0, *_SMOOTHINGS):
+            system = replace(self.system, smoothing=smoothing)
+            begin = start if solution is None else solution.displacement
+            trial = self._newton(
+                lambda _, axial, radial, system=system: static_evaluation(system, axial, radial),
+                unknowns, begin, rows, self.ball_load,
+            )  # fmt: skip
+            if smoothing == 0.0 and trial.converged:
+                return trial
+            if smoothing > 0.0:
+                solution = trial
+        return trial
 
     def moving(
         self, speed: float, centre: FloatArray, displacement: FloatArray, ball_speeds: FloatArray | None
-    ) -> BorderedSolution:
+    ) -> _Attempt:
         """Solve at one speed; six unknowns a ball when friction decides, else two."""
         system = self.system
-        speeds = np.full(system.number, speed)
         rows = self._forces(speed)
-        size = float(rows.max())
-        frictional = self.control == "equilibrium"
-        if frictional and ball_speeds is not None:
-            solution = self._frictional(speeds, np.column_stack([centre, ball_speeds]), displacement, rows)
+        if self.control == "equilibrium" and ball_speeds is not None:
+            guess = np.column_stack([centre, ball_speeds])
+            solution = self._frictional(speed, guess, displacement, rows, self.options, self.nobody)
             if solution.converged:
-                return solution
-        side = INNER if self.control == "inner" else OUTER
-        plain = self._newton(
-            lambda x, axial, radial: race_control_evaluation(system, speeds, side, x, axial, radial),
-            centre, displacement, rows, size,
-        )  # fmt: skip
-        if not frictional or not plain.converged:
-            return plain
+                return _Attempt(solution, self.nobody)
+        plain = self._race_control(speed, centre, displacement, rows)
+        if self.control != "equilibrium" or not plain.converged:
+            return _Attempt(plain, self.nobody)
         distance = system.groove_distances(plain.displacement)
+        speeds = np.full(system.number, speed)
         guess = start_from_race_control(system, speeds, plain.unknowns, distance)
-        return self._frictional(speeds, guess, plain.displacement, rows)
+        solution = self._frictional(speed, guess, plain.displacement, rows, self.options, self.nobody)
+        if solution.converged:
+            return _Attempt(solution, self.nobody)
+        carried = weakly_driven(system, self.lubricant, self.options, guess, distance)
+        for mask in (self.nobody, carried) if carried.any() else (self.nobody,):
+            state, ring = guess, plain.displacement
+            for creep in (*_CREEP_RATIOS, self.options.creep_ratio):
+                softer = replace(self.options, creep_ratio=max(creep, self.options.creep_ratio))
+                solution = self._frictional(speed, state, ring, rows, softer, mask)
+                if np.isfinite(solution.residual):
+                    state, ring = solution.unknowns, solution.displacement
+            if solution.converged:
+                return _Attempt(solution, mask)
+        return _Attempt(solution, self.nobody)
+
+    def _race_control(
+        self, speed: float, centre: FloatArray, displacement: FloatArray, rows: FloatArray
+    ) -> BorderedSolution:
+        side = INNER if self.control == "inner" else OUTER
+        speeds = np.full(self.system.number, speed)
+        for smoothing in (0.0, *_SMOOTHINGS):
+            system = replace(self.system, smoothing=smoothing)
+            solution = self._newton(
+                lambda x, axial, radial, system=system: race_control_evaluation(
+                    system, speeds, side, x, axial, radial
+                ),
+                centre, displacement, rows, float(rows.max()),
+            )  # fmt: skip
+            if smoothing == 0.0 and solution.converged:
+                break
+            if smoothing > 0.0:
+                centre, displacement = solution.unknowns, solution.displacement
+        return solution
 
     def _frictional(
-        self, speeds: FloatArray, guess: FloatArray, displacement: FloatArray, rows: FloatArray
+        self,
+        speed: float,
+        guess: FloatArray,
+        displacement: FloatArray,
+        rows: FloatArray,
+        options: TractionOptions,
+        carried: NDArray[np.bool_],
     ) -> BorderedSolution:
         system = self.system
+        speeds = np.full(system.number, speed)
         moments = 0.5 * rows[:, :1] * system.ball_diameter[:, None] * np.ones(3)
         scale = np.column_stack([rows, rows[:, :1], moments])
         return self._newton(
             lambda x, axial, radial: friction_evaluation(
-                system, speeds, self.lubricant, self.options, x, axial, radial
+                system, speeds, self.lubricant, options, x, axial, radial, carried
             ),
             guess, displacement, scale, float(rows.max()),
         )  # fmt: skip
@@ -202,7 +273,10 @@ class _Solver:
         size = np.full(system.number, max(self.ball_load, float(centrifugal.max()), 1e-9))
         return np.column_stack([size, size])
 
-    def finish(self, solution: BorderedSolution, speed: float) -> Equilibrium:
+    def finish(
+        self, solution: BorderedSolution, speed: float, carried: NDArray[np.bool_] | None = None
+    ) -> Equilibrium:
+        carried = self.nobody if carried is None else carried
         system = self.system
         distance = system.groove_distances(solution.displacement)
         if solution.unknowns.shape[1] == 0:
@@ -227,28 +301,45 @@ class _Solver:
             )
         return Equilibrium(
             solution.displacement, centre, ball_speeds, contacts, solution.tangent, solution.residual,
-            solution.iterations,
+            solution.iterations, carried,
         )  # fmt: skip
+
+
+def weakly_driven(
+    system: BallSystem,
+    lubricant: LubricantState,
+    options: TractionOptions,
+    unknowns: FloatArray,
+    distance: tuple[FloatArray, FloatArray],
+) -> NDArray[np.bool_]:
+    """Balls whose inner contact cannot drive them against drag and gyroscopic moment, (n,).
+
+    None where the strongest of all balls is too weak as well: the cage cannot
+    carry them all.
+    """
+    contacts = evaluate_contacts(system, (unknowns[:, 0], unknowns[:, 1]), distance)
+    capacity = lubricant.limiting_shear_ratio * contacts.load[:, INNER]
+    drag = ball_drag(system, lubricant, options, unknowns[:, 2])
+    gyroscopic = system.inertia * unknowns[:, 2] * np.abs(unknowns[:, 5]) / system.ball_diameter
+    weak = capacity < _DRIVE_MARGIN * (drag + gyroscopic)
+    return weak & ~weak.all()
 
 
 def _continue_in_speed(
     solver: _Solver, speed: float, centre: FloatArray, displacement: FloatArray, where: str
-) -> BorderedSolution:
+) -> _Attempt:
     """Go from rest to the asked speed in steps that halve on failure."""
     reached, step = 0.0, 0.05
-    solution: BorderedSolution | None = None
+    attempt: _Attempt | None = None
     ball_speeds: FloatArray | None = None
     while reached < 1.0:
         target = min(1.0, reached + step)
-        if ball_speeds is not None and reached > 0.0:
-            guess = ball_speeds * (target / reached)
-        else:
-            guess = None
+        guess = None if ball_speeds is None else ball_speeds * (target / reached)
         trial = solver.moving(speed * target, centre, displacement, guess)
         if trial.converged:
-            solution, reached = trial, target
-            centre, displacement = trial.unknowns[:, :2], trial.displacement
-            ball_speeds = trial.unknowns[:, 2:] if trial.unknowns.shape[1] == 6 else None
+            attempt, reached, solution = trial, target, trial.solution
+            centre, displacement = solution.unknowns[:, :2], solution.displacement
+            ball_speeds = solution.unknowns[:, 2:] if solution.unknowns.shape[1] == 6 else None
             step = min(2.0 * step, 0.05)
             continue
         step *= 0.5
@@ -259,9 +350,10 @@ def _continue_in_speed(
                 if solver.control == "equilibrium"
                 else "no ball position balances the forces"
             )
+            onset = f"from about {rpm * target:.0f} rpm on"
             raise NoEquilibriumError(
                 where,
-                f"no quasi-static equilibrium at {rpm:.0f} rpm: {cause} from about {rpm * target:.0f} rpm on.",
+                f"no quasi-static equilibrium at {rpm:.0f} rpm: {cause} {onset}.",
                 "Raise preload or axial load, or lower the speed.",
             )
-    return solution
+    return attempt

@@ -7,7 +7,11 @@ from numpy.typing import NDArray
 
 from spindle_fem.tribology.ball_system import BallSystem, Contacts, Evaluation, evaluate_contacts
 from spindle_fem.tribology.hertz import INNER, OUTER
-from spindle_fem.tribology.race_control import race_control_friction, race_control_speeds
+from spindle_fem.tribology.race_control import (
+    race_control_evaluation,
+    race_control_friction,
+    race_control_speeds,
+)
 from spindle_fem.tribology.traction import (
     LubricantState,
     TractionIntegrals,
@@ -30,13 +34,15 @@ def friction_evaluation(
     unknowns: FloatArray,
     axial: FloatArray,
     radial: FloatArray,
+    carried: NDArray[np.bool_] | None = None,
 ) -> Evaluation:
     """Residual of eqs 22 and 23 for every ball, with derivatives by differences.
 
     Unknowns of a ball: X1, X2 (m), orbital speed, and its speeds about x', y',
     z' (rad/s). Residual rows: radial, axial and tangential force (N), moments
     about x', y', z' (N m). A ball that has left the inner race has no traction
-    to decide its motion: it follows outer race control, carried by the cage.
+    to decide its motion: it follows outer race control, carried by the cage. So
+    do the balls marked ``carried``, (n,).
     """
     centre = np.stack([unknowns[:, :2]] * 3)
     centre[1, :, 0] += _LENGTH_STEP
@@ -68,6 +74,8 @@ def friction_evaluation(
     by_distance = -np.moveaxis(by_place[..., INNER, :], 0, -1)
 
     lost = ~(base_contacts.load[:, INNER] > 0.0)
+    if carried is not None:
+        lost |= carried
     if lost.any():
         _follow_race_control(system, speed, unknowns, (axial, radial), lost, values, by_unknown, by_distance)
     return Evaluation(values[:, :6], values[:, 6:], by_unknown, by_distance)
@@ -127,8 +135,6 @@ def _follow_race_control(
     by_distance: FloatArray,
 ) -> None:
     """Replace the rows of balls off the inner race: forces under race control, its speeds."""
-    from spindle_fem.tribology.race_control import race_control_evaluation
-
     plain = race_control_evaluation(system, speed, OUTER, unknowns[:, :2], *distance)
     contacts = evaluate_contacts(system, (unknowns[:, 0], unknowns[:, 1]), distance)
     speeds = race_control_speeds(contacts.cosine, contacts.sine, system.diameter_ratio, speed, OUTER)

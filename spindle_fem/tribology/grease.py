@@ -88,7 +88,8 @@ class Lubricant:
             )
         for key, low, high in (
             ("density", 500.0, 2500.0), ("density_slope", 0.0, 2e-3), ("limiting_shear_ratio", 0.005, 0.2),
-            ("asperity_friction", 0.0, 0.5), ("thermal_conductivity", 0.05, 1.0), ("film_starvation", 0.05, 1.0),
+            ("asperity_friction", 0.0, 0.5),
+            ("thermal_conductivity", 0.05, 1.0), ("film_starvation", 0.05, 1.0),
             ("path_fill", 0.0, 0.3), ("temperature_limit", 273.15, 700.0),
         ):  # fmt: skip
             value = getattr(self, key)

@@ -13,6 +13,7 @@ from spindle_fem.tribology.ball_system import (
     Evaluation,
     evaluate_contacts,
     load_constant,
+    pressed_part,
 )
 from spindle_fem.tribology.hertz import INNER, OUTER
 
@@ -84,7 +85,7 @@ def static_evaluation(system: BallSystem, axial: FloatArray, radial: FloatArray)
     cosine = np.repeat((a2 / length)[..., None], 2, axis=-1)
     constants = load_constants_in_series(system, cosine)
     total = length - system.rest_length.sum(axis=1)
-    pressed = np.where(total.real > 0.0, total, 0.0)
+    pressed = pressed_part(system, total)
     force = constants * pressed * np.sqrt(pressed)
     components = np.stack([force * a1 / length, force * a2 / length], axis=-1)
     derivative = np.moveaxis(components.imag / _COMPLEX_STEP, 0, -1)

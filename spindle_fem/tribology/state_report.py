@@ -64,8 +64,8 @@ def lubricant_state(
     )
 
 
-def require_seated(system: BallSystem, solved: Equilibrium, names: Sequence[str], speed: float) -> None:
-    """Refuse a state in which loaded balls sit beyond 90° or whose numbers are not finite."""
+def require_seated(solved: Equilibrium, names: Sequence[str], shoulder: FloatArray, speed: float) -> None:
+    """Refuse a state whose loaded balls climb a shoulder (rad, per row), or whose numbers are not finite."""
     loaded = solved.contacts.load[:, INNER] > 0.0
     beyond = loaded & (solved.contacts.cosine[:, INNER] <= 0.0)
     if beyond.any():
@@ -73,6 +73,15 @@ def require_seated(system: BallSystem, solved: Equilibrium, names: Sequence[str]
         raise NoEquilibriumError(
             name, f"balls climb out of the inner groove at {speed * 30.0 / math.pi:.0f} rpm.",
             "Raise the axial load or lower the speed.",
+        )  # fmt: skip
+    angle = np.arctan2(solved.contacts.sine, solved.contacts.cosine)
+    over = (solved.contacts.load > 0.0) & (angle > shoulder[:, None])
+    if over.any():
+        row = int(np.argmax(over.any(axis=1)))
+        raise NoEquilibriumError(
+            names[row], f"the contact climbs the shoulder at {math.degrees(float(shoulder[row])):.1f}° "
+            f"({math.degrees(float(angle[row].max())):.1f}° at {speed * 30.0 / math.pi:.0f} rpm).",
+            "Lower the axial load or the speed.",
         )  # fmt: skip
     if not np.isfinite(solved.contacts.load).all():
         raise NoEquilibriumError(" ".join(dict.fromkeys(names)), "the ball loads are not finite.")
@@ -90,7 +99,6 @@ def build_states(
     options: TractionOptions,
     heat: HeatOptions,
     control: str,
-    preloads: FloatArray,
     film_temperatures: Sequence[float],
     roughness: tuple[float, float],
 ) -> tuple[BearingState, ...]:
@@ -117,23 +125,26 @@ def build_states(
         ring_axial = contacts.load[:, INNER] * contacts.sine[:, INNER] + friction * contacts.cosine[:, INNER]
         ring_radial = contacts.load[:, INNER] * contacts.cosine[:, INNER] - friction * contacts.sine[:, INNER]
         axial_force = float(weight @ ring_axial)
-        radial_force = float(
-            np.hypot(weight @ (ring_radial * np.cos(row["azimuth"])), weight @ (ring_radial * np.sin(row["azimuth"])))
-        ) if len(weight) > 1 else 0.0  # fmt: skip
+        radial_force = 0.0
+        if len(weight) > 1:
+            pull = weight * ring_radial
+            radial_force = float(np.hypot(pull @ np.cos(row["azimuth"]), pull @ np.sin(row["azimuth"])))
         balls = _ball_states(
             row["azimuth"], weight, contacts, (major[part], minor[part]),
-            _cut_system(system, part), solved.ball_speeds[part],
+            _cut(system, part), solved.ball_speeds[part],
         )  # fmt: skip
         bearing_heat_record: BearingHeat | None = None
         temperature = float(film_temperatures[index])
-        warnings = list(
-            _load_warnings(bearing.name, balls, contacts, control, speed, _cut_system(system, part))
-        )
+        cage = int(np.sum(weight[solved.carried[part]]))
+        warnings = list(_load_warnings(bearing.name, balls, contacts, control, speed, _cut(system, part)))
+        if cage:
+            text = f"{bearing.name}: friction is too weak to drive {cage} balls; the cage carries them."
+            warnings.append(CodedWarning("balls_carried_by_cage", text))
         if lubricant is not None and film is not None:
             warnings += lubricant.temperature_warnings(temperature, bearing.name)
             if patch is not None:
                 local = HeatInputs(
-                    geometry, _cut_system(system, part), _cut(patch, part), _cut(traction, part), _cut(film, part),
+                    geometry, _cut(system, part), _cut(patch, part), _cut(traction, part), _cut(film, part),
                     solved.ball_speeds[part, 0], drag[part], speed,
                     float(lubricant.kinematic_viscosity(temperature)), axial_force, radial_force,
                 )  # fmt: skip
@@ -151,7 +162,7 @@ def build_states(
         states.append(
             BearingState(
                 bearing.name, geometry, speed, float(np.mean(distance[0][part])) - free, radial_shift,
-                axial_force, radial_force, float(preloads[index]), stiffness, balls, bearing_heat_record,
+                axial_force, radial_force, math.nan, stiffness, balls, bearing_heat_record,
                 total / speed if speed else 0.0, temperature, solved.residual, tuple(warnings),
             )
         )  # fmt: skip
@@ -215,7 +226,8 @@ def _with_films(
         patch.rolling_radius, lubricant.pressure_viscosity[:, None],
     )  # fmt: skip
     reduction = lubricant.film_starvation[:, None] * thermal_reduction(
-        lubricant.viscosity_slope[:, None], traction.entrainment_speed, lubricant.thermal_conductivity[:, None],
+        lubricant.viscosity_slope[:, None], traction.entrainment_speed,
+        lubricant.thermal_conductivity[:, None],
         model=options.thermal_film, pressure=patch.pressure, reduced_modulus=modulus,
     )  # fmt: skip
     isothermal = film_central_hamrock_dowson(*groups, patch.ellipticity) * patch.rolling_radius
@@ -320,10 +332,6 @@ def _cut(record, part: slice):
     return type(record)(
         *(value[part] if isinstance(value := getattr(record, name), np.ndarray) else value for name in names)
     )
-
-
-def _cut_system(system: BallSystem, part: slice) -> BallSystem:
-    return _cut(system, part)
 
 
 __all__ = ["ContactPatch", "build_states", "lubricant_state", "require_seated"]

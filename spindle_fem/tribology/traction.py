@@ -41,6 +41,10 @@ class TractionOptions:
         Of a ball in the lubricant in its path.
     drag_exponent : float, [-]
         Of the ball speed: 1.95 as in the paper (speed in m/s), 2 for ½ρC_dAv².
+    creep_ratio : float, [-]
+        Slide-roll ratio that elastic creep of the surfaces alone takes up at
+        the limiting stress. It caps the viscosity at high pressure, where the
+        film would be rigid against any sliding.
     nodes_across, nodes_along : int
         Quadrature.
     """
@@ -49,6 +53,7 @@ class TractionOptions:
     thermal_film: Literal["wilson", "gupta", "none"] = "wilson"
     drag_coefficient: float = 0.4
     drag_exponent: float = 1.95
+    creep_ratio: float = 1e-4
     nodes_across: int = 24
     nodes_along: int = 6
 
@@ -259,7 +264,8 @@ def integrate_traction(
     area = (patch.semi_major * patch.semi_minor)[..., None]
     resultant = np.sqrt(along**2 + across**2)
     fade = _ASPERITY_FADE * (entrainment + 1e-9)[..., None]
-    shear = film[..., None, None] * patch.inverse_viscosity
+    creep = options.creep_ratio * entrainment[..., None, None] * patch.inverse_limit
+    shear = film[..., None, None] * patch.inverse_viscosity + creep
     friction = lubricant.asperity_friction[:, None, None] * ratio[..., None]
     pressed = friction * (patch.local_pressure @ along_weight) if np.any(ratio > 0.0) else 0.0 * resultant
 
@@ -303,8 +309,8 @@ def central_film(
     column = (slice(None), None)
     modulus = (2.0 / system.compliance)[column]
     groups = film_groups(
-        lubricant.viscosity[column], entrainment, np.maximum(patch.load, 1e-12), modulus, patch.rolling_radius,
-        lubricant.pressure_viscosity[column],
+        lubricant.viscosity[column], entrainment, np.maximum(patch.load, 1e-12), modulus,
+        patch.rolling_radius, lubricant.pressure_viscosity[column],
     )  # fmt: skip
     film = film_central_hamrock_dowson(*groups, patch.ellipticity) * patch.rolling_radius
     reduction = thermal_reduction(

@@ -1,0 +1,461 @@
+"""One bearing or preloaded set from a TOML file: read, check, solve, report as plain numbers."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spindle_fem.errors import (
+    BadInputError,
+    FaultsError,
+    OutOfValidityError,
+    SpecError,
+    SpindleFemError,
+    UnknownKeyError,
+    did_you_mean,
+)
+from spindle_fem.tribology.bearing import BearingGeometry, bearing_faults, select_orientations
+from spindle_fem.tribology.bearing_set import solve_bearing_set
+from spindle_fem.tribology.grease import Lubricant
+from spindle_fem.tribology.heat import HEAT_LEVELS, HeatOptions
+from spindle_fem.tribology.hertz import INNER, OUTER
+from spindle_fem.tribology.mounting import BearingSet, ExternalLoad, MountedBearing, uniform_temperatures
+from spindle_fem.tribology.state import BearingState
+from spindle_fem.units import to_si
+from spindle_fem.validity import CodedWarning
+
+SCHEMA = "spindle-fem/bearing/1"
+REPORT_SCHEMA = "spindle-fem/bearing-report/1"
+_SPACING_OVER_BALL = 1.7
+
+Reader = Callable[[Any, str], Any]
+
+
+def _quantity(unit: str, kind: str = "quantity") -> Reader:
+    return lambda value, where: to_si(value, unit, where=where, kind=kind)
+
+
+def _text(*allowed: str) -> Reader:
+    def read(value: Any, where: str) -> str:
+        if not isinstance(value, str) or (allowed and value not in allowed):
+            raise SpecError(where, f"{value!r} is not allowed.", did_you_mean(str(value), allowed))
+        return value
+
+    return read
+
+
+def _count(value: Any, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise SpecError(where, f"{value!r} is not a whole number.", "Allowed: a whole number from 3.")
+    return value
+
+
+def _row(value: Any, where: str) -> tuple[int, ...]:
+    if not isinstance(value, str | list):
+        raise SpecError(
+            where, f"{value!r} is no arrangement.", 'Write a name such as "TBT" or a list of 1 and -1.'
+        )
+    return select_orientations(value, where)
+
+
+_LENGTH, _FORCE, _PRESSURE, _NUMBER = _quantity("m"), _quantity("N"), _quantity("Pa"), _quantity("")
+_TEMPERATURE = _quantity("K", "temperature")
+_GEOMETRY: dict[str, Reader] = {
+    "ball_diameter": _LENGTH,
+    "ball_count": _count,
+    "pitch_diameter": _LENGTH,
+    "contact_angle": _quantity("rad"),
+    "groove_curvature_inner": _NUMBER,
+    "groove_curvature_outer": _NUMBER,
+    "young_modulus": _PRESSURE,
+    "poisson_ratio": _NUMBER,
+    "density": _quantity("kg/m**3"),
+    "ball_young_modulus": _PRESSURE,
+    "ball_poisson_ratio": _NUMBER,
+    "bore_diameter": _LENGTH,
+    "outer_diameter": _LENGTH,
+    "width": _LENGTH,
+    "shoulder_angle": _quantity("rad"),
+    "static_load_rating": _FORCE,
+}
+_MOUNTING: dict[str, Reader] = {
+    "arrangement": _row,
+    "preload": _FORCE,
+    "preload_kind": _text("rigid", "spring"),
+    "spacing": _LENGTH,
+    "roughness_raceway": _LENGTH,
+    "roughness_ball": _LENGTH,
+}
+_OPERATION: dict[str, Reader] = {
+    "speed": _quantity("rad/s"),
+    "axial_load": _FORCE,
+    "radial_load": _FORCE,
+    "moment": _quantity("N*m"),
+    "temperature": _TEMPERATURE,
+    "raceway_control": _text("outer", "inner", "equilibrium"),
+}
+_LUBRICANT: dict[str, Reader] = {
+    "name": _text(),
+    "kinematic_viscosity_40": _quantity("m**2/s"),
+    "kinematic_viscosity_100": _quantity("m**2/s"),
+    "base_oil_density": _quantity("kg/m**3"),
+    "density_slope": _quantity("1/K"),
+    "viscosity_law": _text("walther", "roelands"),
+    "pressure_viscosity": _quantity("1/Pa"),
+    "limiting_shear_ratio": _NUMBER,
+    "asperity_friction": _NUMBER,
+    "thermal_conductivity": _quantity("W/(m*K)"),
+    "film_starvation": _NUMBER,
+    "path_fill": _NUMBER,
+    "temperature_limit": _TEMPERATURE,
+}
+_HEAT: dict[str, Reader] = {
+    "model": _text(*HEAT_LEVELS),
+    "palmgren_f0": _NUMBER,
+    "skf_mu_ehl": _NUMBER,
+    "hysteresis_loss": _NUMBER,
+}
+_REQUIRED = {
+    "bearing": tuple(_GEOMETRY)[:6],
+    "operation": ("speed", "axial_load"),
+    "lubricant": ("kinematic_viscosity_40", "kinematic_viscosity_100"),
+    "heat": (),
+}
+_TABLES = {"bearing": _GEOMETRY | _MOUNTING, "operation": _OPERATION, "lubricant": _LUBRICANT, "heat": _HEAT}
+_HEAT_FIELDS = {"model": "level", "skf_mu_ehl": "skf_friction_ehl"}
+
+
+@dataclass(frozen=True, slots=True)
+class BearingCase:
+    """What a bearing file says, in SI.
+
+    Attributes
+    ----------
+    bearing_set : BearingSet
+    speed : float, [rad/s]
+    load : ExternalLoad
+        Thrust turned so that a positive axial load of the file loads the
+        first bearing of the row.
+    temperature : float, [K]
+    raceway_control : str
+    lubricant : Lubricant or None
+    heat : HeatOptions
+    warnings : tuple of CodedWarning
+    """
+
+    bearing_set: BearingSet
+    speed: float
+    load: ExternalLoad
+    temperature: float
+    raceway_control: str
+    lubricant: Lubricant | None
+    heat: HeatOptions
+    warnings: tuple[CodedWarning, ...]
+
+
+def bearing_report(path: str | Path) -> dict[str, Any]:
+    """Solve the bearing or set of a TOML file and report it for JSON.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    dict
+        Keys and units as ``spindle-fem bearing FILE --json`` prints them;
+        None where there is no film (no lubricant, at rest, no contact).
+
+    Raises
+    ------
+    BadInputError
+        Every fault of the file with file, key, value and what is allowed.
+    NoEquilibriumError
+        The state does not exist.
+    """
+    case = read_bearing_file(path)
+    try:
+        states = solve_bearing_set(
+            case.bearing_set,
+            case.speed,
+            case.load,
+            uniform_temperatures(len(case.bearing_set.bearings), case.temperature),
+            lubricant=case.lubricant,
+            control=case.raceway_control,
+            heat=case.heat,
+        )
+    except OutOfValidityError as error:
+        raise SpecError(f"{path}: operation.temperature", error.what, error.how_to_fix) from error
+    return report_of_states(states, case)
+
+
+def read_bearing_file(path: str | Path) -> BearingCase:
+    """Read and check a bearing file; all faults at once.
+
+    Raises
+    ------
+    BadInputError
+    """
+    file = Path(path)
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpecError(str(file), f"cannot be read ({error}).", "Give a TOML file.") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(str(file), f"is not TOML ({error}).", "Correct the syntax.") from error
+    faults: list[SpindleFemError] = []
+    tables = _read_tables(document, str(file), faults)
+    case = None
+    if not faults:
+        case = _build_case(tables, str(file), faults)
+    if len(faults) == 1:
+        raise faults[0]
+    if faults or case is None:
+        raise FaultsError(str(file), faults)
+    return case
+
+
+def _read_tables(
+    document: Mapping[str, Any], file: str, faults: list[SpindleFemError]
+) -> dict[str, dict[str, Any]]:
+    schema = document.get("schema", SCHEMA)
+    if schema != SCHEMA:
+        faults.append(SpecError(f"{file}: schema", f"{schema!r} is unknown.", f'Allowed: "{SCHEMA}".'))
+    tables: dict[str, dict[str, Any]] = {}
+    for name in document:
+        if name != "schema" and name not in _TABLES:
+            faults.append(UnknownKeyError(f"{file}: {name}", "unknown table.", did_you_mean(name, _TABLES)))
+    for name, readers in _TABLES.items():
+        table = document.get(name)
+        if table is None:
+            if name in ("bearing", "operation"):
+                faults.append(SpecError(f"{file}: {name}", "the table is missing.", f"Write [{name}]."))
+            continue
+        if not isinstance(table, dict):
+            faults.append(SpecError(f"{file}: {name}", f"{table!r} is no table.", f"Write [{name}]."))
+            continue
+        values: dict[str, Any] = {}
+        for key, value in table.items():
+            where = f"{file}: {name}.{key}"
+            if key not in readers:
+                faults.append(UnknownKeyError(where, "unknown key.", did_you_mean(key, readers)))
+                continue
+            try:
+                values[key] = readers[key](value, where)
+            except BadInputError as error:
+                faults.append(error)
+        for key in _REQUIRED[name]:
+            if key not in table:
+                faults.append(SpecError(f"{file}: {name}.{key}", "the key is missing.", "It is required."))
+        tables[name] = values
+    return tables
+
+
+def _build_case(
+    tables: dict[str, dict[str, Any]], file: str, faults: list[SpindleFemError]
+) -> BearingCase | None:
+    bearing, operation = tables["bearing"], tables["operation"]
+    orientations = bearing.get("arrangement", (1,))
+    geometry_values = {key: value for key, value in bearing.items() if key in _GEOMETRY}
+    probe = _Unchecked(**geometry_values)
+    for key, what, how_to_fix in bearing_faults(probe):
+        faults.append(SpecError(f"{file}: bearing.{key}", what, how_to_fix))
+    _check_operation(operation, orientations, file, faults)
+    preload = bearing.get("preload", 0.0)
+    if preload < 0.0:
+        faults.append(
+            SpecError(f"{file}: bearing.preload", f"preload is {preload:g} N.", "It must not be negative.")
+        )
+    lubricant = _lubricant(tables.get("lubricant"), file, faults)
+    control = operation.get("raceway_control", "outer")
+    if control == "equilibrium" and lubricant is None and "lubricant" not in tables:
+        faults.append(
+            SpecError(
+                f"{file}: operation.raceway_control",
+                '"equilibrium" lets friction decide, but there is no [lubricant].',
+                'Write [lubricant], or "outer" or "inner".',
+            )
+        )
+    heat_values = tables.get("heat", {})
+    heat = HeatOptions()
+    try:
+        heat = HeatOptions(**{_HEAT_FIELDS.get(key, key): value for key, value in heat_values.items()})
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: {error.where}", error.what, error.how_to_fix))
+    if faults:
+        return None
+    geometry = BearingGeometry(**geometry_values)
+    warnings: list[CodedWarning] = []
+    radial, moment = operation.get("radial_load", 0.0), operation.get("moment", 0.0)
+    spacing = bearing.get("spacing", bearing.get("width"))
+    if spacing is None:
+        spacing = _SPACING_OVER_BALL * geometry.ball_diameter
+        if len(orientations) > 1 and (radial or moment):
+            warnings.append(
+                CodedWarning(
+                    "spacing_assumed",
+                    f"bearings stand {spacing * 1e3:.2f} mm apart (1.7 ball diameters); give bearing.spacing "
+                    "or bearing.width.",
+                )
+            )
+    mounted = tuple(
+        MountedBearing(
+            f"B{index + 1}" if len(orientations) > 1 else "bearing", geometry, side, index * spacing
+        )
+        for index, side in enumerate(orientations)
+    )
+    roughness = {
+        target: bearing[key]
+        for key, target in (("roughness_raceway", "raceway_roughness"), ("roughness_ball", "ball_roughness"))
+        if key in bearing
+    }
+    try:
+        bearing_set = BearingSet(mounted, preload, bearing.get("preload_kind", "rigid"), **roughness)
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: bearing.{error.where}", error.what, error.how_to_fix))
+        return None
+    return BearingCase(
+        bearing_set,
+        operation["speed"],
+        ExternalLoad(operation["axial_load"] * orientations[0], radial, moment),
+        operation.get("temperature", 313.15),
+        control,
+        lubricant,
+        heat,
+        tuple(warnings),
+    )
+
+
+class _Unchecked:
+    """Geometry values before the checks of ``BearingGeometry``."""
+
+    def __init__(self, **values: Any) -> None:
+        for name, spec in BearingGeometry.__dataclass_fields__.items():
+            setattr(self, name, values.get(name, spec.default))
+
+
+def _check_operation(
+    operation: dict[str, Any], orientations: tuple[int, ...], file: str, faults: list[SpindleFemError]
+) -> None:
+    if operation["speed"] < 0.0:
+        rpm = operation["speed"] * 30.0 / math.pi
+        faults.append(
+            SpecError(f"{file}: operation.speed", f"speed is {rpm:g} rpm.", "It must not be negative.")
+        )
+    axial = operation["axial_load"]
+    if axial < 0.0 and len(set(orientations)) == 1:
+        faults.append(
+            SpecError(
+                f"{file}: operation.axial_load",
+                f"{axial:g} N unloads bearings that all face the other way.",
+                "It must not be negative without a counter bearing.",
+            )
+        )
+    if operation.get("radial_load", 0.0) < 0.0:
+        faults.append(
+            SpecError(
+                f"{file}: operation.radial_load",
+                f"{operation['radial_load']:g} N.",
+                "It must not be negative: azimuth 0 lies under the radial load.",
+            )
+        )
+
+
+def _lubricant(values: dict[str, Any] | None, file: str, faults: list[SpindleFemError]) -> Lubricant | None:
+    if values is None:
+        return None
+    fields = {
+        ("density" if key == "base_oil_density" else key): v for key, v in values.items() if key != "name"
+    }
+    try:
+        return Lubricant(**fields)
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: lubricant.{error.where}", error.what, error.how_to_fix))
+        return None
+
+
+def report_of_states(states: tuple[BearingState, ...], case: BearingCase) -> dict[str, Any]:
+    """The report of solved bearings as plain numbers (see ``bearing_report``)."""
+    first = states[0]
+    has_heat = first.heat is not None
+    report: dict[str, Any] = {
+        "schema": REPORT_SCHEMA,
+        "axial_deflection_um": first.axial_displacement * 1e6,
+        "radial_deflection_um": first.radial_displacement * 1e6,
+        "axial_stiffness_N_um": first.axial_stiffness * 1e-6,
+        "heat_W": sum(state.heat_W for state in states) if has_heat else None,
+        "terms_W": _sum_terms(states),
+    }
+    if len(states) == 1:
+        report["balls"] = _ball_reports(first)
+    else:
+        report["bearings"] = [
+            {
+                "name": state.name,
+                "axial_deflection_um": state.axial_displacement * 1e6,
+                "radial_deflection_um": state.radial_displacement * 1e6,
+                "axial_load_N": state.axial_force,
+                "preload_N": _number(state.preload),
+                "heat_W": state.heat_W if has_heat else None,
+                "terms_W": state.terms_W,
+                "balls": _ball_reports(state),
+            }
+            for state in states
+        ]
+    found = [warning for state in states for warning in state.warnings]
+    report["warnings"] = [{"code": entry.code, "text": entry.text} for entry in (*case.warnings, *found)]
+    return report
+
+
+def _sum_terms(states: tuple[BearingState, ...]) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for state in states:
+        for name, value in state.terms_W.items():
+            total[name] = total.get(name, 0.0) + value
+    return total
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _ball_reports(state: BearingState) -> list[dict[str, Any]]:
+    """One record a ball; equal balls under axial load are written out one by one."""
+    count, balls = state.geometry.ball_count, state.balls
+    reports = []
+    for ball in range(count):
+        row = ball if len(balls.weight) == count else 0
+        record: dict[str, Any] = {"azimuth_deg": 360.0 * ball / count}
+        for name, field, factor in (
+            ("contact_angle_{}_deg", "contact_angle", 180.0 / math.pi),
+            ("load_{}_N", "load", 1.0),
+            ("pressure_{}_GPa", "pressure", 1e-9),
+            ("semi_major_{}_mm", "semi_major", 1e3),
+            ("semi_minor_{}_mm", "semi_minor", 1e3),
+            ("deformation_{}_um", "deformation", 1e6),
+        ):
+            for side, ring in ((INNER, "inner"), (OUTER, "outer")):
+                record[name.format(ring)] = float(getattr(balls, field)[row, side]) * factor
+        record |= {
+            "centrifugal_force_N": float(balls.centrifugal_force[row]),
+            "gyroscopic_moment_Nmm": float(balls.gyroscopic_moment[row]) * 1e3,
+            "orbital_speed_rad_s": float(balls.orbital_speed[row]),
+            "spin_speed_rad_s": float(balls.spin_speed[row]),
+        }
+        for name, field, factor in (
+            ("film_central{}_um", "film_central", 1e6),
+            ("film_minimum{}_um", "film_minimum", 1e6),
+            ("lambda{}", "film_thickness_ratio", 1.0),
+        ):
+            values = getattr(balls, field)[row] * factor
+            record[name.format("")] = _number(float(np.fmin(*values)))
+            for side, ring in ((INNER, "_inner"), (OUTER, "_outer")):
+                record[name.format(ring)] = _number(float(values[side]))
+        reports.append(record)
+    return reports
