@@ -18,24 +18,23 @@ LINEAR_BALANCE_TOLERANCE = 1e-10
 
 @dataclass(frozen=True, slots=True)
 class HeatBalance:
-    """Heat flows of a temperature field, [W].
+    """Heat flows of a steady temperature field, [W].
 
     Attributes
     ----------
     heat_in : mapping of str to float
         Heat put into each surface, part and lumped node.
     films : mapping of str to float
-        Heat that leaves through each film (negative where it enters).
+        Heat that leaves through each film and each link to surroundings
+        (negative where it enters).
     links : mapping of str to float
-        Heat along each lumped link, from its node to the other end.
+        Heat along each link between lumped nodes, from ``node`` to ``other``.
     connections : mapping of str to float
         ``"surface>node"``: heat from a surface into a lumped node.
     joints : mapping of str to float
         Heat from part a to part b of each joint.
-    stored : float
-        Rate of heat storage; 0 when steady.
     imbalance : float, [W]
-        Heat in − heat out − stored.
+        Heat in − heat out.
     imbalance_relative : float, [-]
         Relative to the turnover.
     turnover : float, [W]
@@ -47,7 +46,6 @@ class HeatBalance:
     links: Mapping[str, float]
     connections: Mapping[str, float]
     joints: Mapping[str, float]
-    stored: float
     imbalance: float
     imbalance_relative: float
     turnover: float
@@ -58,14 +56,72 @@ class HeatBalance:
         return float(sum(self.heat_in.values()))
 
 
+@dataclass(frozen=True, slots=True)
+class BoundaryFlows:
+    """Heat that enters and leaves, [W].
+
+    Attributes
+    ----------
+    sources : mapping of str to float
+        Heat put into each surface, part and lumped node.
+    films : mapping of str to float
+        Heat that leaves through each film and each link to surroundings.
+    """
+
+    sources: Mapping[str, float]
+    films: Mapping[str, float]
+
+    @property
+    def heat_in(self) -> float:
+        """Sum of the heat put in, [W]."""
+        return float(sum(self.sources.values()))
+
+
+def boundary_flows(
+    problem: ConductionProblem,
+    reference: float,
+    rise: NDArray[np.float64],
+    lumped_rise: NDArray[np.float64],
+) -> BoundaryFlows:
+    """Heat across the boundary of a linear problem.
+
+    Parameters
+    ----------
+    problem : ConductionProblem
+    reference : float, [K]
+    rise, lumped_rise : (n,), (m,) ndarray, [K]
+        Temperatures above the reference.
+    """
+    operators = problem.operators
+    sources = {
+        surface: float(heat_flux(operators, surface, heat) @ operators.facet_areas(surface))
+        for surface, heat in problem.surface_heat.items()
+    }
+    for part, heat in problem.part_heat.items():
+        sources[part] = sources.get(part, 0.0) + float(heat)
+    for node in problem.lumped_nodes:
+        if node.heat:
+            sources[node.name] = float(node.heat)
+    films = {}
+    for film in problem.films:
+        rows = operators.surface_rows[film.surface]
+        ambient = np.asarray(film.ambient_temperature) - reference
+        excess = operators.facet_integral(rise, rows) - ambient * operators.facet_area[rows]
+        films[film.label] = float(np.sum(np.asarray(film.coefficient) * excess))
+    for link in problem.lumped_links:
+        if link.other is None:
+            excess = lumped_rise[problem.lumped_names.index(link.node)] - (link.temperature - reference)
+            films[link.label] = films.get(link.label, 0.0) + float(link.conductance * excess)
+    return BoundaryFlows(sources, films)
+
+
 def compute_balance(
     problem: ConductionProblem,
     system: ThermalSystem,
     rise: NDArray[np.float64],
     lumped_rise: NDArray[np.float64],
-    stored: float = 0.0,
 ) -> HeatBalance:
-    """Flows through every film, connection, link and joint.
+    """Flows through every film, connection, link and joint of a steady field.
 
     Parameters
     ----------
@@ -74,53 +130,30 @@ def compute_balance(
         Of the same problem, before perfect joints are tied.
     rise, lumped_rise : (n,), (m,) ndarray, [K]
         Temperatures above the system's reference.
-    stored : float, [W]
-        Rate of heat storage.
     """
     operators = problem.operators
-    reference = system.reference_temperature
-    heat_in = {
-        surface: float(heat_flux(operators, surface, heat) @ operators.facet_areas(surface))
-        for surface, heat in problem.surface_heat.items()
-    }
-    for part, heat in problem.part_heat.items():
-        heat_in[part] = heat_in.get(part, 0.0) + float(heat)
-    for node in problem.lumped_nodes:
-        if node.heat:
-            heat_in[node.name] = float(node.heat)
-    films = {}
-    for film in problem.films:
-        rows = operators.surface_rows[film.surface]
-        values = operators.per_facet(film.surface, film.coefficient, film.label)
-        ambient = operators.per_facet(film.surface, film.ambient_temperature, film.label) - reference
-        excess = operators.facet_integral(rise, rows) - ambient * operators.facet_area[rows]
-        films[film.label] = float(values @ excess)
-    connections = {}
+    flows = boundary_flows(problem, system.reference_temperature, rise, lumped_rise)
+    connections: dict[str, float] = {}
     for index, node in enumerate(problem.lumped_nodes):
         for surface, value in node.connections:
             rows = operators.surface_rows[surface]
-            values = operators.per_facet(surface, value, node.name)
             excess = operators.facet_integral(rise, rows) - lumped_rise[index] * operators.facet_area[rows]
             key = f"{surface}>{node.name}"
-            connections[key] = connections.get(key, 0.0) + float(values @ excess)
-    links, to_surroundings = {}, []
+            connections[key] = connections.get(key, 0.0) + float(np.sum(np.asarray(value) * excess))
+    links: dict[str, float] = {}
     for link in problem.lumped_links:
-        here = lumped_rise[problem.lumped_names.index(link.node)]
         if link.other is None:
-            there = link.temperature - reference
-            to_surroundings.append(link.conductance * (here - there))
-        else:
-            there = lumped_rise[problem.lumped_names.index(link.other)]
+            continue
+        here, there = (lumped_rise[problem.lumped_names.index(name)] for name in (link.node, link.other))
         links[link.label] = links.get(link.label, 0.0) + float(link.conductance * (here - there))
-    imbalance = sum(heat_in.values()) - sum(films.values()) - sum(to_surroundings) - stored
-    turnover = sum(map(abs, (*heat_in.values(), *films.values(), *to_surroundings, stored))) / 2.0
+    imbalance = flows.heat_in - sum(flows.films.values())
+    turnover = 0.5 * sum(map(abs, (*flows.sources.values(), *flows.films.values())))
     return HeatBalance(
-        heat_in,
-        films,
+        flows.sources,
+        flows.films,
         links,
         connections,
         _joint_heat(problem, system, rise, lumped_rise),
-        stored,
         float(imbalance),
         abs(float(imbalance)) / turnover if turnover else 0.0,
         float(turnover),

@@ -107,6 +107,7 @@ def solve_linear(
     guess: NDArray[np.float64] | None = None,
     *,
     relative_tolerance: float = RELATIVE_TOLERANCE,
+    absolute_tolerance: float | None = None,
     max_iterations: int = MAX_ITERATIONS,
 ) -> LinearSolution:
     """Preconditioned conjugate gradients, checked on the true residual.
@@ -121,6 +122,8 @@ def solve_linear(
     guess : (n,) ndarray, optional
     relative_tolerance : float, [-]
         Of the residual's 2-norm against the load's.
+    absolute_tolerance : float, optional, [W]
+        Of the residual's 2-norm, instead of the relative one.
     max_iterations : int
 
     Raises
@@ -141,7 +144,7 @@ def solve_linear(
     scale = float(np.linalg.norm(load))
     if scale == 0.0:
         scale = float(np.linalg.norm(residual))
-    target = relative_tolerance * scale
+    target = relative_tolerance * scale if absolute_tolerance is None else absolute_tolerance
     iterations = 0
     restarts = 0
     while (norm := float(np.linalg.norm(residual))) > target:
@@ -149,7 +152,7 @@ def solve_linear(
             raise ConvergenceError(
                 "linear solver",
                 f"residual {norm / scale:.2e} after {iterations} iterations.",
-                f"Asked: {relative_tolerance:.1e}. Rebuild the preconditioner or allow more iterations.",
+                f"Asked: {target / scale:.1e}. Rebuild the preconditioner or allow more iterations.",
             )
         correction, steps = _conjugate_gradients(
             matrix, residual, preconditioner.apply, target, max_iterations - iterations

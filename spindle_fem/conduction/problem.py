@@ -237,13 +237,16 @@ class ThermalSystem:
         )
 
 
-def assemble_system(problem: ConductionProblem) -> ThermalSystem:
+def assemble_system(problem: ConductionProblem, reference: float | None = None) -> ThermalSystem:
     """Equations of a problem; the unit integrals are only re-summed.
 
     Parameters
     ----------
     problem : ConductionProblem
         Without film laws: these are linearised first.
+    reference : float, optional, [K]
+        Temperature that unknowns count from; the mean of the surroundings
+        when absent.
 
     Returns
     -------
@@ -279,7 +282,8 @@ def assemble_system(problem: ConductionProblem) -> ThermalSystem:
         coefficient[side_b] += conductance
         operators.add_joint(upper, joint, conductance)
     operators.add_films(upper, coefficient)
-    reference = reference_temperature(problem)
+    if reference is None:
+        reference = reference_temperature(problem)
     load, lumped_load = assemble_load(problem, reference)
     return ThermalSystem(
         operators.matrix(upper),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from spindle_fem.conduction.balance import (
     BALANCE_TOLERANCE,
@@ -123,7 +124,7 @@ def solve_steady(
     matrix, load = tied.full_matrix(), tied.full_load()
     solution = solve_linear(matrix, load, preconditioner, start, relative_tolerance=relative_tolerance)
     unknowns = close_balance(matrix, load, solution.unknowns)
-    rise, lumped_rise = split_unknowns(system, unknowns)
+    rise, lumped_rise = split_unknowns(unknowns, system.n_lumped, system.tie)
     balance = compute_balance(problem, system, rise, lumped_rise)
     require_balance(balance, LINEAR_BALANCE_TOLERANCE if balance_tolerance is None else balance_tolerance)
     return ConductionSolution(
@@ -187,12 +188,11 @@ def close_balance(
 
 
 def split_unknowns(
-    system: ThermalSystem, unknowns: NDArray[np.float64]
+    unknowns: NDArray[np.float64], n_lumped: int, tie: sparse.csr_array | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Rises of the mesh's unknowns and of the lumped nodes, ties undone."""
-    n = len(unknowns) - system.n_lumped
-    rise = unknowns[:n] if system.tie is None else system.tie @ unknowns[:n]
-    return rise, unknowns[n:]
+    n = len(unknowns) - n_lumped
+    return (unknowns[:n] if tie is None else tie @ unknowns[:n]), unknowns[n:]
 
 
 def _start_values(system: ThermalSystem, guess: ConductionSolution) -> NDArray[np.float64]:
