@@ -194,7 +194,22 @@ def quantity_example(unit: str, kind: str = "quantity") -> str:
     """
     if kind == "temperature":
         return '"15 degC"'
-    customary = {"m": "19 mm", "rad/s": "3000 rpm", "rad": "15 deg", "m**3/s": "20 L/min", "K": "5 K"}
+    customary = {
+        "m": "19 mm",
+        "rad/s": "3000 rpm",
+        "rad": "15 deg",
+        "m**3/s": "20 L/min",
+        "m**2/s": "21 mm**2/s",
+        "K": "5 K",
+        "N": "1750 N",
+        "W": "155 W",
+        "Pa": "206 GPa",
+        "1/Pa": "1.8e-8 1/Pa",
+        "kg/m**3": "7850 kg/m**3",
+        "W/m/K": "45 W/m/K",
+        "J/kg/K": "470 J/kg/K",
+        "W/m**2/K": "10 W/m**2/K",
+    }
     return f'"{customary.get(unit, "1 " + unit)}"' if unit else "1.0"
 
 

@@ -38,6 +38,7 @@ class Ports(SpecModel):
     """Radial drillings from the channel to the outside."""
 
     diameter: PositiveLength
+    """At most width - 2 mm fits the channel."""
     wetted: Flag = True
     """Whether the oil exchanges heat with the walls of the drillings."""
 
@@ -56,8 +57,11 @@ class Channel(SpecModel):
     pitch: PositiveLength
     """Advance in one turn of one start."""
     turns: PositiveNumber
+    """Of each start; need not be whole."""
     starts: Annotated[int, Field(ge=1, le=4, strict=True)] = 1
+    """Channels side by side, evenly around the axis."""
     hand: Literal["right", "left"] = "right"
+    """Right-handed advances to the rear as the angle grows."""
     z_start: Length
     """Centre line of the section at angle 0, where the oil enters."""
     ports: Ports | None = None
@@ -86,7 +90,9 @@ class Coolant(SpecModel):
     """Oil in the channel."""
 
     fluid: Literal["iso_vg_32", "water"] = "iso_vg_32"
+    """Whose properties are taken."""
     inlet_temperature: Temperature
+    """Mixed, where the oil enters."""
     flow: VolumeFlow
     """Of all starts together."""
     film_model: Literal["paper", "sieder_tate", "helical"] = "helical"
@@ -109,9 +115,11 @@ class JointGroup(SpecModel):
     """
 
     name: Name
+    """Shared factors and overrides use it."""
     conductance: FilmOrPerfect
     """Heat-transfer coefficient of the joint, or ``"perfect"``."""
     contacts: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Names, with `*` for any text."""
 
 
 class FaceSelector(SpecModel):
@@ -121,6 +129,7 @@ class FaceSelector(SpecModel):
     """
 
     facing: Literal["outward", "inward", "front", "rear"]
+    """Where the normal points."""
     z: Place | None = None
     """A place or from and to; everywhere when left out."""
     r: Place | None = None
@@ -133,16 +142,20 @@ class Surface(SpecModel):
     name: Name
     """By convention ``part.surface``."""
     part: Name
+    """A part or a ring."""
     where: Annotated[tuple[FaceSelector, ...], Field(min_length=1)]
+    """The union of these faces."""
 
 
 class ConstantFilm(SpecModel):
     """Fixed heat-transfer coefficient."""
 
     kind: Literal["constant"]
+    """Tells the films apart."""
     surface: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of surfaces; each surface takes one film or gap."""
     coefficient: UncertainFilm
+    """Convection and radiation together."""
     temperature: AmbientOrTemperature = "ambient"
     """Of the surroundings."""
     name: Name | None = None
@@ -153,13 +166,17 @@ class NaturalFilm(SpecModel):
     """Natural convection and radiation by the surface temperature."""
 
     kind: Literal["natural_convection_radiation"]
+    """Tells the films apart."""
     surface: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of surfaces; each surface takes one film or gap."""
     characteristic_length: PositiveLength
     """Diameter of the cylinder or height of the plate."""
     orientation: Literal["horizontal_cylinder", "vertical_plate"] = "horizontal_cylinder"
+    """Which correlation of natural convection."""
     emissivity: Fraction = 0.9
+    """Of the surface, in large grey surroundings."""
     factor: UncertainNumber = Uncertain(1.0)
+    """On the coefficient."""
     temperature: AmbientOrTemperature = "ambient"
     """Of the surroundings."""
     name: Name | None = None
@@ -170,6 +187,7 @@ class RotatingFilm(SpecModel):
     """Film of a rotating surface in air (Becker), with a floor at rest."""
 
     kind: Literal["rotating"]
+    """Tells the films apart."""
     surface: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of surfaces; each surface takes one film or gap."""
     diameter: PositiveLength
@@ -177,6 +195,7 @@ class RotatingFilm(SpecModel):
     minimum: FilmCoefficient
     """Floor, the coefficient at rest."""
     factor: UncertainNumber = Uncertain(1.0)
+    """On the coefficient."""
     temperature: AmbientOrTemperature = "ambient"
     """Of the surroundings."""
     name: Name | None = None
@@ -194,17 +213,23 @@ class Gap(SpecModel):
     """
 
     name: Name
+    """Shared factors and overrides use it."""
     rotating: Name
     """Name of the rotating surface."""
     standing: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of the standing surfaces that face it."""
     kind: Literal["power_law", "becker_kaye"] = "power_law"
+    """How the coefficient follows from the speed."""
     at_rest: FilmCoefficient | None = None
     """With ``kind = "power_law"`` only."""
     rise: FilmCoefficient = 0.0
+    """Added at the reference speed."""
     reference_speed: ReferenceSpeed = 314.159265359
+    """3000 rpm where none is given."""
     exponent: PositiveNumber = 0.75
+    """Of the relative speed."""
     factor: UncertainNumber = Uncertain(1.0)
+    """On the coefficient."""
 
     @model_validator(mode="after")
     def _check(self) -> Gap:

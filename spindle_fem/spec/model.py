@@ -70,9 +70,11 @@ class Operation(SpecModel):
     """Steady operating point."""
 
     speed: RotationalSpeed
+    """Of the shaft."""
     thrust: Force
     """External axial force on the shaft, positive towards the rear."""
     ambient_temperature: Temperature
+    """Of the air around the machine."""
 
 
 class HeatTable(SpecModel):
@@ -85,6 +87,7 @@ class HeatTable(SpecModel):
     thrust_coefficient: dict[str, Number] = Field(default_factory=dict)
     """c of the factor 1 + c (thrust/reference_thrust - 1), by bearing; 0 where none is given."""
     reference_thrust: PositiveForce = 1750.0
+    """Thrust at which the table holds."""
 
     @model_validator(mode="after")
     def _check(self) -> HeatTable:
@@ -118,8 +121,11 @@ class Heat(SpecModel):
     """
 
     model: Literal["table", "palmgren", "skf", "paper", "full"]
+    """`table`, an empirical friction model (palmgren, skf) or an analytical one (paper, full)."""
     ball_share: Fraction = 0.5
+    """Share of the heat that enters the balls."""
     inner_share: UncertainShare = Uncertain(0.5)
+    """Share of the rest that enters the inner ring."""
     palmgren_f0: PositiveNumber = 2.0
     """Palmgren's lubrication factor: about 2 for grease, up to 4 with a fresh fill."""
     skf_mu_ehl: PositiveNumber = 0.04
@@ -127,6 +133,7 @@ class Heat(SpecModel):
     thermal_preload: Flag = False
     """Whether ring, ball, shaft and housing expansion changes the preload and with it the heat."""
     table: HeatTable | None = None
+    """Needed with `model = "table"`."""
 
     @model_validator(mode="after")
     def _check(self) -> Heat:
@@ -143,20 +150,26 @@ class SharedFactor(SpecModel):
     """
 
     name: Name
+    """The parameter is called by it."""
     sigma_rel: SigmaRel
     """1 sigma of its logarithm."""
     applies_to: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Coefficients that it multiplies."""
 
 
 class Probe(SpecModel):
     """A temperature reading: a point on a part, or the mixed coolant outlet."""
 
     name: Name
+    """Results and recordings use it."""
     kind: Literal["point", "coolant_outlet"] = "point"
+    """What it reads."""
     part: Name | None = None
     """A part, or a ring such as ``F1.outer_ring``; for a point only, like r, z and angle."""
     r: Radius | None = None
+    """Radius of the point."""
     z: Length | None = None
+    """Place of the point along the axis."""
     angle: Angle = 0.0
     """Around the axis; 0 is up."""
 
@@ -182,6 +195,7 @@ class MeshSettings(SpecModel):
     """How the machine is meshed and interpolated."""
 
     preset: Literal["coarse", "normal", "fine"] = "normal"
+    """Fineness."""
     order: Literal[1, 2] = 2
     """Of the temperature's polynomials."""
     size_factor: SizeFactor = 1.0
@@ -198,8 +212,11 @@ class MachineSpec(SpecModel):
     schema_: Annotated[str, Field(alias="schema")]
     """The version of this format."""
     name: Name
+    """Short name of the machine."""
     title: str = ""
+    """One line for reports."""
     description: str = ""
+    """Longer text for reports."""
     initial: Literal["ambient", "first_reading"] = "ambient"
     """Temperatures at the start of a simulation."""
     remaining_surfaces: Literal["adiabatic", "error"] = "error"
@@ -207,10 +224,15 @@ class MachineSpec(SpecModel):
     heat_capacity_factor: UncertainNumber = Uncertain(1.0)
     """Factor on every heat capacity."""
     operation: Operation
+    """Operating point."""
     materials: dict[str, Material]
+    """Solids by name."""
     part: Annotated[tuple[Part, ...], Field(min_length=1)]
+    """Solids of revolution."""
     bearing_types: dict[str, BearingType] = Field(default_factory=dict)
+    """Catalogue data by name."""
     bearing_set: tuple[BearingSet, ...] = ()
+    """Bearings in their sets."""
     grease: Grease | None = None
     """Needed unless ``heat.model = "table"``."""
     channel: Channel | None = None
@@ -218,13 +240,21 @@ class MachineSpec(SpecModel):
     coolant: Coolant | None = None
     """Goes with ``[channel]``."""
     heat: Heat
+    """Friction heat."""
     joint: tuple[JointGroup, ...] = ()
+    """Conductances of contacts."""
     surface: tuple[Surface, ...] = ()
+    """Names for exposed faces."""
     film: tuple[Film, ...] = ()
+    """Heat exchange with the surroundings."""
     gap: tuple[Gap, ...] = ()
+    """Heat exchange across air gaps."""
     factor: tuple[SharedFactor, ...] = ()
+    """Uncertain factors that several coefficients share."""
     probe: tuple[Probe, ...] = ()
+    """Where temperatures are read."""
     mesh: MeshSettings = MeshSettings()
+    """Fineness of the mesh."""
     effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Effects of the catalogue that are switched on, by id, with their parameters."""
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from spindle_fem.spec.fields import QuantityRule, RangeRule
+from spindle_fem.spec.fields import Name, QuantityRule, RangeRule
 from spindle_fem.units import quantity_example
 
 
@@ -90,7 +90,7 @@ def value_text(annotation: Any) -> str:
             for name in ("ge", "le")
         )
         return "a whole number" + (f" from {least} to {most}" if None not in (least, most) else "")
-    return "a text"
+    return "a name" if get_args(Name)[1] in metadata else "a text"
 
 
 def quantity_rule(annotation: Any) -> QuantityRule | None:

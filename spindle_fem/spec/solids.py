@@ -44,8 +44,11 @@ class Material(SpecModel):
     """Isotropic solid with constant properties."""
 
     thermal_conductivity: Conductivity
+    """Constant over temperature."""
     density: Density
+    """Constant over temperature."""
     specific_heat_capacity: SpecificHeat
+    """Constant over temperature."""
 
     @property
     def volumetric_heat_capacity(self) -> float:
@@ -57,10 +60,13 @@ class AnnulusSegment(SpecModel):
     """A ring of rectangular meridian section."""
 
     name: Name
+    """Unique within its part."""
     z: Range
     """From and to along the axis; z = 0 is the spindle nose."""
     inner_diameter: Radius
+    """0 for a solid shaft."""
     outer_diameter: PositiveLength
+    """Larger than the inner one."""
 
     @model_validator(mode="after")
     def _check(self) -> AnnulusSegment:
@@ -82,26 +88,32 @@ class Part(SpecModel):
     """One solid of revolution: its segments are fused."""
 
     name: Name
+    """Joints, surfaces and probes use it."""
     material: Name
     """A key of ``[materials]``."""
     rotating: Flag = False
+    """Whether it turns with the shaft."""
     segment: Annotated[tuple[AnnulusSegment, ...], Field(min_length=1)]
+    """Rings that are fused to the solid; they share faces or overlap."""
 
 
 class BearingType(SpecModel):
     """Catalogue dimensions of an angular-contact ball bearing."""
 
     bore_diameter: PositiveLength
+    """Of the inner ring."""
     outer_diameter: PositiveLength
+    """Of the outer ring."""
     width: PositiveLength
+    """Of both rings."""
     inner_ring_outer_diameter: PositiveLength
     """Cylinder that stands for the inner ring's outside, where its heat enters."""
     outer_ring_inner_diameter: PositiveLength
     """Cylinder that stands for the outer ring's inside, where its heat enters."""
-    inner_raceway_diameter: PositiveLength | None = None
-    outer_raceway_diameter: PositiveLength | None = None
     ball_diameter: PositiveLength
+    """Between the groove bottoms."""
     ball_count: Annotated[int, Field(ge=3, le=200, strict=True)]
+    """In one row."""
     pitch_diameter: PositiveLength | None = None
     """The middle of bore and outside where none is given."""
     contact_angle: Angle
@@ -109,14 +121,21 @@ class BearingType(SpecModel):
     groove_curvature_inner: GrooveCurvature
     """Groove radius over ball diameter."""
     groove_curvature_outer: GrooveCurvature
+    """Groove radius over ball diameter."""
     basic_static_load: PositiveForce | None = None
+    """C0 of the catalogue, for the empirical friction models."""
     ring_material: Name
+    """A key of `[materials]`."""
     ball_material: Name
+    """A key of `[materials]`."""
     young_modulus: Pressure = 206.0e9
+    """Of rings and balls."""
     poisson_ratio: PoissonRatio = 0.3
+    """Of rings and balls."""
     roughness_raceway: PositiveLength = 0.05e-6
     """Root mean square (Rq)."""
     roughness_ball: PositiveLength = 0.01e-6
+    """Root mean square (Rq)."""
 
     @model_validator(mode="after")
     def _check(self) -> BearingType:
@@ -186,6 +205,7 @@ class SetBearing(SpecModel):
     """One bearing of a set."""
 
     name: Name
+    """Its rings are the parts `NAME.inner_ring` and `NAME.outer_ring`."""
     z: Range
     """From and to of its rings; as long as the type is wide."""
     takes_thrust: Literal["towards_rear", "towards_nose"]
@@ -200,6 +220,7 @@ class BallRow(SpecModel):
     """
 
     kind: Literal["contact", "constant"] = "contact"
+    """How the conductances between balls and raceways come about."""
     conductance: UncertainConductance | None = None
     """Balls of one bearing to each raceway, with ``kind = "constant"`` only."""
     capacity: HeatCapacity | None = None
@@ -226,6 +247,7 @@ class BearingSet(SpecModel):
     """Bearings mounted and preloaded against one another."""
 
     name: Name
+    """Shared factors and overrides use it."""
     bearing_type: Name
     """A key of ``[bearing_types]``."""
     preload: Preload
@@ -237,7 +259,9 @@ class BearingSet(SpecModel):
     heat_factor: UncertainNumber = Uncertain(1.0)
     """Factor on the friction heat of every bearing of the set."""
     ball_row: BallRow = BallRow()
+    """Heat paths through the balls."""
     bearing: Annotated[tuple[SetBearing, ...], Field(min_length=1)]
+    """From the nose to the rear."""
 
     @model_validator(mode="after")
     def _check(self) -> BearingSet:
@@ -260,18 +284,23 @@ class Grease(SpecModel):
     """Lubricating grease by its base oil."""
 
     name: str
+    """For reports."""
     kinematic_viscosity_40: KinematicViscosity
     """Base oil at 40 °C."""
     kinematic_viscosity_100: KinematicViscosity
     """Base oil at 100 °C."""
     base_oil_density: Density = 890.0
+    """Of the oil, lighter than the grease."""
     pressure_viscosity: PressureViscosity = 1.8e-8
+    """Coefficient at ambient pressure."""
     path_fill: PathFill = 0.01
     """Share of the balls' path that grease fills once channelled; it drags on the balls."""
     free_volume_fill: Fraction = 0.3
     """Share of the bearing's free volume that grease fills; it wets the balls."""
     thermal_conductivity: Conductivity = 0.14
+    """Of the base oil."""
     temperature_limit: Temperature = 393.15
+    """The grease is checked against it."""
     film_starvation: FilmStarvation = 1.0
     """Film over the fully flooded one; 0.5 to 0.7 in aged grease."""
 

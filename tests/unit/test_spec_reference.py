@@ -1,0 +1,55 @@
+"""The reference page of machine definitions is complete and up to date."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import spindle_fem
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.spec.reference import reference_page
+from spindle_fem.spec.schema import annotation_of, fields_of, shape_of
+
+PAGE = Path(spindle_fem.__file__).parents[1] / "docs" / "machine_definition.md"
+
+
+def models_below(model):
+    yield model
+    for field in fields_of((model,)).values():
+        shape = shape_of(annotation_of(field))
+        while shape.kind in ("list", "mapping"):
+            shape = shape_of(shape.inner)
+        for inner in shape.models:
+            yield from models_below(inner)
+
+
+MODELS = list(dict.fromkeys(models_below(MachineSpec)))
+
+
+@pytest.mark.skipif(not PAGE.parent.is_dir(), reason="the page lies in the source tree, not in the wheel")
+def test_the_page_is_up_to_date():
+    assert PAGE.read_text(encoding="utf-8") == reference_page(), (
+        "run: python -m spindle_fem.spec.reference > docs/machine_definition.md"
+    )
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
+def test_every_key_is_explained_and_listed(model):
+    page = reference_page()
+    for key, field in fields_of((model,)).items():
+        assert field.description, f"{model.__name__}.{key} has no docstring under it"
+        assert key == "marks" or f"| `{key}` |" in page
+
+
+def test_limits_units_and_defaults_stand_in_the_page():
+    page = reference_page()
+    for line in (
+        '| `depth` | Radial height of the section. | a quantity such as "19 mm", above 0 m | **required** |',
+        "| `hand` | Right-handed advances to the rear as the angle grows. | right, left | `right` |",
+        "| `starts` | Channels side by side, evenly around the axis. | a whole number from 1 to 4 | `1` |",
+        "### `[[bearing_set.bearing]]`",
+        "### `[[film]]` with kind rotating",
+        "### `[materials.NAME]`",
+    ):
+        assert line in page
