@@ -29,6 +29,7 @@ SPIKE_PASSES = 4
 SPIKE_SIGMAS = 6.0
 SPIKE_FLOOR = 0.5
 SPIKE_STANDS_OUT = 3.0
+SPIKE_ROUGHNESS_SIGMAS = 4.0
 SPIKE_EDGE_FACTOR = 4.0
 DROPOUT_SIGMAS = 12.0
 DROPOUT_FLOOR = 3.0
@@ -193,10 +194,11 @@ def temperature_flags(
         return flags
     values = kelvin[rows]
     # a step wider than a degree is a jump of the reading, no resolution
-    noise = max(white_noise(values), min(grid, 1.0), 0.0 if sigma is None else sigma)
+    white = white_noise(values)
+    noise = max(white, min(grid, 1.0), 0.0 if sigma is None else sigma)
     kept = rows
     for _ in range(SPIKE_PASSES):  # a spike beside another shows once the first is out
-        spikes = _spikes(kelvin[kept], noise)
+        spikes = _spikes(kelvin[kept], noise, white)
         flags[kept[spikes]] |= np.uint8(Flag.SPIKE)
         if not spikes.any():
             break
@@ -208,7 +210,7 @@ def temperature_flags(
     return flags
 
 
-def _spikes(values: Array, noise: float) -> NDArray[np.bool_]:
+def _spikes(values: Array, noise: float, white: float) -> NDArray[np.bool_]:
     """Readings that leave their neighbours, while those agree with each other.
 
     A true peak has steep flanks: the departure must stand out from the
@@ -218,6 +220,7 @@ def _spikes(values: Array, noise: float) -> NDArray[np.bool_]:
     padded = np.pad(values, 2, mode="reflect")
     flanks = np.maximum(np.abs(padded[1:-3] - padded[:-4]), np.abs(padded[4:] - padded[3:-1]))
     roughness = np.maximum(flanks, np.abs(padded[3:-1] - padded[1:-3]))
+    roughness = np.maximum(0.0, roughness - SPIKE_ROUGHNESS_SIGMAS * white)
     least = np.full(values.size, max(SPIKE_SIGMAS * noise, SPIKE_FLOOR))
     # the first and the last reading have neighbours on one side only: they may be the start of a change
     least[[0, -1]] *= SPIKE_EDGE_FACTOR

@@ -1,0 +1,153 @@
+"""What holds for every conducting network: superposition, maximum principle, balance, reciprocity, decay."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from spindle_fem.network.history import InputHistory
+from spindle_fem.network.model import ThermalNetwork
+from spindle_fem.network.steady import solve_steady
+from spindle_fem.network.transient import simulate_transient
+
+ROOM, BATH = 293.15, 303.15
+several = settings(max_examples=40, deadline=None)
+
+
+@st.composite
+def networks(draw):
+    """A random tree of nodes with extra links, tied to two boundaries."""
+    number = draw(st.integers(2, 8))
+    conductance = st.floats(0.05, 50.0)
+    first, second, values = [], [], []
+    for node in range(1, number):
+        first.append(node)
+        second.append(draw(st.integers(0, node - 1)))
+        values.append(draw(conductance))
+    for _ in range(draw(st.integers(0, 4))):
+        a, b = draw(st.lists(st.integers(0, number - 1), min_size=2, max_size=2, unique=True))
+        first.append(a)
+        second.append(b)
+        values.append(draw(conductance))
+    for boundary in (number, number + 1):
+        first.append(draw(st.integers(0, number - 1)))
+        second.append(boundary)
+        values.append(draw(conductance))
+    capacity = draw(st.lists(st.floats(1.0, 5000.0), min_size=number, max_size=number))
+    heat = draw(st.lists(st.floats(0.0, 200.0), min_size=number, max_size=number))
+    return ThermalNetwork(
+        tuple(f"n{k}" for k in range(number)),
+        capacity,
+        first,
+        second,
+        values,
+        ("room", "bath"),
+        [ROOM, BATH],
+        source_node=np.arange(number),
+        source_input=("power",) * number,
+        source_gain=heat,
+        source_exponent=np.ones(number),
+    )
+
+
+@several
+@given(networks())
+def test_double_heat_is_double_rise(network):
+    cold, once, twice = (solve_steady(network, {"power": p}).temperature for p in (0.0, 1.0, 2.0))
+    assert_allclose(twice - cold, 2.0 * (once - cold), rtol=1e-9, atol=1e-9)
+
+
+@several
+@given(networks())
+def test_maximum_principle(network):
+    cold = solve_steady(network, {"power": 0.0}).temperature
+    assert np.all(cold >= ROOM - 1e-9)
+    assert np.all(cold <= BATH + 1e-9)
+    assert np.all(solve_steady(network, {"power": 1.0}).temperature >= cold - 1e-9)
+
+
+@several
+@given(networks())
+def test_heat_in_is_heat_out(network):
+    state = solve_steady(network, {"power": 1.0})
+    assert state.imbalance_relative < 1e-10
+    assert_allclose(
+        sum(state.boundary_heat.values()), network.source_gain.sum(), atol=1e-8 * (1 + state.heat_in)
+    )
+
+
+@several
+@given(networks(), st.data())
+def test_reciprocity(network, data):
+    """A watt at node a warms node b as a watt at b warms a."""
+    number = network.n_nodes
+    a, b = data.draw(st.integers(0, number - 1)), data.draw(st.integers(0, number - 1))
+    inverse = np.linalg.inv(network.conductance_matrix()[:, :number])
+    assert_allclose(inverse[a, b], inverse[b, a], rtol=1e-9)
+
+
+@several
+@given(networks(), st.floats(0.1, 1000.0))
+def test_transient_stays_between_its_start_and_its_surroundings(network, step):
+    start = np.linspace(285.0, 310.0, network.n_nodes)
+    history = InputHistory.constant(step * np.arange(20.0), {"power": 0.0})
+    run = simulate_transient(network, history, start)
+    assert np.all(run.temperature >= 285.0 - 1e-8)
+    assert np.all(run.temperature <= 310.0 + 1e-8)
+
+
+@several
+@given(networks(), st.floats(0.1, 1000.0))
+def test_transient_ends_in_the_steady_state(network, power):
+    history = InputHistory.constant(np.array([0.0, 1.0, 1.0e9]), {"power": power / 100.0})
+    run = simulate_transient(network, history, np.full(network.n_nodes, 300.0))
+    assert_allclose(
+        run.temperature[-1], solve_steady(network, {"power": power / 100.0}).temperature, rtol=1e-8
+    )
+
+
+@several
+@given(networks(), st.integers(2, 12))
+def test_exact_steps_do_not_depend_on_how_time_is_cut(network, parts):
+    start = np.full(network.n_nodes, 300.0)
+    whole = simulate_transient(network, InputHistory.constant(np.array([0.0, 60.0]), {"power": 1.0}), start)
+    cut = simulate_transient(
+        network, InputHistory.constant(np.linspace(0.0, 60.0, parts + 1), {"power": 1.0}), start
+    )
+    assert_allclose(cut.final, whole.final, rtol=1e-10)
+
+
+@settings(max_examples=10, deadline=None)
+@given(networks())
+def test_implicit_balance_and_agreement(network):
+    history = InputHistory(
+        np.linspace(0.0, 200.0, 6), ("power",), [[0.0], [2.0], [1.0], [0.0], [3.0], [0.0]], [False]
+    )
+    start = np.full(network.n_nodes, 300.0)
+    exact = simulate_transient(network, history, start)
+    implicit = simulate_transient(network, history, start, method="implicit", step_error=1e-3)
+    assert implicit.counts.imbalance_relative < 1e-9
+    assert_allclose(implicit.temperature, exact.temperature, atol=0.1)
+
+
+@several
+@given(networks(), st.floats(0.2, 5.0))
+def test_scaling_time_and_capacity_together_changes_nothing(network, factor):
+    """Capacity and time enter only as their ratio."""
+    slower = ThermalNetwork(
+        network.node_names,
+        network.capacity * factor,
+        network.link_first,
+        network.link_second,
+        network.link_conductance,
+        network.boundary_names,
+        network.boundary_temperature,
+        source_node=network.source_node,
+        source_input=network.source_input,
+        source_gain=network.source_gain,
+        source_exponent=network.source_exponent,
+    )
+    times, start = np.linspace(0.0, 500.0, 8), np.full(network.n_nodes, 310.0)
+    one = simulate_transient(network, InputHistory.constant(times, {"power": 1.0}), start)
+    two = simulate_transient(slower, InputHistory.constant(times * factor, {"power": 1.0}), start)
+    assert_allclose(one.temperature, two.temperature, rtol=1e-9)
