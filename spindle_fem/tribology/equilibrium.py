@@ -29,6 +29,8 @@ from spindle_fem.tribology.traction import LubricantState, TractionOptions, ball
 
 FloatArray = NDArray[np.float64]
 RacewayControl = Literal["outer", "inner", "equilibrium"]
+# N; residuals of a bearing without load are compared with it
+_SMALLEST_FORCE = 1e-6
 _SMALLEST_SPEED_STEP = 1.0 / 256.0
 # Widths (m) of softened contact, and softened traction, on the way to a solution
 _SMOOTHINGS = (2e-6, 3e-7, 5e-8, 1e-8, 0.0)
@@ -259,6 +261,7 @@ class _Solver:
         lever = np.maximum(np.abs(system.axial_map).max(axis=0), np.abs(system.radial_map).max(axis=0))
         balls = float(system.weight.sum())
         stretch = float(np.min(system.rest_length))
+        size = max(size, _SMALLEST_FORCE)
         return solve_bordered(
             system, evaluate, unknowns, displacement, self.load,
             row_scale=rows, load_scale=np.maximum(size * balls * lever / 10.0, np.abs(self.load)),
