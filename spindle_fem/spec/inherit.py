@@ -328,6 +328,7 @@ def _reach(content: Any, key_path: str) -> int:
 
 def relabelled(fault: SpindleFemError, layers: Iterable[Layer]) -> SpindleFemError:
     """The same fault with the file or override in front of its key path."""
+    layers = tuple(layers)
     source = source_of(fault.where, layers)
     where = source if source == f"--set {fault.where}" else f"{source}: {fault.where}"
     return type(fault)(where, fault.what, fault.how_to_fix)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import tomli_w
 from pydantic import TypeAdapter, ValidationError
 
-from spindle_fem.errors import FaultsError, SpecError, SpindleFemError, did_you_mean
+from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError, did_you_mean
 from spindle_fem.spec.consistency import Declared, find_faults
 from spindle_fem.spec.faults import validation_faults
 from spindle_fem.spec.inherit import Layer, apply_overrides, merge, relabelled, split_override, without_none
@@ -146,11 +146,14 @@ class Examination:
         In file order; empty for a valid machine.
     unsound : frozenset of str
         Top-level keys with a fault inside, whose entries ``spec`` may lack.
+    can_be_built : bool
+        Whether all that the geometry needs is sound, whatever else is not.
     """
 
     spec: MachineSpec | None
     faults: tuple[SpindleFemError, ...]
     unsound: frozenset[str] = frozenset()
+    can_be_built: bool = False
 
 
 def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine") -> Examination:
@@ -173,9 +176,27 @@ def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine
     except ValidationError as error:
         faults = validation_faults(error, "", MachineSpec, content)
         spec = _sound_tables(content, error)
-    unsound = frozenset(key for key in content if any(_is_inside(fault.where, key) for fault in faults))
-    faults += find_faults(spec, Declared.of(content, unsound))
-    return Examination(spec, tuple(relabelled(fault, layers) for fault in faults), unsound)
+    keys = [field.alias or name for name, field in MachineSpec.model_fields.items()]
+    unsound = frozenset(key for key in keys if any(_is_inside(fault.where, key) for fault in faults))
+    between = find_faults(spec, Declared.of(content, unsound))
+    can_be_built = not unsound & _GEOMETRY_KEYS and not any(
+        _concerns_geometry(fault.where) for fault in between
+    )
+    located = tuple(relabelled(fault, layers) for fault in (*faults, *between))
+    return Examination(spec, located, unsound, can_be_built)
+
+
+_GEOMETRY_KEYS = frozenset(
+    {"part", "bearing_types", "bearing_set", "channel", "surface", "remaining_surfaces", "mesh"}
+)
+
+
+def _concerns_geometry(where: str) -> bool:
+    """Whether a fault between tables keeps the geometry from being built."""
+    if where in ("part", "surface", "bearing_set.bearing", "channel.part") or where.endswith(".bearing_type"):
+        return True
+    named_part = where.startswith("part.") and not where.endswith(".material")
+    return named_part or (where.startswith("surface.") and where.endswith(".part"))
 
 
 def _is_inside(where: str, key: str) -> bool:
@@ -244,10 +265,7 @@ def validate(content: Mapping[str, Any], source: str | Iterable[Layer] = "machin
     """
     layers = (Layer(source, {}),) if isinstance(source, str) else tuple(source)
     result = examine(content, layers)
-    if result.faults or result.spec is None:
-        files = [layer.source for layer in layers if not layer.override]
-        raise FaultsError(files[-1] if files else "machine", result.faults)
-    return result.spec
+    return _sound_machine(result.spec, result.faults, layers)
 
 
 def _layers_and_content(machine: str | Path, overrides: Iterable[str]) -> tuple[list[Layer], dict[str, Any]]:
@@ -279,7 +297,9 @@ def examine_machine(machine: str | Path, overrides: Iterable[str] = ()) -> Exami
     return examine(content, layers)
 
 
-def load_machine(machine: str | Path, overrides: Iterable[str] = ()) -> MachineSpec:
+def load_machine(
+    machine: str | Path, overrides: Iterable[str] = (), checks: Iterable[Callable[[MachineSpec], object]] = ()
+) -> MachineSpec:
     """Read a definition file, or one that ships by its name.
 
     Parameters
@@ -287,6 +307,10 @@ def load_machine(machine: str | Path, overrides: Iterable[str] = ()) -> MachineS
     machine : str or Path
     overrides : iterable of str
         ``path=value`` texts applied before validation.
+    checks : iterable of callable
+        Further checks, such as building the geometry: each is called with the
+        machine where its geometric tables are sound, and the bad input that it
+        raises is reported together with the faults of the definition.
 
     Raises
     ------
@@ -297,7 +321,26 @@ def load_machine(machine: str | Path, overrides: Iterable[str] = ()) -> MachineS
     0.019
     """
     layers, content = _layers_and_content(machine, overrides)
-    return validate(content, layers)
+    result = examine(content, layers)
+    faults = list(result.faults)
+    if result.spec is not None and result.can_be_built:
+        for check in checks:
+            try:
+                check(result.spec)
+            except FaultsError as error:
+                faults += [relabelled(fault, layers) for fault in error.faults]
+            except BadInputError as error:
+                faults.append(relabelled(error, layers))
+    return _sound_machine(result.spec, faults, layers)
+
+
+def _sound_machine(
+    spec: MachineSpec | None, faults: Sequence[SpindleFemError], layers: Iterable[Layer]
+) -> MachineSpec:
+    if faults or spec is None:
+        files = [layer.source for layer in layers if not layer.override]
+        raise FaultsError(files[-1] if files else "machine", faults)
+    return spec
 
 
 def write_machine(spec: MachineSpec) -> str:

@@ -522,13 +522,80 @@ def test_a_machine_that_cannot_be_built_is_refused(tmp_path, case):
     old, new, *parts = GEOMETRY[case]
     path = tmp_path / "broken.toml"
     path.write_text(replaced(old, new))
-    spec = load_machine(path)
+    load_machine(path)
     with pytest.raises(FaultsError) as caught:
-        build_assembly(spec, where="broken.toml")
+        load_machine(path, checks=(build_assembly,))
     assert caught.value.exit_status == 2
     messages = [str(fault) for fault in caught.value.faults]
-    assert any(all(part in message for part in parts) for message in messages), "\n".join(messages)
+    assert any(all(part in message for part in ("broken.toml: ", *parts)) for message in messages), messages
     assert all(isinstance(fault, GeometryError) for fault in caught.value.faults)
+
+
+def test_faults_of_the_geometry_come_together_with_those_of_other_tables(tmp_path):
+    text = replaced('depth = "6 mm"', 'depth = "30 mm"').replace('flow = "6 L/min"', "flow = 6")
+    text = text.replace(', outer_diameter = "80 mm"}]', ', outer_diameter = "84 mm"}]')
+    text = text.replace(
+        'material = "steel"\nrotating = true\nsegment = [{',
+        'material = "stel"\nrotating = true\nsegment = [{',
+    )
+    path = tmp_path / "broken.toml"
+    path.write_text(text)
+    with pytest.raises(FaultsError) as caught:
+        load_machine(path, ["film.rear.coefficient=10"], checks=(build_assembly,))
+    listing = "\n".join(str(fault) for fault in caught.value.faults)
+    for parts in (
+        ("broken.toml: coolant.flow", "bare number 6"),
+        ("--set film.rear.coefficient", "bare number 10"),
+        ("broken.toml: part.inner_spacer.material", '"stel"'),
+        ("broken.toml: ", "overlaps", "outer_spacer"),
+        ("broken.toml: channel.", "2 mm"),
+    ):
+        assert any(all(part in line for part in parts) for line in listing.splitlines()), (
+            f"{parts} not in\n{listing}"
+        )
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('bearing_type = "7010_C"', 'bearing_type = "7011_C"'),
+        ('part = "shaft"\nwhere', 'part = "shft"\nwhere'),
+        ('[channel]\npart = "housing"', '[channel]\npart = "hosing"'),
+        ('z = ["76 mm", "92 mm"], takes', 'z = ["76 mm", 92], takes'),
+    ],
+)
+def test_the_geometry_is_not_built_of_faulty_tables(tmp_path, old, new):
+    path = tmp_path / "broken.toml"
+    path.write_text(replaced(old, new))
+    with pytest.raises(FaultsError) as caught:
+        load_machine(path, checks=(build_assembly,))
+    assert len(caught.value.faults) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "parts"),
+    [
+        ('depth = "6 mm"', "depth = 6", ("1 fault", "broken.toml: channel.depth: bare number 6")),
+        ('hand = "left"', 'hand = 1\nhnad = "left"', ("2 faults", "channel.hand", "channel.hnad")),
+        ("[mesh]", "[mesh", ("is not valid TOML",)),
+        (*GEOMETRY["floating part"][:2], ("outer_spacer", "touches no other part")),
+        (*GEOMETRY["face claimed twice"][:2], ("housing.rear", "housing.outside")),
+    ],
+)
+def test_the_check_command_prints_every_fault_and_exits_with_two(
+    tmp_path, monkeypatch, capsys, old, new, parts
+):
+    from spindle_fem.cli import main
+
+    path = tmp_path / "broken.toml"
+    path.write_text(replaced(old, new))
+    monkeypatch.setattr("sys.argv", ["spindle-fem", "check", str(path)])
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert caught.value.code == 2
+    printed = capsys.readouterr().err
+    assert all(part in printed for part in parts), printed
+    assert "Traceback" not in printed
 
 
 def test_there_are_at_least_sixty_broken_definitions():
