@@ -1,0 +1,1 @@
+"""Pictures, tables and self-contained HTML reports of results."""

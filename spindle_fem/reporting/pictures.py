@@ -1,0 +1,268 @@
+"""The three-dimensional pictures of a run: cut machine, channel, bearings, mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from spindle_fem.reporting.figures import (
+    FILM_MAP,
+    TEMPERATURE_LABEL,
+    TEMPERATURE_MAP,
+    ColourBar,
+    Label,
+    grouped,
+    picture_figure,
+    pictures_side_by_side,
+    scale_of,
+)
+from spindle_fem.reporting.machine_drawing import part_colours
+from spindle_fem.reporting.profiles import MeridianSection
+from spindle_fem.reporting.scenes import SceneRenderer, View, ball_triangles, crop
+from spindle_fem.reporting.sections import (
+    SegmentSet,
+    TriangleSet,
+    clip_segments,
+    clip_triangles,
+    element_faces,
+    exposed_triangles,
+    facet_edges,
+    facet_triangles,
+    select_triangles,
+    sharp_edges,
+)
+from spindle_fem.results.thermal_result import ThermalResult
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.units import ZERO_CELSIUS_K
+
+TOWARDS_HALF = (-1.0, 0.28, -0.45)
+UP = (0.0, 1.0, 0.0)
+
+
+def temperature_scale(result: ThermalResult) -> ColourBar:
+    """The one temperature scale of all pictures of a run, in °C, balls included."""
+    values = [result.temperature.min(), result.temperature.max()]
+    values += [bearing.temperature_ball for bearing in result.bearings.values()]
+    return scale_of(np.array(values) - ZERO_CELSIUS_K, TEMPERATURE_MAP, TEMPERATURE_LABEL)
+
+
+def _box(points: NDArray[np.float64]) -> tuple[tuple[float, float], ...]:
+    return tuple(
+        (float(low), float(high)) for low, high in zip(points.min(axis=0), points.max(axis=0), strict=True)
+    )
+
+
+def _half_of_balls(result: ThermalResult) -> TriangleSet:
+    spec = result.spec
+    balls = ball_triangles(
+        spec, {name: item.temperature_ball - ZERO_CELSIUS_K for name, item in result.bearings.items()}
+    )
+    # Whole balls: those with their centre on the kept side, and the ones that the cut goes through.
+    triangles_a_ball = len(balls.triangles) // max(
+        1, sum(spec.bearing_types[group.bearing_type].ball_count for group, _ in spec.bearings)
+    )
+    centres = balls.points[balls.triangles].mean(axis=1).reshape(-1, max(triangles_a_ball, 1), 3).mean(axis=1)
+    return select_triangles(balls, np.repeat(centres[:, 0] > -1.0e-6, triangles_a_ball))
+
+
+def _celsius(shape: TriangleSet) -> TriangleSet:
+    return TriangleSet(
+        shape.points, shape.triangles, shape.values - ZERO_CELSIUS_K, shape.label, shape.normals
+    )
+
+
+def add_half_machine(
+    renderer: SceneRenderer,
+    result: ThermalResult,
+    section: MeridianSection,
+    edges: SegmentSet,
+    bar: ColourBar,
+) -> None:
+    """Layers of the machine with its near half removed, coloured by temperature."""
+    outside = exposed_triangles(result.mesh, result.temperature - ZERO_CELSIUS_K)
+    renderer.add_coloured(clip_triangles(outside, outside.points[:, 0]), bar)
+    renderer.add_coloured(_celsius(section.faces), bar, lit=False)
+    if result.bearings:
+        renderer.add_coloured(_half_of_balls(result), bar)
+    renderer.add_lines(section.outlines)
+    renderer.add_lines(clip_segments(edges, edges.points[..., 0]), width=1.0)
+
+
+def probe_labels(spec: MachineSpec, probes: dict[str, float]) -> list[Label]:
+    """Name and reading of every probe that sits at a point."""
+    return [
+        Label(
+            f"{probe.name}\n{probes[probe.name] - ZERO_CELSIUS_K:.1f} °C",
+            np.array([-probe.r * np.sin(probe.angle), probe.r * np.cos(probe.angle), probe.z]),
+        )
+        for probe in spec.probe
+        if probe.kind == "point" and probe.name in probes
+    ]
+
+
+def ball_labels(result: ThermalResult) -> list[Label]:
+    """Name and ball temperature of every bearing, at its lowest ball."""
+    return [
+        Label(
+            f"{bearing.name} balls\n{result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K:.1f} °C",
+            np.array([0.0, -0.5 * result.spec.bearing_types[group.bearing_type].pitch, 0.5 * sum(bearing.z)]),
+        )
+        for group, bearing in result.spec.bearings
+    ]
+
+
+def temperature_cut(renderer: SceneRenderer, result: ThermalResult, bar: ColourBar) -> Figure:
+    """Whole machine cut open; expects the layers of :func:`add_half_machine`."""
+    view = View(TOWARDS_HALF, UP, _box(result.mesh.points[result.mesh.points[:, 0] >= 0.0]))
+    hottest = result.temperature_maximum - ZERO_CELSIUS_K
+    place = result.temperature_maximum_at * 1.0e3
+    notes = (
+        f"Near half removed. Warmest place of the solid {hottest:.1f} °C "
+        f"at r = {np.hypot(*place[:2]):.0f} mm, z = {place[2]:.0f} mm; balls at their own temperature."
+    )
+    return picture_figure(
+        crop(renderer.render(view)),
+        "Temperature of the machine, cut open",
+        bars=[bar],
+        above=probe_labels(result.spec, dict(result.probes)),
+        below=ball_labels(result),
+        notes=notes,
+    )
+
+
+def bearing_close_ups(renderer: SceneRenderer, result: ThermalResult, bar: ColourBar) -> dict[str, Figure]:
+    """A picture of each bearing set, upper half; expects the layers of :func:`add_half_machine`."""
+    figures = {}
+    for group in result.spec.bearing_set:
+        kind = result.spec.bearing_types[group.bearing_type]
+        z_low = min(bearing.z[0] for bearing in group.bearing)
+        z_high = max(bearing.z[1] for bearing in group.bearing)
+        margin = 0.14 * (z_high - z_low)
+        section = 0.5 * (kind.outer_diameter - kind.bore_diameter)
+        radii = (0.5 * kind.bore_diameter - 0.55 * section, 0.5 * kind.outer_diameter + 0.65 * section)
+        view = View((-1.0, 0.0, 0.0), UP, ((0.0, 0.0), radii, (z_low - margin, z_high + margin)))
+        picture = renderer.render(view, margin=0.0)
+        labels = []
+        below = []
+        for bearing in group.bearing:
+            state = result.bearings[bearing.name]
+            middle = 0.5 * sum(bearing.z)
+            parts = "\n".join(f"{value:.0f} W to {name}" for name, value in state.heat_to.items())
+            labels.append(
+                Label(
+                    f"{bearing.name}: {state.heat:.0f} W\n{parts}",
+                    np.array([0.0, 0.5 * kind.pitch, middle]),
+                )
+            )
+            below.append(
+                Label(
+                    f"inner race {state.temperature_inner - ZERO_CELSIUS_K:.1f} °C\n"
+                    f"balls {state.temperature_ball - ZERO_CELSIUS_K:.1f} °C\n"
+                    f"outer race {state.temperature_outer - ZERO_CELSIUS_K:.1f} °C\n"
+                    f"inner − outer {state.ring_difference:.1f} K",
+                    np.array([0.0, 0.25 * (kind.bore_diameter + kind.inner_ring_outer_diameter), middle]),
+                )
+            )
+        figures[group.name] = picture_figure(
+            picture,
+            f"Bearing set {group.name}: heat and temperatures",
+            bars=[bar],
+            above=labels,
+            below=below,
+            notes="Section at the top (θ = 0). Friction heat above, temperatures below; same colour scale as the machine.",
+        )
+    return figures
+
+
+def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | None:
+    """Channel walls with film coefficient and oil temperature side by side; None without a channel."""
+    spec, mesh = result.spec, result.mesh
+    if result.coolant is None or spec.channel is None:
+        return None
+    names = [
+        name
+        for name in (f"{spec.channel.part}.channel_wall", f"{spec.channel.part}.channel_ports")
+        if name in mesh.surfaces and name in result.film_coefficient
+    ]
+    facets = np.concatenate([mesh.surfaces[name] for name in names])
+    film = np.concatenate([result.film_coefficient[name] for name in names])
+    oil = np.concatenate([result.fluid_temperature[name] for name in names]) - ZERO_CELSIUS_K
+    values = np.repeat(np.column_stack([film, oil])[:, None, :], 6, axis=1)
+    shape = facet_triangles(mesh.points, facets, values, np.zeros(len(facets), dtype=np.int32))
+    bars = (
+        scale_of(film, FILM_MAP, "film coefficient / W/(m²·K)"),
+        scale_of(oil, TEMPERATURE_MAP, "oil temperature / °C"),
+    )
+    view = View((-1.0, 0.55, -0.75), UP, _box(shape.points))
+    lines = sharp_edges_of_facets(mesh.points, facets)
+    pictures = []
+    for column, bar in enumerate(bars):
+        renderer.clear()
+        renderer.add_coloured(shape, bar, column=column)
+        renderer.add_lines(lines, width=0.8)
+        pictures.append(crop(renderer.render(view, 900)))
+    coolant = result.coolant
+    inlet, outlet = _channel_ends(spec)
+    labels = (
+        [Label(f"in {coolant.inlet_temperature - ZERO_CELSIUS_K:.1f} °C", inlet)],
+        [Label(f"out {coolant.outlet_temperature - ZERO_CELSIUS_K:.2f} °C", outlet)],
+    )
+    return pictures_side_by_side(
+        pictures,
+        "Walls of the oil channel",
+        bars,
+        [labels[0] + labels[1]] * 2,
+        notes=f"{coolant.flow * 6.0e4:.3g} L/min, Re = {coolant.reynolds:.0f}, {coolant.regime}; "
+        f"mean film {coolant.mean_film_coefficient:.0f} W/(m²·K), {coolant.heat:.0f} W to the oil.",
+    )
+
+
+def _channel_ends(spec: MachineSpec) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    channel = spec.channel
+    sign = 1.0 if channel.hand == "right" else -1.0
+    radius = channel.inner_radius + channel.depth
+    outer = max(
+        segment.outer_diameter for part in spec.part if part.name == channel.part for segment in part.segment
+    )
+    places = []
+    for turns in (0.0, channel.turns):
+        theta = sign * 2.0 * np.pi * turns
+        z = channel.z_start + channel.pitch * turns
+        reach = radius
+        if channel.ports is not None:
+            reach = max(
+                (
+                    0.5 * segment.outer_diameter
+                    for part in spec.part
+                    if part.name == channel.part
+                    for segment in part.segment
+                    if segment.z[0] <= z <= segment.z[1]
+                ),
+                default=0.5 * outer,
+            )
+        places.append(np.array([-reach * np.sin(theta), reach * np.cos(theta), z]))
+    return places[0], places[1]
+
+
+def sharp_edges_of_facets(points: NDArray[np.float64], facets: NDArray[np.int64]) -> SegmentSet:
+    """Sharp edges of one surface alone."""
+    return sharp_edges(points, facets, np.zeros(len(facets), dtype=np.int32))
+
+
+def mesh_picture(renderer: SceneRenderer, result: ThermalResult) -> Figure:
+    """Whole elements behind the vertical plane, coloured by part."""
+    mesh = result.mesh
+    centre = mesh.points[mesh.tetrahedra[:, :4], 0].mean(axis=1)
+    facets, part = element_faces(mesh, centre > 0.0)
+    shape = facet_triangles(mesh.points, facets, np.zeros((len(facets), 6, 0)), part)
+    renderer.clear()
+    renderer.add_parts(shape, part_colours(mesh.part_names))
+    renderer.add_lines(facet_edges(mesh.points, facets), width=0.7, opacity=0.75)
+    view = View(TOWARDS_HALF, UP, _box(mesh.points[mesh.points[:, 0] >= 0.0]))
+    return picture_figure(
+        crop(renderer.render(view)),
+        "Mesh: whole elements behind the vertical plane, coloured by part",
+        notes=f"{grouped(mesh.n_elements)} quadratic tetrahedra, {grouped(result.n_unknowns)} temperature unknowns, "
+        f"worst element quality (minSICN) {mesh.min_quality:.2f}.",
+    )

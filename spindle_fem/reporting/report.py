@@ -1,0 +1,345 @@
+"""Files of a finished run, and its self-contained report."""
+
+from __future__ import annotations
+
+import base64
+import json
+import resource
+import sys
+import time
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spindle_fem import __version__
+from spindle_fem.errors import BadInputError
+from spindle_fem.reporting import tables
+from spindle_fem.reporting.inputs import input_groups
+from spindle_fem.reporting.output import replace_text, require_complete
+from spindle_fem.results.summary import SUMMARY_SCHEMA, build_summary
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from spindle_fem.results.thermal_result import ThermalResult
+
+FIGURE_FOLDER = "figures"
+
+CAPTIONS = {
+    "machine_definition": (
+        "The machine as defined: parts by colour, contact lines of the bearings in red, oil in yellow, surfaces with "
+        "a film as thick lines, probes as dots."
+    ),
+    "temperature_cut": "The machine cut open along the vertical plane through its axis.",
+    "meridian_temperature": "Temperature in the vertical plane through the axis, dimensions in mm.",
+    "axial_profiles": "Temperature along the machine on its main surfaces.",
+    "radial_profiles": "Temperature from the bore to the outside through each bearing; steps are joints.",
+    "heat_by_bearing": "Friction heat of each bearing by its terms, and the bodies that it enters.",
+    "coolant": "Oil along the channel: temperatures, and the film coefficient between its low and high value.",
+    "channel_walls": "Walls of the channel, seen without the housing.",
+    "heat_balance": "Where the heat comes from and where it goes.",
+    "mesh": "The mesh, opened along the vertical plane; colours are parts.",
+}
+
+_LIMITS = (
+    "Steady state of one operating point; loads, speed and surroundings constant.",
+    "Turning parts have the same temperature all round in the time mean; standing parts are three-dimensional.",
+    "Joints have the constant conductance of the definition, which is the least certain input of such a model; "
+    "seats that close or open with temperature are not followed unless the definition says so.",
+    "Balls are one body a bearing with one temperature; races and balls meet through the contact resistances of "
+    "the definition.",
+    "The film coefficient of the channel is a correlation for a developed cross-section; its low and high value "
+    "show what the sources leave open. Ports, pipes and pump are not part of the pressure drop.",
+    "Heat of seals, drive, churning in the housing and cutting is included only where the definition names it.",
+)
+
+
+def write_outputs(
+    result: ThermalResult,
+    folder: str | Path,
+    *,
+    started: float | None = None,
+    notify: Callable[[str], None] | None = None,
+) -> dict[str, float]:
+    """Write every file of a run: fields, data, pictures, machine, summary, report.
+
+    Call it inside :func:`spindle_fem.reporting.output.output_folder`, which
+    marks the folder until all of it is there.
+
+    Parameters
+    ----------
+    result : ThermalResult
+    folder : str or Path
+        An existing folder.
+    started : float, optional
+        ``time.perf_counter()`` when the run began, for ``wall_time_s``.
+    notify : callable, optional
+        Told the name of each step as it begins.
+
+    Returns
+    -------
+    dict of str to float, [s]
+        Time of each step, also in ``summary.json``.
+    """
+    from spindle_fem.reporting.interactive import SURFACE_GROUP, display_surface
+    from spindle_fem.results.dataset import build_dataset, write_dataset
+    from spindle_fem.results.fields import write_fields
+    from spindle_fem.spec.load import write_machine
+
+    folder = Path(folder)
+    clock = _Clock(notify)
+    with clock.step("fields"):
+        write_fields(result, folder / "fields.vtu")
+    with clock.step("data"):
+        dataset = build_dataset(result)
+        surface = display_surface(result)
+        write_dataset(dataset, folder / "result.nc")
+        write_dataset(surface, folder / "result.nc", group=SURFACE_GROUP)
+        replace_text(folder / "machine.toml", write_machine(result.spec))
+    _write_figures(result, folder / FIGURE_FOLDER, clock)
+    with clock.step("report"):
+        wall_time = time.perf_counter() - started if started is not None else sum(clock.times.values())
+        summary = build_summary(result, wall_time, peak_memory_MB())
+        summary["timings_s"] = {**summary["timings_s"], **clock.times}
+        replace_text(
+            folder / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        )
+        replace_text(
+            folder / "report.html", render_run_report(summary, dataset, surface, folder / FIGURE_FOLDER)
+        )
+    return clock.times
+
+
+def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | None]]:
+    """Charts of a run by file name, drawn when called (the 3-D pictures are in ``pictures``)."""
+    from spindle_fem.reporting import charts
+    from spindle_fem.reporting.machine_drawing import machine_drawing
+    from spindle_fem.reporting.pictures import temperature_scale
+    from spindle_fem.reporting.profiles import meridian_section
+
+    section = meridian_section(result.mesh, result.temperature)
+    bar = temperature_scale(result)
+    return {
+        "machine_definition": lambda: machine_drawing(result.spec),
+        "meridian_temperature": lambda: charts.meridian_temperature(result, section, bar),
+        "radial_profiles": lambda: charts.radial_profiles(result, section),
+        "axial_profiles": lambda: charts.axial_profiles(result, section),
+        "heat_balance": lambda: charts.heat_balance(result.energy),
+        "heat_by_bearing": lambda: charts.heat_by_bearing(result),
+        "coolant": lambda: None if result.coolant is None else charts.coolant_along_channel(result.coolant),
+    }
+
+
+def _write_figures(result: ThermalResult, folder: Path, clock: _Clock) -> None:
+    from spindle_fem.reporting import pictures
+    from spindle_fem.reporting.figures import save_png
+    from spindle_fem.reporting.profiles import meridian_section
+    from spindle_fem.reporting.scenes import SceneRenderer
+    from spindle_fem.reporting.sections import part_edges
+
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.png"):
+        old.unlink()
+    with clock.step("charts"):
+        for name, draw in draw_figures(result).items():
+            figure = draw()
+            if figure is not None:
+                save_png(figure, folder / f"{name}.png", colours=0 if name == "meridian_temperature" else 256)
+    with clock.step("pictures"), SceneRenderer() as renderer:
+        bar = pictures.temperature_scale(result)
+        section = meridian_section(result.mesh, result.temperature)
+        pictures.add_half_machine(renderer, result, section, part_edges(result.mesh), bar)
+        save_png(pictures.temperature_cut(renderer, result, bar), folder / "temperature_cut.png", colours=0)
+        for name, figure in pictures.bearing_close_ups(renderer, result, bar).items():
+            save_png(figure, folder / f"bearings_{name}.png", colours=0)
+        channel = pictures.channel_walls(renderer, result)
+        if channel is not None:
+            save_png(channel, folder / "channel_walls.png", colours=256)
+        save_png(pictures.mesh_picture(renderer, result), folder / "mesh.png", colours=128)
+
+
+def rebuild_report(folder: str | Path) -> Path:
+    """Write ``report.html`` of a finished run again, from its other files.
+
+    Parameters
+    ----------
+    folder : str or Path
+        With ``summary.json``, ``result.nc`` and ``figures``.
+
+    Returns
+    -------
+    Path
+        Of the report.
+
+    Raises
+    ------
+    BadInputError
+        The folder is missing or incomplete, or a file is missing or unknown.
+    """
+    from spindle_fem.reporting.interactive import SURFACE_GROUP
+    from spindle_fem.results.dataset import read_dataset
+
+    folder = require_complete(folder)
+    summary = read_summary(folder / "summary.json")
+    dataset = read_dataset(folder / "result.nc")
+    surface = read_dataset(folder / "result.nc", group=SURFACE_GROUP)
+    html = render_run_report(summary, dataset, surface, folder / FIGURE_FOLDER)
+    return replace_text(folder / "report.html", html)
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """Content of ``summary.json``.
+
+    Raises
+    ------
+    BadInputError
+        No such file, no JSON, or another schema.
+    """
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInputError(
+            str(path), f"cannot be read ({error.strerror}).", "Give the folder of a run."
+        ) from error
+    except json.JSONDecodeError as error:
+        raise BadInputError(
+            str(path), f"is not valid JSON: {error}.", "Run again to write it anew."
+        ) from error
+    schema = summary.get("schema") if isinstance(summary, dict) else None
+    if schema != SUMMARY_SCHEMA:
+        raise BadInputError(str(path), f"schema is {schema!r}.", f'Known: "{SUMMARY_SCHEMA}".')
+    return summary
+
+
+def render_run_report(
+    summary: Mapping[str, Any], dataset: xr.Dataset, surface: xr.Dataset | None, figures: Path
+) -> str:
+    """HTML of a run; everything it needs is inside."""
+    from spindle_fem.reporting.interactive import viewer_payload
+
+    definition = tomllib.loads(dataset.attrs["machine_definition_toml"])
+    view = None if surface is None else json.dumps(viewer_payload(surface)).replace("</", "<\\/")
+    failed = [item["name"] for item in summary.get("checks", ()) if not item["passed"]]
+    has_bearings, coolant = bool(summary["bearings"]), tables.coolant_table(summary)
+    sections = [
+        ("headline", "Headline numbers", True),
+        ("answers", "What this answers", True),
+        ("temperature", "Temperature field", True),
+        ("bearings", "Bearings", has_bearings),
+        ("coolant", "Coolant", coolant is not None),
+        ("balance", "Energy balance", True),
+        ("probes", "Probes, joints and surfaces", True),
+        ("checks", "Checks", True),
+        ("inputs", "Inputs", True),
+        ("limits", "Limits of validity", True),
+        ("versions", "Versions", True),
+    ]
+    return render_report(
+        "run.html.j2",
+        kind="Thermal run",
+        title=dataset.attrs["title"],
+        subtitle=_subtitle(definition),
+        sections=[{"id": key, "title": title} for key, title, shown in sections if shown],
+        headline=tables.headline(summary),
+        warnings=summary["warnings"],
+        failed_checks=failed,
+        imbalance=tables.significant(abs(summary["energy"]["imbalance_relative"]), 2),
+        figures=embed_figures(figures, CAPTIONS),
+        view3d=view,
+        bearings=tables.bearing_table(summary),
+        terms=tables.term_table(summary),
+        coolant=coolant,
+        balance=tables.balance_table(summary),
+        probes=tables.probe_table(summary),
+        joints=tables.joint_table(summary),
+        surfaces=tables.surface_table(dataset),
+        checks=tables.check_table(summary),
+        mesh=tables.mesh_table(summary),
+        inputs=input_groups(definition),
+        limits=_LIMITS,
+        versions=tables.version_table(summary, dataset.attrs),
+        sources=[line for line in str(dataset.attrs.get("sources", "")).split("\n") if line],
+    )
+
+
+def render_report(template: str, **context: Any) -> str:
+    """Render one of the templates; every report uses ``base.html.j2`` and its macros."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("spindle_fem.reporting", "templates"),
+        autoescape=jinja2.select_autoescape(["html", "j2"]),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.globals["program_version"] = __version__
+    return environment.get_template(template).render(**context)
+
+
+def embed_figures(folder: Path, captions: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """Figures of a folder as WebP inside the page, by name; absent ones are simply not there.
+
+    WebP at this quality is a fifth of the PNG; the PNG files beside the report
+    are the originals.
+    """
+    import io
+
+    from PIL import Image
+
+    embedded = dict.fromkeys(captions)
+    for path in sorted(folder.glob("*.png")):
+        buffer = io.BytesIO()
+        with Image.open(path) as image:
+            width, height = image.size
+            image.convert("RGB").save(buffer, "WEBP", quality=86, method=2)
+        caption = captions.get(path.stem) or path.stem.replace("_", " ").capitalize() + "."
+        embedded[path.stem] = {
+            "source": "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode(),
+            "alt": caption,
+            "caption": caption,
+            "width": width,
+            "height": height,
+        }
+    return embedded
+
+
+def peak_memory_MB() -> float:  # noqa: N802 - the unit belongs to the name
+    """Largest resident memory of this process so far."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1024.0**2 if sys.platform == "darwin" else 1024.0)
+
+
+def _subtitle(definition: Mapping[str, Any]) -> str:
+    from spindle_fem.reporting.inputs import customary
+
+    operation = definition["operation"]
+    parts = [customary(operation["speed"]), f"thrust {customary(operation['thrust'])}"]
+    parts.append(f"ambient {customary(operation['ambient_temperature'])}")
+    coolant = definition.get("coolant")
+    if coolant:
+        parts.append(f"coolant {customary(coolant['flow'])} at {customary(coolant['inlet_temperature'])}")
+    parts.append(f"heat model “{definition['heat']['model']}”")
+    return ", ".join(parts) + "."
+
+
+class _Clock:
+    def __init__(self, notify: Callable[[str], None] | None) -> None:
+        self.times: dict[str, float] = {}
+        self._notify = notify
+        self._name = ""
+        self._start = 0.0
+
+    def step(self, name: str) -> _Clock:
+        self._name = name
+        return self
+
+    def __enter__(self) -> None:
+        if self._notify is not None:
+            self._notify(self._name)
+        self._start = time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        self.times[self._name] = time.perf_counter() - self._start
