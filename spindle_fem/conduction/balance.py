@@ -14,6 +14,7 @@ from spindle_fem.errors import EnergyBalanceError
 
 BALANCE_TOLERANCE = 1e-8
 LINEAR_BALANCE_TOLERANCE = 1e-10
+NEGLIGIBLE_DIFFERENCE_K = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class HeatBalance:
     imbalance_relative : float, [-]
         Relative to the turnover.
     turnover : float, [W]
-        Half the sum of absolute flows across the boundary.
+        See :class:`BoundaryFlows`.
     """
 
     heat_in: Mapping[str, float]
@@ -66,10 +67,15 @@ class BoundaryFlows:
         Heat put into each surface, part and lumped node.
     films : mapping of str to float
         Heat that leaves through each film and each link to surroundings.
+    turnover : float
+        Half the sum of absolute flows, facet by facet; at least what a
+        millikelvin of difference would drive, so that a machine without heat
+        balances too.
     """
 
     sources: Mapping[str, float]
     films: Mapping[str, float]
+    turnover: float
 
     @property
     def heat_in(self) -> float:
@@ -103,16 +109,24 @@ def boundary_flows(
         if node.heat:
             sources[node.name] = float(node.heat)
     films = {}
+    gross = sum(map(abs, sources.values()))
+    conductance = 0.0
     for film in problem.films:
         rows = operators.surface_rows[film.surface]
         ambient = np.asarray(film.ambient_temperature) - reference
         excess = operators.facet_integral(rise, rows) - ambient * operators.facet_area[rows]
-        films[film.label] = float(np.sum(np.asarray(film.coefficient) * excess))
+        heat = np.asarray(film.coefficient) * excess
+        films[film.label] = float(np.sum(heat))
+        gross += float(np.sum(np.abs(heat)))
+        conductance += float(np.sum(np.asarray(film.coefficient) * operators.facet_area[rows]))
     for link in problem.lumped_links:
         if link.other is None:
             excess = lumped_rise[problem.lumped_names.index(link.node)] - (link.temperature - reference)
-            films[link.label] = films.get(link.label, 0.0) + float(link.conductance * excess)
-    return BoundaryFlows(sources, films)
+            heat = float(link.conductance * excess)
+            films[link.label] = films.get(link.label, 0.0) + heat
+            gross += abs(heat)
+            conductance += link.conductance
+    return BoundaryFlows(sources, films, 0.5 * max(gross, NEGLIGIBLE_DIFFERENCE_K * conductance))
 
 
 def compute_balance(
@@ -147,7 +161,7 @@ def compute_balance(
         here, there = (lumped_rise[problem.lumped_names.index(name)] for name in (link.node, link.other))
         links[link.label] = links.get(link.label, 0.0) + float(link.conductance * (here - there))
     imbalance = flows.heat_in - sum(flows.films.values())
-    turnover = 0.5 * sum(map(abs, (*flows.sources.values(), *flows.films.values())))
+    turnover = flows.turnover
     return HeatBalance(
         flows.sources,
         flows.films,

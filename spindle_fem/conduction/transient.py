@@ -115,7 +115,8 @@ class EnergyAccount:
     stored : float
         Change of the heat content.
     imbalance_relative : float, [-]
-        ``in − out − stored`` relative to half the sum of the absolute amounts.
+        ``in − out − stored`` relative to the turnover: half the
+        absolute flows across the boundary, or the stored heat when larger.
     """
 
     heat_in: float
@@ -218,6 +219,7 @@ class _Ledger:
     """Running sums while stepping."""
 
     heat_in: float = 0.0
+    turnover: float = 0.0
     films: dict[str, float] = field(default_factory=dict)
     errors: list[float] = field(default_factory=list)
     ends: list[float] = field(default_factory=list)
@@ -229,6 +231,7 @@ class _Ledger:
         for weight, stage in zip(weights, stages, strict=True):
             flows = solver.flows(stage)
             self.heat_in += step * weight * flows.heat_in
+            self.turnover += step * weight * flows.turnover
             for label, heat in flows.films.items():
                 self.films[label] = self.films.get(label, 0.0) + step * weight * heat
 
@@ -364,7 +367,7 @@ def _interpolate(
 
 def _close_account(ledger: _Ledger, stored: float) -> EnergyAccount:
     imbalance = ledger.heat_in - sum(ledger.films.values()) - stored
-    turnover = 0.5 * (abs(ledger.heat_in) + sum(map(abs, ledger.films.values())) + abs(stored))
+    turnover = max(ledger.turnover, abs(stored))
     relative = abs(imbalance) / turnover if turnover else 0.0
     if relative > BALANCE_TOLERANCE:
         raise EnergyBalanceError(
