@@ -104,6 +104,10 @@ def heat(
     speed: Annotated[
         list[str] | None, typer.Option("--speed", help='Speeds, repeatable: "3000 rpm"; default 500 to 4500 rpm.')
     ] = None,
+    temperature: Annotated[str, typer.Option(help="Of rings, balls and grease.")] = "40 degC",
+    coupled: Annotated[
+        bool, typer.Option("--coupled", help="Solve the machine at every speed and take its temperatures.")
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for tables and pictures.")
     ] = None,
@@ -114,7 +118,14 @@ def heat(
     from spindle_fem.commands import heat_table
     from spindle_fem.console import print_heat
 
-    content = heat_table(machine, speeds=speed or (), folder=output, overrides=set_ or ())
+    content = heat_table(
+        machine,
+        speeds=speed or (),
+        temperature=temperature,
+        coupled=coupled,
+        folder=output,
+        overrides=set_ or (),
+    )
     _print_json(content) if as_json else print_heat(content)
 
 

@@ -5,25 +5,32 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
 
+def _console() -> Console:
+    """The terminal's width, or a wide page where the output goes to a file or a pipe."""
+    console = Console()
+    return console if console.is_terminal else Console(width=120)
+
+
 def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold")
-    table.add_column(columns[0])
+    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column(columns[0], no_wrap=True)
     for column in columns[1:]:
         table.add_column(column, justify="right")
     return table
 
 
 def _number(value: Any, digits: int) -> str:
-    return "–" if value is None else f"{value:,.{digits}f}"
+    return "–" if value is None else f"{value:.{digits}f}"
 
 
 def print_run(summary: dict[str, Any], folder: Path) -> None:
     """Headline of a run: temperatures, bearings, balance, checks and warnings."""
-    console = Console()
+    console = _console()
     table = _table("Bearings", "", "heat W", "inner °C", "outer °C", "balls °C", "difference K", "preload N", "lambda")
     for name, bearing in summary["bearings"].items():
         table.add_row(
@@ -67,7 +74,7 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
 
 def print_check(content: dict[str, Any]) -> None:
     """What a valid machine is made of."""
-    console = Console()
+    console = _console()
     console.print(f"[bold]{content['machine']}[/] is valid.")
     for key in ("parts", "surfaces", "contacts", "probes"):
         table = _table(key, "name", "")
@@ -80,32 +87,39 @@ def print_check(content: dict[str, Any]) -> None:
 
 def print_pairs(title: str, content: dict[str, Any]) -> None:
     """A title and one line for each key."""
-    console = Console()
+    console = _console()
     console.print(title)
     for key, value in content.items():
         console.print(f"  {key}: {value}")
 
 
+_HEAT_ROWS = (
+    ("axial_load_N", "axial load N", 0),
+    ("preload_N", "preload N", 0),
+    ("contact_angle_inner_deg", "α inner °", 2),
+    ("contact_angle_outer_deg", "α outer °", 2),
+    ("film_um", "film µm", 3),
+    ("lambda", "lambda", 1),
+    ("orbital_speed_rad_s", "orbit rad/s", 1),
+    ("centrifugal_force_N", "centrifugal N", 1),
+)
+
+
 def print_heat(content: dict[str, Any]) -> None:
-    """Heat term by term, one table a bearing, one row a speed."""
-    console = Console()
+    """Heat term by term, one table a bearing, one column a speed."""
+    console = _console()
     for name, rows in content["bearings"].items():
-        terms = list(dict.fromkeys(term for row in rows for term in row["terms_W"]))
-        table = _table(
-            f"{name} ({content['model']})",
-            "rpm", "heat W", *(f"{term} W" for term in terms), "axial load N", "α inner °", "α outer °", "film µm", "lambda",
-        )
-        for row in rows:
-            table.add_row(
-                f"{row['speed_rpm']:.0f}",
-                _number(row["heat_W"], 1),
-                *(_number(row["terms_W"].get(term), 1) for term in terms),
-                _number(row["axial_load_N"], 0),
-                _number(row["contact_angle_inner_deg"], 2),
-                _number(row["contact_angle_outer_deg"], 2),
-                _number(row["film_um"], 3),
-                _number(row["lambda"], 1),
-            )
+        table = _table(f"{name}, model {content['model']}", "rpm", *(f"{row['speed_rpm']:.0f}" for row in rows))
+        table.add_row("heat W", *(_number(row["heat_W"], 1) for row in rows), style="bold")
+        for term in dict.fromkeys(term for row in rows for term in row["terms_W"]):
+            values = [row["terms_W"].get(term) for row in rows]
+            if any(values):
+                table.add_row(f"· {term.replace('_', ' ')}", *(_number(value, 1) for value in values))
+        for key, label, digits in _HEAT_ROWS:
+            table.add_row(label, *(_number(row[key], digits) for row in rows))
+        for level in content["models"][0]["heat_W"] if content["models"] else ():
+            values = [row["heat_W"][level][name] for row in content["models"]]
+            table.add_row(f"by {level} W", *(_number(value, 1) for value in values), style="dim")
         console.print(table)
     for warning in content["warnings"]:
         console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
@@ -113,7 +127,7 @@ def print_heat(content: dict[str, Any]) -> None:
 
 def print_bearing(content: dict[str, Any]) -> None:
     """Deflections and a table of balls for one bearing or each of a set."""
-    console = Console()
+    console = _console()
     for index, bearing in enumerate(content.get("bearings", [content])):
         scalars = {key: value for key, value in bearing.items() if not isinstance(value, (list, dict))}
         console.print(", ".join(f"{key} {value:.5g}" for key, value in scalars.items() if isinstance(value, float)))

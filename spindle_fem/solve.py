@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -235,3 +236,31 @@ def _probes(machine: PreparedMachine, coupled: CoupledState, coolant: CoolantRes
         probe.name: coolant.outlet_temperature if probe.kind == "coolant_outlet" else readings[probe.name]
         for probe in machine.spec.probe
     }
+
+
+def estimate_refinement(result: ThermalResult, spec: MachineSpec, coarsening: float = 1.5) -> ThermalResult:
+    """Add what the probes and the hottest point change by on a coarser mesh.
+
+    Parameters
+    ----------
+    coarsening : float
+        Factor on every element size of the second mesh.
+
+    Returns
+    -------
+    ThermalResult
+        With ``mesh_refinement`` in ``extra``: sizes, and the change of each
+        probe in K. A second-order field on this mesh errs by about
+        ``change / (coarsening³ − 1)``, which is given as ``estimate_K``.
+    """
+    coarse = solve_prepared(prepare_machine(spec, size_factor=spec.mesh.size_factor * coarsening))
+    change = {name: value - coarse.probes[name] for name, value in result.probes.items()}
+    change["hottest"] = result.temperature_maximum - coarse.temperature_maximum
+    gain = coarsening ** (spec.mesh.order + 1) - 1.0
+    refinement = {
+        "coarse_nodes": coarse.n_unknowns,
+        "fine_nodes": result.n_unknowns,
+        "change_K": change,
+        "estimate_K": {name: abs(value) / gain for name, value in change.items()},
+    }
+    return replace(result, extra={**result.extra, "mesh_refinement": refinement})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,3 +92,33 @@ def _range_text(lowest: float, highest: float) -> str:
     if lowest <= -POSITIVE[1]:
         return f"at most {highest:.6g}"
     return f"above 0, at most {highest:.6g}" if above_zero else f"{lowest:.6g} to {highest:.6g}"
+
+
+def fold_warnings(warnings: Iterable[CodedWarning], names: Collection[str]) -> tuple[CodedWarning, ...]:
+    """Each warning once; what several named things say alike is said by the first for all.
+
+    Parameters
+    ----------
+    warnings : iterable of CodedWarning
+    names : collection of str
+        A text that begins with one of them and a colon is about that thing.
+
+    >>> said = [CodedWarning("hot", "F1: 130 °C."), CodedWarning("hot", "F2: 128 °C.")]
+    >>> fold_warnings(said, ("F1", "F2"))[0].text
+    'F1: 130 °C. Likewise F2.'
+    """
+    first: dict[str, CodedWarning] = {}
+    likewise: dict[str, dict[str, None]] = {}
+    for warning in warnings:
+        name = warning.text.partition(": ")[0]
+        key = warning.code if name in names else warning.text
+        if key not in first:
+            first[key] = warning
+        elif name in names and not first[key].text.startswith(f"{name}: "):
+            likewise.setdefault(key, {})[name] = None
+    return tuple(
+        CodedWarning(warning.code, f"{warning.text} Likewise {', '.join(likewise[key])}.")
+        if key in likewise
+        else warning
+        for key, warning in first.items()
+    )

@@ -119,8 +119,6 @@ class BearingMechanics:
             temperature_limit=grease.temperature_limit,
         )
         level = spec.heat.model
-        # Only the paper's terms need friction to decide the ball's attitude.
-        self.control = "equilibrium" if level in ("paper", "full") else "outer"
         self.options = HeatOptions(
             level="palmgren" if level == "table" else level,
             palmgren_f0=spec.heat.palmgren_f0,
@@ -129,7 +127,12 @@ class BearingMechanics:
         self.sets = {group.name: _bearing_set(spec, group) for group in spec.bearing_set}
 
     def states(
-        self, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures], *, expand: bool
+        self,
+        point: OperatingPoint,
+        temperatures: Mapping[str, BearingTemperatures],
+        *,
+        expand: bool,
+        options: HeatOptions | None = None,
     ) -> dict[str, BearingState]:
         """Mechanical state of every bearing.
 
@@ -138,6 +141,8 @@ class BearingMechanics:
         expand : bool
             Whether the parts grow with their temperature, or keep the size they
             were assembled with; the film has its temperature either way.
+        options : HeatOptions, optional
+            Another heat model than the definition's.
 
         Raises
         ------
@@ -153,8 +158,8 @@ class BearingMechanics:
                 point.thrust if group.carries_thrust else 0.0,
                 set_temperatures,
                 lubricant=self.lubricant,
-                control=self.control,
-                heat=self.options,
+                control=_control(options or self.options),
+                heat=options or self.options,
             )
             found |= {state.name: state for state in states}
         return found
@@ -217,6 +222,11 @@ class BearingMechanics:
             )
             warnings += state.warnings
         return heat, tuple(warnings)
+
+
+def _control(options: HeatOptions) -> str:
+    """Only the paper's terms need friction to decide the attitude of the balls."""
+    return "equilibrium" if options.level in ("paper", "full") else "outer"
 
 
 def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:

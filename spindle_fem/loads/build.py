@@ -18,7 +18,7 @@ from spindle_fem.loads.model import BearingHeat, FilmLoad, Loads, LumpedLoad
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.spec.model import BearingSet, MachineSpec
-from spindle_fem.validity import CodedWarning
+from spindle_fem.validity import CodedWarning, fold_warnings
 
 GAP_BAND_WIDTH = 0.02
 SECTORS_WITHOUT_AVERAGING = 24
@@ -138,7 +138,7 @@ class LoadsBuilder:
             coolant = self.coolant_loop.at(point, self.wall_temperature(state))
             films |= self._channel_films(coolant)
             warnings += [*coolant.march.film.warnings, *coolant.pressure.warnings]
-        loads = Loads(surface_heat, films, tuple(lumped), heats, heat_to, tuple(_distinct(warnings, tuple(heats))))
+        loads = Loads(surface_heat, films, tuple(lumped), heats, heat_to, fold_warnings(warnings, tuple(heats)))
         return loads, coolant
 
     def _shares(self, total: float) -> dict[str, float]:
@@ -226,21 +226,3 @@ class LoadsBuilder:
             for surface, index in cells.facet_cell.items()
         }
 
-
-def _distinct(warnings: list[CodedWarning], bearings: tuple[str, ...]) -> list[CodedWarning]:
-    """Each warning once; what several bearings say alike is said by the first for all."""
-    first: dict[str, CodedWarning] = {}
-    likewise: dict[str, list[str]] = {}
-    for warning in warnings:
-        name = warning.text.partition(": ")[0]
-        key = warning.code if name in bearings else warning.text
-        if key not in first:
-            first[key] = warning
-        elif name in bearings:
-            likewise.setdefault(key, []).append(name)
-    return [
-        CodedWarning(warning.code, f"{warning.text} Likewise {', '.join(dict.fromkeys(likewise[key]))}.")
-        if key in likewise
-        else warning
-        for key, warning in first.items()
-    ]

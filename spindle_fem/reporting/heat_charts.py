@@ -45,8 +45,31 @@ def write_heat_charts(content: Mapping[str, Any], folder: Path) -> list[Path]:
 def _panels(number: int, height: float = 620.0) -> tuple[Figure, Sequence[Axes]]:
     figure = new_figure(height)
     axes = np.atleast_1d(figure.subplots(1, number))
-    figure.subplots_adjust(left=0.07, right=0.985, top=0.86, bottom=0.14, wspace=0.26)
+    figure.subplots_adjust(left=0.06, right=0.985, top=0.8, bottom=0.14, wspace=0.28)
     return figure, axes
+
+
+def _groups(content: Mapping[str, Any]) -> dict[str, Sequence[Mapping[str, Any]]]:
+    """Rows of each bearing; bearings that cannot be told apart in a chart share a line, "F1, F2"."""
+    groups: list[tuple[list[str], Sequence[Mapping[str, Any]]]] = []
+    for name, rows in content["bearings"].items():
+        for names, others in groups:
+            alike = [
+                np.isclose(row[key], other[key], rtol=2e-3)
+                for row, other in zip(rows, others, strict=True)
+                for key in ("heat_W", "axial_load_N", "orbital_speed_rad_s")
+            ]
+            if all(alike):
+                names.append(name)
+                break
+        else:
+            groups.append(([name], rows))
+    return {", ".join(names): rows for names, rows in groups}
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.055, 0.995), ncols=6, columnspacing=1.4)
 
 
 def _lines(
@@ -56,7 +79,7 @@ def _lines(
     style: str = "-",
     note: str = "",
 ) -> None:
-    for index, (name, rows) in enumerate(content["bearings"].items()):
+    for index, (name, rows) in enumerate(_groups(content).items()):
         speeds = [row["speed_rpm"] for row in rows]
         axes.plot(
             speeds,
@@ -88,7 +111,7 @@ def film_thickness(content: Mapping[str, Any]) -> Figure:
         )
         _lines(panel, content, lambda row, side=side: row["contacts"][side]["film_um"])
         _finish(panel, f"Central film, {side} raceway", "film thickness / µm")
-        panel.legend(ncols=2)
+    _legend(figure, axes[0])
     return figure
 
 
@@ -114,7 +137,7 @@ def loads_over_thrust(content: Mapping[str, Any]) -> Figure:
         strict=True,
     ):
         panel.set(title=title, xlabel="thrust / N", ylabel=label, ylim=(0.0, None))
-        panel.legend()
+    _legend(figure, axes[0])
     return figure
 
 
@@ -135,7 +158,7 @@ def contacts_over_speed(content: Mapping[str, Any]) -> Figure:
             )
         panel.set(title=title, xlabel=SPEED_LABEL, ylabel=label)
         panel.margins(y=0.25)
-    axes[0].legend(ncols=2, fontsize=7.5)
+    _legend(figure, axes[0])
     return figure
 
 
@@ -152,7 +175,7 @@ def ball_speeds(content: Mapping[str, Any]) -> Figure:
     ):
         _lines(panel, content, lambda row, key=key: row[key])
         _finish(panel, title, label)
-    axes[0].legend()
+    _legend(figure, axes[0])
     return figure
 
 
@@ -167,49 +190,50 @@ def film_ratio(content: Mapping[str, Any]) -> Figure:
             "full film from 3", (0.99, 3.0), xycoords=("axes fraction", "data"), ha="right", va="bottom"
         )
         _finish(panel, f"Film thickness ratio, {side} raceway", "Λ")
-        panel.legend()
+    _legend(figure, axes[0])
     return figure
+
+
+def _merged_terms(terms: Mapping[str, float]) -> dict[str, float]:
+    """Terms with those of both raceways added up."""
+    merged: dict[str, float] = {}
+    for key, value in terms.items():
+        name = key.removeprefix("inner_").removeprefix("outer_").replace("_", " ")
+        merged[name] = merged.get(name, 0.0) + value
+    return merged
 
 
 @styled
 def heat_terms(content: Mapping[str, Any]) -> Figure:
     """Friction heat of each bearing, stacked by term."""
-    names = list(content["bearings"])
-    figure, axes = _panels(len(names))
-    top = max(row["heat_W"] for rows in content["bearings"].values() for row in rows)
-    for panel, name in zip(axes, names, strict=True):
-        rows = content["bearings"][name]
+    groups = _groups(content)
+    figure, axes = _panels(len(groups))
+    terms = {name: [_merged_terms(row["terms_W"]) for row in rows] for name, rows in groups.items()}
+    keys = list(dict.fromkeys(key for rows in terms.values() for row in rows for key in row))
+    keys = [key for key in keys if any(row.get(key) for rows in terms.values() for row in rows)]
+    top = max(row["heat_W"] for rows in groups.values() for row in rows)
+    for panel, (name, rows) in zip(axes, groups.items(), strict=True):
         speeds = [row["speed_rpm"] for row in rows]
-        keys = list(dict.fromkeys(key for row in rows for key in row["terms_W"]))
-        shown = [key for key in keys if max(row["terms_W"].get(key, 0.0) for row in rows) > 0.005 * top]
-        rest = [sum(value for key, value in row["terms_W"].items() if key not in shown) for row in rows]
-        values = [[row["terms_W"].get(key, 0.0) for row in rows] for key in shown]
-        panel.stackplot(
-            speeds,
-            *values,
-            rest,
-            labels=[*(key.replace("_", " ") for key in shown), "all other terms"],
-            colors=CYCLE,
-        )
-        panel.set(title=name, xlabel=SPEED_LABEL, ylim=(0.0, 1.05 * top), xlim=(speeds[0], speeds[-1]))
-    axes[0].set_ylabel("friction heat / W")
-    axes[0].legend(loc="upper left", fontsize=7.5)
-    figure.suptitle(f"Friction heat by term, model {content['model']}", x=0.07, ha="left", fontweight="bold")
+        values = [[row.get(key, 0.0) for row in terms[name]] for key in keys]
+        panel.stackplot(speeds, *values, labels=keys, colors=CYCLE)
+        panel.set(title=name, xlabel=SPEED_LABEL, ylim=(0.0, 1.05 * top), xlim=(speeds[0], max(speeds[-1], speeds[0] + 1)))
+    axes[0].set_ylabel(f"friction heat, model {content['model']} / W")
+    _legend(figure, axes[0])
     return figure
 
 
 @styled
 def heat_models(content: Mapping[str, Any]) -> Figure:
     """The same bearings by every heat model: how far they are apart."""
-    names = list(content["bearings"])
-    figure, axes = _panels(len(names))
+    groups = _groups(content)
+    figure, axes = _panels(len(groups))
     speeds = [row["speed_rpm"] for row in content["models"]]
-    for panel, name in zip(axes, names, strict=True):
+    for panel, group in zip(axes, groups, strict=True):
+        name = group.partition(",")[0]
         for index, level in enumerate(content["models"][0]["heat_W"] if content["models"] else ()):
             heat = [row["heat_W"][level][name] for row in content["models"]]
-            panel.plot(speeds, heat, color=CYCLE[index], marker="o", markersize=3.0, label=level)
-        panel.set(title=name, xlabel=SPEED_LABEL, yscale="log")
+            panel.plot(speeds, heat, color=CYCLE[index], marker="o", markersize=3.0, label=f"model {level}")
+        panel.set(title=group, xlabel=SPEED_LABEL, yscale="log")
     axes[0].set_ylabel("friction heat / W")
-    axes[0].legend()
-    figure.suptitle("Friction heat by model", x=0.07, ha="left", fontweight="bold")
+    _legend(figure, axes[0])
     return figure
