@@ -118,9 +118,9 @@ def scale_of(values: ArrayLike, colour_map: Colormap, label: str) -> ColourBar:
 
 
 def grouped(number: int) -> str:
-    """Whole number with narrow spaces between thousands.
+    r"""Whole number with narrow spaces between thousands.
 
-    >>> grouped(1234567).replace("\\u202f", " ")
+    >>> grouped(1234567).replace("\u202f", " ")
     '1 234 567'
     """
     return f"{number:,}".replace(",", "\u202f")
@@ -225,13 +225,13 @@ def picture_figure(
     above: Sequence[Label] = (),
     below: Sequence[Label] = (),
     notes: str = "",
-    width_px: float = WIDTH_PX,
 ) -> Figure:
     """One picture with its title, labels on leaders above and below, and colour bars.
 
     Parameters
     ----------
     picture : Picture
+        Shown pixel by pixel; the figure is a little wider.
     title : str
     bars : sequence of ColourBar
         Drawn side by side under the picture.
@@ -241,38 +241,19 @@ def picture_figure(
     notes : str
         One line under the title.
     """
-    margin = 24.0
-    scale = (width_px - 2.0 * margin) / picture.width
-    rail = {rows: 34.0 + 27.0 * rows for rows in range(1, 6)}
-    lines_above = max((label.text.count("\n") + 1 for label in above), default=0)
-    lines_below = max((label.text.count("\n") + 1 for label in below), default=0)
-    head = 52.0 + (30.0 if notes else 0.0)
-    top = head + rail.get(lines_above, 8.0)
-    height = picture.height * scale
-    foot = rail.get(lines_below, 8.0) + (112.0 if bars else 8.0)
-    figure = new_figure(top + height + foot, width_px)
-    total = top + height + foot
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set(xlim=(0.0, width_px), ylim=(total, 0.0))
-    axes.axis("off")
-    axes.imshow(
-        picture.image,
-        extent=(margin, width_px - margin, top + height, top),
-        interpolation="antialiased",
-        aspect="auto",
-    )
-    axes.set(xlim=(0.0, width_px), ylim=(total, 0.0))
-    axes.text(margin, 34.0, title, fontsize=12.5, fontweight="bold", va="center")
-    if notes:
-        axes.text(margin, 66.0, notes, fontsize=9.0, color=MUTED, va="center")
-    offset = np.array([margin, top])
-    for labels, edge, sign in ((above, top - 12.0, -1.0), (below, top + height + 12.0, 1.0)):
-        _leaders(axes, picture, labels, offset, scale, edge, sign, (margin, width_px - margin))
+    width_px = picture.width + 2.0 * _MARGIN
+    top = _head(notes) + _rail(above)
+    foot = _rail(below) + (112.0 if bars else 8.0)
+    figure, axes = _canvas(top + picture.height + foot, width_px, title, notes)
+    _place(figure, picture, _MARGIN, top)
+    offset, ends = np.array([_MARGIN, top]), (_MARGIN, width_px - _MARGIN)
+    _leaders(axes, picture, above, offset, top - 12.0, -1.0, ends)
+    _leaders(axes, picture, below, offset, top + picture.height + 12.0, 1.0, ends)
     for number, bar in enumerate(bars):
-        share = (width_px - 2.0 * margin) / len(bars)
+        share = picture.width / len(bars)
         length = min(760.0, share - 60.0)
-        left = margin + share * (number + 0.5) - 0.5 * length
-        draw_colour_bar(pixel_axes(figure, left, total - 92.0, length, 20.0), bar)
+        left = _MARGIN + share * (number + 0.5) - 0.5 * length
+        draw_colour_bar(pixel_axes(figure, left, top + picture.height + foot - 92.0, length, 20.0), bar)
     return figure
 
 
@@ -284,35 +265,50 @@ def pictures_side_by_side(
     labels: Sequence[Sequence[Label]],
     *,
     notes: str = "",
-    width_px: float = WIDTH_PX,
 ) -> Figure:
-    """Pictures of one size in a row, each with its own colour bar and labels above it."""
-    margin, gap = 24.0, 40.0
-    column = (width_px - 2.0 * margin - gap * (len(pictures) - 1)) / len(pictures)
-    top = 52.0 + (30.0 if notes else 0.0) + (62.0 if any(labels) else 8.0)
-    height = max(column * picture.height / picture.width for picture in pictures)
+    """Pictures in a row, each with its own colour bar and labels above it."""
+    top = _head(notes) + max(_rail(items) for items in labels)
+    height = max(picture.height for picture in pictures)
+    width_px = sum(picture.width for picture in pictures) + 40.0 * (len(pictures) - 1) + 2.0 * _MARGIN
     total = top + height + 124.0
-    figure = new_figure(total, width_px)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.axis("off")
-    for number, (picture, bar) in enumerate(zip(pictures, bars, strict=True)):
-        left = margin + number * (column + gap)
-        scale = column / picture.width
-        axes.imshow(
-            picture.image,
-            extent=(left, left + column, top + picture.height * scale, top),
-            interpolation="antialiased",
-            aspect="auto",
+    figure, axes = _canvas(total, width_px, title, notes)
+    left = _MARGIN
+    for picture, bar, items in zip(pictures, bars, labels, strict=True):
+        _place(figure, picture, left, top)
+        _leaders(axes, picture, items, np.array([left, top]), top - 12.0, -1.0, (left, left + picture.width))
+        draw_colour_bar(
+            pixel_axes(figure, left + 0.1 * picture.width, total - 92.0, 0.8 * picture.width, 20.0), bar
         )
-        axes.set(xlim=(0.0, width_px), ylim=(total, 0.0))
-        offset = np.array([left, top])
-        _leaders(axes, picture, labels[number], offset, scale, top - 12.0, -1.0, (left, left + column))
-        draw_colour_bar(pixel_axes(figure, left + 0.1 * column, total - 92.0, 0.8 * column, 20.0), bar)
-    axes.set(xlim=(0.0, width_px), ylim=(total, 0.0))
-    axes.text(margin, 34.0, title, fontsize=12.5, fontweight="bold", va="center")
-    if notes:
-        axes.text(margin, 66.0, notes, fontsize=9.0, color=MUTED, va="center")
+        left += picture.width + 40.0
     return figure
+
+
+_MARGIN = 24.0
+
+
+def _head(notes: str) -> float:
+    return 82.0 if notes else 52.0
+
+
+def _rail(labels: Sequence[Label]) -> float:
+    lines = max((label.text.count("\n") + 1 for label in labels), default=0)
+    return 34.0 + 27.0 * lines if lines else 8.0
+
+
+def _canvas(height_px: float, width_px: float, title: str, notes: str) -> tuple[Figure, Axes]:
+    figure = new_figure(round(height_px), width_px)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width_px), ylim=(round(height_px), 0.0))
+    axes.axis("off")
+    axes.text(_MARGIN, 34.0, title, fontsize=12.5, fontweight="bold", va="center")
+    if notes:
+        axes.text(_MARGIN, 66.0, notes, fontsize=9.0, color=MUTED, va="center")
+    return figure, axes
+
+
+def _place(figure: Figure, picture: Picture, left: float, top: float) -> None:
+    # Pixel by pixel: resampling would blur thin lines and cost more than drawing the rest.
+    height = round(figure.get_size_inches()[1] * DPI)
+    figure.figimage(picture.image, xo=round(left), yo=height - round(top) - picture.height, zorder=-1)
 
 
 def draw_colour_bar(axes: Axes, bar: ColourBar) -> None:
@@ -329,7 +325,6 @@ def _leaders(
     picture: Picture,
     labels: Iterable[Label],
     offset: NDArray[np.float64],
-    scale: float,
     edge: float,
     sign: float,
     ends: tuple[float, float],
@@ -337,7 +332,7 @@ def _leaders(
     labels = list(labels)
     if not labels:
         return
-    places = picture.to_pixels(np.array([label.at for label in labels])) * scale + offset
+    places = picture.to_pixels(np.array([label.at for label in labels])) + offset
     longest = [max(len(line) for line in label.text.split("\n")) for label in labels]
     widths = [12.6 * characters + 22.0 for characters in longest]
     centres = spread(places[:, 0], widths, *ends)

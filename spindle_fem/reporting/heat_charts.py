@@ -69,7 +69,9 @@ def _groups(content: Mapping[str, Any]) -> dict[str, Sequence[Mapping[str, Any]]
 
 def _legend(figure: Figure, axes: Axes) -> None:
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.055, 0.995), ncols=6, columnspacing=1.4)
+    figure.legend(
+        handles, labels, loc="upper left", bbox_to_anchor=(0.055, 0.995), ncols=6, columnspacing=1.4
+    )
 
 
 def _lines(
@@ -216,7 +218,12 @@ def heat_terms(content: Mapping[str, Any]) -> Figure:
         speeds = [row["speed_rpm"] for row in rows]
         values = [[row.get(key, 0.0) for row in terms[name]] for key in keys]
         panel.stackplot(speeds, *values, labels=keys, colors=CYCLE)
-        panel.set(title=name, xlabel=SPEED_LABEL, ylim=(0.0, 1.05 * top), xlim=(speeds[0], max(speeds[-1], speeds[0] + 1)))
+        panel.set(
+            title=name,
+            xlabel=SPEED_LABEL,
+            ylim=(0.0, 1.05 * top),
+            xlim=(speeds[0], max(speeds[-1], speeds[0] + 1)),
+        )
     axes[0].set_ylabel(f"friction heat, model {content['model']} / W")
     _legend(figure, axes[0])
     return figure

@@ -160,7 +160,7 @@ def viewer_payload(surface: xr.Dataset) -> dict[str, Any]:
         "parts": ranges,
         "balls": np.round(balls, 5).tolist(),
         "colours": base64.b64encode(colours.tobytes()).decode(),
-        "block": base64.b64encode(zlib.compress(block, 9)).decode(),
+        "block": base64.b64encode(zlib.compress(block, 6)).decode(),
     }
 
 

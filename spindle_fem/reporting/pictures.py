@@ -19,7 +19,7 @@ from spindle_fem.reporting.figures import (
 )
 from spindle_fem.reporting.machine_drawing import part_colours
 from spindle_fem.reporting.profiles import MeridianSection
-from spindle_fem.reporting.scenes import SceneRenderer, View, ball_triangles, crop
+from spindle_fem.reporting.scenes import SceneRenderer, View, ball_triangles
 from spindle_fem.reporting.sections import (
     SegmentSet,
     TriangleSet,
@@ -47,10 +47,9 @@ def temperature_scale(result: ThermalResult) -> ColourBar:
     return scale_of(np.array(values) - ZERO_CELSIUS_K, TEMPERATURE_MAP, TEMPERATURE_LABEL)
 
 
-def _box(points: NDArray[np.float64]) -> tuple[tuple[float, float], ...]:
-    return tuple(
-        (float(low), float(high)) for low, high in zip(points.min(axis=0), points.max(axis=0), strict=True)
-    )
+def _kept_points(result: ThermalResult, section: MeridianSection) -> NDArray[np.float64]:
+    points = result.mesh.points
+    return np.concatenate([points[points[:, 0] >= 0.0], section.outlines.points.reshape(-1, 3)])
 
 
 def _half_of_balls(result: ThermalResult) -> TriangleSet:
@@ -112,9 +111,11 @@ def ball_labels(result: ThermalResult) -> list[Label]:
     ]
 
 
-def temperature_cut(renderer: SceneRenderer, result: ThermalResult, bar: ColourBar) -> Figure:
+def temperature_cut(
+    renderer: SceneRenderer, result: ThermalResult, section: MeridianSection, bar: ColourBar
+) -> Figure:
     """Whole machine cut open; expects the layers of :func:`add_half_machine`."""
-    view = View(TOWARDS_HALF, UP, _box(result.mesh.points[result.mesh.points[:, 0] >= 0.0]))
+    view = View(TOWARDS_HALF, UP, _kept_points(result, section))
     hottest = result.temperature_maximum - ZERO_CELSIUS_K
     place = result.temperature_maximum_at * 1.0e3
     notes = (
@@ -122,7 +123,7 @@ def temperature_cut(renderer: SceneRenderer, result: ThermalResult, bar: ColourB
         f"at r = {np.hypot(*place[:2]):.0f} mm, z = {place[2]:.0f} mm; balls at their own temperature."
     )
     return picture_figure(
-        crop(renderer.render(view)),
+        renderer.render(view),
         "Temperature of the machine, cut open",
         bars=[bar],
         above=probe_labels(result.spec, dict(result.probes)),
@@ -141,8 +142,8 @@ def bearing_close_ups(renderer: SceneRenderer, result: ThermalResult, bar: Colou
         margin = 0.14 * (z_high - z_low)
         section = 0.5 * (kind.outer_diameter - kind.bore_diameter)
         radii = (0.5 * kind.bore_diameter - 0.55 * section, 0.5 * kind.outer_diameter + 0.65 * section)
-        view = View((-1.0, 0.0, 0.0), UP, ((0.0, 0.0), radii, (z_low - margin, z_high + margin)))
-        picture = renderer.render(view, margin=0.0)
+        ends = np.array([[0.0, radii[0], z_low - margin], [0.0, radii[1], z_high + margin]])
+        picture = renderer.render(View((-1.0, 0.0, 0.0), UP, ends), margin_px=0.0)
         labels = []
         below = []
         for bearing in group.bearing:
@@ -194,14 +195,14 @@ def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | No
         scale_of(film, FILM_MAP, "film coefficient / W/(m²·K)"),
         scale_of(oil, TEMPERATURE_MAP, "oil temperature / °C"),
     )
-    view = View((-1.0, 0.55, -0.75), UP, _box(shape.points))
+    view = View((-1.0, 0.55, -0.75), UP, shape.points)
     lines = sharp_edges_of_facets(mesh.points, facets)
     pictures = []
     for column, bar in enumerate(bars):
         renderer.clear()
         renderer.add_coloured(shape, bar, column=column)
         renderer.add_lines(lines, width=0.8)
-        pictures.append(crop(renderer.render(view, 900)))
+        pictures.append(renderer.render(view, 756))
     coolant = result.coolant
     inlet, outlet = _channel_ends(spec)
     labels = (
@@ -259,9 +260,9 @@ def mesh_picture(renderer: SceneRenderer, result: ThermalResult) -> Figure:
     renderer.clear()
     renderer.add_parts(shape, part_colours(mesh.part_names))
     renderer.add_lines(facet_edges(mesh.points, facets), width=0.7, opacity=0.75)
-    view = View(TOWARDS_HALF, UP, _box(mesh.points[mesh.points[:, 0] >= 0.0]))
+    view = View(TOWARDS_HALF, UP, shape.points)
     return picture_figure(
-        crop(renderer.render(view)),
+        renderer.render(view),
         "Mesh: whole elements behind the vertical plane, coloured by part",
         notes=f"{grouped(mesh.n_elements)} quadratic tetrahedra, {grouped(result.n_unknowns)} temperature unknowns, "
         f"worst element quality (minSICN) {mesh.min_quality:.2f}.",

@@ -151,7 +151,11 @@ def _write_figures(result: ThermalResult, folder: Path, clock: _Clock) -> None:
         bar = pictures.temperature_scale(result)
         section = meridian_section(result.mesh, result.temperature)
         pictures.add_half_machine(renderer, result, section, part_edges(result.mesh), bar)
-        save_png(pictures.temperature_cut(renderer, result, bar), folder / "temperature_cut.png", colours=0)
+        save_png(
+            pictures.temperature_cut(renderer, result, section, bar),
+            folder / "temperature_cut.png",
+            colours=0,
+        )
         for name, figure in pictures.bearing_close_ups(renderer, result, bar).items():
             save_png(figure, folder / f"bearings_{name}.png", colours=0)
         channel = pictures.channel_walls(renderer, result)
@@ -294,7 +298,7 @@ def embed_figures(folder: Path, captions: Mapping[str, str]) -> dict[str, dict[s
         buffer = io.BytesIO()
         with Image.open(path) as image:
             width, height = image.size
-            image.convert("RGB").save(buffer, "WEBP", quality=86, method=2)
+            image.convert("RGB").save(buffer, "WEBP", quality=86, method=1)
         caption = captions.get(path.stem) or path.stem.replace("_", " ").capitalize() + "."
         embedded[path.stem] = {
             "source": "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode(),

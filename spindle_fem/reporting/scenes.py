@@ -15,7 +15,9 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 from spindle_fem.reporting.figures import ColourBar
 from spindle_fem.reporting.sections import SegmentSet, TriangleSet
@@ -62,13 +64,13 @@ class View:
     Attributes
     ----------
     towards_viewer, up : (3,) sequence
-    box : ((x0, x1), (y0, y1), (z0, z1)), [m]
-        What must be inside the frame.
+    frame : (n, 3) ndarray, [m]
+        Points that must be inside the frame.
     """
 
     towards_viewer: Sequence[float]
     up: Sequence[float]
-    box: tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
+    frame: NDArray[np.float64]
 
     def axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Unit vectors to the right, up and towards the viewer."""
@@ -94,7 +96,7 @@ class SceneRenderer:
             self._plotter = pv.Plotter(off_screen=True, window_size=(64, 64), lighting="none")
             self._plotter.background_color = "white"
             self._plotter.enable_parallel_projection()
-            self._plotter.enable_anti_aliasing("msaa", multi_samples=8)
+            self._plotter.enable_anti_aliasing("msaa", multi_samples=4)
             self._plotter.show(auto_close=False, interactive=False)
         finally:
             vtkLogger.SetStderrVerbosity(verbosity)
@@ -175,26 +177,23 @@ class SceneRenderer:
         self._lines.append(actor)
         return actor
 
-    def render(self, view: View, width_px: int = 1552, *, margin: float = 0.01) -> Picture:
-        """Image of all layers, the box of the view filling the width.
+    def render(self, view: View, width_px: int = 1552, *, margin_px: float = 6.0) -> Picture:
+        """Image of all layers, the frame of the view filling the width.
 
         Parameters
         ----------
         view : View
         width_px : int
-        margin : float
-            Share of the width left free on each side.
+        margin_px : float
+            Left free on each side.
         """
         right, up, towards = view.axes()
-        corners = np.array(np.meshgrid(*view.box)).reshape(3, -1).T
-        across, along = corners @ right, corners @ up
-        width = np.ptp(across) * (1.0 + 2.0 * margin)
-        height = np.ptp(along) + 2.0 * margin * np.ptp(across)
-        height_px = max(2, round(width_px * height / width))
-        centre = (
-            0.5 * (across.min() + across.max()) * right
-            + 0.5 * (along.min() + along.max()) * up
-            + 0.5 * ((corners @ towards).min() + (corners @ towards).max()) * towards
+        across, along, depth = view.frame @ right, view.frame @ up, view.frame @ towards
+        scale = (width_px - 2.0 * margin_px) / np.ptp(across)  # pixels a metre
+        height_px = max(2, round(np.ptp(along) * scale + 2.0 * margin_px))
+        centre = sum(
+            0.5 * (value.min() + value.max()) * axis
+            for value, axis in ((across, right), (along, up), (depth, towards))
         )
         plotter = self._plotter
         plotter.window_size = (width_px, height_px)
@@ -202,20 +201,31 @@ class SceneRenderer:
         camera.focal_point = centre
         camera.position = centre + 2.0 * towards
         camera.up = up
-        camera.parallel_scale = 0.5 * height_px * width / width_px
+        camera.parallel_scale = 0.5 * height_px / scale
         plotter.renderer.camera_set = True
         for actor in self._lines:  # a third of a millimetre in front of the faces that they bound
             actor.position = LINE_LIFT * towards
         self._light(right, up, towards, centre)
         plotter.renderer.ResetCameraClippingRange()
-        plotter.render()
-        image = plotter.screenshot(return_img=True)
-        scale = width_px / width
         affine = np.empty((2, 4))
         affine[0, :3], affine[1, :3] = scale * right, -scale * up
         affine[0, 3] = 0.5 * width_px - scale * (centre @ right)
         affine[1, 3] = 0.5 * height_px + scale * (centre @ up)
-        return Picture(np.ascontiguousarray(image[..., :3]), affine)
+        return Picture(self._image(), affine)
+
+    def _image(self) -> NDArray[np.uint8]:
+        window = self._plotter.render_window
+        window.Render()
+        reader = vtkWindowToImageFilter()
+        reader.SetInput(window)
+        reader.ShouldRerenderOff()  # rendering in software is most of the cost of a picture
+        reader.ReadFrontBufferOff()
+        reader.SetInputBufferTypeToRGB()
+        reader.Update()
+        image = reader.GetOutput()
+        width, height, _ = image.GetDimensions()
+        pixels = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, 3)
+        return np.ascontiguousarray(pixels[::-1])
 
     def _light(
         self,
@@ -233,19 +243,6 @@ class SceneRenderer:
             light = pv.Light(position=centre + 5.0 * direction, focal_point=centre, intensity=intensity)
             light.positional = False
             plotter.add_light(light)
-
-
-def crop(picture: Picture, margin: int = 12) -> Picture:
-    """The picture without white borders."""
-    ink = (picture.image < 250).any(axis=2)
-    rows, columns = np.flatnonzero(ink.any(axis=1)), np.flatnonzero(ink.any(axis=0))
-    if not rows.size:
-        return picture
-    top, left = max(0, rows[0] - margin), max(0, columns[0] - margin)
-    bottom, right = rows[-1] + margin + 1, columns[-1] + margin + 1
-    affine = picture.world_to_pixels.copy()
-    affine[:, 3] -= (left, top)
-    return Picture(picture.image[top:bottom, left:right], affine)
 
 
 def ball_triangles(spec: MachineSpec, values: dict[str, float], subdivisions: int = 3) -> TriangleSet:

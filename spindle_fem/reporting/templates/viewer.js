@@ -125,9 +125,13 @@
     gl.viewport(0, 0, w, h);
     gl.clearColor(1, 1, 1, pick ? 0 : 1); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
-    const reach = Math.hypot(data.size[0], data.size[1], data.size[2]);
-    const fit = 2 * state.zoom / (0.94 * reach) * Math.min(1, w / h * 1.02);
-    gl.uniformMatrix3fv(at.turn, false, turn());
+    const reach = Math.hypot(data.size[0], data.size[1], data.size[2]), m = turn();
+    const wide = Math.abs(m[0]) * data.size[0] + Math.abs(m[3]) * data.size[1] + Math.abs(m[6]) * data.size[2];
+    const tall = Math.abs(m[1]) * data.size[0] + Math.abs(m[4]) * data.size[1] + Math.abs(m[7]) * data.size[2];
+    // Fitted to the view buttons' direction, so that turning does not pump the size.
+    if (!state.fit) state.fit = Math.min(1.9 * w / h / wide, 1.9 / tall);
+    const fit = state.fit * state.zoom;
+    gl.uniformMatrix3fv(at.turn, false, m);
     gl.uniform3fv(at.centre, centre);
     gl.uniform3f(at.zoom, fit * h / w, fit, 0.9 / reach);
     gl.uniform2f(at.shift, state.x, state.y);
@@ -186,7 +190,7 @@
       b.addEventListener("click", function () {
         if (b.dataset.view === "start") { Object.assign(state, { yaw: start.yaw, pitch: start.pitch, zoom: 1, x: 0, y: 0 }); }
         else { state.yaw = views[b.dataset.view][0]; state.pitch = views[b.dataset.view][1]; }
-        redraw();
+        state.fit = 0; redraw();
       });
     });
     host.querySelectorAll("[data-zoom]").forEach(function (b) { b.addEventListener("click", function () { state.zoom *= parseFloat(b.dataset.zoom); redraw(); }); });
@@ -201,7 +205,7 @@
       });
       label.append(box, document.createTextNode(" " + p.name)); list.append(label);
     });
-    window.addEventListener("resize", redraw);
+    window.addEventListener("resize", function () { state.fit = 0; redraw(); });
   }
   function legend() {
     const bar = host.querySelector(".view3d-bar"), stops = [];
