@@ -16,10 +16,11 @@ from spindle_fem.recordings.checks import (
     channel_noise,
     longest_run,
     resolution,
+    stale_readings,
     temperature_flags,
 )
 from spindle_fem.recordings.defects import ChannelDefects, DefectReport, Gap
-from spindle_fem.recordings.manifest import Channel, Manifest, conversions, load_manifest
+from spindle_fem.recordings.manifest import Channel, ColumnUnit, Manifest, conversions, load_manifest
 from spindle_fem.recordings.read import RawTable, read_table
 
 Array = NDArray[np.float64]
@@ -28,6 +29,8 @@ GAP_STEPS = 1.5
 UNIFORM_TOLERANCE = 0.01
 LONG_GAP_SECONDS = 1800.0
 LONG_GAP_STEPS = 60.0
+# Of a channel without declared noise, in K: no sensor on a machine is better than a millikelvin.
+SMALLEST_SIGMA = 1.0e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,52 +195,34 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
     by_role: dict[str, list[Channel]] = {"temperature": [], "input": [], "covariate": []}
     for channel in manifest.channel:
         by_role[channel.role].append(channel)
+    times = grid.times
+    merged = {
+        channel.column: grid.merge(
+            table.columns[channel.column], last=channel.role == "input" and channel.hold == "previous"
+        )
+        for channel in manifest.channel
+    }
+    silent = [np.isnan(merged[channel.column]) for channel in by_role["input"]]
+    inputs_missing = np.logical_and.reduce(silent) if silent else np.zeros(times.size, dtype=bool)
     aligned: dict[str, Array] = {}
     defects: list[ChannelDefects] = []
     noises: dict[str, ChannelNoise] = {}
     flags: dict[str, NDArray[np.uint8]] = {}
-    times = grid.times
     for channel in manifest.channel:
-        raw = table.columns[channel.column]
-        held = channel.role == "input" and channel.hold == "previous"
-        merged = grid.merge(raw, last=held)
-        unit = units[channel.column]
-        fine = resolution(merged) * unit.scale
-        coarse = resolution(merged, share=0.5) * unit.scale
-        values = merged * unit.scale + unit.offset
-        if unit.is_temperature:
-            marked = temperature_flags(values, channel.sigma, fine, judge_stuck=channel.role == "temperature")
-        else:
-            marked = np.where(np.isfinite(values), 0, int(Flag.MISSING)).astype(np.uint8)
-        good = marked == 0
-        noise = channel_noise(times[good], values[good], fine, coarse)
-        noises[channel.column], flags[channel.column], aligned[channel.column] = noise, marked, values
-        defects.append(
-            ChannelDefects(
-                column=channel.column,
-                role=channel.role,
-                readings=int(np.isfinite(values).sum()),
-                empty_cells=int(np.isnan(raw).sum()) - table.infinite[channel.column],
-                infinite=table.infinite[channel.column],
-                longest_missing_s=longest_run(~np.isfinite(values), times),
-                spikes=_count(marked, Flag.SPIKE),
-                dropouts=_count(marked, Flag.DROPOUT),
-                stuck=_count(marked, Flag.STUCK),
-                implausible=_count(marked, Flag.IMPLAUSIBLE),
-                bridged=int((~good).sum()) if channel.role == "input" else 0,
-                noise=noise,
-                sigma_declared=channel.sigma,
-            )
-        )
-        if channel.role == "input" and not good.any():
-            raise RecordingError(source, f'the input column "{channel.column}" has no reading.')
+        column, unit = channel.column, units[channel.column]
+        values = merged[column] * unit.scale + unit.offset
+        marked, noise = _checked(channel, unit, merged[column], values, times, inputs_missing)
+        aligned[column], flags[column], noises[column] = values, marked, noise
+        defects.append(_channel_defects(channel, values, marked, noise, times, table))
+        if channel.role == "input" and np.all(marked):
+            raise RecordingError(source, f'the input column "{column}" has no reading.')
     temperatures = by_role["temperature"]
     if not any((flags[c.column] == 0).any() for c in temperatures):
         raise RecordingError(source, "no temperature channel has a reading that can be used.")
     inputs = by_role["input"]
     input_values = _stack([np.where(flags[c.column] == 0, aligned[c.column], np.nan) for c in inputs], times)
     report, segments = _report(manifest, table, grid, tuple(defects), long_gap)
-    sigma = [c.sigma if c.sigma is not None else noises[c.column].white for c in temperatures]
+    sigma = [c.sigma or max(noises[c.column].white, SMALLEST_SIGMA) for c in temperatures]
     recording = Recording(
         name=manifest.name,
         source=source,
@@ -262,6 +247,55 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
     for array in (recording.times, recording.temperature, recording.flags, recording.inputs, recording.sigma):
         array.setflags(write=False)
     return recording
+
+
+def _checked(
+    channel: Channel,
+    unit: ColumnUnit,
+    merged: Array,
+    values: Array,
+    times: Array,
+    inputs_missing: NDArray[np.bool_],
+) -> tuple[NDArray[np.uint8], ChannelNoise]:
+    """Flags and noise of one channel."""
+    fine = resolution(merged) * unit.scale
+    coarse = resolution(merged, share=0.5) * unit.scale
+    if unit.is_temperature:
+        measured = channel.role == "temperature"
+        marked = temperature_flags(values, channel.sigma, fine, judge_stuck=measured)
+        if measured:
+            stale = stale_readings(times, values, inputs_missing, coarse)
+            marked[stale] |= np.uint8(Flag.STUCK)
+    else:
+        marked = np.where(np.isfinite(values), 0, int(Flag.MISSING)).astype(np.uint8)
+    good = marked == 0
+    return marked, channel_noise(times[good], values[good], fine, coarse)
+
+
+def _channel_defects(
+    channel: Channel,
+    values: Array,
+    marked: NDArray[np.uint8],
+    noise: ChannelNoise,
+    times: Array,
+    table: RawTable,
+) -> ChannelDefects:
+    infinite = table.infinite[channel.column]
+    return ChannelDefects(
+        column=channel.column,
+        role=channel.role,
+        readings=int(np.isfinite(values).sum()),
+        empty_cells=int(np.isnan(table.columns[channel.column]).sum()) - infinite,
+        infinite=infinite,
+        longest_missing_s=longest_run(~np.isfinite(values), times),
+        spikes=_count(marked, Flag.SPIKE),
+        dropouts=_count(marked, Flag.DROPOUT),
+        stuck=_count(marked, Flag.STUCK),
+        implausible=_count(marked, Flag.IMPLAUSIBLE),
+        bridged=int(np.count_nonzero(marked)) if channel.role == "input" else 0,
+        noise=noise,
+        sigma_declared=channel.sigma,
+    )
 
 
 def _stack(columns: list[Array], times: Array) -> Array:

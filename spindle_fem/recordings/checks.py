@@ -36,6 +36,9 @@ DROPOUT_FLOOR = 3.0
 DROPOUT_LONGEST = 200
 STUCK_CHANCE = 1.0e-9
 STUCK_MOST_EQUAL = 0.6
+STALE_READINGS = 60
+STALE_SECONDS = 1800.0
+STALE_APPROACH = 600.0
 QUIET_SHARE = 0.25
 # An open thermocouple reads above or below this; no spindle sensor does in earnest.
 PLAUSIBLE_KELVIN = (213.15, 673.15)
@@ -270,6 +273,59 @@ def _stuck(values: Array) -> NDArray[np.bool_]:
             # the first reading of the run is a true one
             stuck[begin + 1 : end + 1] = True
     return stuck
+
+
+def stale_readings(
+    times: Array, values: Array, inputs_missing: NDArray[np.bool_], coarse_step: float
+) -> NDArray[np.bool_]:
+    """Readings that a logger repeats after their source has gone.
+
+    Parameters
+    ----------
+    times : (n,) ndarray, [s]
+    values : (n,) ndarray
+        One temperature channel, NaN where missing.
+    inputs_missing : (n,) bool ndarray
+        Whether no input has a reading.
+    coarse_step : float
+        Of the channel, see :class:`ChannelNoise`.
+
+    Returns
+    -------
+    (n,) bool ndarray
+        All but the first reading of a run of one value that lasts at least
+        60 readings and half an hour, and in which either no input reads
+        anything, or which begins straight out of a change of two coarse steps
+        within ten minutes: no body stops like that.
+    """
+    stale = np.zeros(values.size, dtype=bool)
+    rows = np.flatnonzero(np.isfinite(values))
+    if rows.size < STALE_READINGS:
+        return stale
+    equal = np.diff(values[rows]) == 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]).astype(np.int8)))
+    for begin, end in edges.reshape(-1, 2):
+        run = rows[begin : end + 1]
+        if run.size < STALE_READINGS or times[run[-1]] - times[run[0]] < STALE_SECONDS:
+            continue
+        before = rows[np.searchsorted(times[rows], times[run[0]] - STALE_APPROACH) : begin]
+        moved = np.ptp(values[np.append(before, run[0])]) if before.size else 0.0
+        abrupt = coarse_step > 0.0 and moved > 2.0 * coarse_step
+        if abrupt:
+            stale[run[1:]] = True
+        else:
+            stale[run[1:]] = _in_long_runs(inputs_missing[run], times[run])[1:]
+    return stale
+
+
+def _in_long_runs(marked: NDArray[np.bool_], times: Array) -> NDArray[np.bool_]:
+    """Marks that belong to runs of at least 60 readings and half an hour."""
+    kept = np.zeros(marked.size, dtype=bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))).reshape(-1, 2)
+    for begin, end in edges:
+        if end - begin >= STALE_READINGS and times[end - 1] - times[begin] >= STALE_SECONDS:
+            kept[begin:end] = True
+    return kept
 
 
 def longest_run(marked: NDArray[np.bool_], times: Array) -> float:
