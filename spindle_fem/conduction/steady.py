@@ -35,6 +35,7 @@ from spindle_fem.errors import ConvergenceError, SpecError
 
 NONLINEAR_TOLERANCE_K = 1e-6
 MAX_NONLINEAR_STEPS = 40
+DIVERGED_K = 1e5
 # Natural convection has no heat at no difference: start off the ambient.
 START_RISE_K = 5.0
 
@@ -155,12 +156,19 @@ def _solve_nonlinear(
     for step in range(1, MAX_NONLINEAR_STEPS + 1):
         linear = linearise_films(problem, temperature)
         solution = solve_steady(
-            linear, solution, preconditioner, method=method, relative_tolerance=relative_tolerance
+            linear,
+            solution,
+            preconditioner,
+            method=method,
+            relative_tolerance=relative_tolerance,
+            balance_tolerance=BALANCE_TOLERANCE,
         )
         preconditioner = solution.preconditioner
         iterations += solution.iterations
         change = float(np.abs(solution.temperature - temperature).max())
         temperature = solution.temperature
+        if change > DIVERGED_K:
+            break
         if change <= nonlinear_tolerance:
             balance = with_law_heat(solution.balance, law_heat(problem, temperature))
             require_balance(balance, BALANCE_TOLERANCE if balance_tolerance is None else balance_tolerance)
@@ -169,7 +177,7 @@ def _solve_nonlinear(
             )
     raise ConvergenceError(
         "film laws",
-        f"temperatures still change by {change:.3g} K after {MAX_NONLINEAR_STEPS} Newton steps.",
+        f"temperatures still change by {change:.3g} K after {step} Newton steps.",
         f"Asked: {nonlinear_tolerance:g} K. Check that each film's heat rises with temperature.",
     )
 
