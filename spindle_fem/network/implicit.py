@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.network.balance import NetworkBalance, explicit_derivative
 from spindle_fem.network.history import InputHistory, boundary_history, source_history
-from spindle_fem.network.model import Array, NetworkBalance, Parameter, ThermalNetwork
+from spindle_fem.network.model import Array, Parameter, ThermalNetwork
 
 GAMMA = 2.0 - np.sqrt(2.0)
 DIAGONAL = 0.5 * GAMMA
@@ -301,30 +302,3 @@ class _Stepper:
         return explicit_derivative(
             self.network, self.balance, self.parameters, temperature, boundary, sources
         )
-
-
-def explicit_derivative(
-    network: ThermalNetwork,
-    balance: NetworkBalance,
-    parameters: tuple[Parameter, ...],
-    temperature: Array,
-    boundary: Array,
-    sources: Array,
-) -> Array:
-    """Derivative of the net heat to the log-parameters at fixed temperatures, ``(n, p) [W]``."""
-    n = network.n_nodes
-    both = np.concatenate([temperature, boundary])
-    result = np.zeros((n, len(parameters)))
-    for p, parameter in enumerate(parameters):
-        index = parameter.index
-        if parameter.kind == "conductance":
-            first, second = network.link_first[index], network.link_second[index]
-            flow = network.link_conductance[index] * (both[first] - both[second])
-            for end, sign in ((first, -1.0), (second, 1.0)):
-                if end < n:
-                    result[end, p] += sign * flow
-        elif parameter.kind == "gain":
-            result[network.source_node[index], p] += sources[index]
-        elif parameter.kind == "temperature":
-            result[:, p] += balance.boundary_matrix[:, index] * network.boundary_temperature[index]
-    return result

@@ -10,7 +10,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError
-from spindle_fem.network.model import Array, Inputs, NetworkBalance, ThermalNetwork
+from spindle_fem.network.balance import NetworkBalance
+from spindle_fem.network.model import Array, Inputs, ThermalNetwork
 
 BALANCE_TOLERANCE = 1.0e-10
 

@@ -16,10 +16,10 @@ from spindle_fem.errors import (
     UnitError,
     did_you_mean,
 )
+from spindle_fem.network.balance import NetworkBalance, explicit_derivative
 from spindle_fem.network.exact import LinearSystem
 from spindle_fem.network.history import InputHistory, boundary_history, source_history
-from spindle_fem.network.implicit import explicit_derivative
-from spindle_fem.network.model import NetworkBalance, Parameter, ThermalNetwork
+from spindle_fem.network.model import Parameter, ThermalNetwork
 from spindle_fem.network.steady import solve_steady
 from spindle_fem.network.transient import simulate_transient
 from spindle_fem.recordings.align import Recording

@@ -5,7 +5,14 @@ import pytest
 
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.checks import Flag, resolution, slow_error, temperature_flags, white_noise
+from spindle_fem.recordings.checks import (
+    Flag,
+    resolution,
+    slow_error,
+    stale_readings,
+    temperature_flags,
+    white_noise,
+)
 
 MANIFEST = """
 schema = "spindle-fem/recording/1"
@@ -164,6 +171,43 @@ def test_constant_reading_of_a_coarse_sensor_proves_nothing():
     values = np.round(signal(600, sigma=0.01)[1])
     flags = temperature_flags(values + 273.15, None, 1.0, judge_stuck=True)
     assert not (flags & Flag.STUCK).any()
+
+
+def test_reading_repeated_after_the_inputs_have_gone(tmp_path):
+    """Whole degrees that stand still for an hour prove nothing, unless nothing else is read either."""
+    times, values = signal(900, sigma=0.0)
+    values = np.round(values)
+    silent = (times >= 5000.0) & (times < 8000.0)
+    values[silent] = values[500]
+    rows = [
+        (t, float(v), None if s else 20.0, None if s else 500.0)
+        for t, v, s in zip(times, values, silent, strict=True)
+    ]
+    recording = read(tmp_path, rows)
+    stuck = np.flatnonzero(recording.flags[:, 0] & Flag.STUCK)
+    assert stuck[0] == 500
+    assert stuck[-1] == 799
+    assert recording.defects.channel("SP01").stuck == stuck.size == 300
+
+
+def test_reading_that_stops_in_the_middle_of_a_change():
+    times = np.arange(1000) * 10.0
+    values = np.round(300.0 + np.minimum(times, 3000.0) * 0.02)
+    missing = np.zeros(1000, dtype=bool)
+    stale = stale_readings(times, values, missing, 1.0)
+    assert stale[310:].all()
+    assert not stale[:290].any()
+    # an approach that slows down may end in one whole degree for hours
+    slow = np.round(320.0 + 40.0 * np.exp(-times / 1500.0))
+    assert not stale_readings(times, slow, missing, 1.0).any()
+
+
+def test_channel_without_noise_gets_the_smallest_sigma(tmp_path):
+    rows = [(10.0 * k, 20.0 + k, 20.0, 0.0) for k in range(50)]
+    (tmp_path / "recording.toml").write_text(MANIFEST.replace("sigma = 0.1\n", ""))
+    lines = [",".join(repr(float(value)) for value in row) for row in rows]
+    (tmp_path / "data.csv").write_text("\n".join(["time_s,SP01,ambient,speed", *lines]) + "\n")
+    assert 1e-3 <= read_recording(tmp_path).sigma[0] < 0.5
 
 
 @pytest.mark.parametrize("sigma", [0.02, 0.3])
