@@ -147,16 +147,29 @@ def styled(draw: Any) -> Any:
 
 
 @styled
-def save_png(figure: Figure, path: Path, *, colours: int = 256) -> Path:
-    """Write a figure with a palette: a third of the size of true colour, no visible change."""
+def rasterise(figure: Figure) -> NDArray[np.uint8]:
+    """Pixels (height, width, 3) of a figure, its pictures behind everything else."""
+    figure.canvas.draw()
+    drawn = np.asarray(figure.canvas.buffer_rgba())
+    backdrops = getattr(figure, "backdrops", ())
+    if not backdrops:
+        return np.ascontiguousarray(drawn[..., :3])
+    pixels = np.full((*drawn.shape[:2], 3), 255, dtype=np.uint8)
+    for image, left, top in backdrops:
+        pixels[top : top + image.shape[0], left : left + image.shape[1]] = image
+    covered = drawn[..., 3] > 0
+    opacity = drawn[covered, 3:].astype(np.float32) / 255.0
+    pixels[covered] = np.round(opacity * drawn[covered, :3] + (1.0 - opacity) * pixels[covered])
+    return pixels
+
+
+def save_png(figure: Figure, path: Path, *, colours: int = 0) -> Path:
+    """Write a figure, in true colour or with a palette of ``colours`` where it has few."""
     from PIL import Image
 
-    figure.canvas.draw()
-    width, height = figure.canvas.get_width_height()
-    rgb = np.asarray(figure.canvas.buffer_rgba()).reshape(height, width, 4)[..., :3]
-    image = Image.fromarray(np.ascontiguousarray(rgb))
+    image = Image.fromarray(rasterise(figure))
     if colours:
-        image = image.quantize(colours, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        image = image.quantize(colours, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     image.save(path, dpi=(DPI, DPI), compress_level=6)
     return path
 
@@ -306,9 +319,9 @@ def _canvas(height_px: float, width_px: float, title: str, notes: str) -> tuple[
 
 
 def _place(figure: Figure, picture: Picture, left: float, top: float) -> None:
-    # Pixel by pixel: resampling would blur thin lines and cost more than drawing the rest.
-    height = round(figure.get_size_inches()[1] * DPI)
-    figure.figimage(picture.image, xo=round(left), yo=height - round(top) - picture.height, zorder=-1)
+    # Pasted pixel by pixel on saving: resampling would blur thin lines and cost more than all the rest.
+    figure.patch.set_alpha(0.0)
+    figure.backdrops = [*getattr(figure, "backdrops", []), (picture.image, round(left), round(top))]
 
 
 def draw_colour_bar(axes: Axes, bar: ColourBar) -> None:

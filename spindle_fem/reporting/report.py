@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 FIGURE_FOLDER = "figures"
 
+_SHADED = ("meridian_temperature",)  # a palette would show as bands
+
 CAPTIONS = {
     "machine_definition": (
         "The machine as defined: parts by colour, contact lines of the bearings in red, oil in yellow, surfaces with "
@@ -146,7 +148,7 @@ def _write_figures(result: ThermalResult, folder: Path, clock: _Clock) -> None:
         for name, draw in draw_figures(result).items():
             figure = draw()
             if figure is not None:
-                save_png(figure, folder / f"{name}.png", colours=0 if name == "meridian_temperature" else 256)
+                save_png(figure, folder / f"{name}.png", colours=0 if name in _SHADED else 256)
     with clock.step("pictures"), SceneRenderer() as renderer:
         bar = pictures.temperature_scale(result)
         section = meridian_section(result.mesh, result.temperature)
@@ -154,14 +156,13 @@ def _write_figures(result: ThermalResult, folder: Path, clock: _Clock) -> None:
         save_png(
             pictures.temperature_cut(renderer, result, section, bar),
             folder / "temperature_cut.png",
-            colours=0,
         )
         for name, figure in pictures.bearing_close_ups(renderer, result, bar).items():
-            save_png(figure, folder / f"bearings_{name}.png", colours=0)
+            save_png(figure, folder / f"bearings_{name}.png")
         channel = pictures.channel_walls(renderer, result)
         if channel is not None:
-            save_png(channel, folder / "channel_walls.png", colours=256)
-        save_png(pictures.mesh_picture(renderer, result), folder / "mesh.png", colours=128)
+            save_png(channel, folder / "channel_walls.png")
+        save_png(pictures.mesh_picture(renderer, result), folder / "mesh.png", colours=192)
 
 
 def rebuild_report(folder: str | Path) -> Path:
@@ -298,7 +299,7 @@ def embed_figures(folder: Path, captions: Mapping[str, str]) -> dict[str, dict[s
         buffer = io.BytesIO()
         with Image.open(path) as image:
             width, height = image.size
-            image.convert("RGB").save(buffer, "WEBP", quality=86, method=1)
+            image.convert("RGB").save(buffer, "WEBP", quality=76, method=1)
         caption = captions.get(path.stem) or path.stem.replace("_", " ").capitalize() + "."
         embedded[path.stem] = {
             "source": "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode(),

@@ -196,7 +196,7 @@ class SceneRenderer:
             for value, axis in ((across, right), (along, up), (depth, towards))
         )
         plotter = self._plotter
-        plotter.window_size = (width_px, height_px)
+        plotter.render_window.SetSize(width_px, height_px)  # pyvista's setter would render as well
         camera = plotter.camera
         camera.focal_point = centre
         camera.position = centre + 2.0 * towards
