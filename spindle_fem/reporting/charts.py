@@ -15,6 +15,8 @@ from matplotlib.tri import Triangulation
 
 from spindle_fem.reporting.figures import (
     BALLS,
+    BODY_COLOURS,
+    BODY_NAMES,
     CYCLE,
     DPI,
     INK,
@@ -118,13 +120,13 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
     bearings = result.spec.bearings
     if not bearings:
         return None
-    columns = min(3, len(bearings))
+    columns = len(bearings) if len(bearings) <= 6 else 4
     rows = math.ceil(len(bearings) / columns)
     figure = new_figure(100.0 + 400.0 * rows + 80.0)
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
     height = 100.0 + 400.0 * rows + 80.0
     figure.subplots_adjust(
-        left=0.055, right=0.99, top=1.0 - 138.0 / height, bottom=100.0 / height, wspace=0.06, hspace=0.36
+        left=0.055, right=0.99, top=1.0 - 138.0 / height, bottom=100.0 / height, wspace=0.08, hspace=0.36
     )
     kinds = {"rotating": CYCLE[1], "standing": CYCLE[0]}
     for axes, (group, bearing) in zip(grid.flat, bearings, strict=False):
@@ -148,8 +150,8 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
             linewidth=4.0,
             solid_capstyle="butt",
         )
-        axes.set_title(f"{bearing.name}   {state.heat:.0f} W,  z = {0.5 * sum(bearing.z) * _MM:.1f} mm")
-        axes.set_xlabel("radius / mm")
+        axes.set_title(f"{bearing.name}, {state.heat:.0f} W")
+        axes.set_xlabel(f"radius / mm  (z = {0.5 * sum(bearing.z) * _MM:.1f})")
         axes.tick_params(labelbottom=True)
     for axes in list(grid.flat)[len(bearings) :]:
         axes.axis("off")
@@ -287,7 +289,7 @@ def heat_balance(energy: EnergyBalance) -> Figure:
     top = 0.5 * (580.0 - body)
     axes.add_patch(
         Rectangle(
-            (690.0, top), 172.0, body * sum(sources.values()) / total, facecolor="#c9d2da", linewidth=0.0
+            (710.0, top), 132.0, body * sum(sources.values()) / total, facecolor="#c9d2da", linewidth=0.0
         )
     )
     axes.text(
@@ -308,7 +310,7 @@ def _bands(axes: Axes, flows: Mapping[str, float], body: float, total: float, *,
     top = 0.5 * (580.0 - body)
     at_body = top + np.cumsum(heights) - 0.5 * heights
     at_end = spread(at_body, np.maximum(heights + 8.0, 32.0), 0.0, 580.0)
-    near, far = (690.0, 380.0) if left else (862.0, 1172.0)
+    near, far = (710.0, 480.0) if left else (842.0, 1072.0)
     middle = 0.5 * (near + far)
     palette = (CYCLE[1], CYCLE[4]) if left else (CYCLE[0], CYCLE[5])
     for number, (name, value) in enumerate(flows.items()):
@@ -360,17 +362,24 @@ def heat_by_bearing(result: ThermalResult) -> Figure | None:
     figure = new_figure(height)
     panels = (
         ("Friction heat term by term", [dict(result.bearings[name].terms) for name in names], None),
-        ("Where it enters", [dict(result.bearings[name].heat_to) for name in names], (BALLS, INNER, OUTER)),
+        ("Where it enters", [dict(result.bearings[name].heat_to) for name in names], BODY_COLOURS),
     )
-    limit = 1.14 * max(max(sum(item.values()) for item in panel[1]) for panel in panels)
+    limit = 1.2 * max(max(sum(item.values()) for item in panel[1]) for panel in panels)
     for number, (title, rows, colours) in enumerate(panels):
         axes = pixel_axes(figure, 70.0 + 784.0 * number, 150.0, 730.0, height - 230.0)
         keys = list(dict.fromkeys(key for row in rows for key in row))
         left = np.zeros(len(names))
         for index, key in enumerate(keys):
             values = np.array([row.get(key, 0.0) for row in rows])
-            colour = (colours or CYCLE)[index % len(colours or CYCLE)]
-            axes.barh(names, values, left=left, color=colour, height=0.62, label=key.replace("_", " "))
+            colour = CYCLE[index % len(CYCLE)] if colours is None else colours[key]
+            axes.barh(
+                names,
+                values,
+                left=left,
+                color=colour,
+                height=0.62,
+                label=BODY_NAMES.get(key, key.replace("_", " ")),
+            )
             for row, value in enumerate(values):
                 if value > 0.07 * limit:
                     axes.text(

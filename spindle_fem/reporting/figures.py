@@ -46,6 +46,9 @@ GRID = "#dfe4e9"
 # Okabe & Ito: distinct for colour-blind readers, in this order everywhere.
 CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8c6d31", "#6b6b6b")
 INNER, BALLS, OUTER = "#D55E00", "#E69F00", "#0072B2"
+# Bodies that friction heat enters, by their keys in ``heat_to``.
+BODY_COLOURS = {"inner": INNER, "balls": BALLS, "outer": OUTER}
+BODY_NAMES = {"inner": "inner ring", "balls": "balls", "outer": "outer ring"}
 
 _STYLE = {
     "font.family": "sans-serif",
@@ -170,6 +173,10 @@ def save_png(figure: Figure, path: Path, *, colours: int = 0) -> Path:
     image = Image.fromarray(rasterise(figure))
     if colours:
         image = image.quantize(colours, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        palette = image.getpalette()
+        corner = 3 * image.getpixel((0, 0))
+        palette[corner : corner + 3] = (255, 255, 255)  # the method rounds white
+        image.putpalette(palette)
     image.save(path, dpi=(DPI, DPI), compress_level=6)
     return path
 

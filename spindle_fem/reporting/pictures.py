@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from spindle_fem.reporting.figures import (
+    BODY_NAMES,
     FILM_MAP,
     TEMPERATURE_LABEL,
     TEMPERATURE_MAP,
@@ -149,7 +150,7 @@ def bearing_close_ups(renderer: SceneRenderer, result: ThermalResult, bar: Colou
         for bearing in group.bearing:
             state = result.bearings[bearing.name]
             middle = 0.5 * sum(bearing.z)
-            parts = "\n".join(f"{value:.0f} W to {name}" for name, value in state.heat_to.items())
+            parts = "\n".join(f"{value:.0f} W to {BODY_NAMES[name]}" for name, value in state.heat_to.items())
             labels.append(
                 Label(
                     f"{bearing.name}: {state.heat:.0f} W\n{parts}",

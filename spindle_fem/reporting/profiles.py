@@ -12,7 +12,7 @@ from spindle_fem.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.reporting.sections import (
     SegmentSet,
     TriangleSet,
-    boundary_triangles,
+    boundary_lines,
     section_of_triangles,
     section_of_volume,
 )
@@ -38,11 +38,9 @@ class MeridianSection:
 
 def meridian_section(mesh: TaggedMesh, temperature: NDArray[np.float64]) -> MeridianSection:
     """Cut the machine along the vertical plane through its axis."""
-    boundary = boundary_triangles(mesh, temperature)
+    level = mesh.points[:, 0]
     return MeridianSection(
-        section_of_volume(mesh, temperature, mesh.points[:, 0]),
-        section_of_triangles(boundary, boundary.points[:, 0]),
-        mesh.part_names,
+        section_of_volume(mesh, temperature, level), boundary_lines(mesh, temperature, level), mesh.part_names
     )
 
 

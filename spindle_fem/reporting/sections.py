@@ -34,6 +34,33 @@ _TETRAHEDRON_FACES = ((0, 2, 1, 6, 5, 4), (0, 1, 3, 4, 8, 7), (1, 2, 3, 5, 9, 8)
 _TRIANGLE_NODES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
 
 
+def _quadratic_values(local: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quadratic shape functions (n, 6 or 10) at barycentric coordinates (n, 3 or 4)."""
+    edges = (
+        ((0, 1), (1, 2), (2, 0)) if local.shape[1] == 3 else ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+    )
+    between = [4.0 * local[:, a] * local[:, b] for a, b in edges]
+    return np.column_stack([local * (2.0 * local - 1.0), *between])
+
+
+def _refinement(split: NDArray[np.int64], corners: int) -> NDArray[np.float64]:
+    """Quadratic nodes of each piece of ``split`` in terms of the nodes of the whole."""
+    edges = ((0, 1), (1, 2), (2, 0)) if corners == 3 else ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+    whole = np.eye(corners)
+    nodes = np.vstack([whole, *(0.5 * (whole[a] + whole[b]) for a, b in edges)])
+    pieces = []
+    for piece in split:
+        local = nodes[piece]
+        local = np.vstack([local, *(0.5 * (local[a] + local[b]) for a, b in edges)])
+        pieces.append(_quadratic_values(local))
+    return np.stack(pieces)
+
+
+# Nodes of the pieces of one quadratic element, each a quadratic element again.
+_TRIANGLE_REFINEMENT = _refinement(_TRIANGLE_SPLIT, 3)
+_TETRAHEDRON_REFINEMENT = _refinement(_TETRAHEDRON_SPLIT, 4)
+
+
 @dataclass(frozen=True, slots=True)
 class TriangleSet:
     """Flat triangles with values at their points.
@@ -203,26 +230,36 @@ def section_of_volume(
     level : (n_nodes,) ndarray
         Signed distance from the plane at every mesh node.
     curved : bool
-        Follow the quadratic elements by splitting each in eight; otherwise
-        their straight-edged corners alone, an eighth of the triangles.
+        Follow the quadratic elements in 64 pieces each; otherwise their
+        straight-edged corners alone.
 
     Returns
     -------
     TriangleSet
         ``label`` is the index of the part.
     """
-    # A node exactly on the plane would give triangles of no area; move it by a nanometre.
-    level = np.where(np.abs(level) < 1.0e-9, 1.0e-9, level)
-    split = _TETRAHEDRON_SPLIT if curved else np.arange(4)[None, :]
     at_nodes = level[mesh.tetrahedra]
     crossed = np.flatnonzero((at_nodes.min(axis=1) < 0.0) & (at_nodes.max(axis=1) > 0.0))
-    pieces = mesh.tetrahedra[crossed][:, split].reshape(-1, 4)
-    label = np.repeat(mesh.part_of_element[crossed], len(split))
+    columns = np.column_stack([mesh.points, np.reshape(values, (len(mesh.points), -1)), level])
+    if curved:
+        # Twice: into eight quadratic elements, and each of these into eight flat ones.
+        nodes = np.einsum(
+            "pab,nbk->npak", _TETRAHEDRON_REFINEMENT, columns[mesh.tetrahedra[crossed]], optimize=True
+        )
+        columns = nodes.reshape(-1, columns.shape[1])
+        whole = np.arange(len(columns)).reshape(-1, 10)
+        pieces = whole[:, _TETRAHEDRON_SPLIT].reshape(-1, 4)
+        label = np.repeat(mesh.part_of_element[crossed], 64)
+    else:
+        pieces = mesh.tetrahedra[crossed][:, :4]
+        label = mesh.part_of_element[crossed]
+    # A node exactly on the plane would give triangles of no area; move it by a nanometre.
+    level = np.where(np.abs(columns[:, -1]) < 1.0e-9, 1.0e-9, columns[:, -1])
+    columns = columns[:, :-1]
     inside = level[pieces] > 0.0
     count = inside.sum(axis=1)
     order = np.argsort(~inside, axis=1, kind="stable")  # points with a positive level first
     pieces = np.take_along_axis(pieces, order, axis=1)
-    columns = np.concatenate([mesh.points, np.reshape(values, (len(mesh.points), -1))], axis=1)
     found: list[NDArray[np.float64]] = []
     labels: list[NDArray[np.int32]] = []
     for number, edges in ((1, ((0, 1), (0, 2), (0, 3))), (3, ((3, 0), (3, 1), (3, 2)))):
@@ -256,10 +293,25 @@ def section_of_triangles(shape: TriangleSet, level: NDArray[np.float64]) -> Segm
     return SegmentSet(ends[..., :3], ends[..., 3:], shape.label[crossed])
 
 
-def boundary_triangles(mesh: TaggedMesh, values: NDArray[np.float64]) -> TriangleSet:
-    """Every face of every part, those in joints included; ``label`` is the part."""
+def boundary_lines(mesh: TaggedMesh, values: NDArray[np.float64], level: NDArray[np.float64]) -> SegmentSet:
+    """Lines where a plane cuts the faces of every part, joints included; ``label`` is the part.
+
+    Parameters
+    ----------
+    mesh : TaggedMesh
+    values : (n_nodes,) or (n_nodes, k) ndarray
+    level : (n_nodes,) ndarray
+        Signed distance from the plane.
+    """
     facets, owner = _all_facets(mesh)
-    return facet_triangles(mesh.points, facets, np.reshape(values, (len(mesh.points), -1))[facets], owner)
+    at_nodes = level[facets]
+    crossed = np.flatnonzero((at_nodes.min(axis=1) < 0.0) & (at_nodes.max(axis=1) > 0.0))
+    columns = np.column_stack([mesh.points, np.reshape(values, (len(mesh.points), -1)), level])
+    nodes = np.einsum("pab,nbk->npak", _TRIANGLE_REFINEMENT, columns[facets[crossed]], optimize=True)
+    columns = nodes.reshape(-1, columns.shape[1])
+    triangles = np.arange(len(columns)).reshape(-1, 6)[:, _TRIANGLE_SPLIT].reshape(-1, 3)
+    shape = TriangleSet(columns[:, :3], triangles, columns[:, 3:-1], np.repeat(owner[crossed], 16))
+    return section_of_triangles(shape, columns[:, -1])
 
 
 def sharp_edges(

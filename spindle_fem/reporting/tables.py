@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spindle_fem.reporting.figures import grouped
+from spindle_fem.reporting.figures import BODY_NAMES, grouped
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,7 +150,7 @@ def term_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
         column("bearing"),
         *(column(readable(key), number=True) for key in terms),
         column("sum", number=True),
-        *(column(f"to {readable(key)}", number=True) for key in paths),
+        *(column(f"to {BODY_NAMES.get(key, readable(key))}", number=True) for key in paths),
     ]
     return {"columns": columns, "rows": rows}
 
