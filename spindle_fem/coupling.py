@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spindle_fem.conduction.operators import ThermalOperators, build_operators
 from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.conduction.steady import ConductionSolution, solve_steady
-from spindle_fem.errors import ConvergenceError, NoSteadyStateError
+from spindle_fem.errors import ConvergenceError, NoEquilibriumError, NoSteadyStateError, OutOfValidityError
 from spindle_fem.geometry.assembly import build_assembly
 from spindle_fem.loads.bearing_heat import heat_model_of
 from spindle_fem.loads.build import FieldState, LoadsBuilder
@@ -22,15 +22,17 @@ from spindle_fem.loads.model import Loads
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.meshing.build import build_mesh
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.runaway import RELAXATION, highest_stable_speed, preload_runs_away
 from spindle_fem.spec.model import MachineSpec
 
 # The coolant's energy closes to 1e-8 only when the wall is known to about 1e-7 K.
 FIELD_TOLERANCE = 1.0e-8
 HEAT_TOLERANCE = 1.0e-7
-MAXIMUM_ITERATIONS = 60
+MAXIMUM_ITERATIONS = 100
 ANDERSON_DEPTH = 6
 # Greases and seals are gone long before; a field beyond this is running away.
 RUNAWAY_TEMPERATURE = 600.0
+MIXING_BELOW = 0.5
 
 Progress = Callable[[str], None]
 
@@ -161,26 +163,36 @@ def solve_coupled(
 
     Source: Walker & Ni (2011), SIAM J. Numer. Anal. 49, 1715-1735 (mixing).
     """
-    unknowns = np.full(machine.operators.n_unknowns, point.ambient_temperature) if start is None else start
+    operators = machine.operators
+    unknowns = np.full(operators.n_unknowns, point.ambient_temperature) if start is None else start
     lumped: dict[str, float] = {}
     mixing = _AndersonMixing(ANDERSON_DEPTH)
     solution: ConductionSolution | None = None
     heat_before = np.inf
     change = np.inf
+    follows_preload = machine.spec.heat.thermal_preload and machine.spec.heat.model != "table"
+    assembled: dict[str, float] = {}
     for iteration in range(1, MAXIMUM_ITERATIONS + 1):
-        loads, coolant = machine.builder.at(point, machine.field_state(unknowns, lumped))
+        try:
+            loads, coolant = machine.builder.at(point, machine.field_state(unknowns, lumped))
+        except (NoEquilibriumError, OutOfValidityError) as error:
+            if iteration == 1 or not follows_preload:
+                raise
+            raise _no_steady_state(machine, point, str(error)) from error
         solution = solve_steady(
             machine.problem(loads),
             guess=solution,
             preconditioner=None if solution is None else solution.preconditioner,
         )
         hottest = float(solution.temperature.max())
+        preload = {name: heat.preload for name, heat in loads.bearing_heat.items()}
+        assembled = assembled or preload
         if not np.isfinite(hottest) or hottest > RUNAWAY_TEMPERATURE:
-            raise NoSteadyStateError(
-                machine.spec.name,
-                f"the temperature runs away (over {RUNAWAY_TEMPERATURE - 273.15:.0f} °C in iteration {iteration}) "
-                f"at {point.speed * 30 / np.pi:.0f} rpm with {loads.total_heat:.0f} W of friction heat.",
-                "Lower the speed or the preload, or cool more.",
+            raise _no_steady_state(machine, point, f"{loads.total_heat:.0f} W would heat it over {hottest - 273.15:.0f} °C.")
+        if follows_preload and preload_runs_away(preload, assembled):
+            worst = max(preload, key=lambda name: preload[name] / assembled[name])
+            raise _no_steady_state(
+                machine, point, f"the preload of {worst} passes {preload[worst]:.0f} N, from {assembled[worst]:.0f} N cold."
             )
         change = float(np.abs(solution.temperature - unknowns).max())
         heat = loads.total_heat
@@ -189,16 +201,30 @@ def solve_coupled(
             return CoupledState(solution, loads, coolant, iteration, change)
         heat_before = heat
         names = solution.problem.lumped_names
-        given = np.concatenate([unknowns, [lumped.get(name, value) for name, value in
-                                           zip(names, solution.lumped_temperature, strict=True)]])
-        mixed = mixing.next(given, np.concatenate([solution.temperature, solution.lumped_temperature]))
-        unknowns = mixed[: machine.operators.n_unknowns]
-        lumped = dict(zip(names, mixed[machine.operators.n_unknowns :].tolist(), strict=True))
+        found = np.concatenate([solution.temperature, solution.lumped_temperature])
+        given = np.concatenate([unknowns, [lumped.get(name, point.ambient_temperature) for name in names]])
+        # Far from the fixed point, heat that grows with temperature must be followed as the machine warms.
+        if follows_preload and change > MIXING_BELOW:
+            mixed = given + RELAXATION * (found - given)
+        else:
+            mixed = mixing.next(given, found)
+        unknowns = mixed[: operators.n_unknowns]
+        lumped = dict(zip(names, mixed[operators.n_unknowns :].tolist(), strict=True))
     raise ConvergenceError(
         machine.spec.name,
         f"field and loads still change by {change:.2g} K after {MAXIMUM_ITERATIONS} iterations.",
         "Friction heat may rise with temperature faster than the machine can carry it away; lower speed or preload.",
     )
+
+
+def _no_steady_state(machine: PreparedMachine, point: OperatingPoint, reason: str) -> NoSteadyStateError:
+    """The error of a runaway, with the speed up to which the machine has an equilibrium."""
+    rpm = point.speed * 30.0 / np.pi
+    advice = "Lower the speed or the preload, or cool more."
+    if machine.spec.heat.thermal_preload:
+        limit = highest_stable_speed(machine, point) * 30.0 / np.pi
+        advice = f"A thermal equilibrium exists up to about {limit:.0f} rpm. {advice}"
+    return NoSteadyStateError(machine.spec.name, f"no thermal equilibrium at {rpm:.0f} rpm: {reason}", advice)
 
 
 class _AndersonMixing:

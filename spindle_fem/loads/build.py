@@ -126,7 +126,7 @@ class LoadsBuilder:
         lumped: list[LumpedLoad] = []
         for group, bearing in self.spec.bearings:
             heat = heats[bearing.name]
-            shares = self._shares(heat.total)
+            shares = self.shares(heat.total)
             heat_to[bearing.name] = shares
             surface_heat[f"{bearing.name}.inner_raceway"] = shares["inner"]
             surface_heat[f"{bearing.name}.outer_raceway"] = shares["outer"]
@@ -141,7 +141,8 @@ class LoadsBuilder:
         loads = Loads(surface_heat, films, tuple(lumped), heats, heat_to, fold_warnings(warnings, tuple(heats)))
         return loads, coolant
 
-    def _shares(self, total: float) -> dict[str, float]:
+    def shares(self, total: float) -> dict[str, float]:
+        """Where a bearing's heat enters: both rings and the balls, W."""
         heat = self.spec.heat
         rings = (1.0 - heat.ball_share) * total
         inner = heat.inner_share.value

@@ -1,0 +1,130 @@
+"""Where the rings' own heat stops having a thermal equilibrium.
+
+A rigid preload rises when the inner ring is hotter than the outer one, more
+preload makes more friction heat, and more heat a larger difference. Above some
+speed that loop has no fixed point; the answer is then a speed, not a
+temperature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.conduction.steady import solve_steady
+from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
+from spindle_fem.loads.bearing_heat import BearingTemperatures
+from spindle_fem.loads.operating_point import OperatingPoint
+
+if TYPE_CHECKING:
+    from spindle_fem.coupling import PreparedMachine
+
+# A preload this many times that of assembly ends a bearing, whatever the loop then does.
+LARGEST_PRELOAD_RATIO = 5.0
+RELAXATION = 0.3
+HEAT_TOLERANCE = 1.0e-4
+MAXIMUM_STEPS = 200
+SPEED_TOLERANCE = 0.005
+MAXIMUM_RESPONSES = 6
+
+
+class HeatResponse:
+    """Bearing temperatures as a linear function of the heat of each bearing.
+
+    Films, oil and contact conductances stay as they are at the operating
+    point, so one solve a bearing describes the machine for all heats.
+    """
+
+    def __init__(self, machine: PreparedMachine, point: OperatingPoint) -> None:
+        self.machine = machine
+        self.point = point
+        self.names = [bearing.name for _, bearing in machine.spec.bearings]
+        unknowns = np.full(machine.operators.n_unknowns, point.ambient_temperature)
+        loads, _ = machine.builder.at(point, machine.field_state(unknowns, {}))
+        solution = None
+        columns = []
+        for active in (None, *self.names):
+            heat = dict.fromkeys(loads.surface_heat, 0.0)
+            shares = machine.builder.shares(1.0)
+            if active:
+                heat |= {f"{active}.inner_raceway": shares["inner"], f"{active}.outer_raceway": shares["outer"]}
+            balls = machine.builder.ball_nodes(active) if active else ()
+            lumped = tuple(
+                replace(node, heat=shares["balls"] / len(balls) if node.name in balls else 0.0)
+                for node in loads.lumped
+            )
+            problem = machine.problem(replace(loads, surface_heat=heat, lumped=lumped))
+            solution = solve_steady(
+                problem, guess=solution, preconditioner=None if solution is None else solution.preconditioner
+            )
+            nodes = dict(zip(problem.lumped_names, solution.lumped_temperature.tolist(), strict=True))
+            found = machine.builder.bearing_temperatures(machine.field_state(solution.temperature, nodes))
+            columns.append(_as_array(found, self.names))
+        self.unheated = columns[0]
+        self.per_watt = np.stack([column - columns[0] for column in columns[1:]], axis=-1)
+
+    def temperatures(self, heat: NDArray[np.float64]) -> dict[str, BearingTemperatures]:
+        """Temperatures at given heats (n_bearings,) in W."""
+        values = self.unheated + self.per_watt @ heat
+        return {name: BearingTemperatures(*row) for name, row in zip(self.names, values.tolist(), strict=True)}
+
+    def settles(self, speed: float) -> bool:
+        """Whether heat and temperature reach a fixed point when they start cold."""
+        point = replace(self.point, speed=speed)
+        heat = np.zeros(len(self.names))
+        assembled: dict[str, float] | None = None
+        for _ in range(MAXIMUM_STEPS):
+            try:
+                found, _ = self.machine.builder.heat_model(point, self.temperatures(heat))
+            except (NoEquilibriumError, OutOfValidityError):
+                return False
+            preload = {name: found[name].preload for name in self.names}
+            assembled = assembled or preload
+            if preload_runs_away(preload, assembled):
+                return False
+            wanted = np.array([found[name].total for name in self.names])
+            if np.abs(wanted - heat).max() <= HEAT_TOLERANCE * wanted.max():
+                return True
+            heat = heat + RELAXATION * (wanted - heat)
+        return False
+
+    def highest_speed(self, highest: float) -> float:
+        """Largest speed below ``highest`` (rad/s) at which an equilibrium exists."""
+        low, high = 0.0, highest
+        while high - low > SPEED_TOLERANCE * highest:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.settles(middle) else (low, middle)
+        return low
+
+
+def highest_stable_speed(machine: PreparedMachine, point: OperatingPoint) -> float:
+    """Speed up to which the machine has a thermal equilibrium, rad/s; below that of ``point``.
+
+    Films depend on speed, so the response is taken again at the speed found
+    until both agree.
+    """
+    limit = point.speed
+    for _ in range(MAXIMUM_RESPONSES):
+        found = HeatResponse(machine, replace(point, speed=limit)).highest_speed(point.speed)
+        settled = abs(found - limit) <= 2.0 * SPEED_TOLERANCE * point.speed
+        limit = found
+        if settled or limit == 0.0:
+            break
+    return limit
+
+
+def preload_runs_away(preload: dict[str, float], assembled: dict[str, float]) -> bool:
+    """Whether a preload has grown beyond what a bearing survives."""
+    return any(preload[name] > LARGEST_PRELOAD_RATIO * assembled[name] for name in preload)
+
+
+def _as_array(found: dict[str, BearingTemperatures], names: list[str]) -> NDArray[np.float64]:
+    return np.array(
+        [
+            (found[name].inner, found[name].outer, found[name].ball, found[name].shaft, found[name].housing)
+            for name in names
+        ]
+    )
