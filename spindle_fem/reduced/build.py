@@ -1,0 +1,314 @@
+"""Make a reduced model: snapshots, basis, check against the full model, enrichment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from spindle_fem.coupling import PreparedMachine, prepare_machine
+from spindle_fem.errors import ConvergenceError
+from spindle_fem.loads.coolant_loop import CoolantLoop
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.reduced.affine import AffineSystem, build_affine_system
+from spindle_fem.reduced.coefficients import (
+    CHANNEL_FILM,
+    CoefficientTable,
+    build_coefficient_table,
+    free_parameters,
+    gap_radii_of,
+)
+from spindle_fem.reduced.model import ReducedModel, project, reduced_digest, reduced_path
+from spindle_fem.reduced.snapshots import Sample, compress, helix_profiles, load_columns, solve_shifted
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.spec.parameters import with_parameters
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+RPM = np.pi / 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class ReductionOptions:
+    """How a reduced model is made.
+
+    Attributes
+    ----------
+    samples : int
+        Sets of coefficients beside the nominal one.
+    checks : int
+        Sets that the basis is not made from.
+    sigmas : float
+        Half width of the sampled range in standard deviations.
+    tolerance : float, [-]
+        Of the proper orthogonal decomposition.
+    error : float, [K]
+        Largest error at any probe in the checks, for loads as large as they occur.
+    largest : int
+        Basis vectors at most.
+    """
+
+    samples: int = 8
+    checks: int = 3
+    sigmas: float = 3.0
+    tolerance: float = 3.0e-6
+    error: float = 5.0e-3
+    largest: int = 140
+
+
+# Laplace frequencies, 1/s: steady state, hours, minutes, half a minute.
+SHIFTS = (0.0, 3.0e-4, 3.0e-3)
+FAST_SHIFT = 3.0e-2
+FRICTION_HEAT = 80.0
+PLACE_HEAT = 50.0
+FLUID_RISE = 10.0
+SPEEDS_RPM = (0.0, 3000.0, 1000.0, 4500.0, 2000.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Workshop:
+    """What building the snapshots needs beside the operators."""
+
+    machine: PreparedMachine
+    affine: AffineSystem
+    table: CoefficientTable
+    sigma: Mapping[str, float]
+    options: ReductionOptions
+
+    def sample(self, factors: Mapping[str, float], speed: float) -> Sample:
+        """Coefficients with factors at a speed."""
+        spec = self.machine.spec
+        point = replace(OperatingPoint.of(spec), speed=speed)
+        chosen = self.table.factors(factors)
+        chosen.pop("heat.inner_share", None)
+        base = self.table.base(point)
+        coefficients = {name: base[name] * self.table.scale(name, chosen) for name in self.affine.coefficient_names}
+        capacities = {
+            name: value * self.table.scale(name, chosen) for name, value in self.table.capacities().items()
+        }
+        film = nominal_channel_film(self.machine, point) * self.table.scale(CHANNEL_FILM, chosen)
+        return Sample(coefficients, film, capacities)
+
+    def random_samples(self, number: int, seed: int, sigmas: float) -> list[Sample]:
+        """Latin hypercube over all parameters; the speeds take turns."""
+        names = tuple(self.sigma)
+        unit = qmc.LatinHypercube(max(1, len(names)), rng=seed).random(number)
+        found = []
+        for row, values in enumerate(unit):
+            factors = {
+                name: float(np.exp(sigmas * self.sigma[name] * (2.0 * value - 1.0)))
+                for name, value in zip(names, values, strict=False)
+            }
+            found.append(self.sample(factors, SPEEDS_RPM[row % len(SPEEDS_RPM)] * RPM))
+        return found
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest coefficient that the samples may have."""
+        ends = []
+        for speed in SPEEDS_RPM:
+            for sign in (-1.0, 1.0):
+                factors = {name: float(np.exp(sign * self.options.sigmas * s)) for name, s in self.sigma.items()}
+                sample = self.sample(factors, speed * RPM)
+                ends.append(
+                    sample.coefficients
+                    | sample.capacities
+                    | ({CHANNEL_FILM: float(sample.channel_film.mean())} if sample.channel_film.size else {})
+                )
+        return {name: (min(e[name] for e in ends), max(e[name] for e in ends)) for name in ends[0]}
+
+
+def nominal_channel_film(machine: PreparedMachine, point: OperatingPoint) -> Array:
+    """Film of every coolant cell with the wall at inlet temperature, (n_cells,) W/(m²·K)."""
+    cells = machine.builder.cells
+    if cells is None:
+        return np.zeros(0)
+    wall = np.full(cells.cell_area.shape, point.coolant_inlet_temperature)
+    return CoolantLoop(machine.spec, cells).at(point, wall).film_coefficient.ravel()
+
+
+def reduced_model_of(
+    spec: MachineSpec,
+    *,
+    options: ReductionOptions | None = None,
+    progress: Progress = lambda stage: None,
+) -> ReducedModel:
+    """Reduced model of a machine, from the cache where it was made before.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    options : ReductionOptions, optional
+    progress : callable
+        Told each stage by name as it begins.
+    """
+    chosen = options or ReductionOptions()
+    digest = reduced_digest(spec, asdict(chosen))
+    found = ReducedModel.load(reduced_path(digest))
+    if found is not None and found.digest == digest:
+        return found
+    machine = prepare_machine(spec, progress=progress)
+    model = build_reduced_model(machine, chosen, progress=progress)
+    model.save(reduced_path(digest))
+    return model
+
+
+def build_reduced_model(
+    machine: PreparedMachine,
+    options: ReductionOptions | None = None,
+    *,
+    progress: Progress = lambda stage: None,
+) -> ReducedModel:
+    """Project a prepared machine and check the projection against the full model.
+
+    Snapshots are full solutions at several Laplace frequencies (moment
+    matching, rational Krylov) for every source and fluid at the nominal
+    coefficients, and for the physical loads at coefficients drawn over the
+    range; their proper orthogonal decomposition in the energy of the nominal
+    operator is the basis. Where a check at other coefficients errs by more
+    than ``options.error``, its solutions join the snapshots.
+
+    Raises
+    ------
+    ConvergenceError
+        The checks still err after three rounds.
+    """
+    chosen = options or ReductionOptions()
+    spec = machine.spec
+    progress("reduced model: operators")
+    affine = build_affine_system(machine)
+    radii = gap_radii_of(machine)
+    table = build_coefficient_table(spec, machine.mesh.joints, radii)
+    workshop = _Workshop(machine, affine, table, free_parameters(spec), chosen)
+    nominal = workshop.sample({}, 3000.0 * RPM)
+    progress("reduced model: snapshots")
+    snapshots = [_nominal_snapshots(affine, nominal, spec)]
+    samples = workshop.random_samples(chosen.samples, 1, chosen.sigmas)
+    for sample in samples:
+        for shift in SHIFTS:
+            snapshots.append(solve_shifted(affine, sample, shift, physical_loads(affine, sample, spec)))
+    energy = (
+        affine.conduction(nominal.coefficients, nominal.channel_film) + 1e-4 * affine.capacity(nominal.capacities)
+    ).tocsr()
+    uniform = np.ones((affine.size, 1))
+    checks = workshop.random_samples(chosen.checks, 2, 0.9 * chosen.sigmas)
+    exact = [
+        [(shift, solve_shifted(affine, sample, shift, physical_loads(affine, sample, spec))) for shift in SHIFTS]
+        for sample in checks
+    ]
+    for _ in range(3):
+        progress("reduced model: basis")
+        basis = compress(np.hstack(snapshots), energy, chosen.tolerance, chosen.largest, uniform)
+        one = basis.T @ (energy @ uniform[:, 0])
+        model = project(
+            affine,
+            basis,
+            one,
+            cells=machine.builder.cells,
+            contacts=tuple(machine.mesh.joints),
+            gap_radii=radii,
+            ranges=workshop.ranges(),
+            digest=reduced_digest(spec, asdict(chosen)),
+        )
+        errors = [_check(affine, model, basis, sample, found, spec) for sample, found in zip(checks, exact, strict=True)]
+        worst = {key: max(error[key] for error in errors) for key in errors[0]}
+        model = replace(model, errors=worst)
+        if worst["probes"] <= chosen.error:
+            return model
+        for number, error in enumerate(errors):
+            if error["probes"] > chosen.error:
+                snapshots += [solution for _, solution in exact[number]]
+        # Solutions that have joined can no longer judge: draw others.
+        checks = workshop.random_samples(chosen.checks, 100 + len(snapshots), 0.9 * chosen.sigmas)
+        exact = [
+            [(s, solve_shifted(affine, sample, s, physical_loads(affine, sample, spec))) for s in SHIFTS]
+            for sample in checks
+        ]
+    raise ConvergenceError(
+        "reduced model",
+        f"its probes still err by {worst['probes']:.3g} K with {model.size} basis vectors.",
+        f"Asked: {chosen.error:g} K. Allow more basis vectors or a larger error.",
+    )
+
+
+def _source_places(affine: AffineSystem, spec: MachineSpec) -> tuple[list[str], list[str]]:
+    """Places where friction heat enters, and those where a diagnosis may need a source."""
+    friction = [
+        f"{bearing.name}.{side}"
+        for _, bearing in spec.bearings
+        for side in ("inner_raceway", "outer_raceway", "balls")
+    ]
+    rings = {f"{bearing.name}.{side}" for _, bearing in spec.bearings for side in ("inner_ring", "outer_ring")}
+    segments = {f"{part.name}.{segment.name}" for part in spec.part for segment in part.segment}
+    single = {f"{part.name}.{part.segment[0].name}" for part in spec.part if len(part.segment) == 1}
+    other = [name for name in affine.place_names if name in segments - single or name in rings]
+    other += [part.name for part in spec.part if len(part.segment) == 1]
+    return friction, other
+
+
+def _nominal_snapshots(affine: AffineSystem, nominal: Sample, spec: MachineSpec) -> Array:
+    friction, other = _source_places(affine, spec)
+    heat = FRICTION_HEAT * load_columns(affine, friction)
+    fluids = [nominal.coefficients[name] * FLUID_RISE * load for name, load in affine.fluid_load.items()]
+    columns = [heat, PLACE_HEAT * load_columns(affine, other), np.array(fluids).reshape(-1, affine.size).T]
+    columns.append(_coolant_loads(affine, nominal, 5))
+    loads = np.hstack(columns)
+    found = [solve_shifted(affine, nominal, shift, loads) for shift in SHIFTS]
+    found.append(solve_shifted(affine, nominal, FAST_SHIFT, heat))
+    return np.hstack(found)
+
+
+def _coolant_loads(affine: AffineSystem, sample: Sample, degree: int) -> Array:
+    if not affine.cell_film:
+        return np.zeros((affine.size, 0))
+    profiles = helix_profiles(*affine.cell_area.shape, degree) * FLUID_RISE
+    return np.asarray(affine.cell_load.T @ (sample.channel_film[:, None] * profiles))
+
+
+def physical_loads(affine: AffineSystem, sample: Sample, spec: MachineSpec) -> Array:
+    """Loads that occur: heat of each set on inner and on outer raceways, air, coolant."""
+    columns = []
+    for group in spec.bearing_set:
+        for side in ("inner_raceway", "outer_raceway"):
+            names = [f"{bearing.name}.{side}" for bearing in group.bearing]
+            columns.append(FRICTION_HEAT * load_columns(affine, names).sum(axis=1))
+    if affine.fluid_load:
+        films = sum(sample.coefficients[name] * load for name, load in affine.fluid_load.items())
+        columns.append(FLUID_RISE * films)
+    coolant = _coolant_loads(affine, sample, 1)
+    return np.column_stack([*columns, *coolant.T])
+
+
+def _check(
+    affine: AffineSystem,
+    model: ReducedModel,
+    basis: Array,
+    sample: Sample,
+    exact: list[tuple[float, Array]],
+    spec: MachineSpec,
+) -> dict[str, float]:
+    """Largest error of each kind over loads and frequencies."""
+    loads = basis.T @ physical_loads(affine, sample, spec)
+    weights = np.array([sample.coefficients[name] for name in model.coefficient_names])
+    conduction = np.einsum("c,cij->ij", weights, model.operators)
+    conduction += np.einsum("c,cij->ij", sample.channel_film, model.cell_film)
+    capacities = np.array([sample.capacities[name] for name in model.storage_names])
+    storage = np.einsum("c,cij->ij", capacities, model.storage)
+    worst = {"probes": 0.0, "places": 0.0}
+    for shift, full in exact:
+        small = np.linalg.solve(conduction + shift * storage, loads)
+        worst["probes"] = max(worst["probes"], _largest(model.probes @ small - affine.probes @ full))
+        worst["places"] = max(worst["places"], _largest(model.places @ small - affine.places @ full))
+    return worst
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max()) if values.size else 0.0
+
+
+def widened(spec: MachineSpec, factors: Mapping[str, float]) -> MachineSpec:
+    """The machine with its uncertain values moved to where a calibration went: the centre of a new range."""
+    return with_parameters(spec, dict(factors))

@@ -1,0 +1,233 @@
+"""The projected model: small dense operators with every coefficient still free."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.loads.channel_cells import ChannelCells
+from spindle_fem.meshing.cache import MESHER_REVISION, cache_directory
+from spindle_fem.reduced.affine import AffineSystem
+from spindle_fem.reduced.coefficients import CoefficientTable, build_coefficient_table
+from spindle_fem.spec.model import MachineSpec
+
+Array = NDArray[np.float64]
+
+FORMAT = "spindle-fem/reduced/1"
+# Raise it whenever the same machine gives another reduced model.
+REVISION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class ReducedModel:
+    """Galerkin projection of a machine's finite-element model on ``r`` basis vectors.
+
+    The reduced unknowns ``u`` stand for the field ``V u``. Every operator is
+    ``Vᵀ K_i V``: symmetric, positive semi-definite, and since the basis holds
+    the uniform field, heat is conserved exactly.
+
+    Attributes
+    ----------
+    coefficient_names : tuple of str
+    operators : (n_c, r, r) ndarray
+        Of unit coefficient.
+    fluid_names : tuple of str
+        Coefficients that are films.
+    fluid_load : (n_f, r) ndarray
+        What a fluid of 1 K puts in at unit coefficient.
+    cell_film : (n_cells, r, r) ndarray, [m²]
+    cell_load : (n_cells, r) ndarray, [m²]
+    cell_area : (n_starts, n_along) ndarray, [m²]
+    cell_angle, cell_position : (n_along,) ndarray, [rad], [m]
+    cell_is_port : (n_along,) bool ndarray
+    storage_names : tuple of str
+    storage : (n_s, r, r) ndarray
+    place_names : tuple of str
+    places : (n_p, r) ndarray
+        Mean over each place; also the load of 1 W spread over it.
+    probe_names : tuple of str
+    probes : (n_q, r) ndarray
+    one : (r,) ndarray
+        The uniform field of 1 K.
+    contacts : tuple of str
+    gap_radii : mapping of gap to (float, float), [m]
+    ranges : mapping of coefficient to (float, float)
+        Where the basis was made and checked.
+    errors : mapping of str to float
+        Largest error against the full model at samples that the basis was not
+        made from, K, by what was compared.
+    n_full : int
+        Unknowns of the full model.
+    digest : str
+    """
+
+    coefficient_names: tuple[str, ...]
+    operators: Array
+    fluid_names: tuple[str, ...]
+    fluid_load: Array
+    cell_film: Array
+    cell_load: Array
+    cell_area: Array
+    cell_angle: Array
+    cell_position: Array
+    cell_is_port: NDArray[np.bool_]
+    storage_names: tuple[str, ...]
+    storage: Array
+    place_names: tuple[str, ...]
+    places: Array
+    probe_names: tuple[str, ...]
+    probes: Array
+    one: Array
+    contacts: tuple[str, ...]
+    gap_radii: Mapping[str, tuple[float, float]]
+    ranges: Mapping[str, tuple[float, float]]
+    errors: Mapping[str, float] = field(default_factory=dict)
+    n_full: int = 0
+    digest: str = ""
+
+    @property
+    def size(self) -> int:
+        """Basis vectors."""
+        return len(self.one)
+
+    def place(self, name: str) -> Array:
+        """Mean over a place, and the load of 1 W spread over it, (r,)."""
+        return self.places[self.place_names.index(name)]
+
+    def table(self, spec: MachineSpec) -> CoefficientTable:
+        """Coefficients of a machine with this model's geometry."""
+        return build_coefficient_table(spec, self.contacts, self.gap_radii)
+
+    def channel_cells(self) -> ChannelCells:
+        """The coolant's cells, without the mesh's facets."""
+        return ChannelCells(
+            (), {}, {}, self.cell_area, self.cell_angle, self.cell_position, self.cell_is_port
+        )
+
+    def outside_range(self, coefficients: Mapping[str, float]) -> tuple[str, ...]:
+        """Coefficients for which the basis was not made."""
+        return tuple(
+            name
+            for name, value in coefficients.items()
+            if name in self.ranges
+            and not self.ranges[name][0] * (1.0 - 1e-9) <= value <= self.ranges[name][1] * (1.0 + 1e-9)
+        )
+
+    # ----------------------------------------------------------------- disk
+    def save(self, path: Path) -> None:
+        """Write to an .npz file; readers never see half of it."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        arrays, header = {}, {"schema": FORMAT}
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                arrays[item.name] = value
+            else:
+                header[item.name] = dict(value) if isinstance(value, Mapping) else value
+        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".partial")
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                np.savez_compressed(stream, header=json.dumps(header), **arrays)
+            Path(temporary).replace(path)
+        finally:
+            Path(temporary).unlink(missing_ok=True)
+
+    @classmethod
+    def load(cls, path: Path) -> ReducedModel | None:
+        """What :meth:`save` wrote; None where there is none, or another version, or a damaged file."""
+        if not path.is_file():
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                header = json.loads(str(data["header"]))
+                arrays = {name: data[name] for name in data.files if name != "header"}
+        except (OSError, ValueError, KeyError, EOFError):
+            return None
+        if header.pop("schema", None) != FORMAT:
+            return None
+        for name, value in header.items():
+            if isinstance(value, list):
+                header[name] = tuple(value)
+        for name in ("gap_radii", "ranges"):
+            header[name] = {key: tuple(pair) for key, pair in header[name].items()}
+        return cls(**header, **arrays)
+
+
+def project(
+    affine: AffineSystem,
+    basis: Array,
+    one: Array,
+    *,
+    cells: ChannelCells | None,
+    contacts: tuple[str, ...],
+    gap_radii: Mapping[str, tuple[float, float]],
+    ranges: Mapping[str, tuple[float, float]],
+    digest: str,
+) -> ReducedModel:
+    """Galerkin projection of every operator.
+
+    Parameters
+    ----------
+    affine : AffineSystem
+    basis : (n, r) ndarray
+    one : (r,) ndarray
+        Coordinates of the uniform field.
+    """
+
+    def small(matrices: tuple) -> Array:
+        found = [basis.T @ (matrix @ basis) for matrix in matrices]
+        stacked = np.array(found) if found else np.zeros((0, basis.shape[1], basis.shape[1]))
+        return 0.5 * (stacked + stacked.transpose(0, 2, 1))
+
+    n_along = affine.cell_area.shape[1]
+    return ReducedModel(
+        coefficient_names=affine.coefficient_names,
+        operators=small(affine.operators),
+        fluid_names=tuple(affine.fluid_load),
+        fluid_load=np.array([basis.T @ load for load in affine.fluid_load.values()]).reshape(-1, basis.shape[1]),
+        cell_film=small(affine.cell_film),
+        cell_load=np.asarray(affine.cell_load @ basis),
+        cell_area=affine.cell_area,
+        cell_angle=np.zeros(n_along) if cells is None else cells.angle,
+        cell_position=np.zeros(n_along) if cells is None else cells.position,
+        cell_is_port=np.zeros(n_along, dtype=bool) if cells is None else cells.is_port,
+        storage_names=affine.storage_names,
+        storage=small(affine.storage),
+        place_names=affine.place_names,
+        places=np.asarray(affine.places @ basis),
+        probe_names=affine.probe_names,
+        probes=np.asarray(affine.probes @ basis),
+        one=one,
+        contacts=contacts,
+        gap_radii=gap_radii,
+        ranges=ranges,
+        n_full=affine.size,
+        digest=digest,
+    )
+
+
+def reduced_digest(spec: MachineSpec, options: Mapping[str, float]) -> str:
+    """Hash of everything that a reduced model depends on."""
+    content = spec.model_dump(mode="json")
+    # The operating point and the words change nothing in the operators.
+    for key in ("operation", "name", "title", "description", "initial", "effects"):
+        content.pop(key, None)
+    text = json.dumps(
+        {"format": FORMAT, "revision": [REVISION, MESHER_REVISION], "spec": content, "options": dict(options)},
+        sort_keys=True,
+        default=str,
+    )
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def reduced_path(digest: str) -> Path:
+    """File of a reduced model in the cache."""
+    return cache_directory() / f"reduced-{digest}.npz"
