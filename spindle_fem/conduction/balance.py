@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.conduction.operators import spread
-from spindle_fem.conduction.problem import ConductionProblem, ThermalSystem, heat_flux
+from spindle_fem.conduction.problem import ConductionProblem, heat_flux
+from spindle_fem.conduction.system import ThermalSystem
 from spindle_fem.errors import EnergyBalanceError
 
 BALANCE_TOLERANCE = 1e-8

@@ -13,7 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
 
 from spindle_fem.conduction.multigrid import build_hierarchy
-from spindle_fem.conduction.problem import ThermalSystem
+from spindle_fem.conduction.system import ThermalSystem
 from spindle_fem.errors import ConvergenceError, SpecError
 
 DIRECT_BELOW = 20_000
@@ -152,9 +152,8 @@ def solve_linear(
     target = relative_tolerance * scale if absolute_tolerance is None else absolute_tolerance
     iterations = 0
     restarts = 0
-    diagonal = matrix.diagonal()
     while (norm := float(np.linalg.norm(residual))) > target:
-        if norm <= ROUND_OFF * float(np.linalg.norm(diagonal * unknowns)):
+        if restarts and norm <= ROUND_OFF * float(np.linalg.norm(matrix.diagonal() * unknowns)):
             break
         if iterations >= max_iterations or restarts > 4:
             raise ConvergenceError(

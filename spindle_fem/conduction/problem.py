@@ -1,4 +1,4 @@
-"""What is asked of a mesh: coefficients, heat, films, lumped nodes; and its equations."""
+"""What is asked of a mesh: coefficients, heat, films, lumped nodes."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from spindle_fem.conduction.operators import ThermalOperators, spread
+from spindle_fem.conduction.system import ThermalSystem as ThermalSystem
 from spindle_fem.errors import MeshTagError, NoSteadyStateError, SpecError, did_you_mean
 
 PERFECT_CONTACT = np.inf
@@ -171,179 +172,6 @@ class ConductionProblem:
         return tuple(node.name for node in self.lumped_nodes)
 
 
-@dataclass(frozen=True, slots=True)
-class ThermalSystem:
-    """Equations ``[K −B; −Bᵀ D] [T; T_l] = [f; f_l]`` of a problem.
-
-    Temperatures count from ``reference_temperature``, so that round-off is
-    relative to the rise and not to absolute zero.
-
-    Attributes
-    ----------
-    matrix : (n, n) csr_array, [W/K]
-    load : (n,) ndarray, [W]
-    exchange : (n, m) csc_array, [W/K]
-        Coupling of unknowns with lumped nodes.
-    lumped_matrix : (m, m) ndarray, [W/K]
-    lumped_load : (m,) ndarray, [W]
-    reference_temperature : float, [K]
-    tie : (n, n_tied) csr_array or None
-        Unknowns from those left when perfect joints tie node pairs.
-    prolongation : (n, n_corners) csr_array or None
-        From linear to quadratic temperatures, for multigrid.
-    """
-
-    matrix: sparse.csr_array
-    load: NDArray[np.float64]
-    exchange: sparse.csc_array
-    lumped_matrix: NDArray[np.float64]
-    lumped_load: NDArray[np.float64]
-    reference_temperature: float
-    tie: sparse.csr_array | None
-    prolongation: sparse.csr_array | None
-
-    @property
-    def n_lumped(self) -> int:
-        """Number of lumped nodes."""
-        return len(self.lumped_load)
-
-    def full_matrix(self) -> sparse.csr_array:
-        """``[K −B; −Bᵀ D]`` as one sparse matrix."""
-        if not self.n_lumped:
-            return self.matrix
-        return sparse.block_array(
-            [[self.matrix, -self.exchange], [-self.exchange.T, sparse.csr_array(self.lumped_matrix)]],
-            format="csr",
-        )
-
-    def full_load(self) -> NDArray[np.float64]:
-        """``[f; f_l]``."""
-        return np.concatenate((self.load, self.lumped_load))
-
-    def tied(self) -> ThermalSystem:
-        """The same equations with perfect joints eliminated."""
-        if self.tie is None:
-            return self
-        tie = self.tie
-        return ThermalSystem(
-            (tie.T @ self.matrix @ tie).tocsr(),
-            tie.T @ self.load,
-            (tie.T @ self.exchange).tocsc(),
-            self.lumped_matrix,
-            self.lumped_load,
-            self.reference_temperature,
-            None,
-            _tied_prolongation(tie, self.prolongation),
-        )
-
-
-def assemble_system(problem: ConductionProblem, reference: float | None = None) -> ThermalSystem:
-    """Equations of a problem; the unit integrals are only re-summed.
-
-    Parameters
-    ----------
-    problem : ConductionProblem
-        Without film laws: these are linearised first.
-    reference : float, optional, [K]
-        Temperature that unknowns count from; the mean of the surroundings
-        when absent.
-
-    Returns
-    -------
-    ThermalSystem
-    """
-    if problem.film_laws:
-        raise SpecError("problem", "film laws must be linearised before assembly.", "Use linearise_films.")
-    operators = problem.operators
-    upper = operators.sum_conduction(conductivity_of_parts(problem), _factors(problem))
-    coefficient = np.zeros(len(operators.facet_area))
-    for film in problem.films:
-        coefficient[operators.surface_rows[film.surface]] += np.asarray(film.coefficient)
-    columns, diagonal = [], []
-    for node in problem.lumped_nodes:
-        column = np.zeros(operators.n_unknowns)
-        total = 0.0
-        for surface, value in node.connections:
-            rows = operators.surface_rows[surface]
-            values = operators.per_facet(surface, value, node.name)
-            coefficient[rows] += values
-            column += operators.facet_vector(values, rows)
-            total += float(values @ operators.facet_area[rows])
-        columns.append(sparse.csc_array(column[:, None]))
-        diagonal.append(total)
-    ties = []
-    for joint, value in problem.joint_conductance.items():
-        side_a, side_b = operators.joint_rows[joint]
-        if np.ndim(value) == 0 and np.isinf(value):
-            ties.append(joint)
-            continue
-        conductance = spread(value, side_a.stop - side_a.start, joint)
-        coefficient[side_a] += conductance
-        coefficient[side_b] += conductance
-        operators.add_joint(upper, joint, conductance)
-    operators.add_films(upper, coefficient)
-    if reference is None:
-        reference = reference_temperature(problem)
-    load, lumped_load = assemble_load(problem, reference)
-    return ThermalSystem(
-        operators.matrix(upper),
-        load,
-        sparse.hstack(columns, format="csc") if columns else sparse.csc_array((operators.n_unknowns, 0)),
-        _lumped_matrix(problem, diagonal),
-        lumped_load,
-        reference,
-        _tie_matrix(operators, ties),
-        operators.prolongation,
-    )
-
-
-def assemble_load(
-    problem: ConductionProblem, reference: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Right-hand sides of the mesh's unknowns (n,) and of the lumped nodes (m,), [W].
-
-    Parameters
-    ----------
-    problem : ConductionProblem
-    reference : float, [K]
-        Temperature that unknowns count from.
-    """
-    operators = problem.operators
-    flux = np.zeros(len(operators.facet_area))
-    for film in problem.films:
-        rows = operators.surface_rows[film.surface]
-        flux[rows] += np.asarray(film.coefficient) * (np.asarray(film.ambient_temperature) - reference)
-    for surface, heat in problem.surface_heat.items():
-        flux[operators.surface_rows[surface]] += heat_flux(operators, surface, heat)
-    load = operators.facet_vector(flux, slice(0, len(flux)))
-    for part, heat in problem.part_heat.items():
-        own = operators.part_of_unknown == operators.part_index(part, "part_heat")
-        load[own] += heat / operators.part_volume[part] * operators.part_load[own]
-    lumped_load = np.array([node.heat for node in problem.lumped_nodes], dtype=float)
-    for link in problem.lumped_links:
-        if link.other is None:
-            rise = link.temperature - reference
-            lumped_load[problem.lumped_names.index(link.node)] += link.conductance * rise
-    return load, lumped_load
-
-
-def assemble_capacity(problem: ConductionProblem) -> tuple[sparse.csr_array, NDArray[np.float64]]:
-    """Capacity matrix (n, n) and capacities of the lumped nodes (m,), [J/K].
-
-    Raises
-    ------
-    SpecError
-        A part without volumetric capacity.
-    """
-    operators = problem.operators
-    missing = [part for part in operators.mesh.part_names if part not in problem.volumetric_capacity]
-    if missing:
-        raise SpecError("volumetric_capacity", f"no value for {', '.join(missing)}.", "Name every part.")
-    capacity = np.array([problem.volumetric_capacity[part] for part in operators.mesh.part_names])
-    matrix = operators.matrix(operators.sum_storage(capacity))
-    return matrix, np.array([node.capacity for node in problem.lumped_nodes])
-
-
 def conductivity_of_parts(problem: ConductionProblem) -> NDArray[np.float64]:
     """Conductivity of each part in the mesh's order, (n_parts,) [W/(m·K)]."""
     return np.array([problem.conductivity[part] for part in problem.operators.mesh.part_names], dtype=float)
@@ -362,56 +190,6 @@ def reference_temperature(problem: ConductionProblem) -> float:
     given = [float(np.mean(film.ambient_temperature)) for film in (*problem.films, *problem.film_laws)]
     given += [link.temperature for link in problem.lumped_links if link.temperature is not None]
     return float(np.mean(given)) if given else 0.0
-
-
-def _factors(problem: ConductionProblem) -> NDArray[np.float64] | None:
-    if not problem.circumferential_factor:
-        return None
-    return np.array(
-        [problem.circumferential_factor.get(part, 1.0) for part in problem.operators.mesh.part_names],
-        dtype=float,
-    )
-
-
-def _lumped_matrix(problem: ConductionProblem, diagonal: list[float]) -> NDArray[np.float64]:
-    names = problem.lumped_names
-    matrix = np.diag(np.array(diagonal, dtype=float)) if diagonal else np.zeros((0, 0))
-    for link in problem.lumped_links:
-        i = names.index(link.node)
-        matrix[i, i] += link.conductance
-        if link.other is not None:
-            j = names.index(link.other)
-            matrix[j, j] += link.conductance
-            matrix[i, j] -= link.conductance
-            matrix[j, i] -= link.conductance
-    return matrix
-
-
-def _tie_matrix(operators: ThermalOperators, joints: list[str]) -> sparse.csr_array | None:
-    if not joints:
-        return None
-    sides = [operators.joint_rows[joint] for joint in joints]
-    nodes_a = np.concatenate([operators.facet_nodes[a].ravel() for a, _ in sides])
-    nodes_b = np.concatenate([operators.facet_nodes[b].ravel() for _, b in sides])
-    n = operators.n_unknowns
-    graph = sparse.coo_array((np.ones(len(nodes_a)), (nodes_a, nodes_b)), shape=(n, n))
-    count, label = connected_components(graph, directed=False)
-    return sparse.csr_array((np.ones(n), (np.arange(n), label)), shape=(n, count))
-
-
-def _tied_prolongation(
-    tie: sparse.csr_array, prolongation: sparse.csr_array | None
-) -> sparse.csr_array | None:
-    """Prolongation between tied unknowns: corners tie with corners, middles with middles."""
-    if prolongation is None:
-        return None
-    n_corners = prolongation.shape[1]
-    labels, group = np.unique(tie.indices[:n_corners], return_inverse=True)
-    tie_corners = sparse.csr_array(
-        (np.ones(n_corners), (np.arange(n_corners), group)), shape=(n_corners, len(labels))
-    )
-    first = np.unique(tie.indices, return_index=True)[1]
-    return (prolongation[first] @ tie_corners).tocsr()
 
 
 # ------------------------------------------------------------------ validation

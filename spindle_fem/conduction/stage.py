@@ -10,18 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from spindle_fem.conduction.assemble import assemble_capacity, assemble_load, assemble_system
 from spindle_fem.conduction.balance import BoundaryFlows, boundary_flows
 from spindle_fem.conduction.linear_solvers import Preconditioner, build_preconditioner, solve_linear
 from spindle_fem.conduction.nonlinear import linearise_films
-from spindle_fem.conduction.problem import (
-    ConductionProblem,
-    ThermalSystem,
-    assemble_capacity,
-    assemble_load,
-    assemble_system,
-    reference_temperature,
-)
+from spindle_fem.conduction.problem import ConductionProblem, reference_temperature
 from spindle_fem.conduction.steady import close_balance, split_unknowns
+from spindle_fem.conduction.system import ThermalSystem
 from spindle_fem.errors import ConvergenceError, SpecError
 
 if TYPE_CHECKING:
@@ -71,6 +66,7 @@ class _Kept:
     conduction: sparse.csr_array | None = None
     step: float = -1.0
     matrix: sparse.csr_array | None = None
+    row_sums: NDArray[np.float64] | None = None
     preconditioner: Preconditioner | None = None
     fresh_iterations: int = -1
     stale: bool = False
@@ -256,7 +252,7 @@ class StageSolver:
             kept.fresh_iterations = max(solution.iterations, 1)
         elif solution.iterations > STALE_FACTOR * kept.fresh_iterations + STALE_EXTRA:
             kept.stale = True
-        return close_balance(matrix, right, solution.unknowns)
+        return close_balance(matrix, right, solution.unknowns, kept.row_sums)
 
     def _linear(self, problem: ConductionProblem, temperature: NDArray[np.float64]) -> ConductionProblem:
         if problem.operators is not self._operators or problem.lumped_names != self._names:
@@ -281,13 +277,14 @@ class StageSolver:
         # sizes that differ by round-off alone share one matrix
         if kept.matrix is None or abs(size - kept.step) > 1e-12 * size or kept.stale:
             factor = size * DIAGONAL
-            kept.matrix = sparse.csr_array(self._storage + factor * kept.conduction)
+            kept.matrix = add_scaled(self._storage, factor, kept.conduction)
+            kept.row_sums = kept.matrix @ np.ones(kept.matrix.shape[0])
             kept.step = size
             self.matrix_builds += 1
             if kept.preconditioner is None or kept.stale:
                 tied = kept.tied
                 stepped = ThermalSystem(
-                    sparse.csr_array(self._tied_storage + factor * tied.matrix),
+                    add_scaled(self._tied_storage, factor, tied.matrix),
                     tied.load,
                     tied.exchange * factor,
                     np.diag(self._lumped_capacity) + factor * tied.lumped_matrix,
@@ -315,6 +312,13 @@ class StageSolver:
         self, problem: ConductionProblem, unknowns: NDArray[np.float64], load: NDArray[np.float64]
     ) -> Stage:
         return Stage(problem, unknowns, load - self._kept.conduction @ unknowns, self._values(unknowns))
+
+
+def add_scaled(one: sparse.csr_array, factor: float, other: sparse.csr_array) -> sparse.csr_array:
+    """``one + factor · other``; on one pattern only the entries are added."""
+    if one.nnz == other.nnz and one.indices.ctypes.data == other.indices.ctypes.data:
+        return sparse.csr_array((one.data + factor * other.data, one.indices, one.indptr), shape=one.shape)
+    return sparse.csr_array(one + factor * other)
 
 
 def same_coefficients(one: ConductionProblem, other: ConductionProblem) -> bool:

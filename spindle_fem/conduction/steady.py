@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from spindle_fem.conduction.assemble import assemble_system
 from spindle_fem.conduction.balance import (
     BALANCE_TOLERANCE,
     LINEAR_BALANCE_TOLERANCE,
@@ -24,13 +25,8 @@ from spindle_fem.conduction.linear_solvers import (
     solve_linear,
 )
 from spindle_fem.conduction.nonlinear import law_heat, linearise_films
-from spindle_fem.conduction.problem import (
-    ConductionProblem,
-    ThermalSystem,
-    assemble_system,
-    reference_temperature,
-    require_surroundings,
-)
+from spindle_fem.conduction.problem import ConductionProblem, reference_temperature, require_surroundings
+from spindle_fem.conduction.system import ThermalSystem
 from spindle_fem.errors import ConvergenceError, SpecError
 
 NONLINEAR_TOLERANCE_K = 1e-6
@@ -183,16 +179,19 @@ def _solve_nonlinear(
 
 
 def close_balance(
-    matrix: object, load: NDArray[np.float64], unknowns: NDArray[np.float64]
+    matrix: sparse.csr_array,
+    load: NDArray[np.float64],
+    unknowns: NDArray[np.float64],
+    row_sums: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Galerkin correction by a constant: what is left of the residual sums to zero.
 
     The sum of all equations is the heat balance, so one uniform shift (far
     below the solver's tolerance) closes it to round-off.
     """
-    ones = np.ones_like(load)
-    image = matrix @ ones
-    return unknowns + float(np.sum(load - matrix @ unknowns)) / float(ones @ image)
+    sums = matrix @ np.ones_like(load) if row_sums is None else row_sums
+    # the matrix is symmetric, so its row sums are its column sums
+    return unknowns + (float(np.sum(load)) - float(sums @ unknowns)) / float(np.sum(sums))
 
 
 def split_unknowns(

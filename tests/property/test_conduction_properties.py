@@ -8,8 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spindle_fem.conduction.assemble import assemble_system
 from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode, assemble_system
+from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.conduction.steady import solve_steady
 from spindle_fem.conduction.transient import StepControl, integrate, uniform_state
 from spindle_fem.meshing.simple import build_joined_tubes

@@ -7,20 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from spindle_fem.conduction.assemble import assemble_capacity, assemble_system
 from spindle_fem.conduction.balance import require_balance
 from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear
 from spindle_fem.conduction.multigrid import largest_eigenvalue
 from spindle_fem.conduction.nonlinear import film_heat_flux, linearise_films
 from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import (
-    ConductionProblem,
-    Film,
-    FilmLaw,
-    LumpedLink,
-    LumpedNode,
-    assemble_capacity,
-    assemble_system,
-)
+from spindle_fem.conduction.problem import ConductionProblem, Film, FilmLaw, LumpedLink, LumpedNode
 from spindle_fem.conduction.steady import solve_steady
 from spindle_fem.errors import (
     ConvergenceError,

@@ -8,8 +8,9 @@ from scipy.sparse.linalg import spsolve
 from skfem import Functional, LinearForm
 from skfem.helpers import dot, grad
 
+from spindle_fem.conduction.assemble import assemble_system
 from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film, assemble_system
+from spindle_fem.conduction.problem import ConductionProblem, Film
 from spindle_fem.conduction.skfem_mesh import load_into_skfem
 from spindle_fem.meshing.simple import build_tube
 

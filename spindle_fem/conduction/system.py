@@ -1,0 +1,90 @@
+"""The linear equations of a problem, with lumped nodes and tied joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+
+@dataclass(frozen=True, slots=True)
+class ThermalSystem:
+    """Equations ``[K −B; −Bᵀ D] [T; T_l] = [f; f_l]`` of a problem.
+
+    Temperatures count from ``reference_temperature``, so that round-off is
+    relative to the rise and not to absolute zero.
+
+    Attributes
+    ----------
+    matrix : (n, n) csr_array, [W/K]
+    load : (n,) ndarray, [W]
+    exchange : (n, m) csc_array, [W/K]
+        Coupling of unknowns with lumped nodes.
+    lumped_matrix : (m, m) ndarray, [W/K]
+    lumped_load : (m,) ndarray, [W]
+    reference_temperature : float, [K]
+    tie : (n, n_tied) csr_array or None
+        Unknowns from those left when perfect joints tie node pairs.
+    prolongation : (n, n_corners) csr_array or None
+        From linear to quadratic temperatures, for multigrid.
+    """
+
+    matrix: sparse.csr_array
+    load: NDArray[np.float64]
+    exchange: sparse.csc_array
+    lumped_matrix: NDArray[np.float64]
+    lumped_load: NDArray[np.float64]
+    reference_temperature: float
+    tie: sparse.csr_array | None
+    prolongation: sparse.csr_array | None
+
+    @property
+    def n_lumped(self) -> int:
+        """Number of lumped nodes."""
+        return len(self.lumped_load)
+
+    def full_matrix(self) -> sparse.csr_array:
+        """``[K −B; −Bᵀ D]`` as one sparse matrix."""
+        if not self.n_lumped:
+            return self.matrix
+        return sparse.block_array(
+            [[self.matrix, -self.exchange], [-self.exchange.T, sparse.csr_array(self.lumped_matrix)]],
+            format="csr",
+        )
+
+    def full_load(self) -> NDArray[np.float64]:
+        """``[f; f_l]``."""
+        return np.concatenate((self.load, self.lumped_load))
+
+    def tied(self) -> ThermalSystem:
+        """The same equations with perfect joints eliminated."""
+        if self.tie is None:
+            return self
+        tie = self.tie
+        return ThermalSystem(
+            (tie.T @ self.matrix @ tie).tocsr(),
+            tie.T @ self.load,
+            (tie.T @ self.exchange).tocsc(),
+            self.lumped_matrix,
+            self.lumped_load,
+            self.reference_temperature,
+            None,
+            _tied_prolongation(tie, self.prolongation),
+        )
+
+
+def _tied_prolongation(
+    tie: sparse.csr_array, prolongation: sparse.csr_array | None
+) -> sparse.csr_array | None:
+    """Prolongation between tied unknowns: corners tie with corners, middles with middles."""
+    if prolongation is None:
+        return None
+    n_corners = prolongation.shape[1]
+    labels, group = np.unique(tie.indices[:n_corners], return_inverse=True)
+    tie_corners = sparse.csr_array(
+        (np.ones(n_corners), (np.arange(n_corners), group)), shape=(n_corners, len(labels))
+    )
+    first = np.unique(tie.indices, return_index=True)[1]
+    return (prolongation[first] @ tie_corners).tocsr()
