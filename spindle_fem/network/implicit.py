@@ -13,6 +13,7 @@ Source: Hosea and Shampine (1996), Applied Numerical Mathematics 20, 21-37.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +31,9 @@ ERROR_WEIGHTS = (
     WEIGHT - (3.0 * WEIGHT + 1.0) / 3.0,
     DIAGONAL - DIAGONAL / 3.0,
 )
-NEWTON_TOLERANCE = 1.0e-10
+NEWTON_TOLERANCE = 1.0e-11
 SLOW_CONTRACTION = 0.1
+ROUNDING_UNITS = 4.0
 MAX_NEWTON = 15
 # Of an interval; also what rounding may leave of one.
 SHORTEST_STEP = 1.0e-9
@@ -165,6 +167,7 @@ class _Stepper:
         self._rate = np.zeros(network.n_nodes)
         self.counts = StepCounts()
         self._matrix_step = np.nan
+        self._rounding = 0.0
         self._inverse = np.empty(0)
 
     def cross(self, interval: int, state: Array, slope: Array) -> tuple[Array, Array]:
@@ -243,21 +246,28 @@ class _Stepper:
             self.counts.newton += 1
             net = self.balance.net_heat(temperature, *forcing)
             change = self._inverse @ (known - capacity * temperature + scaled * net)
-            size = float(np.abs(change).max(initial=0.0))
+            size = float(np.abs(change).max())
             temperature = temperature + change
-            if not np.isfinite(size) or np.any(temperature <= 0.0):
+            if not math.isfinite(size) or (size > 1.0 and temperature.min() <= 0.0):
                 return None
-            if size <= NEWTON_TOLERANCE:
+            contraction = size / previous
+            # what is left after this change is smaller by the contraction that the last two show
+            left = size * contraction if iteration and contraction < SLOW_CONTRACTION else size
+            if left <= max(NEWTON_TOLERANCE, self._rounding):
                 return temperature, self.balance.net_heat(temperature, *forcing)
-            if iteration and size > SLOW_CONTRACTION * previous:
+            if iteration and contraction > SLOW_CONTRACTION:
                 self._refactor(temperature, forcing, step)
             previous = size
         return None
 
     def _refactor(self, temperature, forcing, step) -> None:
         derivative = self.balance(temperature, *forcing)[1]
-        self._inverse = np.linalg.inv(np.diag(self.network.capacity) - step * DIAGONAL * derivative)
+        scaled, capacity = step * DIAGONAL, self.network.capacity
+        self._inverse = np.linalg.inv(np.diag(capacity) - scaled * derivative)
         self._matrix_step = step
+        # what the rounding of large flows between tightly joined nodes leaves in a Newton change
+        sizes = capacity * temperature + scaled * (np.abs(derivative) @ temperature)
+        self._rounding = ROUNDING_UNITS * np.finfo(float).eps * float((np.abs(self._inverse) @ sizes).max())
 
     def _account(self, step, stages) -> None:
         (two, two_net, first_net), (three, three_net) = stages

@@ -299,6 +299,18 @@ def test_runaway_in_time_is_an_error():
         simulate_transient(network, history, np.array([300.0]))
 
 
+def test_tightly_joined_nodes():
+    """A joint of 1e8 W/K makes two lumps one, and its rounding does not stop the iteration."""
+    network = ThermalNetwork(
+        ("a", "b"), [60.0, 40.0], [0, 1], [1, 2], [1.0e8, 2.0], ("room",), [300.0],
+    )  # fmt: skip
+    history = InputHistory.constant(np.linspace(0.0, 100.0, 11), {})
+    for method in ("exact", "implicit"):
+        run = simulate_transient(network, history, np.array([310.0, 310.0]), method=method, step_error=1e-5)
+        expected = 300.0 + 10.0 * np.exp(-run.times / 50.0)
+        assert_allclose(run.temperature, np.stack([expected, expected], axis=1), atol=2e-3)
+
+
 def test_negative_input_under_a_broken_power():
     history = InputHistory([0.0, 1.0], ("air", "power"), [[290.0, -1.0], [290.0, 1.0]], [True, True])
     with pytest.raises(OutOfValidityError, match=r'"power" falls to -1, which has no power 1.5'):

@@ -1,0 +1,267 @@
+"""Steady state of a machine's network: Newton with sparse, analytic Jacobian."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError
+from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel, heat_model_of
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.laws import CoolantLaw, WallFilmLaw
+from spindle_fem.network.machine import MachineNetwork
+from spindle_fem.network.operating import OperatingNetwork, operate, tabulate_friction
+
+Array = NDArray[np.float64]
+BALANCE_TOLERANCE = 1.0e-10
+NEWTON_STEPS = 40
+CONTACT_ROUNDS = 30
+CONTACT_TOLERANCE = 1.0e-7
+
+
+@dataclass(frozen=True, slots=True)
+class MachineNetworkState:
+    """A steady state of a machine's network.
+
+    Attributes
+    ----------
+    temperature : (n,) ndarray, [K]
+    boundary_heat : mapping of film surface to float, [W]
+        Out of the machine; ``coolant`` is what the oil carries away.
+    heat_in : float, [W]
+    imbalance_relative : float
+        Of the heat in and out, over the larger of heat and flows.
+    coolant_outlet : float, [K]
+        NaN without coolant.
+    iterations : int
+        Newton steps, all rounds.
+    """
+
+    network: OperatingNetwork
+    temperature: Array
+    boundary_heat: Mapping[str, float]
+    heat_in: float
+    imbalance_relative: float
+    coolant_outlet: float
+    iterations: int
+
+    def bearing_temperatures(self) -> dict[str, BearingTemperatures]:
+        """Raceways, balls and what the rings sit on."""
+        return _around(self.network, self.temperature)
+
+    def links(self) -> list[tuple[int, int, str, float]]:
+        """Every flow as (first, second, kind, heat from first to second in W); boundaries follow nodes."""
+        network = self.network
+        both = np.concatenate([self.temperature, network.boundary_temperature])
+        flow = network.conductance * (both[network.first] - both[network.second])
+        found = list(
+            zip(network.first.tolist(), network.second.tolist(), network.kind.tolist(), flow.tolist(), strict=True)
+        )
+        ambient = self.temperature.size
+        for law in network.laws:
+            if isinstance(law, WallFilmLaw):
+                heat = np.bincount(law.patch.node, law.heat(self.temperature)[0], self.temperature.size)
+                found += [(int(n), ambient, law.name, float(heat[n])) for n in np.flatnonzero(heat)]
+            elif isinstance(law, CoolantLaw):
+                h = law.coefficients(self.temperature)[0]
+                coolant = law.nodes[law.cell]
+                heat = law.conductances(h)[0] * (self.temperature[law.patch.node] - self.temperature[coolant])
+                pairs, inverse = np.unique(np.column_stack([law.patch.node, coolant]), axis=0, return_inverse=True)
+                summed = np.bincount(inverse.ravel(), heat, len(pairs))
+                found += [
+                    (int(a), int(b), "coolant", float(value)) for (a, b), value in zip(pairs, summed, strict=True)
+                ]
+        return found
+
+
+class SparseBalance:
+    """Net heat into every node and its sparse derivative."""
+
+    def __init__(self, network: OperatingNetwork) -> None:
+        self.network = network
+        n, total = network.n_nodes, network.n_nodes + len(network.boundary_names)
+        first, second, g = network.first, network.second, network.conductance
+        up, down = network.streams
+        rate = np.full(len(up), network.stream_rate)
+        rows = np.concatenate([first, second, first, second, down, down])
+        columns = np.concatenate([first, second, second, first, down, up])
+        values = np.concatenate([g, g, -g, -g, rate, -rate])
+        whole = sparse.csr_array((values, (rows, columns)), shape=(total, total))
+        self.matrix = whole[:n, :n].tocsc()
+        self.load = network.heat - whole[:n, n:] @ network.boundary_temperature
+        self.n = n
+
+    def __call__(self, temperature: Array) -> tuple[Array, sparse.csc_array]:
+        """Net heat (n,) [W] and derivative (n, n) [W/K]."""
+        net = self.load - self.matrix @ temperature
+        derivative = -self.matrix
+        if self.network.laws:
+            pieces = [law(temperature) for law in self.network.laws]
+            net = net + sum(heat for heat, _ in pieces)
+            rows, columns, values = (np.concatenate([item[1][k] for item in pieces]) for k in range(3))
+            derivative = derivative + sparse.csc_array((values, (rows, columns)), shape=(self.n, self.n))
+        return net, derivative.tocsc()
+
+
+def newton(network: OperatingNetwork, start: Array) -> tuple[Array, int]:
+    """Temperatures at which every balance is zero.
+
+    Raises
+    ------
+    NoSteadyStateError
+        The balance is singular, or no step lowers the imbalance.
+    ConvergenceError
+    """
+    balance = SparseBalance(network)
+    temperature = start.copy()
+    net, derivative = balance(temperature)
+    norm = float(np.abs(net).max())
+    for iteration in range(1, NEWTON_STEPS + 1):
+        try:
+            step = splu(derivative).solve(-net)
+        except RuntimeError as error:
+            raise NoSteadyStateError(
+                network.machine.spec.name, "the network's heat balance is singular.", "A body loses no heat."
+            ) from error
+        damping = 1.0
+        while True:
+            trial = temperature + damping * step
+            trial_net, trial_derivative = balance(trial)
+            trial_norm = float(np.abs(trial_net).max())
+            rounding = 1.0e-13 * float(np.abs(derivative.diagonal()).max()) * float(trial.max())
+            if trial_norm <= max((1.0 - 0.25 * damping) * norm, rounding):
+                break
+            damping *= 0.5
+            if damping < 1.0e-4:
+                raise NoSteadyStateError(
+                    network.machine.spec.name,
+                    f"no step lowers the network's imbalance of {norm:.3g} W.",
+                    "Friction heat grows faster with temperature than it is lost.",
+                )
+        temperature, net, derivative, norm = trial, trial_net, trial_derivative, trial_norm
+        moved = float(np.abs(damping * step).max())
+        if norm <= rounding and (not network.laws or moved < 1.0e-8):
+            return temperature, iteration
+    raise ConvergenceError(
+        network.machine.spec.name, f"{NEWTON_STEPS} Newton steps left an imbalance of {norm:.3g} W."
+    )
+
+
+def solve_machine_network(
+    machine: MachineNetwork,
+    point: OperatingPoint | None = None,
+    *,
+    heat_model: HeatModel | None = None,
+    start: Array | None = None,
+) -> MachineNetworkState:
+    """Steady state of a machine's network with heat, contacts and films at its own temperatures.
+
+    Parameters
+    ----------
+    machine : MachineNetwork
+    point : OperatingPoint, optional
+        The definition's own by default.
+    heat_model : HeatModel, optional
+        The definition's own by default.
+    start : (n,) ndarray, [K], optional
+
+    Raises
+    ------
+    NoSteadyStateError, ConvergenceError, OutOfValidityError
+    EnergyBalanceError
+        Heat in and out differ by more than 1e-10.
+    """
+    point = OperatingPoint.of(machine.spec) if point is None else point
+    heat_model = heat_model_of(machine.spec) if heat_model is None else heat_model
+    friction = tabulate_friction(machine, point, heat_model)
+    around, steps = None, 0
+    temperature = np.full(machine.n_nodes, point.ambient_temperature) if start is None else start
+    for _ in range(CONTACT_ROUNDS):
+        network = operate(machine, point, heat_model, around=around, friction=friction)
+        temperature, used = newton(network, temperature)
+        steps += used
+        found = _around(network, temperature)
+        change = _change(around, found)
+        if _is_settled(machine, change):
+            return _state(network, temperature, steps)
+        around = found
+    raise ConvergenceError(
+        machine.spec.name,
+        f"heat and contacts of the bearings still follow a change of {change:.2g} K.",
+        "Friction heat may rise with temperature faster than the machine can carry it away.",
+    )
+
+
+def _is_settled(machine: MachineNetwork, change: float) -> bool:
+    spec = machine.spec
+    contacts = any(group.ball_row.kind == "contact" for group in spec.bearing_set)
+    coupled = bool(spec.bearing_set) and (contacts or spec.heat.thermal_preload)
+    return not coupled or change < CONTACT_TOLERANCE
+
+
+def _change(before: Mapping[str, BearingTemperatures] | None, after: Mapping[str, BearingTemperatures]) -> float:
+    if before is None:
+        return np.inf
+    fields = BearingTemperatures.__slots__
+    changes = [abs(getattr(after[name], f) - getattr(before[name], f)) for name in after for f in fields]
+    return max(changes, default=0.0)
+
+
+def _around(network: OperatingNetwork, temperature: Array) -> dict[str, BearingTemperatures]:
+    machine = network.machine
+    found = {}
+    for name, ball in machine.ball_nodes.items():
+        inner, outer = network.raceway_temperatures(temperature, name)
+        shaft = _seat(machine, temperature, f"{name}.inner_ring", inner)
+        housing = _seat(machine, temperature, f"{name}.outer_ring", outer)
+        found[name] = BearingTemperatures(inner, outer, float(temperature[ball]), shaft, housing)
+    return found
+
+
+def _seat(machine: MachineNetwork, temperature: Array, ring: str, default: float) -> float:
+    """Mean of what a ring sits on, taken at the nodes behind the joint."""
+    contact = machine.cells.contact
+    own = machine.cells.part_names.index(ring)
+    part = machine.cells.part
+    on_first, on_second = part[contact.first] == own, part[contact.second] == own
+    rows = np.flatnonzero((on_first | on_second) & contact.radial)
+    if not rows.size:
+        return default
+    other = np.where(on_first[rows], contact.second[rows], contact.first[rows])
+    return float(np.average(temperature[machine.partition.node_of_cell[other]], weights=contact.area[rows]))
+
+
+def _state(network: OperatingNetwork, temperature: Array, iterations: int) -> MachineNetworkState:
+    machine, n = network.machine, network.n_nodes
+    both = np.concatenate([temperature, network.boundary_temperature])
+    flow = network.conductance * (both[network.first] - both[network.second])
+    out: dict[str, float] = {}
+    outward = network.second >= n
+    for kind in dict.fromkeys(network.kind[outward]):
+        out[str(kind)] = float(flow[outward & (network.kind == kind)].sum())
+    heat_in = float(network.heat.sum())
+    for law in network.laws:
+        if isinstance(law, WallFilmLaw):
+            out[law.name] = float(law.heat(temperature)[0].sum())
+        elif not isinstance(law, CoolantLaw):
+            heat_in += float(law(temperature)[0].sum())
+    outlet = float("nan")
+    if machine.coolant is not None:
+        outlet = float(temperature[network.streams[1][-1]])
+        rises = both[network.streams[1]] - both[network.streams[0]]
+        out["coolant"] = float(network.stream_rate * rises.sum())
+    scale = max(abs(heat_in), *(abs(value) for value in out.values()), 1.0e-12)
+    imbalance = abs(heat_in - sum(out.values())) / scale
+    if imbalance > BALANCE_TOLERANCE:
+        raise EnergyBalanceError(
+            machine.spec.name,
+            f"the network takes in {heat_in:.9g} W and gives off {sum(out.values()):.9g} W "
+            f"({imbalance:.1e} relative).",
+            f"Allowed: {BALANCE_TOLERANCE:.0e}.",
+        )
+    return MachineNetworkState(network, temperature, out, heat_in, imbalance, outlet, iterations)
