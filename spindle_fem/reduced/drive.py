@@ -1,0 +1,231 @@
+"""Inputs of a machine over time, and the classes of operating points that share their operators."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import RecordingError
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.recordings.align import Recording
+from spindle_fem.spec.model import MachineSpec
+
+Array = NDArray[np.float64]
+
+# Temperature and flow change the film in the channel by 0.02 % a kelvin and 0.3 % a per cent.
+INLET_BIN = 1.0
+FLOW_BIN = 0.01
+SPEED_BIN = 2.0e-3
+MOST_CLASSES = 60
+LARGEST_STEP = 60.0
+MOST_STEP_SIZES = 200
+
+STANDARD = ("speed", "thrust", "ambient", "coolant_inlet", "coolant_flow")
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Inputs on a grid of steps.
+
+    Attributes
+    ----------
+    times : (N,) ndarray, [s]
+        Where outputs are wanted.
+    grid : (G + 1,) ndarray, [s]
+        Ends of the steps.
+    names : tuple of str
+        ``speed`` [rad/s], ``thrust`` [N], ``ambient``, ``coolant_inlet`` [K],
+        ``coolant_flow`` [m³/s], then ``heat.<source>`` [W].
+    start, end : (G, m) ndarray
+        Inputs just after the start and just before the end of each step.
+    step_class : (G,) int ndarray
+        Class of each step.
+    points : tuple of OperatingPoint
+        Mean operating point of each class.
+    notes : tuple of str
+    """
+
+    times: Array
+    grid: Array
+    names: tuple[str, ...]
+    start: Array
+    end: Array
+    step_class: NDArray[np.int64]
+    points: tuple[OperatingPoint, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def steps(self) -> Array:
+        """Length of each step, (G,) [s]."""
+        return np.diff(self.grid)
+
+    def column(self, name: str) -> int:
+        """Column of an input."""
+        return self.names.index(name)
+
+    def first(self, name: str) -> float:
+        """Value of an input at the start."""
+        return float(self.start[0, self.column(name)])
+
+
+def standard_inputs(spec: MachineSpec) -> dict[str, float]:
+    """Inputs as the definition has them, for those that a recording does not give."""
+    point = OperatingPoint.of(spec)
+    return {
+        "speed": point.speed,
+        "thrust": point.thrust,
+        "ambient": point.ambient_temperature,
+        "coolant_inlet": point.coolant_inlet_temperature,
+        "coolant_flow": point.coolant_flow,
+    }
+
+
+def drive_of_recording(spec: MachineSpec, recording: Recording, *, largest_step: float = LARGEST_STEP) -> Drive:
+    """Inputs of a recording on the steps of its own grid.
+
+    Raises
+    ------
+    RecordingError
+        An input that the machine does not know, or a speed that is not given.
+    """
+    known = standard_inputs(spec)
+    unknown = [n for n in recording.input_names if n not in known and not n.startswith("heat.")]
+    if unknown:
+        raise RecordingError(
+            recording.source,
+            f'drives "{unknown[0]}", which a machine with geometry does not have.',
+            f"Allowed: {', '.join(known)}, heat.<source>.",
+        )
+    if "speed" not in recording.input_names:
+        raise RecordingError(
+            recording.source, "no channel drives the speed.", 'Add an input channel with drives = "speed".'
+        )
+    notes = [
+        f'"{name}" is not recorded: the definition\'s value is used' for name in known if name not in recording.input_names
+    ]
+    names = (*known, *(n for n in recording.input_names if n.startswith("heat.")))
+    history = recording.input_history()
+    columns, held = [], []
+    for name in names:
+        if name in history.names:
+            position = history.names.index(name)
+            values = history.values[:, position]
+            # Friction does not know which way a spindle turns.
+            columns.append(np.abs(values) if name == "speed" else values)
+            held.append(bool(history.held[position]))
+        else:
+            columns.append(np.full(recording.times.size, known[name]))
+            held.append(True)
+    return make_drive(
+        recording.times, names, np.column_stack(columns), np.array(held), notes=tuple(notes), largest_step=largest_step
+    )
+
+
+def make_drive(
+    times: Array,
+    names: tuple[str, ...],
+    values: Array,
+    held: NDArray[np.bool_],
+    *,
+    notes: tuple[str, ...] = (),
+    largest_step: float = LARGEST_STEP,
+) -> Drive:
+    """Inputs on steps no longer than allowed, sorted into classes.
+
+    Parameters
+    ----------
+    times : (N,) ndarray, [s]
+        Strictly increasing.
+    names : tuple of str
+        The standard ones first, as in :class:`Drive`.
+    values : (N, m) ndarray, SI
+    held : (m,) bool ndarray
+    largest_step : float, [s]
+    """
+    if names[: len(STANDARD)] != STANDARD:
+        raise RecordingError("inputs", f"named {names}.", f"Allowed: {STANDARD} first.")
+    grid = _grid(np.asarray(times, dtype=float), values[:, held], largest_step)
+    start, end = np.empty((grid.size - 1, len(names))), np.empty((grid.size - 1, len(names)))
+    owner = np.searchsorted(times, 0.5 * (grid[:-1] + grid[1:]), side="right") - 1
+    for column in range(len(names)):
+        if held[column]:
+            start[:, column] = end[:, column] = values[owner, column]
+        else:
+            on_grid = np.interp(grid, times, values[:, column])
+            start[:, column], end[:, column] = on_grid[:-1], on_grid[1:]
+    step_class, points = _classes(0.5 * (start + end))
+    return Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
+
+
+def _grid(times: Array, held: Array, largest: float) -> Array:
+    """Ends of the steps: every stamp, long gaps divided; few sizes only where stamps jitter."""
+    gaps = np.diff(times)
+    pieces = np.maximum(1, np.ceil(gaps / largest - 1e-9).astype(int))
+    if np.unique(np.round(gaps / pieces, 6)).size <= MOST_STEP_SIZES:
+        within = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        return np.append(np.repeat(times[:-1], pieces) + within * np.repeat(gaps / pieces, pieces), times[-1])
+    # Equal steps between the changes of held inputs; outputs are interpolated between them.
+    changes = times[1:][np.any(np.diff(held, axis=0) != 0.0, axis=1)]
+    step = min(largest, float(np.median(gaps)))
+    edges = np.unique(np.concatenate(([times[0]], changes, [times[-1]])))
+    parts = []
+    for begin, stop in zip(edges[:-1], edges[1:], strict=True):
+        whole = int(np.floor((stop - begin) / step * (1.0 + 1e-9)))
+        parts.append(begin + step * np.arange(whole + 1 if begin + whole * step < stop - 1e-6 * step else whole))
+    return np.append(np.concatenate(parts), times[-1])
+
+
+def _classes(inputs: Array) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
+    """Steps whose films differ too little to matter share one operator."""
+    speed, thrust, ambient, inlet, flow = inputs[:, : len(STANDARD)].T
+    width = SPEED_BIN * max(float(speed.max()), 1.0)
+    flow_width = FLOW_BIN * max(float(flow.max()), 1e-9)
+    inlet_width = INLET_BIN
+    while True:
+        keys = np.column_stack(
+            (np.round(speed / width), np.round(inlet / inlet_width), np.round(flow / flow_width))
+        )
+        # Standstill is a class of its own: films at rest are not those of slow turning.
+        keys[speed == 0.0, 0] = -1.0
+        _, label = np.unique(keys, axis=0, return_inverse=True)
+        label = label.reshape(-1)
+        if label.max() < MOST_CLASSES:
+            break
+        width, inlet_width, flow_width = 1.5 * width, 1.5 * inlet_width, 1.5 * flow_width
+    means = [
+        np.bincount(label, weights=column) / np.bincount(label) for column in (speed, thrust, ambient, inlet, flow)
+    ]
+    return label, tuple(OperatingPoint(*(float(v) for v in values)) for values in zip(*means, strict=True))
+
+
+def heat_of_table(spec: MachineSpec, speed: Array, thrust: Array) -> Array:
+    """Heat of every bearing by the table over time, (n, n_bearings) W, in the order of ``spec.bearings``.
+
+    Parameters
+    ----------
+    speed : (n,) ndarray, [rad/s]
+    thrust : (n,) ndarray, [N]
+    """
+    table = spec.heat.table
+    grid = np.asarray(table.speed)
+    segment = np.clip(np.searchsorted(grid, speed, side="right") - 1, 0, len(grid) - 2)
+    fraction = (speed - grid[segment]) / (grid[segment + 1] - grid[segment])
+    found = np.empty((len(speed), len(spec.bearings)))
+    for column, (group, bearing) in enumerate(spec.bearings):
+        values = np.asarray(table.heat[bearing.name])
+        nominal = values[segment] + fraction * (values[segment + 1] - values[segment])
+        slope = table.thrust_coefficient.get(bearing.name, 0.0)
+        factor = 1.0 + slope * (thrust / table.reference_thrust - 1.0)
+        found[:, column] = np.maximum(0.0, nominal * factor) * group.heat_factor.value
+    return found
+
+
+def inputs_at(drive: Drive, times: Array) -> Mapping[str, Array]:
+    """Inputs at any times, as they are just after them."""
+    step = np.clip(np.searchsorted(drive.grid, times, side="right") - 1, 0, drive.grid.size - 2)
+    part = ((times - drive.grid[step]) / drive.steps[step])[:, None]
+    values = drive.start[step] + part * (drive.end[step] - drive.start[step])
+    return {name: values[:, column] for column, name in enumerate(drive.names)}

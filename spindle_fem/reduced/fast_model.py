@@ -1,0 +1,256 @@
+"""A machine's reduced model with its coefficients, ready to be driven and differentiated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.loads.coolant_loop import CoolantLoop
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
+from spindle_fem.reduced.coolant import CoolantMaps, coolant_maps, film_derivative
+from spindle_fem.reduced.model import ReducedModel
+from spindle_fem.spec.model import MachineSpec
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ClassOperators:
+    """Operators of one operating class and their derivatives.
+
+    ``K u = W w`` with ``w`` the load inputs of :attr:`FastModel.load_names`.
+
+    Attributes
+    ----------
+    conduction : (r, r) ndarray
+    loads : (r, n_w) ndarray
+    outputs : (n_out, r) ndarray
+        Temperature channels from the unknowns.
+    output_inputs : (n_out, n_w) ndarray
+        And from the load inputs, for the coolant's outlet.
+    conduction_by : mapping of parameter to (r, r) ndarray
+        Derivatives to logarithms; absent where zero. Likewise the others.
+    loads_by, outputs_by, output_inputs_by : mapping of parameter to ndarray
+    """
+
+    conduction: Array
+    loads: Array
+    outputs: Array
+    output_inputs: Array
+    conduction_by: Mapping[str, Array]
+    loads_by: Mapping[str, Array]
+    outputs_by: Mapping[str, Array]
+    output_inputs_by: Mapping[str, Array]
+
+
+class FastModel:
+    """Reduced model and definition of one machine.
+
+    Parameters
+    ----------
+    model : ReducedModel
+    spec : MachineSpec
+        The machine that the model was made of, or one that differs only in
+        coefficients, operation and effects.
+    """
+
+    def __init__(self, model: ReducedModel, spec: MachineSpec) -> None:
+        self.model = model
+        self.spec = spec
+        self.table: CoefficientTable = model.table(spec)
+        self.bearings = tuple(bearing.name for _, bearing in spec.bearings)
+        self.channels = tuple(probe.name for probe in spec.probe)
+        self._outlet_row = next(
+            (row for row, probe in enumerate(spec.probe) if probe.kind == "coolant_outlet"), None
+        )
+        self._point_rows = [row for row, probe in enumerate(spec.probe) if probe.kind == "point"]
+        self.loop = CoolantLoop(spec, model.channel_cells()) if spec.channel is not None else None
+        self.fixed_fluids = tuple(
+            dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
+        )
+        friction = [f"{name}.{side}" for name in self.bearings for side in ("inner_raceway", "outer_raceway", "balls")]
+        self.heat_places = tuple(friction)
+        fixed = tuple(f"fixed[{number}]" for number in range(len(self.fixed_fluids)))
+        self.load_names = (*self.heat_places, "ambient", "coolant_inlet", "coolant_friction", *fixed)
+        self._positions = {name: i for i, name in enumerate(model.coefficient_names)}
+        self._fluid_rows = {name: i for i, name in enumerate(model.fluid_names)}
+
+    # ------------------------------------------------------------- operators
+    def storage(self, factors: Mapping[str, float]) -> Array:
+        """Capacity matrix, (r, r) J/K."""
+        capacities = self.table.capacities()
+        weights = [capacities[name] * self.table.scale(name, factors) for name in self.model.storage_names]
+        return np.tensordot(np.array(weights), self.model.storage, axes=1)
+
+    def storage_by(self, factors: Mapping[str, float], parameters: Sequence[str]) -> dict[str, Array]:
+        """Derivatives of the capacity matrix to the logarithms of parameters; absent where zero."""
+        capacities = self.table.capacities()
+        found = {}
+        for parameter in parameters:
+            targets = set(self.table.targets(parameter))
+            rows = [i for i, n in enumerate(self.model.storage_names) if targets & set(self.table.groups[n])]
+            if rows:
+                names = [self.model.storage_names[i] for i in rows]
+                weights = np.array([capacities[n] * self.table.scale(n, factors) for n in names])
+                found[parameter] = np.tensordot(weights, self.model.storage[rows], axes=1)
+        return found
+
+    def channel_film(self, point: OperatingPoint, factors: Mapping[str, float]) -> tuple[Array, float, float]:
+        """Film of each cell [W/(m²·K)], capacity rate of each start [W/K], friction heat [W].
+
+        Film and properties at inlet temperature; where the definition asks for
+        those at bulk temperature, this is the first step of that iteration.
+        """
+        wall = np.full(self.model.cell_area.shape, point.coolant_inlet_temperature)
+        state = self.loop.at(point, wall)
+        rate = float(state.march.mass_flow * np.mean(state.march.march.specific_heat_capacity))
+        friction = float(state.march.march.pumping_heat.sum()) if self.spec.coolant.pumping_heat else 0.0
+        return state.film_coefficient.ravel() * self.table.scale(CHANNEL_FILM, factors), rate, friction
+
+    def coefficients(self, point: OperatingPoint, factors: Mapping[str, float]) -> dict[str, float]:
+        """Every coefficient of a class, the mean channel film included."""
+        base = self.table.base(point)
+        found = {name: base[name] * self.table.scale(name, factors) for name in self.model.coefficient_names}
+        if self.loop is not None:
+            found[CHANNEL_FILM] = float(self.channel_film(point, factors)[0].mean())
+        return found
+
+    def operators(
+        self, point: OperatingPoint, factors: Mapping[str, float], parameters: Sequence[str] = ()
+    ) -> ClassOperators:
+        """Operators at an operating point with factors, and derivatives to some parameters.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+            Of the class; heat, air and inlet temperature do not enter.
+        factors : mapping of str to float
+            As :meth:`CoefficientTable.factors` gives them.
+        parameters : sequence of str
+        """
+        model, table = self.model, self.table
+        base = table.base(point)
+        values = np.array([base[name] * table.scale(name, factors) for name in model.coefficient_names])
+        conduction = np.tensordot(values, model.operators, axes=1)
+        loads = np.zeros((model.size, len(self.load_names)))
+        for column, place in enumerate(self.heat_places):
+            loads[:, column] = model.place(place)
+        for name in model.fluid_names:
+            loads[:, self._fluid_column(name)] += values[self._positions[name]] * model.fluid_load[self._fluid_rows[name]]
+        outputs = np.zeros((len(self.channels), model.size))
+        outputs[self._point_rows] = model.probes
+        output_inputs = np.zeros((len(self.channels), len(self.load_names)))
+        conduction_by, loads_by, outputs_by, output_inputs_by = {}, {}, {}, {}
+        for parameter in parameters:
+            targets = set(table.targets(parameter))
+            rows = [i for i, n in enumerate(model.coefficient_names) if targets & set(table.groups[n])]
+            if not rows:
+                continue
+            conduction_by[parameter] = np.tensordot(values[rows], model.operators[rows], axes=1)
+            films = [model.coefficient_names[i] for i in rows if model.coefficient_names[i] in self._fluid_rows]
+            if films:
+                by = np.zeros_like(loads)
+                for name in films:
+                    load = model.fluid_load[self._fluid_rows[name]]
+                    by[:, self._fluid_column(name)] += values[self._positions[name]] * load
+                loads_by[parameter] = by
+        if self.loop is not None:
+            film, rate, friction = self.channel_film(point, factors)
+            maps = coolant_maps(model, film, rate, friction)
+            conduction = conduction + maps.conduction
+            self._add_coolant(loads, outputs, output_inputs, maps)
+            for parameter in parameters:
+                if set(table.targets(parameter)) & set(table.groups[CHANNEL_FILM]):
+                    by = film_derivative(model, film, rate, friction)
+                    conduction_by[parameter] = conduction_by.get(parameter, 0.0) + by.conduction
+                    loads_by.setdefault(parameter, np.zeros_like(loads))
+                    outputs_by[parameter] = np.zeros_like(outputs)
+                    output_inputs_by[parameter] = np.zeros_like(output_inputs)
+                    self._add_coolant(
+                        loads_by[parameter], outputs_by[parameter], output_inputs_by[parameter], by
+                    )
+        return ClassOperators(
+            conduction, loads, outputs, output_inputs, conduction_by, loads_by, outputs_by, output_inputs_by
+        )
+
+    def _fluid_column(self, coefficient: str) -> int:
+        surface = coefficient.removeprefix("film.")
+        film = next(f for f in self.spec.film if surface in f.surface)
+        if film.temperature == "ambient":
+            return self.load_names.index("ambient")
+        return self.load_names.index(f"fixed[{self.fixed_fluids.index(film.temperature)}]")
+
+    def _add_coolant(self, loads: Array, outputs: Array, output_inputs: Array, maps: CoolantMaps) -> None:
+        inlet, friction = self.load_names.index("coolant_inlet"), self.load_names.index("coolant_friction")
+        loads[:, inlet] += maps.inlet_load
+        loads[:, friction] += maps.constant_load
+        if self._outlet_row is not None:
+            outputs[self._outlet_row] = maps.outlet
+            output_inputs[self._outlet_row, inlet] = maps.outlet_inlet
+            output_inputs[self._outlet_row, friction] = maps.outlet_constant
+
+    # ------------------------------------------------------------- heat shares
+    def friction_loads(
+        self, heat: Array, factors: Mapping[str, float], parameters: Sequence[str] = ()
+    ) -> tuple[Array, dict[str, Array]]:
+        """Heat of every heat place from that of every bearing, and derivatives.
+
+        Parameters
+        ----------
+        heat : (n, n_bearings) ndarray, [W]
+            Before factors.
+        factors : mapping of str to float
+        parameters : sequence of str
+
+        Returns
+        -------
+        (n, n_heat_places) ndarray, [W]
+        mapping of parameter to (n, n_heat_places) ndarray
+
+        Raises
+        ------
+        SpecError
+            The inner share leaves 0 to 1.
+        """
+        settings = self.spec.heat
+        inner = settings.inner_share.value * factors.get(INNER_SHARE, 1.0)
+        if not 0.0 <= inner <= 1.0:
+            raise SpecError(INNER_SHARE, f"the share becomes {inner:g}.", "Allowed: 0 to 1.")
+        balls = settings.ball_share
+        shares = np.array([(1.0 - balls) * inner, (1.0 - balls) * (1.0 - inner), balls])
+        scales = np.array(
+            [np.prod([factors.get(name, 1.0) for name in self.table.heat_groups(b)]) for b in self.bearings]
+        )
+        scaled = heat * scales
+        loads = (scaled[:, :, None] * shares).reshape(len(heat), -1)
+        by = {}
+        for parameter in parameters:
+            targets = set(self.table.targets(parameter))
+            touched = np.array([bool(targets & set(self.table.heat_groups(b))) for b in self.bearings])
+            found = np.zeros_like(loads)
+            if touched.any():
+                found += (np.where(touched, scaled, 0.0)[:, :, None] * shares).reshape(len(heat), -1)
+            if INNER_SHARE in targets:
+                moved = (1.0 - balls) * inner * np.array([1.0, -1.0, 0.0])
+                found += (scaled[:, :, None] * moved).reshape(len(heat), -1)
+            if touched.any() or INNER_SHARE in targets:
+                by[parameter] = found
+        return loads, by
+
+    def require_channels(self, probes: Sequence[str], where: str) -> NDArray[np.int64]:
+        """Rows of the outputs for the probes of a recording.
+
+        Raises
+        ------
+        SpecError
+            A probe that the machine does not have.
+        """
+        for probe in probes:
+            if probe not in self.channels:
+                raise SpecError(where, f'reads "{probe}", no probe of this machine.', did_you_mean(probe, self.channels))
+        return np.array([self.channels.index(probe) for probe in probes], dtype=np.int64)
