@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -32,6 +32,7 @@ from spindle_fem.reporting.figures import (
     styled,
 )
 from spindle_fem.reporting.profiles import MeridianSection, axial_profile, largest_part, radial_profile
+from spindle_fem.reporting.tables import heat_by_source, readable
 from spindle_fem.results.thermal_result import CoolantResult, EnergyBalance, ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -138,7 +139,6 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
             axes.axvspan(
                 np.nanmin(radius) * _MM, np.nanmax(radius) * _MM, color=colour, alpha=0.06, linewidth=0.0
             )
-            axes.axvline(np.nanmax(radius) * _MM, color="white", linewidth=1.2)
         state = result.bearings[bearing.name]
         reach = 0.25 * (kind.outer_ring_inner_diameter - kind.inner_ring_outer_diameter)
         centre = 0.25 * (kind.outer_ring_inner_diameter + kind.inner_ring_outer_diameter)
@@ -263,9 +263,11 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
 
 
 @styled
-def heat_balance(energy: EnergyBalance) -> Figure:
-    """Where heat comes from and where it goes, widths in proportion to W."""
-    sources = {name: value for name, value in energy.heat_in_by.items() if value > 0.0}
+def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
+    """Where heat comes from and where it goes, widths in proportion to W; bearings as wholes."""
+    sources = {
+        name: value for name, value in heat_by_source(energy.heat_in_by, bearings).items() if value > 0.0
+    }
     sources |= {f"{name} (gains)": -value for name, value in energy.heat_out.items() if value < 0.0}
     sinks = {name: value for name, value in energy.heat_out.items() if value > 0.0}
     sources = dict(sorted(sources.items(), key=lambda item: -item[1]))
@@ -341,7 +343,7 @@ def _bands(axes: Axes, flows: Mapping[str, float], body: float, total: float, *,
         axes.add_patch(
             PathPatch(Path(vertices, codes), facecolor=palette[number % 2], alpha=0.72, linewidth=0.0)
         )
-        text = f"{name.replace('_', ' ')}   {value:.1f} W ({100.0 * value / total:.1f} %)"
+        text = f"{readable(name)}   {value:.1f} W ({100.0 * value / total:.1f} %)"
         axes.text(
             far + (-14.0 if left else 14.0),
             end,
@@ -358,15 +360,17 @@ def heat_by_bearing(result: ThermalResult) -> Figure | None:
     if not result.bearings:
         return None
     names = list(result.bearings)
-    height = 210.0 + 74.0 * len(names)
-    figure = new_figure(height)
     panels = (
-        ("Friction heat term by term", [dict(result.bearings[name].terms) for name in names], None),
+        ("Friction heat term by term", _large_terms([result.bearings[name].terms for name in names]), None),
         ("Where it enters", [dict(result.bearings[name].heat_to) for name in names], BODY_COLOURS),
     )
     limit = 1.2 * max(max(sum(item.values()) for item in panel[1]) for panel in panels)
+    legend_rows = max(math.ceil(len({key for row in panel[1] for key in row}) / 4) for panel in panels)
+    top = 128.0 + 28.0 * legend_rows
+    height = top + 60.0 * len(names) + 80.0
+    figure = new_figure(height)
     for number, (title, rows, colours) in enumerate(panels):
-        axes = pixel_axes(figure, 70.0 + 784.0 * number, 150.0, 730.0, height - 230.0)
+        axes = pixel_axes(figure, 70.0 + 784.0 * number, top, 730.0, 60.0 * len(names))
         keys = list(dict.fromkeys(key for row in rows for key in row))
         left = np.zeros(len(names))
         for index, key in enumerate(keys):
@@ -395,25 +399,52 @@ def heat_by_bearing(result: ThermalResult) -> Figure | None:
         for row, value in enumerate(left):
             axes.text(value + 0.012 * limit, row, f"{value:.1f} W", va="center", fontsize=8.8)
         axes.invert_yaxis()
-        axes.set(xlim=(0.0, max(limit, 1.0e-9)), xlabel="heat / W", title=title)
+        axes.set(xlim=(0.0, max(limit, 1.0e-9)), xlabel="heat / W")
         axes.grid(axis="y", visible=False)
-        axes.title.set_position((0.0, 1.0))
         axes.legend(
             loc="lower left",
             bbox_to_anchor=(-0.01, 1.0),
-            ncols=3,
+            ncols=4,
             handlelength=1.0,
             columnspacing=1.2,
             borderaxespad=0.1,
         )
-        axes.set_title(title, pad=44.0 if len(keys) > 3 else 28.0)
+        place = 1.0 - (top - 28.0 * legend_rows - 26.0) / height
+        figure.text(
+            (70.0 + 784.0 * number) / 1600.0, place, title, fontsize=10.5, fontweight="bold", va="center"
+        )
     _title(figure, "Heat of the bearings")
     return figure
 
 
+def _large_terms(rows: list[Mapping[str, float]], share: float = 0.03) -> list[dict[str, float]]:
+    """Terms above a share of the largest heat; the small ones together as "other"."""
+    total = max((sum(row.values()) for row in rows), default=0.0)
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    large = [key for key in keys if max(row.get(key, 0.0) for row in rows) > share * total]
+    merged = []
+    for row in rows:
+        kept = {key: row.get(key, 0.0) for key in large}
+        rest = sum(row.values()) - sum(kept.values())
+        if len(large) < len(keys):
+            kept["other"] = rest
+        merged.append(kept)
+    if merged and all(row.get("other", 1.0) == 0.0 for row in merged):
+        merged = [{key: value for key, value in row.items() if key != "other"} for row in merged]
+    return merged
+
+
 @styled
-def coolant_along_channel(coolant: CoolantResult) -> Figure:
-    """Oil and wall temperature, and the film coefficient with its range, along the channel."""
+def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Figure:
+    """Oil and wall temperature, and the film coefficient with its range, along the channel.
+
+    Parameters
+    ----------
+    coolant : CoolantResult
+    ports : bool
+        Whether the first and the last cell are the drilled ports: another
+        section with another film, so they are told in words.
+    """
     figure = new_figure(620.0)
     order = np.argsort(coolant.position, kind="stable")
     place = coolant.position[order]
@@ -424,31 +455,34 @@ def coolant_along_channel(coolant: CoolantResult) -> Figure:
     left.set(xlabel="length along the channel / m", ylabel=TEMPERATURE_LABEL, title="Oil and wall")
     left.legend(loc="best")
     right = pixel_axes(figure, 890.0, 130.0, 680.0, 400.0)
-    right.fill_between(
-        place,
-        coolant.film_low[order],
-        coolant.film_high[order],
-        color=CYCLE[2],
-        alpha=0.2,
-        linewidth=0.0,
-        label="low to high",
+    inside = np.ones(place.size, dtype=bool)
+    if ports and place.size > 2:
+        inside = (place > place.min()) & (place < place.max())
+    along = place[inside]
+    film, low, high = (
+        item[order][inside] for item in (coolant.film_coefficient, coolant.film_low, coolant.film_high)
     )
-    right.plot(place, coolant.film_coefficient[order], color=CYCLE[2], label="film coefficient")
+    right.fill_between(along, low, high, color=CYCLE[2], alpha=0.2, linewidth=0.0, label="low to high")
+    right.plot(along, film, color=CYCLE[2], label="film coefficient")
     right.axhline(
-        coolant.mean_film_coefficient, color=INK, linewidth=0.9, linestyle=(0, (4, 3)), label="area mean"
+        coolant.mean_film_coefficient,
+        color=INK,
+        linewidth=0.9,
+        linestyle=(0, (4, 3)),
+        label="area mean, ports included" if ports else "area mean",
     )
     right.set(
         xlabel="length along the channel / m", ylabel="film coefficient / W/(m²·K)", title="Film coefficient"
     )
-    right.set_ylim(bottom=0.0)
-    right.legend(loc="best")
+    right.set_ylim(0.0, 1.25 * high.max())
+    right.legend(loc="upper right", ncols=3, columnspacing=1.2)
+    notes = f"{coolant.source}; dotted lines: full turns."
+    if ports and place.size > 2:
+        ends = coolant.film_coefficient[order][~inside]
+        notes += f" Ports: {ends.min():.0f} to {ends.max():.0f} W/(m²·K)."
     for axes in (left, right):
         axes.margins(x=0.01)
         for turn in range(1, math.floor(turns.max()) + 1):
             axes.axvline(np.interp(turn, turns, place), color="#cfd6dc", linewidth=0.8, linestyle=":")
-    _title(
-        figure,
-        "Oil along the helical channel",
-        f"{coolant.source}; dotted lines: full turns.",
-    )
+    _title(figure, "Oil along the helical channel", notes)
     return figure

@@ -89,12 +89,13 @@ class Label:
 
 @dataclass(frozen=True, slots=True)
 class ColourBar:
-    """One colour scale: its map, its limits and its label with the unit."""
+    """One colour scale: its map, its limits, its label with the unit, and which end values go beyond."""
 
     colour_map: Colormap
     low: float
     high: float
     label: str
+    extend: str = "neither"
 
     @property
     def norm(self) -> Normalize:
@@ -334,7 +335,9 @@ def _place(figure: Figure, picture: Picture, left: float, top: float) -> None:
 def draw_colour_bar(axes: Axes, bar: ColourBar) -> None:
     """Horizontal colour bar with its label."""
     figure = axes.figure
-    drawn = figure.colorbar(ScalarMappable(bar.norm, bar.colour_map), cax=axes, orientation="horizontal")
+    drawn = figure.colorbar(
+        ScalarMappable(bar.norm, bar.colour_map), cax=axes, orientation="horizontal", extend=bar.extend
+    )
     drawn.set_label(bar.label, fontsize=9.5)
     drawn.outline.set_linewidth(0.6)
     drawn.ax.tick_params(labelsize=9.0)

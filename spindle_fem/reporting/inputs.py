@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 # SI unit as definitions write it: customary unit, factor, digits.
@@ -60,6 +60,8 @@ def _sequence(items: list[str]) -> str:
     parts = [item.split(" ", 1) for item in items]
     units = {part[1] for part in parts if len(part) == 2}
     if len(units) == 1 and all(len(part) == 2 for part in parts):
+        if len(items) == 2 and items[0] == items[1]:
+            return items[0]
         joiner = " to " if len(items) == 2 else ", "
         return joiner.join(part[0] for part in parts) + " " + units.pop()
     return ", ".join(items)
@@ -72,13 +74,16 @@ def _short(number: float) -> str:
     return f"{rounded:g}"
 
 
-def input_groups(definition: Mapping[str, Any]) -> list[dict[str, Any]]:
+def input_groups(definition: Mapping[str, Any], defaults: Collection[str] = ()) -> list[dict[str, Any]]:
     """Tables of a resolved definition, one a top-level table of the file.
 
     Parameters
     ----------
     definition : mapping
         As read from ``machine.toml``.
+    defaults : collection of str
+        Paths (``film.0.name``) of values that the user's file did not give;
+        the mark of their table does not hold for them.
 
     Returns
     -------
@@ -86,39 +91,33 @@ def input_groups(definition: Mapping[str, Any]) -> list[dict[str, Any]]:
         ``title``, ``open``, ``columns`` and ``rows`` for the report's table macro.
     """
     columns = [{"title": "quantity"}, {"title": "value"}, {"title": "source", "mark": True}]
+    unset = frozenset(defaults)
+    groups = []
+    for key, value in definition.items():
+        rows: list[dict[str, Any]] = []
+        if _is_tables(value):
+            for index, item in enumerate(value):
+                rows += _heading(item.get("name", index + 1)) + _rows(
+                    item, "", f"{key}.{index}.", unset, skip_name=True
+                )
+        elif isinstance(value, Mapping) and _holds_tables(value):
+            for name, table in value.items():
+                rows += _heading(name) + _rows(table, "", f"{key}.{name}.", unset)
+        elif isinstance(value, Mapping):
+            rows = _rows(value, "", f"{key}.", unset)
+        if rows:
+            groups.append(
+                {"title": key.replace("_", " "), "open": key in _OPEN, "columns": columns, "rows": rows}
+            )
+    order = [name.replace("_", " ") for name in _OPEN]
+    groups.sort(key=lambda group: order.index(group["title"]) if group["title"] in order else len(order))
     general = [
         {"cells": [key.replace("_", " "), customary(value), ""]}
         for key, value in definition.items()
         if not isinstance(value, Mapping) and not _is_tables(value) and key not in _HIDDEN
     ]
-    groups = []
-    for key, value in definition.items():
-        rows: list[dict[str, Any]] = []
-        if (
-            isinstance(value, Mapping)
-            and any(isinstance(item, Mapping) for item in value.values())
-            and key not in _OPEN
-        ):
-            for name, table in value.items():
-                rows += _rows(table, f"{name}" if isinstance(table, Mapping) else "", "")
-        elif isinstance(value, Mapping):
-            rows = _rows(value, "", "")
-        elif _is_tables(value):
-            for number, item in enumerate(value, 1):
-                rows += _rows(item, str(item.get("name", number)), "")
-        if rows:
-            groups.append(
-                {
-                    "title": key.replace("_", " "),
-                    "open": key in _OPEN,
-                    "columns": columns,
-                    "rows": rows,
-                    "key": key,
-                }
-            )
-    groups.sort(key=lambda group: _OPEN.index(group["key"]) if group["key"] in _OPEN else len(_OPEN))
     if general:
-        groups.append({"title": "general", "open": False, "columns": columns, "rows": general, "key": ""})
+        groups.append({"title": "general", "open": False, "columns": columns, "rows": general})
     return groups
 
 
@@ -126,31 +125,42 @@ def _is_tables(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
 
 
-def _rows(table: Any, heading: str, prefix: str) -> list[dict[str, Any]]:
-    if not isinstance(table, Mapping):
-        return [{"cells": [prefix.replace("_", " ") or heading, customary(table), ""]}]
-    marks = table.get("marks", {})
+def _is_prior(value: Any) -> bool:
+    return isinstance(value, Mapping) and set(value) == {"value", "sigma_rel"}
+
+
+def _holds_tables(table: Mapping[str, Any]) -> bool:
+    inner = [value for key, value in table.items() if key != "marks"]
+    return bool(inner) and all(isinstance(value, Mapping) and not _is_prior(value) for value in inner)
+
+
+def _heading(name: Any) -> list[dict[str, Any]]:
+    return [{"kind": "group", "cells": [str(name)]}]
+
+
+def _rows(
+    table: Mapping[str, Any],
+    prefix: str,
+    path: str,
+    unset: Collection[str],
+    inherited: str = "",
+    *,
+    skip_name: bool = False,
+) -> list[dict[str, Any]]:
+    marks = table.get("marks", {"default": inherited})
     marks = {"default": marks} if isinstance(marks, str) else marks
-    rows: list[dict[str, Any]] = [{"kind": "group", "cells": [heading.replace("_", " ")]}] if heading else []
+    rows: list[dict[str, Any]] = []
     for key, value in table.items():
-        if key == "marks" or (heading and key == "name"):
+        if key == "marks" or (skip_name and key == "name"):
             continue
-        label = f"{prefix}{key}".replace("_", " ")
-        mark = marks.get(key, marks.get("default", ""))
+        label = prefix + key.replace("_", " ")
+        mark = "" if path + key in unset else marks.get(key, marks.get("default", ""))
         if _is_tables(value):
-            for number, item in enumerate(value, 1):
-                name = item.get("name", number)
-                rows += [
-                    row
-                    for row in _rows(item, "", f"{label}, {name}: ")
-                    if not row["cells"][0].endswith(": name")
-                ]
-        elif isinstance(value, Mapping) and set(value) != {"value", "sigma_rel"}:
-            inner = _rows(value, "", f"{label}, ")
-            own = value.get("marks")
-            if own is None:
-                inner = [{**row, "cells": [*row["cells"][:2], row["cells"][2] or mark]} for row in inner]
-            rows += inner
+            for index, item in enumerate(value):
+                inner = f"{label}, {item.get('name', index + 1)}: "
+                rows += _rows(item, inner, f"{path}{key}.{index}.", unset, mark, skip_name=True)
+        elif isinstance(value, Mapping) and not _is_prior(value):
+            rows += _rows(value, f"{label}, ", f"{path}{key}.", unset, mark)
         else:
             rows.append({"cells": [label, customary(value), mark]})
     return rows

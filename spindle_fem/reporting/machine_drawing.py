@@ -295,7 +295,8 @@ def _film_legend(spec: MachineSpec) -> list[tuple[str, str]]:
         if gap.kind == "power_law":
             text = f"{gap.at_rest:g} W/(m²·K) at rest"
             if gap.rise:
-                text = f"{gap.at_rest:g} + {gap.rise:g} (n/{gap.reference_speed * 30 / math.pi:.0f} rpm)^{gap.exponent:g} W/(m²·K)"
+                speed = gap.reference_speed * 30.0 / math.pi
+                text = f"{gap.at_rest:g} + {gap.rise:g} (n/{speed:.0f} rpm)^{gap.exponent:g} W/(m²·K)"
         entries.append((colours[gap.rotating], f"{gap.name.replace('_', ' ')}: {text}, shaft to housing"))
     return entries
 

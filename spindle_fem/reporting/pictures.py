@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -172,7 +174,7 @@ def bearing_close_ups(renderer: SceneRenderer, result: ThermalResult, bar: Colou
             bars=[bar],
             above=labels,
             below=below,
-            notes="Section at the top (θ = 0). Friction heat above, temperatures below; same colour scale as the machine.",
+            notes="Section at the top (θ = 0): friction heat above, temperatures below.",
         )
     return figures
 
@@ -189,11 +191,12 @@ def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | No
     ]
     facets = np.concatenate([mesh.surfaces[name] for name in names])
     film = np.concatenate([result.film_coefficient[name] for name in names])
+    helix = result.film_coefficient[names[0]]
     oil = np.concatenate([result.fluid_temperature[name] for name in names]) - ZERO_CELSIUS_K
     values = np.repeat(np.column_stack([film, oil])[:, None, :], 6, axis=1)
     shape = facet_triangles(mesh.points, facets, values, np.zeros(len(facets), dtype=np.int32))
     bars = (
-        scale_of(film, FILM_MAP, "film coefficient / W/(m²·K)"),
+        _film_scale(helix, film),
         scale_of(oil, TEMPERATURE_MAP, "oil temperature / °C"),
     )
     view = View((-1.0, 0.55, -0.75), UP, shape.points)
@@ -215,9 +218,19 @@ def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | No
         "Walls of the oil channel",
         bars,
         [labels[0] + labels[1]] * 2,
-        notes=f"{coolant.flow * 6.0e4:.3g} L/min, Re = {coolant.reynolds:.0f}, {coolant.regime}; "
-        f"mean film {coolant.mean_film_coefficient:.0f} W/(m²·K), {coolant.heat:.0f} W to the oil.",
+        notes=f"{coolant.flow * 6.0e4:.3g} L/min, Re = {coolant.reynolds:.0f}, {coolant.regime}; film "
+        f"{helix.min():.0f} to {helix.max():.0f} along the helix"
+        + (f", {film.max():.0f} in the ports" if film.max() > helix.max() else "")
+        + f"; {coolant.heat:.0f} W to the oil.",
     )
+
+
+def _film_scale(helix: NDArray[np.float64], film: NDArray[np.float64]) -> ColourBar:
+    # Ports are another section: on one scale with them the helix would be of one colour.
+    bar = scale_of(helix, FILM_MAP, "film coefficient / W/(m²·K)")
+    above, below = film.max() > bar.high, film.min() < bar.low
+    extend = {(True, True): "both", (True, False): "max", (False, True): "min"}.get((above, below), "neither")
+    return replace(bar, extend=extend)
 
 
 def _channel_ends(spec: MachineSpec) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -265,6 +278,6 @@ def mesh_picture(renderer: SceneRenderer, result: ThermalResult) -> Figure:
     return picture_figure(
         renderer.render(view),
         "Mesh: whole elements behind the vertical plane, coloured by part",
-        notes=f"{grouped(mesh.n_elements)} quadratic tetrahedra, {grouped(result.n_unknowns)} temperature unknowns, "
-        f"worst element quality (minSICN) {mesh.min_quality:.2f}.",
+        notes=f"{grouped(mesh.n_elements)} quadratic tetrahedra, {grouped(result.n_unknowns)} temperature "
+        f"unknowns, worst element quality (minSICN) {mesh.min_quality:.2f}.",
     )

@@ -31,15 +31,15 @@ _SHADED = ("meridian_temperature",)  # a palette would show as bands
 
 CAPTIONS = {
     "machine_definition": (
-        "The machine as defined: parts by colour, contact lines of the bearings in red, oil in yellow, surfaces with "
-        "a film as thick lines, probes as dots."
+        "The machine as defined: parts by colour, contact lines of the bearings in red, oil in yellow, "
+        "surfaces with a film as thick lines, probes as dots."
     ),
     "temperature_cut": "The machine cut open along the vertical plane through its axis.",
     "meridian_temperature": "Temperature in the vertical plane through the axis, dimensions in mm.",
     "axial_profiles": "Temperature along the machine on its main surfaces.",
     "radial_profiles": "Temperature from the bore to the outside through each bearing; steps are joints.",
     "heat_by_bearing": "Friction heat of each bearing by its terms, and the bodies that it enters.",
-    "coolant": "Oil along the channel: temperatures, and the film coefficient between its low and high value.",
+    "coolant": "Oil along the channel: temperatures, and the film coefficient with its low and high value.",
     "channel_walls": "Walls of the channel, seen without the housing.",
     "heat_balance": "Where the heat comes from and where it goes.",
     "mesh": "The mesh, opened along the vertical plane; colours are parts.",
@@ -47,14 +47,14 @@ CAPTIONS = {
 
 _LIMITS = (
     "Steady state of one operating point; loads, speed and surroundings constant.",
-    "Turning parts have the same temperature all round in the time mean; standing parts are three-dimensional.",
-    "Joints have the constant conductance of the definition, which is the least certain input of such a model; "
+    "Turning parts have one temperature all round in the time mean; standing parts are three-dimensional.",
+    "Joints have the constant conductance of the definition, the least certain input of such a model; "
     "seats that close or open with temperature are not followed unless the definition says so.",
-    "Balls are one body a bearing with one temperature; races and balls meet through the contact resistances of "
-    "the definition.",
-    "The film coefficient of the channel is a correlation for a developed cross-section; its low and high value "
-    "show what the sources leave open. Ports, pipes and pump are not part of the pressure drop.",
-    "Heat of seals, drive, churning in the housing and cutting is included only where the definition names it.",
+    "The balls of a bearing are one body with one temperature; they meet the races through the contact "
+    "resistances of the definition.",
+    "The film coefficient of the channel is a correlation; its low and high value show what the sources "
+    "leave open. Pipes, filter and pump outside the machine are not part of the pressure drop.",
+    "Heat of seals, drive, churning and cutting is included only where the definition names it.",
 )
 
 
@@ -128,9 +128,13 @@ def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | No
         "meridian_temperature": lambda: charts.meridian_temperature(result, section, bar),
         "radial_profiles": lambda: charts.radial_profiles(result, section),
         "axial_profiles": lambda: charts.axial_profiles(result, section),
-        "heat_balance": lambda: charts.heat_balance(result.energy),
+        "heat_balance": lambda: charts.heat_balance(result.energy, result.bearings),
         "heat_by_bearing": lambda: charts.heat_by_bearing(result),
-        "coolant": lambda: None if result.coolant is None else charts.coolant_along_channel(result.coolant),
+        "coolant": lambda: (
+            None
+            if result.coolant is None
+            else charts.coolant_along_channel(result.coolant, ports=_wetted_ports(result))
+        ),
     }
 
 
@@ -262,7 +266,7 @@ def render_run_report(
         surfaces=tables.surface_table(dataset),
         checks=tables.check_table(summary),
         mesh=tables.mesh_table(summary),
-        inputs=input_groups(definition),
+        inputs=input_groups(definition, dataset.attrs.get("machine_defaults", "").split("\n")),
         limits=_LIMITS,
         versions=tables.version_table(summary, dataset.attrs),
         sources=[line for line in str(dataset.attrs.get("sources", "")).split("\n") if line],
@@ -315,6 +319,11 @@ def peak_memory_MB() -> float:  # noqa: N802 - the unit belongs to the name
     """Largest resident memory of this process so far."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1024.0**2 if sys.platform == "darwin" else 1024.0)
+
+
+def _wetted_ports(result: ThermalResult) -> bool:
+    channel = result.spec.channel
+    return channel is not None and channel.ports is not None and channel.ports.wetted
 
 
 def _subtitle(definition: Mapping[str, Any]) -> str:

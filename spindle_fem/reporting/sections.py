@@ -238,6 +238,7 @@ def section_of_volume(
     TriangleSet
         ``label`` is the index of the part.
     """
+    level = _off_plane(level)
     at_nodes = level[mesh.tetrahedra]
     crossed = np.flatnonzero((at_nodes.min(axis=1) < 0.0) & (at_nodes.max(axis=1) > 0.0))
     columns = np.column_stack([mesh.points, np.reshape(values, (len(mesh.points), -1)), level])
@@ -253,9 +254,7 @@ def section_of_volume(
     else:
         pieces = mesh.tetrahedra[crossed][:, :4]
         label = mesh.part_of_element[crossed]
-    # A node exactly on the plane would give triangles of no area; move it by a nanometre.
-    level = np.where(np.abs(columns[:, -1]) < 1.0e-9, 1.0e-9, columns[:, -1])
-    columns = columns[:, :-1]
+    level, columns = _off_plane(columns[:, -1]), columns[:, :-1]
     inside = level[pieces] > 0.0
     count = inside.sum(axis=1)
     order = np.argsort(~inside, axis=1, kind="stable")  # points with a positive level first
@@ -281,7 +280,7 @@ def section_of_volume(
 
 def section_of_triangles(shape: TriangleSet, level: NDArray[np.float64]) -> SegmentSet:
     """Lines where a plane cuts triangles (outlines of parts, profiles along a line)."""
-    level = np.where(np.abs(level) < 1.0e-9, 1.0e-9, level)
+    level = _off_plane(level)
     inside = level[shape.triangles] > 0.0
     count = inside.sum(axis=1)
     crossed = np.flatnonzero((count == 1) | (count == 2))
@@ -304,6 +303,7 @@ def boundary_lines(mesh: TaggedMesh, values: NDArray[np.float64], level: NDArray
         Signed distance from the plane.
     """
     facets, owner = _all_facets(mesh)
+    level = _off_plane(level)
     at_nodes = level[facets]
     crossed = np.flatnonzero((at_nodes.min(axis=1) < 0.0) & (at_nodes.max(axis=1) > 0.0))
     columns = np.column_stack([mesh.points, np.reshape(values, (len(mesh.points), -1)), level])
@@ -415,6 +415,11 @@ def _all_facets(mesh: TaggedMesh) -> tuple[NDArray[np.int64], NDArray[np.int32]]
             facets.append(side)
             labels.append(part_of_node[side[:, 0]])
     return _stack(facets, 6), np.concatenate([np.zeros(0, np.int32), *labels])
+
+
+def _off_plane(level: NDArray[np.float64]) -> NDArray[np.float64]:
+    # Points exactly on the plane count as a nanometre in front, so that a face in it is found once.
+    return np.where(np.abs(level) < 1.0e-9, 1.0e-9, level)
 
 
 def _between(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,12 +29,23 @@ def number(value: Any, digits: int = 1) -> str:
 
 
 def significant(value: Any, digits: int = 3) -> str:
-    """Text with significant digits, a dash where there is no value."""
+    """Text with significant digits, a dash where there is no value.
+
+    >>> significant(1213.6), significant(2.6e-13, 2), significant(0.0)
+    ('1210', '2.6e−13', '0')
+    """
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return MISSING
-    if value != 0.0 and (abs(value) < 1.0e-3 or abs(value) >= 1.0e6):
-        return f"{value:.{max(digits - 1, 1)}e}".replace("e-0", "e-").replace("-", "−")
-    return f"{value:.{digits}g}".replace("-", "−")
+    if value == 0.0:
+        return "0"
+    if 1.0e-3 <= abs(value) < 1.0e6:
+        decimals = digits - 1 - math.floor(math.log10(abs(value)))
+        text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+        if "." in text:
+            text = text.rstrip("0").rstrip(".")
+    else:
+        text = f"{value:.{max(digits - 1, 1)}e}".replace("e-0", "e-").replace("e+0", "e+")
+    return text.replace("-", "−")
 
 
 def column(title: str, **kind: bool) -> dict[str, Any]:
@@ -48,8 +59,30 @@ def rows_of(cells: Any) -> list[dict[str, Any]]:
 
 
 def readable(name: str) -> str:
-    """Name of a surface, joint or term for people."""
-    return name.replace("_", " ").replace("|", " | ")
+    """Name of a surface, joint or term for people.
+
+    >>> readable("housing.channel_wall"), readable("F1.inner_ring|shaft:face")
+    ('coolant, channel wall', 'F1.inner ring | shaft, face')
+    """
+    for ending, text in (("channel_wall", "coolant, channel wall"), ("channel_ports", "coolant, ports")):
+        if name.endswith("." + ending):
+            return text
+    return name.replace("_", " ").replace("|", " | ").replace(":", ", ")
+
+
+def heat_by_source(heat_in_by: Mapping[str, float], bearings: Iterable[str]) -> dict[str, float]:
+    """Heat put in with the races and balls of each bearing added up.
+
+    >>> heat_by_source({"F1.inner_raceway": 1.0, "F1.balls": 2.0, "motor": 3.0}, ["F1"])
+    {'F1': 3.0, 'motor': 3.0}
+    """
+    names = set(bearings)
+    totals: dict[str, float] = {}
+    for key, value in heat_in_by.items():
+        owner = key.split(".", 1)[0]
+        source = owner if owner in names else key
+        totals[source] = totals.get(source, 0.0) + value
+    return totals
 
 
 def headline(summary: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -73,6 +106,10 @@ def headline(summary: Mapping[str, Any]) -> list[dict[str, str]]:
                 f"largest inner minus outer raceway temperature, {rings}",
             ),
         ]
+        films = {name: state["lambda"] for name, state in bearings.items() if state["lambda"] is not None}
+        if films:
+            thin = min(films, key=films.__getitem__)
+            items.append((number(films[thin]), f"smallest film over roughness (lambda), {thin}"))
     items.append((f"{number(energy['heat_in_W'], 0)} W", "heat put in"))
     coolant = summary.get("coolant")
     if coolant:
@@ -121,38 +158,37 @@ def bearing_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def term_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Heat term by term, and where it enters."""
+    """Heat term by term, and where it enters, one column a bearing."""
     bearings = summary["bearings"]
     if not bearings:
         return None
-    terms = list(dict.fromkeys(key for state in bearings.values() for key in state["terms_W"]))
-    paths = list(dict.fromkeys(key for state in bearings.values() for key in state.get("heat_to_W", {})))
-    rows = rows_of(
-        [
-            name,
-            *(number(state["terms_W"].get(key, 0.0)) for key in terms),
-            number(state["heat_W"]),
-            *(number(state.get("heat_to_W", {}).get(key, 0.0)) for key in paths),
-        ]
-        for name, state in bearings.items()
-    )
-    total = [
-        "all",
-        *(number(sum(state["terms_W"].get(key, 0.0) or 0.0 for state in bearings.values())) for key in terms),
-        number(sum(state["heat_W"] for state in bearings.values())),
-        *(
-            number(sum(state.get("heat_to_W", {}).get(key, 0.0) or 0.0 for state in bearings.values()))
-            for key in paths
-        ),
-    ]
-    rows.append({"kind": "total", "cells": total})
+
+    def rows(key: str, names: Mapping[str, str]) -> list[dict[str, Any]]:
+        found = list(dict.fromkeys(name for state in bearings.values() for name in state.get(key, {})))
+        table = []
+        for name in found:
+            values = [state.get(key, {}).get(name) or 0.0 for state in bearings.values()]
+            table.append(
+                {"cells": [names.get(name, readable(name)), *map(number, values), number(sum(values))]}
+            )
+        return table
+
+    total = [state["heat_W"] for state in bearings.values()]
     columns = [
-        column("bearing"),
-        *(column(readable(key), number=True) for key in terms),
-        column("sum", number=True),
-        *(column(f"to {BODY_NAMES.get(key, readable(key))}", number=True) for key in paths),
+        column("friction heat / W"),
+        *(column(name, number=True) for name in bearings),
+        column("all", number=True),
     ]
-    return {"columns": columns, "rows": rows}
+    return {
+        "columns": columns,
+        "rows": [
+            {"kind": "group", "cells": ["term by term"]},
+            *rows("terms_W", {}),
+            {"kind": "total", "cells": ["sum", *map(number, total), number(sum(total))]},
+            {"kind": "group", "cells": ["where it enters"]},
+            *rows("heat_to_W", BODY_NAMES),
+        ],
+    }
 
 
 def coolant_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -198,7 +234,7 @@ def balance_table(summary: Mapping[str, Any]) -> dict[str, Any]:
     energy = summary["energy"]
     scale = abs(energy["heat_in_W"]) or 1.0
     rows: list[dict[str, Any]] = [{"kind": "group", "cells": ["put in"]}]
-    for name, value in energy.get("heat_in_by_W", {}).items():
+    for name, value in heat_by_source(energy.get("heat_in_by_W", {}), summary["bearings"]).items():
         rows.append({"cells": [readable(name), number(value, 2), number(100.0 * value / scale)]})
     rows.append({"kind": "total", "cells": ["sum", number(energy["heat_in_W"], 2), "100.0"]})
     rows.append({"kind": "group", "cells": ["leaves by"]})

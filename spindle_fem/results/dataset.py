@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from spindle_fem.errors import BadInputError
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
@@ -29,6 +30,30 @@ def spec_digest(spec: MachineSpec) -> str:
     """SHA-256 of the fully resolved definition: equal machines have equal digests."""
     text = json.dumps(spec.model_dump(mode="json", by_alias=True), sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def default_paths(spec: MachineSpec) -> list[str]:
+    """Paths of the values that the definition left to the program, such as ``film.0.factor``."""
+    return sorted(_defaults(spec, ""))
+
+
+def _defaults(value: Any, path: str) -> Iterator[str]:
+    if isinstance(value, BaseModel):
+        for name, field in type(value).model_fields.items():
+            inner = f"{path}{field.alias or name}"
+            if name == "marks":
+                continue
+            if name not in value.model_fields_set:
+                yield inner
+                if not isinstance(getattr(value, name), BaseModel):
+                    continue
+            yield from _defaults(getattr(value, name), f"{inner}.")
+    elif isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _defaults(item, f"{path}{key}.")
+    elif isinstance(value, tuple):
+        for index, item in enumerate(value):
+            yield from _defaults(item, f"{path}{index}.")
 
 
 def surface_means(
@@ -130,6 +155,7 @@ def build_dataset(result: ThermalResult, sources: tuple[str, ...] = ()) -> xr.Da
         "title": result.spec.title or result.spec.name,
         "machine": result.spec.name,
         "machine_definition_toml": write_machine(result.spec),
+        "machine_defaults": "\n".join(default_paths(result.spec)),
         "spec_sha256": spec_digest(result.spec),
         "mesh_digest": result.mesh.digest,
         "element_order": result.order,

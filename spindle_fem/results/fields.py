@@ -183,7 +183,8 @@ def write_tagged_vtu(
         blocks.append(np.ascontiguousarray(array))
         components = f' NumberOfComponents="{array.shape[1]}"' if array.ndim == 2 else ""
         kind = _TYPES[array.dtype.name]
-        return f'<DataArray type="{kind}" Name="{name}"{components} format="appended" offset="{{{len(blocks) - 1}}}"/>'
+        place = f'format="appended" offset="{{{len(blocks) - 1}}}"'
+        return f'<DataArray type="{kind}" Name="{name}"{components} {place}/>'
 
     number = f'NumberOfPoints="{len(mesh.points)}" NumberOfCells="{mesh.n_elements + n_faces}"'
     text = "\n".join(
@@ -230,7 +231,8 @@ def write_tagged_vtu(
 def _numbered(kind: str, names: tuple[str, ...]) -> Iterator[str]:
     # One array a name, because readers other than VTK refuse arrays of text.
     for number, name in enumerate(names):
-        yield f'<DataArray type="Int32" Name="{kind}.{name}" NumberOfTuples="1" format="ascii">{number}</DataArray>'
+        opening = f'<DataArray type="Int32" Name="{kind}.{name}" NumberOfTuples="1" format="ascii">'
+        yield f"{opening}{number}</DataArray>"
 
 
 def _compress(arrays: list[NDArray]) -> list[bytes]:

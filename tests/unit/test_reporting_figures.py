@@ -1,0 +1,167 @@
+"""Placing of labels, colour scales, tables and texts of reports."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spindle_fem.reporting import tables
+from spindle_fem.reporting.figures import TEMPERATURE_MAP, new_figure, rasterise, scale_of, spread
+from spindle_fem.reporting.inputs import customary, input_groups
+from spindle_fem.reporting.machine_drawing import channel_sections, machine_drawing, part_colours
+from spindle_fem.spec.load import load_machine
+
+
+@given(st.lists(st.tuples(st.floats(-50, 150), st.floats(1, 9)), min_size=1, max_size=10))
+def test_spread_labels_neither_overlap_nor_leave_the_line(items):
+    wanted, widths = map(np.array, zip(*items, strict=True))
+    places = spread(wanted, widths, 0.0, 100.0)
+    order = np.argsort(places)
+    gaps = np.diff(places[order]) - 0.5 * (widths[order][1:] + widths[order][:-1])
+    assert (gaps > -1.0e-6).all()
+    assert (places - 0.5 * widths > -1.0e-6).all()
+    assert (places + 0.5 * widths < 100.0 + 1.0e-6).all()
+
+
+def test_spread_leaves_labels_that_fit_where_they_are():
+    assert spread([10.0, 50.0, 90.0], [5.0] * 3, 0.0, 100.0) == pytest.approx([10.0, 50.0, 90.0])
+
+
+def test_spread_keeps_the_order_of_places():
+    places = spread([30.0, 31.0, 29.0], [20.0] * 3, 0.0, 100.0)
+    assert places[2] < places[0] < places[1]
+
+
+def test_scale_of_a_constant_field_has_a_width():
+    bar = scale_of([20.0, 20.0], TEMPERATURE_MAP, "temperature / °C")
+    assert bar.low < 20.0 < bar.high
+
+
+def test_temperature_map_grows_in_lightness():
+    colours = TEMPERATURE_MAP(np.linspace(0.0, 1.0, 64))[:, :3]
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    luminance = linear @ np.array([0.2126, 0.7152, 0.0722])
+    assert (np.diff(luminance) > 0.0).all()
+
+
+def test_figures_have_the_size_that_was_asked():
+    assert rasterise(new_figure(300, 500)).shape == (300, 500, 3)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("0.019 m", "19 mm"),
+        ("5e-08 m", "0.05 µm"),
+        ("314.1592653589793 rad/s", "3000 rpm"),
+        ("0.0003333333333333 m**3/s", "20 L/min"),
+        ("0.2617993877991494 rad", "15°"),
+        ("15 degC", "15 °C"),
+        (["0.041 m", "0.4 m"], "41 to 400 mm"),
+        ({"value": "10.0 W/m**2/K", "sigma_rel": 0.3}, "10 W/(m²·K) ± 30 %"),
+        ("helical", "helical"),
+        (True, "yes"),
+        (0.5, "0.5"),
+        (30, "30"),
+    ],
+)
+def test_values_are_shown_in_customary_units(text, expected):
+    assert customary(text) == expected
+
+
+def test_inputs_carry_the_marks_of_the_file():
+    import tomllib
+
+    from spindle_fem.spec.load import write_machine
+
+    definition = tomllib.loads(write_machine(load_machine("wu_tan_2016")))
+    groups = {group["title"]: group for group in input_groups(definition)}
+    cells = {row["cells"][0]: row["cells"] for row in groups["operation"]["rows"]}
+    assert cells["speed"][1:] == ["3000 rpm", "P"]
+    cells = {row["cells"][0]: row["cells"] for row in groups["coolant"]["rows"]}
+    assert cells["flow"][1:] == ["20 L/min", "A"]
+    assert cells["inlet temperature"][1:] == ["15 °C", "P"]
+    parts = [row["cells"] for row in groups["part"]["rows"]]
+    assert ["segment, nose: outer diameter", "180 mm", "A"] in parts
+    assert ["segment, front_seat: outer diameter", "140 mm", "C"] in parts
+    assert groups["operation"]["open"]
+    assert not groups["part"]["open"]
+
+
+def test_every_input_of_every_shipped_machine_finds_its_row():
+    import tomllib
+
+    from spindle_fem.spec.load import write_machine
+
+    def leaves(value):
+        if isinstance(value, dict) and set(value) != {"value", "sigma_rel"}:
+            return sum(leaves(item) for key, item in value.items() if key != "marks")
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            return sum(leaves(item) - ("name" in item) for item in value)  # names are headings
+        return 1
+
+    for name in ("wu_tan_2016", "recorded_spindle", "small_two_start", "uncooled"):
+        definition = tomllib.loads(write_machine(load_machine(name)))
+        titles = ("schema", "name", "title", "description")
+        shown = {key: value for key, value in definition.items() if key not in titles}
+        rows = [row for group in input_groups(definition) for row in group["rows"] if row.get("kind") != "group"]
+        assert len(rows) == leaves(shown), name
+        assert all(row["cells"][0] and row["cells"][1] for row in rows)
+
+
+def test_marks_do_not_cover_values_that_the_file_left_out():
+    definition = {"coolant": {"marks": {"default": "P"}, "flow": "0.001 m**3/s", "film_factor": 1.0}}
+    (group,) = input_groups(definition, ["coolant.film_factor"])
+    assert [row["cells"][2] for row in group["rows"]] == ["P", ""]
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "expected"),
+    [(1.25, 1, "1.2"), (-0.02, 1, "0.0"), (-3.0, 0, "−3"), (None, 1, "–"), (math.nan, 2, "–")],
+)
+def test_numbers_of_tables(value, digits, expected):
+    assert tables.number(value, digits) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(1234.5, "1230"), (0.0, "0"), (2.6e-13, "2.60e−13"), (None, "–"), (418.0, "418"), (-0.25, "−0.25")],
+)
+def test_significant_digits_of_tables(value, expected):
+    assert tables.significant(value) == expected
+
+
+def test_heat_sources_are_added_up_by_bearing():
+    heat = {"F1.inner_raceway": 10.0, "F1.outer_raceway": 12.0, "F1.balls": 20.0, "drive": 5.0}
+    assert tables.heat_by_source(heat, ["F1"]) == {"F1": 42.0, "drive": 5.0}
+
+
+def test_channel_sections_of_a_left_handed_double_start():
+    channel = load_machine("wu_tan_2016").channel.model_copy(
+        update={"starts": 2, "hand": "left", "turns": 1.0}
+    )
+    at_top = [round(1.0e3 * z, 6) for z in channel_sections(channel, 0.0)]
+    assert at_top == [48.0, 60.0, 72.0]
+    quarter = [round(1.0e3 * z, 6) for z in channel_sections(channel, 0.5 * np.pi)]
+    assert quarter == [54.0, 66.0]
+
+
+def test_part_colours_do_not_depend_on_other_parts():
+    assert part_colours(["x", "shaft"])[1] == part_colours(["shaft"])[0]
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("name", ["wu_tan_2016", "small_two_start", "uncooled"])
+def test_drawings_of_the_shipped_machines_fill_their_page(name):
+    pixels = rasterise(machine_drawing(load_machine(name)))
+    ink = (pixels < 250).any(axis=2)
+    rows, columns = np.flatnonzero(ink.any(axis=1)), np.flatnonzero(ink.any(axis=0))
+    height, width = ink.shape
+    assert rows[0] < 0.05 * height
+    assert rows[-1] > 0.94 * height
+    assert columns[0] < 0.05 * width
+    assert columns[-1] > 0.93 * width
