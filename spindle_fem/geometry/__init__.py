@@ -1,0 +1,1 @@
+"""Parts, faces, contacts and the channel of a machine, and their OpenCASCADE solids."""

@@ -60,13 +60,15 @@ class ChannelDefinition:
 class PortGeometry:
     """One radial drilling, a cylinder about the ray at ``angle`` and ``z``, in m.
 
-    ``start_radius`` lies inside the channel, ``end_radius`` outside the part.
+    ``start_radius`` lies inside the channel, ``seam_radius`` in the metal around
+    the whole drilling, ``end_radius`` outside the part.
     """
 
     angle: float
     z: float
     radius: float
     start_radius: float
+    seam_radius: float
     end_radius: float
 
     @property
@@ -342,10 +344,9 @@ def _place_port(
     for step in sorted({round(distance) * 1.0e-9 for distance in distances}):
         if radius > step - MINIMUM_WALL and radius < step + PORT_MARGIN:
             radius = max(step - MINIMUM_WALL, min(step - PORT_MARGIN, 1.5e-3))
-    reaching = (owner == part) & (boxes[:, 0] < centre + to_nanometres(radius))
-    reaching &= boxes[:, 1] > centre - to_nanometres(radius)
-    blocking = beyond & (owner != VOID) & (boxes[:, 0] < centre + to_nanometres(radius))
-    blocking &= boxes[:, 1] > centre - to_nanometres(radius)
+    low, high = centre - to_nanometres(radius), centre + to_nanometres(radius)
+    beside = (boxes[:, 0] < high) & (boxes[:, 1] > low)
+    blocking = beside & beyond & (owner != VOID)
     if blocking.any() or radius < 0.5e-3:
         what = (
             f'hits part "{meridian.part_names[owner[blocking][0]]}"'
@@ -360,10 +361,13 @@ def _place_port(
             )
         )
         return None
+    nearest_exit = boxes[beside & beyond, 2].min() * 1.0e-9
+    wall_radius = definition.inner_radius + definition.depth
     return PortGeometry(
-        angle,
-        z,
-        radius,
-        definition.inner_radius + 0.5 * definition.depth,
-        float(boxes[reaching, 3].max()) * 1.0e-9 + 5.0e-3,
+        angle=angle,
+        z=z,
+        radius=radius,
+        start_radius=definition.inner_radius + 0.5 * definition.depth,
+        seam_radius=float(wall_radius + 0.4 * (nearest_exit - wall_radius)),
+        end_radius=float(boxes[beside & (owner == part), 3].max()) * 1.0e-9 + 5.0e-3,
     )

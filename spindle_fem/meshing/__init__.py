@@ -1,0 +1,1 @@
+"""Curved tetrahedral meshes with named parts, surfaces and joints."""

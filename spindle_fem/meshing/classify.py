@@ -14,7 +14,7 @@ from spindle_fem.geometry.channel import ChannelGeometry, PortGeometry
 
 # Boolean operations leave points within a tenth of a micrometre; sweeps follow the helix to well below a micrometre.
 EXACT = 1.0e-6
-SWEPT = 2.0e-6
+SWEPT = 5.0e-6
 
 Shape = Literal["plane", "cylinder", "helicoid", "port"]
 

@@ -12,7 +12,8 @@ from spindle_fem.errors import MeshQualityError
 from spindle_fem.geometry.assembly import AssemblyGeometry
 from spindle_fem.geometry.solids import SolidModel, build_solids, gmsh_session
 from spindle_fem.meshing.classify import EXACT, FaceClass, classify_face
-from spindle_fem.meshing.sizes import MeshSizes, edge_sizes
+from spindle_fem.meshing.size_fields import set_sizes
+from spindle_fem.meshing.sizes import MeshSizes
 
 LOGGER = logging.getLogger(__name__)
 
@@ -72,7 +73,7 @@ class Attempt:
     surface_algorithm: int
     volume_algorithm: int
     size_factor: float
-    optimize_threshold: float = 0.35
+    optimize_threshold: float = 0.2
 
     def describe(self) -> str:
         """For notes and logs."""
@@ -84,11 +85,9 @@ class Attempt:
 LADDER = (
     Attempt(6, 10, 1.0),
     Attempt(5, 10, 1.0),
-    Attempt(6, 10, 0.85),
-    Attempt(5, 10, 0.85),
-    Attempt(6, 1, 0.85),
-    Attempt(6, 10, 0.7),
-    Attempt(1, 1, 0.7),
+    Attempt(6, 10, 0.85, 0.35),
+    Attempt(5, 10, 0.7, 0.35),
+    Attempt(6, 1, 0.7, 0.35),
 )
 
 
@@ -118,7 +117,7 @@ def mesh_once(assembly: AssemblyGeometry, sizes: MeshSizes, attempt: Attempt, th
     with gmsh_session(threads) as geometry:
         solids = build_solids(assembly, geometry)
         _set_options(attempt, threads)
-        _set_sizes(assembly, sizes.scaled(attempt.size_factor))
+        set_sizes(assembly, sizes.scaled(attempt.size_factor))
         try:
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises nothing more specific
@@ -145,65 +144,6 @@ def _set_options(attempt: Attempt, threads: int) -> None:
         ("Mesh.RandomSeed", 1),
     ):
         gmsh.option.setNumber(name, value)
-
-
-def _set_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
-    """Sizes at the corners of the model; gmsh carries them inwards."""
-    import gmsh
-
-    wanted: dict[tuple[int, int], float] = {}
-    for edge, size in zip(assembly.edges, edge_sizes(assembly, sizes), strict=True):
-        for z, r in ((edge.z[0], edge.r[0]), (edge.z[1], edge.r[1])):
-            key = round(z * 1e6), round(r * 1e6)
-            wanted[key] = min(wanted.get(key, size), size)
-    ports = assembly.channel.ports if assembly.channel is not None else ()
-    for _, tag in gmsh.model.getEntities(0):
-        x, y, z = gmsh.model.getValue(0, tag, [])
-        size = wanted.get((round(z * 1e6), round(np.hypot(x, y) * 1e6)), sizes.channel)
-        for port in ports:
-            u = x * port.direction[0] + y * port.direction[1]
-            v = -x * port.direction[1] + y * port.direction[0]
-            if u > 0.99 * port.start_radius and np.hypot(v, z - port.z) < 1.05 * port.radius:
-                size = min(size, 2.0 * np.pi * port.radius / sizes.port_segments)
-        gmsh.model.mesh.setSize([(0, tag)], size)
-    _grade_around_ports(assembly, sizes)
-
-
-def _grade_around_ports(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
-    """Let sizes grow steadily away from the drillings."""
-    import gmsh
-
-    if assembly.channel is None or not assembly.channel.ports:
-        return
-    bulk = max(sizes.part.values())
-    fields = []
-    for port in assembly.channel.ports:
-        fine = 2.0 * np.pi * port.radius / sizes.port_segments
-        reach = port.radius + (bulk - fine) / sizes.port_growth
-        x, y = port.direction
-        tag = gmsh.model.mesh.field.add("Frustum")
-        values = {
-            "X1": x * (port.start_radius - port.radius),
-            "Y1": y * (port.start_radius - port.radius),
-            "Z1": port.z,
-            "X2": x * port.end_radius,
-            "Y2": y * port.end_radius,
-            "Z2": port.z,
-            "InnerR1": port.radius,
-            "InnerR2": port.radius,
-            "OuterR1": reach,
-            "OuterR2": reach,
-            "InnerV1": fine,
-            "InnerV2": fine,
-            "OuterV1": bulk,
-            "OuterV2": bulk,
-        }
-        for name, value in values.items():
-            gmsh.model.mesh.field.setNumber(tag, name, value)
-        fields.append(tag)
-    smallest = gmsh.model.mesh.field.add("Min")
-    gmsh.model.mesh.field.setNumbers(smallest, "FieldsList", fields)
-    gmsh.model.mesh.field.setAsBackgroundMesh(smallest)
 
 
 def _read(assembly: AssemblyGeometry, solids: SolidModel) -> LinearMesh:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from spindle_fem.meshing.quality import TETRAHEDRON_EDGES, sampled_quality
 
-TARGET = 0.25
-PASSES = 8
+TARGET = 0.2
+PASSES = 30
+_ROUND = 10
 # Steps as fractions of the mean edge around a node, along axes and diagonals.
 _STEPS = (0.3, 0.1, 0.03)
 _DIRECTIONS = np.array(
@@ -59,14 +60,14 @@ def improve_elements(
     """
     points, quality = points.copy(), quality.copy()
     patches = _Patches(elements, fixed, n_corners)
+    idle = 0
     for number in range(PASSES):
         bad = np.flatnonzero(quality < target)
-        if len(bad) == 0:
+        if len(bad) == 0 or idle == _ROUND:
             break
-        first_column, last_column = (0, 4) if number % 2 == 0 else (4, 10)
-        moved = _relax(points, elements, quality, bad, patches, slice(first_column, last_column))
-        if moved == 0 and number % 2 == 1:
-            break
+        # Each pass tries another node of an element: its corners, then its middles.
+        moved = _relax(points, elements, quality, bad, patches, np.roll(np.arange(_ROUND), -number))
+        idle = 0 if moved else idle + 1
     return points, quality
 
 
@@ -92,7 +93,7 @@ def _relax(
     quality: NDArray[np.float64],
     bad: NDArray[np.int64],
     patches: _Patches,
-    columns: slice,
+    columns: NDArray[np.int64],
 ) -> int:
     """One sweep over nodes whose patches share no element; number of nodes moved."""
     nodes, members = _independent_nodes(elements, quality, bad, patches, columns)
@@ -133,7 +134,7 @@ def _independent_nodes(
     quality: NDArray[np.float64],
     bad: NDArray[np.int64],
     patches: _Patches,
-    columns: slice,
+    columns: NDArray[np.int64],
 ) -> tuple[list[int], list[NDArray[np.int64]]]:
     """Free nodes of the worst elements first, no two with an element or node in common."""
     taken: set[int] = set()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -15,7 +15,6 @@ from spindle_fem.geometry.meridian import MeridianEdge
 Preset = Literal["coarse", "normal", "fine"]
 
 CHANNEL = "channel"
-PORTS = "ports"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,33 +26,29 @@ class MeshSizes:
     part : mapping of str to float
     channel : float
         On the four walls.
-    port_segments : int
-        Edges around a port.
-    port_growth : float
-        Increase of size per distance from a port.
-    circle_segments : int
-        Least number of edges around any circle about the axis.
-    smallest_strip_edges : float
-        How many times longer than its width the edges of a narrow face may be.
+    port_segments, circle_segments : int
+        Least number of edges around a port and around any circle about the axis.
+    strip_edges : float
+        Longest edges over the width of a narrow face that they lie on.
+    wall_edges : float
+        Longest edges over the thickness of metal between the channel and the
+        outside or its next turn.
+    growth : float
+        Increase of size per distance from ports and thin walls.
     """
 
     part: Mapping[str, float]
     channel: float
     port_segments: int = 18
-    port_growth: float = 0.4
     circle_segments: int = 16
-    smallest_strip_edges: float = 3.0
+    strip_edges: float = 3.0
+    wall_edges: float = 1.5
+    growth: float = 0.4
 
     def key(self) -> dict[str, object]:
         """Plain values for the hash of a mesh."""
-        return {
-            "part": {name: float(size) for name, size in sorted(self.part.items())},
-            "channel": float(self.channel),
-            "port_segments": self.port_segments,
-            "smallest_strip_edges": self.smallest_strip_edges,
-            "port_growth": self.port_growth,
-            "circle_segments": self.circle_segments,
-        }
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return values | {"part": dict(sorted(self.part.items()))}
 
     def scaled(self, factor: float) -> MeshSizes:
         """All lengths times ``factor``; half the length is eight times the elements."""
@@ -63,19 +58,23 @@ class MeshSizes:
             channel=factor * self.channel,
             port_segments=max(self.port_segments, round(self.port_segments / factor)),
             circle_segments=max(self.circle_segments, round(self.circle_segments / factor)),
+            strip_edges=min(self.strip_edges, factor * self.strip_edges),
+            wall_edges=min(self.wall_edges, factor * self.wall_edges),
         )
 
 
 @dataclass(frozen=True, slots=True)
 class _Preset:
-    """Sizes of a preset: fractions of a part's wall and of the channel's section."""
+    """Sizes of a preset; the first three make lengths, the others are MeshSizes'."""
 
     bulk: float
     wall_fraction: float
     channel_fraction: float
     port_segments: int
     circle_segments: int
-    smallest_strip_edges: float
+    strip_edges: float
+    wall_edges: float
+    growth: float
     smallest: float = 1.0e-3
 
 
@@ -83,9 +82,9 @@ class _Preset:
 # channel channel_fraction * the shorter side of its section, at most half bulk.
 _PRESETS: Mapping[str, _Preset] = MappingProxyType(
     {
-        "coarse": _Preset(0.050, 2.0, 1.8, 14, 12, 5.0),
-        "normal": _Preset(0.020, 1.0, 0.75, 18, 16, 3.0),
-        "fine": _Preset(0.010, 0.5, 0.38, 24, 24, 2.0),
+        "coarse": _Preset(0.036, 2.0, 1.8, 14, 12, 5.0, 2.5, 0.7),
+        "normal": _Preset(0.020, 1.0, 0.75, 18, 16, 3.0, 1.6, 0.4),
+        "fine": _Preset(0.010, 0.5, 0.38, 24, 24, 2.0, 1.0, 0.4),
     }
 )
 
@@ -128,15 +127,26 @@ def build_sizes(
         raise BadInputError("mesh.size_factor", f"is {size_factor:g}.", "Allowed: above 0.")
     settings = _PRESETS[preset]
     part = {
-        geometry.name: size_factor
-        * min(settings.bulk, max(settings.smallest, settings.wall_fraction * _wall(geometry)))
+        geometry.name: min(settings.bulk, max(settings.smallest, settings.wall_fraction * _wall(geometry)))
         for geometry in assembly.parts
     }
-    channel = size_factor * settings.bulk
+    channel = settings.bulk
     if assembly.channel is not None:
         definition = assembly.channel.definition
-        section = min(definition.depth, definition.width)
-        channel = size_factor * min(0.5 * settings.bulk, settings.channel_fraction * section)
+        land = definition.pitch / definition.starts - definition.width
+        channel = min(
+            0.5 * settings.bulk,
+            settings.channel_fraction * min(definition.depth, definition.width),
+            settings.wall_edges * land,
+        )
+    sizes = MeshSizes(
+        MappingProxyType(part),
+        channel,
+        **{
+            name: getattr(settings, name)
+            for name in ("port_segments", "circle_segments", "strip_edges", "wall_edges", "growth")
+        },
+    ).scaled(size_factor)
     allowed = [*part, CHANNEL]
     for name, size in (overrides or {}).items():
         where = f"mesh.size.{name}"
@@ -145,17 +155,10 @@ def build_sizes(
         if not size > 0.0:
             raise BadInputError(where, f"is {size:g} m.", "Allowed: above 0.")
         if name == CHANNEL:
-            channel = size
+            sizes = replace(sizes, channel=size)
         else:
-            part[name] = size
-    segments = max(settings.port_segments, round(settings.port_segments / size_factor))
-    return MeshSizes(
-        MappingProxyType(part),
-        channel,
-        port_segments=segments,
-        circle_segments=settings.circle_segments,
-        smallest_strip_edges=settings.smallest_strip_edges * min(1.0, size_factor),
-    )
+            sizes = replace(sizes, part=MappingProxyType({**sizes.part, name: size}))
+    return sizes
 
 
 # Largest sagitta h² / 8 r of a chord over the clearance to the next cylinder, and
@@ -174,7 +177,7 @@ def edge_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> list[float]:
     for edge in assembly.edges:
         size = min(sizes.part[part] for part in edge.parts)
         length = (edge.z[1] - edge.z[0]) + (edge.r[1] - edge.r[0])
-        size = min(size, sizes.smallest_strip_edges * length)
+        size = min(size, sizes.strip_edges * length)
         if not edge.is_axis:
             size = min(size, 2.0 * math.pi * max(edge.r[0], 1e-3 * edge.r[1]) / sizes.circle_segments)
         if edge.is_cylinder and not edge.is_axis:
