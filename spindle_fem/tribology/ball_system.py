@@ -312,7 +312,7 @@ def solve_bordered(
             force_change = -np.einsum("nij,nj->ni", current.by_unknown[:, p:, :], solved_residual)
             weighted = weight * force_change
             right = -(ring + system.axial_map.T @ weighted[:, 0] + system.radial_map.T @ weighted[:, 1])
-            step_q = np.linalg.lstsq(tangent, right, rcond=1e-14)[0]
+            step_q = _solve_rings(tangent, right)
         else:
             step_q = np.zeros(0)
         distance_step = np.stack([system.axial_map @ step_q, system.radial_map @ step_q], axis=-1)
@@ -338,6 +338,15 @@ def solve_bordered(
         current, ring, merit = trial, trial_ring, trial_merit
     tangent = _tangent(system, current)[0]
     return BorderedSolution(x, q, merit, bool(merit < accept), iterations, tangent)
+
+
+def _solve_rings(tangent: FloatArray, right: FloatArray) -> FloatArray:
+    """Displacement step; the shortest one where the rings can move without force."""
+    try:
+        step = np.linalg.solve(tangent, right)
+    except np.linalg.LinAlgError:
+        return np.linalg.lstsq(tangent, right, rcond=1e-14)[0]
+    return step if np.isfinite(step).all() else np.linalg.lstsq(tangent, right, rcond=1e-14)[0]
 
 
 def _ring_residual(system: BallSystem, evaluation: Evaluation, load: FloatArray) -> FloatArray:

@@ -31,9 +31,9 @@ FloatArray = NDArray[np.float64]
 RacewayControl = Literal["outer", "inner", "equilibrium"]
 # N; residuals of a bearing without load are compared with it
 _SMALLEST_FORCE = 1e-6
-_SMALLEST_SPEED_STEP = 1.0 / 256.0
+_SMALLEST_SPEED_STEP = 1.0 / 100.0
 # Widths (m) of softened contact, and softened traction, on the way to a solution
-_SMOOTHINGS = (2e-6, 3e-7, 5e-8, 1e-8, 0.0)
+_SMOOTHINGS = (2e-6, 3e-7, 5e-8, 1e-8, 1e-9, 1e-10, 1e-11, 0.0)
 _CREEP_RATIOS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
 # A ball is left to the cage below this multiple of the traction it needs
 _DRIVE_MARGIN = 2.0
@@ -189,7 +189,8 @@ class _Solver:
             solution = self._frictional(speed, guess, displacement, rows, self.options, self.nobody)
             if solution.converged:
                 return _Attempt(solution, self.nobody)
-        plain = self._race_control(speed, centre, displacement, rows)
+        rough = self.control == "equilibrium"
+        plain = self._race_control(speed, centre, displacement, rows, 1e-6 if rough else 1e-11)
         if self.control != "equilibrium" or not plain.converged:
             return _Attempt(plain, self.nobody)
         distance = system.groove_distances(plain.displacement)
@@ -211,8 +212,14 @@ class _Solver:
         return _Attempt(solution, self.nobody)
 
     def _race_control(
-        self, speed: float, centre: FloatArray, displacement: FloatArray, rows: FloatArray
+        self,
+        speed: float,
+        centre: FloatArray,
+        displacement: FloatArray,
+        rows: FloatArray,
+        tolerance: float,
     ) -> BorderedSolution:
+        """Raceway control; ``tolerance`` may be rough where it only starts another solution."""
         side = INNER if self.control == "inner" else OUTER
         speeds = np.full(self.system.number, speed)
         for smoothing in (0.0, *_SMOOTHINGS):
@@ -221,7 +228,7 @@ class _Solver:
                 lambda x, axial, radial, system=system: race_control_evaluation(
                     system, speeds, side, x, axial, radial
                 ),
-                centre, displacement, rows, float(rows.max()),
+                centre, displacement, rows, float(rows.max()), tolerance,
             )  # fmt: skip
             if smoothing == 0.0 and solution.converged:
                 break
@@ -256,6 +263,7 @@ class _Solver:
         displacement: FloatArray,
         rows: FloatArray,
         size: float,
+        tolerance: float = 1e-11,
     ) -> BorderedSolution:
         system = self.system
         lever = np.maximum(np.abs(system.axial_map).max(axis=0), np.abs(system.radial_map).max(axis=0))
@@ -265,7 +273,7 @@ class _Solver:
         return solve_bordered(
             system, evaluate, unknowns, displacement, self.load,
             row_scale=rows, load_scale=np.maximum(size * balls * lever / 10.0, np.abs(self.load)),
-            step_limit=0.1 * stretch,
+            step_limit=0.1 * stretch, tolerance=tolerance, accept=max(1e-7, tolerance),
         )  # fmt: skip
 
     def _forces(self, speed: float) -> FloatArray:

@@ -182,6 +182,7 @@ def contact_polynomials(geometry: BearingGeometry) -> NDArray[np.float64]:
     return table
 
 
+@lru_cache(maxsize=256)
 def mean_load_constant(geometry: BearingGeometry) -> float:
     """K_n of inner and outer contact in series at the free contact angle, N/m^1.5."""
     inner = bearing_contact_constants(geometry, geometry.contact_angle, INNER).load_constant

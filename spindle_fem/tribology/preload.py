@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -227,6 +228,7 @@ def unloading_thrust(
     return sum(axial_force(geometry, total) for geometry in loaded)
 
 
+@lru_cache(maxsize=1024)
 def tandem_approach(geometries: tuple[BearingGeometry, ...], force: float) -> float:
     """Common axial approach of bearings in tandem that share a force, m."""
     require_force("preload", force)
