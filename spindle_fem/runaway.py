@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 # A preload this many times that of assembly ends a bearing, whatever the loop then does.
 LARGEST_PRELOAD_RATIO = 5.0
 RELAXATION = 0.3
-HEAT_TOLERANCE = 1.0e-4
-MAXIMUM_STEPS = 200
-SPEED_TOLERANCE = 0.005
+# The linear response has no film or oil loop to upset, so it may step further.
+RESPONSE_RELAXATION = 0.6
+HEAT_TOLERANCE = 1.0e-3
+MAXIMUM_STEPS = 100
+SPEED_TOLERANCE = 0.01
 MAXIMUM_RESPONSES = 6
 
 
@@ -88,7 +90,7 @@ class HeatResponse:
             wanted = np.array([found[name].total for name in self.names])
             if np.abs(wanted - heat).max() <= HEAT_TOLERANCE * wanted.max():
                 return True
-            heat = heat + RELAXATION * (wanted - heat)
+            heat = heat + RESPONSE_RELAXATION * (wanted - heat)
         return False
 
     def highest_speed(self, highest: float) -> float:

@@ -1,0 +1,194 @@
+"""The coupled solve: balances, limits, symmetry of rotating parts, and what it refuses."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from spindle_fem.checks import require_checks
+from spindle_fem.coupling import prepare_machine, solve_coupled
+from spindle_fem.errors import CheckFailedError, FaultsError, NoSteadyStateError
+from spindle_fem.loads.joints import group_of_contacts
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.runaway import HeatResponse, highest_stable_speed
+from spindle_fem.solve import estimate_refinement, solve_prepared
+from spindle_fem.spec.load import load_machine
+
+RPM = math.pi / 30.0
+
+
+def test_energy_and_coolant_close(recorded_result):
+    assert abs(recorded_result.energy.imbalance_relative) < 1e-10
+    checks = {check.name: check for check in recorded_result.checks}
+    assert checks["coolant enthalpy"].value < 1e-8
+    assert all(check.passed for check in recorded_result.checks)
+    assert recorded_result.energy.heat_in == pytest.approx(2 * 155 + 140 + 2 * 85)
+
+
+def test_coolant_takes_what_its_temperature_rise_says(recorded_result):
+    coolant = recorded_result.coolant
+    oil = 873.3 * 1858.0  # density and heat capacity of equation 29 at 15 °C
+    assert coolant.heat == pytest.approx(
+        oil * coolant.flow * (coolant.outlet_temperature - coolant.inlet_temperature), rel=1e-3
+    )
+    assert coolant.mean_film_coefficient == pytest.approx(243.2, rel=1e-3)
+
+
+def test_channel_wall_has_the_exact_helical_area(recorded_result):
+    assert recorded_result.coolant.wetted_area == pytest.approx(0.1562, rel=1e-3)
+
+
+def test_temperatures_rise_in_proportion_to_heat(recorded):
+    """With films, flow and oil properties fixed, double heat is double rise over one ambient."""
+    spec = recorded.spec
+    table = spec.heat.table
+    doubled = table.model_copy(
+        update={"heat": {name: tuple(2.0 * value for value in row) for name, row in table.heat.items()}}
+    )
+    point = dataclasses.replace(OperatingPoint.of(spec), coolant_inlet_temperature=290.75, ambient_temperature=290.75)
+    single = solve_prepared(recorded, point)
+    heated = prepare_machine(spec.model_copy(update={"heat": spec.heat.model_copy(update={"table": doubled})}))
+    twice = solve_prepared(heated, point)
+    rise, doubled_rise = single.temperature - 290.75, twice.temperature - 290.75
+    assert np.abs(doubled_rise - 2.0 * rise).max() < 1e-6 * rise.max()
+
+
+def test_no_heat_leaves_the_machine_between_its_surroundings(recorded):
+    point = dataclasses.replace(OperatingPoint.of(recorded.spec), speed=0.0)
+    result = solve_prepared(recorded, point)
+    assert result.energy.heat_in == 0.0
+    assert result.temperature.min() > 288.15 - 1e-9
+    assert result.temperature.max() < 290.75 + 1e-9
+
+
+def test_rotating_parts_are_uniform_around_the_axis(recorded_result):
+    assert _first_harmonic(recorded_result, "F1.inner_raceway") < 0.01
+    assert _first_harmonic(recorded_result, "F1.outer_raceway") > 0.1
+
+
+def test_without_averaging_the_inner_ring_follows_the_outer_one(recorded, recorded_result):
+    spec = recorded.spec
+    kept = spec.model_copy(update={"mesh": spec.mesh.model_copy(update={"circumferential_averaging": False})})
+    local = solve_prepared(prepare_machine(kept))
+    averaged = _first_harmonic(recorded_result, "F1.inner_raceway")
+    assert _first_harmonic(local, "F1.inner_raceway") > 5.0 * averaged
+    assert local.probes["SP01"] == pytest.approx(recorded_result.probes["SP01"], abs=0.2)
+
+
+def _first_harmonic(result, surface):
+    """Amplitude in K of the first harmonic around the axis on a cylindrical surface."""
+    nodes = np.unique(result.mesh.surfaces[surface])
+    x, y, z = result.mesh.points[nodes].T
+    along = np.polynomial.chebyshev.chebvander(2.0 * (z - z.min()) / np.ptp(z) - 1.0, 4)
+    radius = np.hypot(x, y)
+    columns = np.column_stack([along, x / radius, y / radius])
+    coefficients, *_ = np.linalg.lstsq(columns, result.temperature[nodes], rcond=None)
+    return np.hypot(*coefficients[-2:])
+
+
+def test_linear_and_quadratic_temperatures_agree(recorded, recorded_result):
+    spec = recorded.spec
+    linear = solve_prepared(prepare_machine(spec.model_copy(update={"mesh": spec.mesh.model_copy(update={"order": 1})})))
+    assert linear.n_unknowns < recorded_result.n_unknowns / 3
+    for name, value in recorded_result.probes.items():
+        # Straight temperatures on elements of 10-20 mm; the rings alone span 15 K.
+        assert linear.probes[name] == pytest.approx(value, abs=0.5)
+
+
+def test_ring_difference_is_what_the_ball_row_and_heat_make_of_it(recorded_result):
+    bearing = recorded_result.bearings["F1"]
+    assert bearing.temperature_outer < bearing.temperature_ball < bearing.temperature_inner
+    assert bearing.ring_difference == pytest.approx(18.0, abs=1.5)
+
+
+def test_reference_run_reports_every_friction_term(reference_result):
+    terms = reference_result.bearings["F1"].terms
+    assert sum(terms.values()) == pytest.approx(reference_result.bearings["F1"].heat)
+    assert terms["inner_rolling"] > terms["ball_drag"] > terms["inner_sliding"]
+    codes = {warning.code for warning in reference_result.warnings}
+    assert "thermal_preload_omitted" in codes
+    assert "coolant_film_extrapolated" in codes
+
+
+def test_heat_enters_balls_and_rings_by_the_share(reference_result):
+    bearing = reference_result.bearings["F1"]
+    assert bearing.heat_to["balls"] == pytest.approx(0.5 * bearing.heat)
+    assert bearing.heat_to["inner"] == pytest.approx(bearing.heat_to["outer"])
+
+
+def test_grease_beyond_its_limit_fails_the_run(recorded):
+    spec = recorded.spec
+    cool_grease = spec.model_copy(update={"grease": spec.grease.model_copy(update={"temperature_limit": 310.0})})
+    result = solve_prepared(prepare_machine(cool_grease))
+    with pytest.raises(CheckFailedError, match=r"grease temperature 50\..* degC \(limit 36\.85\)"):
+        require_checks(result.checks, "recorded")
+
+
+def test_heat_response_tells_stable_from_runaway(reference):
+    spec = reference.spec
+    following = prepare_machine(
+        spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": True})})
+    )
+    response = HeatResponse(following, OperatingPoint.of(spec))
+    assert response.settles(200.0 * RPM)
+    assert not response.settles(3000.0 * RPM)
+
+
+@pytest.mark.slow
+def test_rigid_preload_runs_away_and_says_up_to_which_speed_it_does_not():
+    spec = load_machine("wu_tan_2016", ["mesh.preset=coarse", "heat.thermal_preload=true"])
+    machine = prepare_machine(spec)
+    with pytest.raises(NoSteadyStateError, match=r"no thermal equilibrium at 3000 rpm.*up to about \d+ rpm"):
+        solve_coupled(machine, OperatingPoint.of(spec))
+    limit = highest_stable_speed(machine, OperatingPoint.of(spec))
+    slower = dataclasses.replace(OperatingPoint.of(spec), speed=0.9 * limit)
+    state = solve_coupled(machine, slower)
+    cold = solve_coupled(
+        prepare_machine(load_machine("wu_tan_2016", ["mesh.preset=coarse"])), slower
+    )
+    assert state.loads.bearing_heat["F2"].preload > cold.loads.bearing_heat["F2"].preload
+    assert HeatResponse(machine, slower).settles(slower.speed)
+
+
+def test_spring_preload_keeps_its_force_when_the_rings_grow():
+    spec = load_machine(
+        "wu_tan_2016",
+        [
+            "mesh.preset=coarse",
+            "heat.thermal_preload=true",
+            "bearing_set.front.preload_kind=spring",
+            "bearing_set.rear.preload_kind=spring",
+        ],
+    )
+    result = solve_prepared(prepare_machine(spec))
+    assert result.bearings["F3"].preload == pytest.approx(1137.2, rel=1e-3)
+    assert result.bearings["F3"].contact_angle_inner < math.radians(15.0)
+
+
+def test_second_mesh_estimates_the_error(recorded, recorded_result):
+    refined = estimate_refinement(recorded_result, recorded.spec)
+    estimate = refined.extra["mesh_refinement"]
+    assert estimate["coarse_nodes"] < estimate["fine_nodes"]
+    assert set(estimate["estimate_K"]) == {*recorded_result.probes, "hottest"}
+    assert max(estimate["estimate_K"].values()) < 0.2
+
+
+def test_contacts_need_one_group_each(recorded):
+    spec = recorded.spec
+    first, *others = spec.joint
+    faulty = spec.model_copy(
+        update={
+            "joint": (
+                first.model_copy(update={"contacts": ("F1.inner_ring|shaft", "X*|shaft")}),
+                others[0].model_copy(update={"contacts": (*others[0].contacts, "F1.inner_ring|shaft")}),
+                *others[1:],
+            )
+        }
+    )
+    with pytest.raises(FaultsError) as error:
+        group_of_contacts(faulty, recorded.mesh.joints)
+    text = str(error.value)
+    assert '"X*|shaft" is no contact of this machine.' in text
+    assert 'the contact "F2.inner_ring|shaft" has no conductance.' in text
+    assert 'the contact "F1.inner_ring|shaft" is claimed by inner_ring_seats and front_outer_ring_seats' in text
