@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import gzip
 import io
 import warnings
@@ -191,10 +192,11 @@ def _check_lines(data: Path, content: bytes, separator: str, expected: int) -> t
     lengths = ends - starts
     carriage = codes[np.maximum(ends - 1, 0)] == ord("\r")
     blank = (lengths - carriage) <= 0
-    if b'"' in content:  # separators inside quotes: leave the counting to the parser
-        return content, int(blank.sum()), 0, False
-    separators = np.flatnonzero(codes == ord(separator))
-    cells = np.searchsorted(separators, ends) - np.searchsorted(separators, starts) + 1
+    if b'"' in content:
+        cells = _quoted_cells(data, content, separator, ends.size)
+    else:
+        separators = np.flatnonzero(codes == ord(separator))
+        cells = np.searchsorted(separators, ends) - np.searchsorted(separators, starts) + 1
     long = np.flatnonzero(cells > expected)
     if long.size:
         raise RecordingError(
@@ -206,6 +208,17 @@ def _check_lines(data: Path, content: bytes, separator: str, expected: int) -> t
         content = content[: starts[-1]]
         short[-1] = False
     return content, int(blank.sum()), int(short.sum()), truncated
+
+
+def _quoted_cells(data: Path, content: bytes, separator: str, lines: int) -> NDArray[np.int64]:
+    """Cells of each line where quotes may hide separators."""
+    try:
+        cells = [len(row) for row in csv.reader(io.StringIO(content.decode("utf-8")), delimiter=separator)]
+    except csv.Error as error:
+        raise RecordingError(str(data), f"is not a readable table ({error}).") from error
+    if len(cells) != lines:
+        raise RecordingError(str(data), "has a quoted cell that runs over several lines.")
+    return np.maximum(np.array(cells, dtype=np.int64), 1)
 
 
 def _has_decimal_comma(content: bytes) -> bool:

@@ -58,7 +58,7 @@ def nonlinear():
     return chain(
         conductance_laws=(
             ConductanceLaw(np.array([2]), natural_convection),
-            ConductanceLaw(np.array([3]), radiation),
+            ConductanceLaw(np.array([1, 3]), radiation),
         ),
         heat_laws=(warm_friction,),
     )

@@ -167,6 +167,20 @@ def test_too_many_cells_are_refused(tmp_path):
         read_recording(write(tmp_path, lines))
 
 
+def test_quoted_cells(tmp_path):
+    """Quotes may hide separators: such lines are counted another way."""
+    plain = read_recording(write(tmp_path, rows()))
+    lines = [",".join(f'"{cell}"' for cell in row.split(",")) for row in rows()]
+    header = '"time_s","SP01","SP03","speed"'
+    np.testing.assert_array_equal(
+        plain.temperature, read_recording(write(tmp_path, lines, header=header)).temperature
+    )
+    with pytest.raises(RecordingError, match="line 2: has 5 cells, the header names 4"):
+        read_recording(write(tmp_path, [line + ',"9"' for line in lines], header=header))
+    with pytest.raises(RecordingError, match="quoted cell that runs over several lines"):
+        read_recording(write(tmp_path, [*lines, '"300","20\n1","2","3"'], header=header))
+
+
 def test_missing_column_offers_the_nearest(tmp_path):
     with pytest.raises(RecordingError, match=r'line 1: has no column "SP03". Did you mean "SP3"'):
         read_recording(write(tmp_path, rows(), header="time_s,SP01,SP3,speed"))

@@ -161,6 +161,20 @@ def test_each_segment_starts_from_its_first_reading(tmp_path, network):
     assert any("each starts from its first readings" in note for note in result.notes)
 
 
+def test_initial_parameters_move_the_first_segment_only(tmp_path, network):
+    times = np.concatenate([np.arange(0.0, 1000.0, 10.0), np.arange(90000.0, 91000.0, 10.0)])
+    recording = make(tmp_path, network, times=times)
+    start = initial_parameters(network, recording)
+    assert [item.name for item in start] == ["initial.bearing", "initial.shaft", "initial.housing"]
+    # 0.1 K of noise on what is read, 5 K on the estimate of what is not
+    assert [item.sigma_log * item.value for item in start] == pytest.approx([0.1, 5.0, 0.1])
+    moved = tuple(replace(item, value=item.value + 10.0) for item in start)
+    result = simulate_on_recording(network, recording, parameters=moved)
+    assert_allclose(result.predicted[0], recording.temperature[0] + 10.0, atol=1e-9)
+    assert_allclose(result.predicted[100], recording.temperature[100], atol=1e-9)
+    assert np.all(result.sensitivity[100:] == 0.0)
+
+
 def test_unread_node_starts_where_its_balance_is_zero(network):
     history = InputHistory.constant(np.array([0.0, 1.0]), {"ambient": 293.15, "speed": 0.0})
     state, _ = initial_state(network, history, {"shaft": 310.0, "housing": 300.0})
@@ -210,7 +224,8 @@ def test_sensitivities_with_the_start_against_finite_differences(tmp_path, netwo
 def test_unread_start_carries_its_dependence_on_parameters(tmp_path, network):
     """Without initial parameters the shaft's start follows the bearing and the conductances."""
     manifest = MANIFEST.replace('probe = "bearing"', 'probe = "shaft"')
-    recording = make(tmp_path, network, times=np.arange(0.0, 3000.0, 30.0), manifest=manifest)
+    start = (320.0, 290.0, 300.0)
+    recording = make(tmp_path, network, times=np.arange(0.0, 3000.0, 30.0), start=start, manifest=manifest)
     derivative = simulate_on_recording(network, recording, parameters=network.parameters).sensitivity
     step = 1e-6
     for p, parameter in enumerate(network.parameters):
