@@ -136,7 +136,8 @@ def build_states(
         bearing_heat_record: BearingHeat | None = None
         temperature = float(film_temperatures[index])
         cage = int(np.sum(weight[solved.carried[part]]))
-        warnings = list(_load_warnings(bearing.name, balls, contacts, control, speed, _cut(system, part)))
+        grooves = (distance[0][part], distance[1][part])
+        warnings = _load_warnings(bearing.name, balls, contacts, grooves, control, speed, _cut(system, part))
         if cage:
             text = f"{bearing.name}: friction is too weak to drive {cage} balls; the cage carries them."
             warnings.append(CodedWarning("balls_carried_by_cage", text))
@@ -257,16 +258,21 @@ def _with_films(
 
 
 def _load_warnings(
-    name: str, balls: BallStates, contacts: Contacts, control: str, speed: float, system: BallSystem
+    name: str,
+    balls: BallStates,
+    contacts: Contacts,
+    grooves: tuple[FloatArray, FloatArray],
+    control: str,
+    speed: float,
+    system: BallSystem,
 ) -> list[CodedWarning]:
     warnings = []
     free = ~(contacts.load[:, INNER] > 0.0)
-    if free.all():
-        warnings.append(
-            CodedWarning(
-                "counter_bearing_unloaded", f"{name}: no ball touches the inner raceway; it carries nothing."
-            )
-        )
+    # the grooves are too far apart to hold a ball at rest; centrifugal force may still wedge it
+    apart = np.hypot(*grooves) <= system.rest_length.sum(axis=1) * (1.0 + 1e-12)
+    if free.all() or apart.all():
+        held = "no ball touches the inner raceway" if free.all() else "only centrifugal force seats its balls"
+        warnings.append(CodedWarning("counter_bearing_unloaded", f"{name}: {held}; it carries no preload."))
     elif free.any():
         share = int(np.sum(balls.weight[free]))
         warnings.append(

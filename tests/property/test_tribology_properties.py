@@ -84,8 +84,10 @@ def test_heat_is_drag_torque_times_speed(bearing: BearingGeometry) -> None:
     system = join_rows([build_ball_rows(bearing, np.zeros(1), float(bearing.ball_count))], [0])
     film = lubricant_state(GREASE, np.array([313.15]), None)
     solved = solve_equilibrium(
-        system, speed, np.array([load]), "equilibrium", start=np.array([axial_state(bearing, load).approach]),
-        ball_load=load / bearing.ball_count / math.sin(bearing.contact_angle), lubricant=film, options=options,
+        system, speed, np.array([load]), "equilibrium",
+        start=np.array([axial_state(bearing, load).approach]),
+        ball_load=load / bearing.ball_count / math.sin(bearing.contact_angle),
+        lubricant=film, options=options,
     )  # fmt: skip
     patch = build_patch(system, solved.contacts, film, options)
     integrals = integrate_traction(system, patch, film, options, np.array([speed]), solved.ball_speeds)

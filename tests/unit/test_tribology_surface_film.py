@@ -1,0 +1,139 @@
+"""Rough profiles, spectral moments, asperity contact and film corrections."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from spindle_fem.errors import OutOfValidityError, SpecError
+from spindle_fem.tribology.film import film_fit_warnings, thermal_reduction
+from spindle_fem.tribology.surface import (
+    SurfaceRoughness,
+    contact_area_ratio,
+    exceedance_integral,
+    profile_moments,
+    read_profile,
+    roughness_from_rms,
+    weierstrass_mandelbrot_moments,
+    weierstrass_mandelbrot_profile,
+)
+from spindle_fem.tribology.traction import ellipse_quadrature
+
+FRACTAL = (1e-11, 1.4, 22, 30)
+
+
+def test_profile_moments_meet_the_closed_form() -> None:
+    # incommensurate wave lengths: the record must span many of the longest
+    x = np.arange(400_000) * 2.0e-8
+    height = weierstrass_mandelbrot_profile(x, *FRACTAL)
+    sampled = profile_moments(x, height)
+    closed = weierstrass_mandelbrot_moments(*FRACTAL)
+    assert sampled[0] == pytest.approx(closed[0], rel=0.01)
+    # second differences of the shortest wave, 25 samples long, lose (kh)²/12
+    assert sampled[1] == pytest.approx(closed[1], rel=0.03)
+    assert sampled[2] == pytest.approx(closed[2], rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((1e-9, 2.0, 1, 5), "fractal_dimension: it is 2. Allowed: between 1 and 2."),
+        ((1e-9, 1.5, 6, 5), "highest mode 5 lies below the lowest 6"),
+    ],
+)
+def test_fractals_that_do_not_exist(arguments: tuple, message: str) -> None:
+    with pytest.raises(SpecError) as caught:
+        weierstrass_mandelbrot_moments(*arguments)
+    assert message in str(caught.value)
+
+
+def test_profile_from_file(tmp_path) -> None:
+    file = tmp_path / "race.csv"
+    file.write_text("x_um,z_nm\n0,10\n0.5,-20\n1.0,30\n")
+    position, height = read_profile(file)
+    assert position == pytest.approx([0.0, 5e-7, 1e-6])
+    assert height == pytest.approx([1e-8, -2e-8, 3e-8])
+    with pytest.raises(SpecError, match="Give at least 16 positions"):
+        profile_moments(position, height)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x,z\n0,1\n", "Write it as x_um,z_nm"),
+        ("x_um,z_inch\n0,1\n", "Write it as x_um,z_nm"),
+        ("x_um,z_nm\n0,one\n", "line 2: '0,one' is no pair of numbers"),
+        ("", "Write it as x_um,z_nm"),
+    ],
+)
+def test_profile_files_that_cannot_be_read(tmp_path, text: str, message: str) -> None:
+    file = tmp_path / "race.csv"
+    file.write_text(text)
+    with pytest.raises(SpecError) as caught:
+        read_profile(file)
+    assert message in str(caught.value)
+
+
+def test_missing_profile_file(tmp_path) -> None:
+    with pytest.raises(SpecError, match="cannot be read"):
+        read_profile(tmp_path / "absent.csv")
+
+
+def test_unequal_spacing_is_refused() -> None:
+    x = np.arange(40.0)
+    x[20] += 0.3
+    with pytest.raises(SpecError, match="not equally spaced"):
+        profile_moments(x, np.sin(x))
+
+
+def test_exceedance_integral_against_quadrature() -> None:
+    for distance in (-1.0, 0.3, 2.5):
+        integral, _ = quad(
+            lambda x, t=distance: (x - t) * math.exp(-0.5 * x * x) / math.sqrt(2 * math.pi), distance, 20.0
+        )
+        assert float(exceedance_integral(distance)) == pytest.approx(integral, rel=1e-9)
+
+
+def test_asperity_contact_fades_with_the_film() -> None:
+    surface = roughness_from_rms(0.05e-6) + roughness_from_rms(0.01e-6)
+    ratios = contact_area_ratio(np.array([0.02, 0.05, 0.1, 0.2, 0.9]) * 1e-6, surface)
+    assert np.all(np.diff(ratios) < 0.0)
+    assert ratios[0] < 0.3
+    assert ratios[-1] < 1e-30
+
+
+def test_moments_add_and_need_a_bandwidth() -> None:
+    total = roughness_from_rms(3e-8) + roughness_from_rms(4e-8)
+    assert total.height_rms == pytest.approx(5e-8)
+    with pytest.raises(OutOfValidityError, match=r"Allowed: at least 1\.5"):
+        SurfaceRoughness(1e-15, 1e-3, 1e8)
+    with pytest.raises(SpecError, match="All must be above 0"):
+        SurfaceRoughness(0.0, 1e-3, 1e12)
+
+
+def test_ellipse_quadrature_integrates_pressure_and_its_square() -> None:
+    across, across_weight, along, along_weight = ellipse_quadrature(20, 6)
+    pressure = np.sqrt(1.0 - across**2)[:, None] * along
+    disc = across_weight @ (pressure @ along_weight)
+    square = across_weight @ (pressure**2 @ along_weight)
+    # ∫√(1-r²) = 2π/3, ∫(1-r²) = π/2 over the unit disc
+    assert disc == pytest.approx(2.0 * math.pi / 3.0, rel=2e-3)
+    assert square == pytest.approx(math.pi / 2.0, rel=1e-6)
+
+
+def test_thermal_reduction_limits() -> None:
+    assert float(thermal_reduction(1e-3, 0.0, 0.14)) == 1.0
+    assert float(thermal_reduction(1e-3, 10.0, 0.14, model="none")) == 1.0
+    rolling, sliding = (float(thermal_reduction(1e-3, 10.0, 0.14, slide)) for slide in (0.0, 0.2))
+    assert sliding < rolling < 1.0
+
+
+def test_film_fit_warning_names_what_is_outside() -> None:
+    assert film_fit_warnings(1e-11, 4000.0, 5.0) == ()
+    (warning,) = film_fit_warnings(2e-10, 4000.0, 8.6)
+    assert warning.code == "film_fit_extrapolated"
+    assert "U is 2e-10" in warning.text
+    assert "ellipticity is 8.6" in warning.text
