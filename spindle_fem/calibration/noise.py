@@ -1,0 +1,148 @@
+"""Errors of readings: white noise, and a slow error that neighbouring readings share.
+
+The slow error (drift of the logger, of what a probe touches, and of the model
+itself) is an Ornstein-Uhlenbeck process: covariance ``σ² exp(−|t − t'|/τ)``.
+Residuals are averaged over bins and whitened with the covariance of the
+averages, so that a reading repeated every second does not count as a new one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+SHORTEST_BIN = 60.0
+MOST_BINS = 500
+
+
+@dataclass(frozen=True, slots=True)
+class SlowError:
+    """Slow error of every channel.
+
+    Attributes
+    ----------
+    sigma : float, [K]
+        One standard deviation.
+    time : float, [s]
+        Correlation time.
+    """
+
+    sigma: float = 0.035
+    time: float = 1500.0
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelBins:
+    """Usable readings of one channel, averaged.
+
+    Attributes
+    ----------
+    channel : int
+        Column of the recording.
+    rows : (k,) int ndarray
+        Usable readings.
+    owner : (k,) int ndarray
+        Bin of each.
+    times : (b,) ndarray, [s]
+        Mean time of each bin.
+    number : (b,) ndarray
+        Readings in each.
+    white : float, [K]
+        Of a single reading, rounding included.
+    """
+
+    channel: int
+    rows: NDArray[np.int64]
+    owner: NDArray[np.int64]
+    times: Array
+    number: Array
+    white: float
+
+    def average(self, values: Array) -> Array:
+        """Means over the bins of values (N, ...) at all stamps of the recording."""
+        chosen = values[self.rows]
+        total = np.zeros((len(self.times), *values.shape[1:]))
+        np.add.at(total, self.owner, chosen)
+        return total / self.number.reshape(-1, *([1] * (values.ndim - 1)))
+
+    def factor(self, slow: SlowError) -> Array:
+        """Lower Cholesky factor of the covariance of the bin means, (b, b) [K]."""
+        apart = np.abs(self.times[:, None] - self.times)
+        covariance = slow.sigma**2 * np.exp(-apart / slow.time)
+        covariance[np.diag_indices_from(covariance)] += self.white**2 / self.number
+        return np.linalg.cholesky(covariance)
+
+
+def channel_bins(recording: Recording, use: NDArray[np.bool_] | None = None) -> tuple[ChannelBins, ...]:
+    """Bins of every channel that has usable readings.
+
+    Parameters
+    ----------
+    recording : Recording
+    use : (N,) bool ndarray, optional
+        Stamps to use; the others are held out.
+    """
+    times = recording.times
+    width = max(SHORTEST_BIN, float(times[-1] - times[0]) / MOST_BINS)
+    found = []
+    for channel in range(recording.temperature.shape[1]):
+        usable = recording.usable[:, channel] & (True if use is None else use)
+        rows = np.flatnonzero(usable)
+        if rows.size == 0:
+            continue
+        _, owner = np.unique(np.floor((times[rows] - times[0]) / width), return_inverse=True)
+        number = np.bincount(owner).astype(float)
+        rounding = recording.noise[channel].resolution / np.sqrt(12.0)
+        # A declared sigma is that of the sensor; rounding of the file comes on top where it is coarse.
+        white = float(np.hypot(recording.sigma[channel], rounding))
+        mean_time = np.bincount(owner, weights=times[rows]) / number
+        found.append(ChannelBins(channel, rows, owner, mean_time, number, white))
+    return tuple(found)
+
+
+def whiten(factor: Array, values: Array) -> Array:
+    """``L⁻¹ x``: unit variance, uncorrelated."""
+    return solve_triangular(factor, values, lower=True, check_finite=False)
+
+
+def likely_slow_error(
+    residuals: Sequence[tuple[ChannelBins, Array]],
+    *,
+    prior: SlowError | None = None,
+    prior_width: float = 0.35,
+    sigmas: Sequence[float] = (0.01, 0.02, 0.035, 0.05, 0.075, 0.11, 0.17, 0.25, 0.4, 0.65, 1.0, 1.6, 2.5),
+    times: Sequence[float] = (600.0, 1200.0, 2400.0, 4800.0, 9600.0),
+) -> SlowError:
+    """Most probable slow error of binned residuals.
+
+    Parameters
+    ----------
+    residuals : sequence of (ChannelBins, (b,) ndarray)
+        Residuals of the bin means [K].
+    prior : SlowError, optional
+        Where the magnitude is expected; its logarithm has the standard
+        deviation ``prior_width``. Without it every listed value is as likely.
+    sigmas, times : sequence of float, [K], [s]
+        Values to choose from.
+    """
+    best, chosen = -np.inf, SlowError()
+    for sigma in sigmas:
+        for time in times:
+            slow = SlowError(sigma, time)
+            likelihood = 0.0
+            for bins, values in residuals:
+                factor = bins.factor(slow)
+                likelihood -= np.log(np.diag(factor)).sum() + 0.5 * float(np.sum(whiten(factor, values) ** 2))
+            if prior is not None:
+                likelihood -= 0.5 * (np.log(sigma / prior.sigma) / prior_width) ** 2
+            if likelihood > best:
+                best, chosen = likelihood, slow
+    return chosen
