@@ -1,0 +1,94 @@
+"""``spindle-fem run`` and ``report`` on a small machine."""
+
+import json
+
+import meshio
+import pytest
+import xarray as xr
+
+FILES = ("summary.json", "fields.vtu", "result.nc", "report.html", "machine.toml")
+
+
+@pytest.mark.render
+def test_run_writes_every_file(small_run):
+    folder, process = small_run
+    assert process.returncode == 0, process.stderr
+    assert [name for name in FILES if not (folder / name).is_file()] == []
+    assert len(list((folder / "figures").glob("*.png"))) >= 8
+    assert not (folder / "INCOMPLETE").exists()
+
+
+@pytest.mark.render
+def test_json_output_is_the_summary(small_run):
+    folder, process = small_run
+    assert json.loads(process.stdout) == json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.render
+def test_summary_has_the_keys_that_stay_put(small_run):
+    summary = json.loads((small_run[0] / "summary.json").read_text(encoding="utf-8"))
+    assert {"schema", "machine", "versions", "wall_time_s", "peak_rss_MB", "warnings"} <= set(summary)
+    assert {"nodes", "elements", "min_quality", "area_error_relative"} <= set(summary["mesh"])
+    assert abs(summary["energy"]["imbalance_relative"]) < 1e-8
+    assert max(map(abs, summary["mesh"]["area_error_relative"].values())) < 1e-3
+    assert {"flow_m3_s", "inlet_degC", "outlet_degC", "reynolds", "regime", "pressure_drop_Pa"} <= set(
+        summary["coolant"]
+    )
+    assert set(summary["coolant"]["film_coefficient_W_m2K"]) == {"value", "low", "high"}
+    for bearing in summary["bearings"].values():
+        assert {
+            "heat_W", "terms_W", "temperature_inner_degC", "temperature_outer_degC", "temperature_ball_degC",
+            "ring_difference_K", "contact_angle_inner_deg", "contact_angle_outer_deg", "preload_N", "film_um", "lambda",
+        } <= set(bearing)  # fmt: skip
+    assert {"min_degC", "max_degC", "max_at_mm"} == set(summary["temperature"])
+
+
+@pytest.mark.render
+def test_heat_in_equals_heat_out_by_surface(small_run):
+    energy = json.loads((small_run[0] / "summary.json").read_text(encoding="utf-8"))["energy"]
+    assert sum(energy["heat_out_W"].values()) == pytest.approx(energy["heat_in_W"], rel=1e-8)
+
+
+@pytest.mark.render
+def test_fields_open_in_meshio_and_agree_with_the_summary(small_run):
+    folder, _ = small_run
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    fields = meshio.read(folder / "fields.vtu")
+    temperature = next(values for name, values in fields.point_data.items() if "temperature" in name)
+    assert temperature.max() == pytest.approx(summary["temperature"]["max_degC"], abs=1e-3)
+    with xr.open_dataset(folder / "result.nc", engine="h5netcdf") as dataset:
+        assert dataset.attrs
+
+
+@pytest.mark.render
+def test_resolved_machine_runs_again_to_the_same_numbers(small_run, command, tmp_path):
+    folder, _ = small_run
+    again = command("run", folder / "machine.toml", "-o", tmp_path / "again", "--json")
+    assert again.returncode == 0, again.stderr
+    first = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert json.loads(again.stdout)["probes"] == pytest.approx(first["probes"], abs=1e-6)
+
+
+@pytest.mark.render
+def test_report_is_rebuilt_from_the_folder(small_run, command):
+    folder, _ = small_run
+    (folder / "report.html").unlink()
+    process = command("report", folder)
+    assert process.returncode == 0, process.stderr
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "http://" not in text.replace("http://www.w3.org", "")
+    assert "https://" not in text
+
+
+def test_report_of_an_empty_folder_is_bad_input(command, tmp_path):
+    process = command("report", tmp_path)
+    assert process.returncode == 2
+    assert "summary.json" in process.stderr
+
+
+def test_run_into_a_folder_of_other_things_is_refused(command, tmp_path):
+    (tmp_path / "letters.txt").write_text("mine", encoding="utf-8")
+    process = command("run", "small_two_start", "-o", tmp_path)
+    assert process.returncode == 2
+    assert "letters.txt" in process.stderr
+    assert (tmp_path / "letters.txt").read_text(encoding="utf-8") == "mine"
