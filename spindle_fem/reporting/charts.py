@@ -272,10 +272,10 @@ def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
     sinks = {name: value for name, value in energy.heat_out.items() if value > 0.0}
     sources = dict(sorted(sources.items(), key=lambda item: -item[1]))
     sinks = dict(sorted(sinks.items(), key=lambda item: -item[1]))
-    figure = new_figure(700.0)
-    axes = pixel_axes(figure, 24.0, 100.0, 1552.0, 580.0)
+    figure = new_figure(592.0)
+    axes = pixel_axes(figure, 24.0, 100.0, 1552.0, 480.0)
     axes.axis("off")
-    axes.set(xlim=(0.0, 1552.0), ylim=(580.0, 0.0))
+    axes.set(xlim=(0.0, 1552.0), ylim=(480.0, 0.0))
     total = max(sum(sources.values()), sum(sinks.values()))
     _title(
         figure,
@@ -283,12 +283,12 @@ def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
         f"{energy.heat_in:.1f} W put in; imbalance {energy.imbalance_relative:.1e} of it.",
     )
     if total <= 0.0:
-        axes.text(776.0, 290.0, "No heat flows.", ha="center", va="center")
+        axes.text(776.0, 240.0, "No heat flows.", ha="center", va="center")
         return figure
     body = 420.0
     _bands(axes, sources, body, total, left=True)
     _bands(axes, sinks, body, total, left=False)
-    top = 0.5 * (580.0 - body)
+    top = 0.5 * (480.0 - body)
     axes.add_patch(
         Rectangle(
             (710.0, top), 132.0, body * sum(sources.values()) / total, facecolor="#c9d2da", linewidth=0.0
@@ -309,9 +309,9 @@ def _bands(axes: Axes, flows: Mapping[str, float], body: float, total: float, *,
     if not flows:
         return
     heights = np.array(list(flows.values())) / total * body
-    top = 0.5 * (580.0 - body)
+    top = 0.5 * (480.0 - body)
     at_body = top + np.cumsum(heights) - 0.5 * heights
-    at_end = spread(at_body, np.maximum(heights + 8.0, 32.0), 0.0, 580.0)
+    at_end = spread(at_body, np.maximum(heights + 8.0, 32.0), 0.0, 480.0)
     near, far = (710.0, 480.0) if left else (842.0, 1072.0)
     middle = 0.5 * (near + far)
     palette = (CYCLE[1], CYCLE[4]) if left else (CYCLE[0], CYCLE[5])

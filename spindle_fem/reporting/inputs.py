@@ -103,7 +103,7 @@ def input_groups(definition: Mapping[str, Any], defaults: Collection[str] = ()) 
         elif isinstance(value, Mapping) and _holds_tables(value):
             for name, table in value.items():
                 rows += _heading(name) + _rows(table, "", f"{key}.{name}.", unset)
-        elif isinstance(value, Mapping):
+        elif isinstance(value, Mapping) and not _is_prior(value):
             rows = _rows(value, "", f"{key}.", unset)
         if rows:
             groups.append(
@@ -114,7 +114,9 @@ def input_groups(definition: Mapping[str, Any], defaults: Collection[str] = ()) 
     general = [
         {"cells": [key.replace("_", " "), customary(value), ""]}
         for key, value in definition.items()
-        if not isinstance(value, Mapping) and not _is_tables(value) and key not in _HIDDEN
+        if (_is_prior(value) or not isinstance(value, Mapping))
+        and not _is_tables(value)
+        and key not in _HIDDEN
     ]
     if general:
         groups.append({"title": "general", "open": False, "columns": columns, "rows": general})

@@ -304,7 +304,7 @@ def embed_figures(folder: Path, captions: Mapping[str, str]) -> dict[str, dict[s
         with Image.open(path) as image:
             width, height = image.size
             image.convert("RGB").save(buffer, "WEBP", quality=76, method=1)
-        caption = captions.get(path.stem) or path.stem.replace("_", " ").capitalize() + "."
+        caption = captions.get(path.stem) or _caption(path.stem)
         embedded[path.stem] = {
             "source": "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode(),
             "alt": caption,
@@ -313,6 +313,13 @@ def embed_figures(folder: Path, captions: Mapping[str, str]) -> dict[str, dict[s
             "height": height,
         }
     return embedded
+
+
+def _caption(stem: str) -> str:
+    kind, _, name = stem.partition("_")
+    if kind == "bearings" and name:
+        return f"Bearing set {name}: where its heat goes, and the temperatures of races and balls."
+    return stem.replace("_", " ").capitalize() + "."
 
 
 def peak_memory_MB() -> float:  # noqa: N802 - the unit belongs to the name

@@ -114,6 +114,8 @@ class SceneRenderer:
 
     def add_coloured(self, shape: TriangleSet, bar: ColourBar, *, column: int = 0, lit: bool = True) -> Any:
         """Layer coloured by one value of its points; unlit it matches the colour bar exactly."""
+        if not len(shape.triangles):
+            return None
         mesh = _polydata(shape)
         mesh.point_data["value"] = shape.values[:, column]
         return self._plotter.add_mesh(
@@ -129,6 +131,8 @@ class SceneRenderer:
 
     def add_plain(self, shape: TriangleSet, colour: str, *, lit: bool = True, opacity: float = 1.0) -> Any:
         """Layer of one colour."""
+        if not len(shape.triangles):
+            return None
         return self._plotter.add_mesh(
             _polydata(shape),
             color=colour,
@@ -143,6 +147,8 @@ class SceneRenderer:
         """Layer coloured by the label of its triangles."""
         from matplotlib.colors import to_rgb
 
+        if not len(shape.triangles):
+            return None
         table = (np.array([to_rgb(colour) for colour in colours]) * 255.0).astype(np.uint8)
         mesh = _polydata(shape)
         mesh.cell_data["colour"] = table[shape.label]
@@ -161,6 +167,8 @@ class SceneRenderer:
     ) -> Any:
         """Layer of segments, drawn in front of triangles at the same place."""
         number = len(lines.points)
+        if not number:
+            return None
         mesh = pv.PolyData()
         mesh.points = lines.points.reshape(-1, 3)
         mesh.lines = np.column_stack([np.full(number, 2), np.arange(2 * number).reshape(-1, 2)]).ravel()
