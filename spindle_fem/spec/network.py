@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pint
+import tomli_w
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError
 
 from spindle_fem.errors import (
@@ -19,7 +20,10 @@ from spindle_fem.errors import (
     UnknownSurfaceError,
     did_you_mean,
 )
+from spindle_fem.spec.faults import validation_faults
 from spindle_fem.spec.fields import Name, SpecModel, uncertain_field
+from spindle_fem.spec.inherit import apply_overrides
+from spindle_fem.spec.load import find_machine, read_toml
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain, registry, to_si, uncertain_to_si
 
 NETWORK_SCHEMA = "spindle-fem/machine/1"
@@ -195,170 +199,6 @@ class NetworkMachineSpec(SpecModel):
     network: NetworkSpec
 
 
-def network_faults(spec: NetworkSpec) -> list[SpindleFemError]:
-    """Everything that makes a well-formed network unusable, by name.
-
-    Floating nodes, capacities and conductances that are not positive, unknown
-    or repeated names, links to themselves, gains without a power.
-    """
-    faults: list[SpindleFemError] = []
-    seen: dict[str, str] = {}
-    for kind, items in (("node", spec.node), ("boundary", spec.boundary)):
-        for number, item in enumerate(items, 1):
-            where = f"network.{kind}[{number}].name"
-            if item.name in seen:
-                earlier = seen[item.name]
-                faults.append(
-                    SpecError(
-                        where, f'"{item.name}" is defined twice, first as {earlier}.', "Use one definition."
-                    )
-                )
-            seen.setdefault(item.name, f"network.{kind}[{number}]")
-    for number, node in enumerate(spec.node, 1):
-        if not node.capacity.value > 0.0:
-            faults.append(
-                SpecError(
-                    f"network.node[{number}].capacity",
-                    f'"{node.name}" has {node.capacity.value:g} J/K.',
-                    "Allowed: above 0 J/K.",
-                )
-            )
-    for number, boundary in enumerate(spec.boundary, 1):
-        value = boundary.temperature
-        if isinstance(value, Uncertain) and not value.value > 0.0:
-            faults.append(
-                SpecError(
-                    f"network.boundary[{number}].temperature",
-                    f"{value.value:g} K is below absolute zero.",
-                    'Allowed: such as "20 degC".',
-                )
-            )
-    faults += _link_faults(spec, seen)
-    faults += _source_faults(spec)
-    if not faults:
-        faults += _floating_faults(spec)
-    return faults
-
-
-def _link_faults(spec: NetworkSpec, known: Mapping[str, str]) -> list[SpindleFemError]:
-    faults: list[SpindleFemError] = []
-    labels: dict[frozenset[str] | str, int] = {}
-    boundaries = {boundary.name for boundary in spec.boundary}
-    for number, link in enumerate(spec.link, 1):
-        where = f"network.link[{number}]"
-        unknown = [end for end in dict.fromkeys(link.between) if end not in known]
-        faults += [
-            UnknownSurfaceError(
-                f"{where}.between", f'"{end}" is neither a node nor a boundary.', did_you_mean(end, known)
-            )
-            for end in unknown
-        ]
-        if link.between[0] == link.between[1]:
-            faults.append(
-                SpecError(
-                    f"{where}.between", f'joins "{link.between[0]}" to itself.', "Name two different ends."
-                )
-            )
-        elif set(link.between) <= boundaries:
-            faults.append(
-                SpecError(
-                    f"{where}.between",
-                    f'joins the boundaries "{link.between[0]}" and "{link.between[1]}".',
-                    "At least one end must be a node.",
-                )
-            )
-        if not link.conductance.value > 0.0:
-            faults.append(
-                SpecError(
-                    f"{where}.conductance",
-                    f'"{link.label}" has {link.conductance.value:g} W/K.',
-                    "Allowed: above 0 W/K.",
-                )
-            )
-        label = link.name or frozenset(link.between)
-        if label in labels:
-            faults.append(
-                SpecError(
-                    where,
-                    f'"{link.label}" is the same link as network.link[{labels[label]}].',
-                    "Give the second one a name of its own, or add the conductances.",
-                )
-            )
-        labels.setdefault(label, number)
-    return faults
-
-
-def _source_faults(spec: NetworkSpec) -> list[SpindleFemError]:
-    faults: list[SpindleFemError] = []
-    names = [node.name for node in spec.node]
-    labels: dict[str, int] = {}
-    for number, source in enumerate(spec.source, 1):
-        where = f"network.source[{number}]"
-        if source.node not in names:
-            faults.append(
-                UnknownSurfaceError(
-                    f"{where}.node", f'"{source.node}" is not a node.', did_you_mean(source.node, names)
-                )
-            )
-        if source.label in labels:
-            faults.append(
-                SpecError(
-                    where,
-                    f'node "{source.node}" already takes heat from {source.input or "a constant"} in '
-                    f"network.source[{labels[source.label]}].",
-                    "Use one source for each node and input.",
-                )
-            )
-        labels.setdefault(source.label, number)
-        faults += _gain_faults(source, where)
-    return faults
-
-
-def _gain_faults(source: SourceSpec, where: str) -> list[SpindleFemError]:
-    units = registry()
-    power = units.Unit("W").dimensionality
-    is_power = units.Unit(source.gain.unit).dimensionality == power
-    example = 'For example gain = "5 W".'
-    if source.input is None:
-        if source.exponent != 1.0 or source.reference is not None:
-            return [
-                SpecError(where, "exponent and reference need an input.", "Name the input, or drop them.")
-            ]
-        if not is_power:
-            return [UnitError(f"{where}.gain", "a source without input needs a power.", example)]
-    elif source.reference is not None:
-        if not source.reference.amount.value > 0.0:
-            return [SpecError(f"{where}.reference", "must be above 0.", 'For example "1000 rpm".')]
-        if not is_power:
-            return [
-                UnitError(f"{where}.gain", "with a reference the gain is the heat there, a power.", example)
-            ]
-    return []
-
-
-def _floating_faults(spec: NetworkSpec) -> list[SpindleFemError]:
-    neighbours: dict[str, set[str]] = {}
-    for link in spec.link:
-        first, second = link.between
-        neighbours.setdefault(first, set()).add(second)
-        neighbours.setdefault(second, set()).add(first)
-    reached = {boundary.name for boundary in spec.boundary}
-    frontier = list(reached)
-    while frontier:
-        new = neighbours.get(frontier.pop(), set()) - reached
-        reached |= new
-        frontier += new
-    return [
-        SpecError(
-            f"network.node[{number}]",
-            f'"{node.name}" floats: no chain of links joins it to a boundary.',
-            "Link it, directly or through other nodes, to a boundary.",
-        )
-        for number, node in enumerate(spec.node, 1)
-        if node.name not in reached
-    ]
-
-
 def validate_network_machine(content: Mapping[str, Any], source: str) -> NetworkMachineSpec:
     """Typed ``[network]`` machine of raw tables; every fault at once.
 
@@ -374,8 +214,6 @@ def validate_network_machine(content: Mapping[str, Any], source: str) -> Network
     FaultsError
         One or more faults; each names file, key, value and what is allowed.
     """
-    from spindle_fem.spec.load import validation_faults
-
     schema = content.get("schema")
     if schema != NETWORK_SCHEMA:
         fault = SpecError(f"{source}: schema", f"{schema!r} is not known.", f'Allowed: "{NETWORK_SCHEMA}".')
@@ -384,6 +222,8 @@ def validate_network_machine(content: Mapping[str, Any], source: str) -> Network
         spec = NetworkMachineSpec.model_validate(dict(content))
     except ValidationError as error:
         raise FaultsError(source, validation_faults(error, source, NetworkMachineSpec)) from error
+    from spindle_fem.spec.network_faults import network_faults
+
     faults = network_faults(spec.network)
     if faults:
         raise FaultsError(
@@ -393,15 +233,77 @@ def validate_network_machine(content: Mapping[str, Any], source: str) -> Network
     return spec
 
 
-def load_network_machine(path: str | Path) -> NetworkMachineSpec:
-    """Read a ``[network]`` machine file.
+def is_network_machine(content: Mapping[str, Any]) -> bool:
+    """Whether raw tables describe a machine without drawings."""
+    return "network" in content and "part" not in content
+
+
+def load_network_machine(machine: str | Path, overrides: Iterable[str] = ()) -> NetworkMachineSpec:
+    """Read a ``[network]`` machine file, or one that ships by its name.
+
+    Parameters
+    ----------
+    machine : str or Path
+    overrides : iterable of str
+        ``path=value`` texts, such as ``network.node.winding.capacity=50 J/K``.
 
     Raises
     ------
     SpecError
-        Anything wrong with the file.
+        Anything wrong with the file or the overrides.
     """
-    from spindle_fem.spec.load import find_machine, read_toml
+    found = find_machine(machine)
+    content = apply_overrides(read_toml(found), overrides, NetworkMachineSpec)
+    return validate_network_machine(content, found.name)
 
-    found = find_machine(path)
-    return validate_network_machine(read_toml(found), found.name)
+
+def write_network_machine(spec: NetworkMachineSpec) -> str:
+    """TOML text of a network machine; reads back to an equal one."""
+    content = spec.model_dump(mode="json", by_alias=True, exclude_none=True)
+    return tomli_w.dumps(_without_empty(content))
+
+
+def _without_empty(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_empty(item) for key, item in value.items() if item not in ({}, [], "")}
+    return [_without_empty(item) for item in value] if isinstance(value, list) else value
+
+
+def with_parameters(spec: NetworkMachineSpec, values: Mapping[str, Uncertain]) -> NetworkMachineSpec:
+    """The same machine with some values replaced, for example by calibrated ones.
+
+    Parameters
+    ----------
+    spec : NetworkMachineSpec
+    values : mapping of str to Uncertain
+        By the names that :func:`spindle_fem.network.build.build_network` gives
+        its parameters, in the units of the definition: a gain with a reference
+        is the heat there.
+
+    Raises
+    ------
+    UnknownSurfaceError
+        A name that this machine does not have.
+    """
+    network = spec.network
+    changed: dict[str, list[SpecModel]] = {
+        "node": list(network.node),
+        "boundary": list(network.boundary),
+        "link": list(network.link),
+        "source": list(network.source),
+    }
+    places = {f"capacity.{node.name}": ("node", i, "capacity") for i, node in enumerate(network.node)}
+    places |= {
+        f"temperature.{b.name}": ("boundary", i, "temperature") for i, b in enumerate(network.boundary)
+    }
+    places |= {f"conductance.{link.label}": ("link", i, "conductance") for i, link in enumerate(network.link)}
+    places |= {f"gain.{source.label}": ("source", i, "gain") for i, source in enumerate(network.source)}
+    for name, value in values.items():
+        if name not in places:
+            raise UnknownSurfaceError("parameters", f'"{name}" is unknown.', did_you_mean(name, places))
+        kind, index, field = places[name]
+        item = changed[kind][index]
+        given = Gain(value, item.gain.unit) if isinstance(item, SourceSpec) else value
+        changed[kind][index] = item.model_copy(update={field: given})
+    tables = {kind: tuple(items) for kind, items in changed.items()}
+    return spec.model_copy(update={"network": network.model_copy(update=tables)})

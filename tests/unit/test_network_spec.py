@@ -5,12 +5,18 @@ import tomllib
 
 import numpy as np
 import pytest
-import tomli_w
 
-from spindle_fem.errors import FaultsError
+from spindle_fem.errors import FaultsError, SpecError, UnknownSurfaceError
 from spindle_fem.network.build import build_network
 from spindle_fem.spec.load import machine_folder
-from spindle_fem.spec.network import load_network_machine, validate_network_machine
+from spindle_fem.spec.network import (
+    is_network_machine,
+    load_network_machine,
+    validate_network_machine,
+    with_parameters,
+    write_network_machine,
+)
+from spindle_fem.units import Uncertain
 
 TEXT = """
 schema = "spindle-fem/machine/1"
@@ -113,14 +119,48 @@ def test_gain_in_any_unit(content, text, input_value, heat):
 
 def test_round_trip_through_toml(content):
     spec = validate_network_machine(content, "machine.toml")
-    again = tomllib.loads(
-        tomli_w.dumps(spec.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True))
-    )
-    second = validate_network_machine(again, "again.toml")
-    one, two = build_network(spec.network), build_network(second.network)
+    again = validate_network_machine(tomllib.loads(write_network_machine(spec)), "again.toml")
+    one, two = build_network(spec.network), build_network(again.network)
     np.testing.assert_allclose(one.boundary_temperature, two.boundary_temperature, rtol=1e-12)
     np.testing.assert_allclose(one.source_gain, two.source_gain, rtol=1e-12)
+    np.testing.assert_allclose(one.source_exponent, two.source_exponent)
+    assert [p.name for p in one.parameters] == [p.name for p in two.parameters]
     assert [p.sigma_log for p in one.parameters] == pytest.approx([p.sigma_log for p in two.parameters])
+
+
+def test_calibrated_values_are_written_and_read_back(content):
+    content["network"]["source"][1]["gain"] = {"value": "60 W", "sigma_rel": 0.4}
+    spec = validate_network_machine(content, "machine.toml")
+    values = {
+        "capacity.winding": Uncertain(47.0, 0.02),
+        "conductance.body|ambient": Uncertain(0.7, 0.01),
+        "gain.body.speed": Uncertain(55.0, 0.05),
+        "temperature.bench": Uncertain(300.0, 0.001),
+    }
+    text = write_network_machine(with_parameters(spec, values))
+    network = build_network(validate_network_machine(tomllib.loads(text), "calibrated.toml").network)
+    assert network.capacity[0] == pytest.approx(47.0)
+    assert network.boundary_temperature[1] == pytest.approx(300.0)
+    heat = network.source_values({"electrical_power": 0.0, "speed": 3000.0 * 2 * np.pi / 60})
+    assert heat[1] == pytest.approx(55.0)
+    found = {item.name: item.sigma_log for item in network.parameters}
+    assert found["gain.body.speed"] == pytest.approx(0.05)
+    with pytest.raises(UnknownSurfaceError, match=r'Did you mean "capacity\.winding"'):
+        with_parameters(spec, {"capacity.windin": Uncertain(1.0)})
+
+
+def test_overrides_by_name(content, tmp_path):
+    path = tmp_path / "machine.toml"
+    path.write_text(TEXT)
+    spec = load_network_machine(path, ["network.node.winding.capacity=55 J/K"])
+    assert spec.network.node[0].capacity == Uncertain(55.0, 0.5)  # the prior stays
+    with pytest.raises(SpecError, match="windin"):
+        load_network_machine(path, ["network.node.windin.capacity=55 J/K"])
+
+
+def test_kind_of_machine(content):
+    assert is_network_machine(content)
+    assert not is_network_machine({"schema": "spindle-fem/machine/1", "part": []})
 
 
 def changed(content, path, value):
