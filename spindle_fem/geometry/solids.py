@@ -9,6 +9,7 @@ sewn; short pieces keep the Boolean operations at the ports local.
 from __future__ import annotations
 
 import math
+import os
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -45,6 +46,9 @@ class SolidModel:
 @contextmanager
 def gmsh_session(threads: int = 1) -> Iterator[Geometry]:
     """A pygmsh occ environment with gmsh's defaults, silent, and closed afterwards."""
+    # Threads of the mesher that wait by spinning starve one another on busy
+    # cores (twice the processor time was measured); read when gmsh is loaded.
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     import gmsh
     import pygmsh
 

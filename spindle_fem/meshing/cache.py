@@ -9,7 +9,6 @@ import sys
 import tempfile
 import zipfile
 from dataclasses import asdict
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
@@ -202,7 +201,6 @@ def load_npz(path: str | Path) -> TaggedMesh:
     return mesh
 
 
-@cache
 def file_checksum(path: Path) -> str:
     """SHA-256 of a file, 64 hexadecimal digits."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
