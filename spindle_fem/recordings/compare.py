@@ -42,14 +42,13 @@ class ErrorRow:
     noise: float
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data with units in the keys."""
+        """Plain data with units in the keys; null where nothing was read."""
+        errors = {"rmse_K": self.rmse, "mean_K": self.mean, "max_K": self.largest}
         return {
             "channel": self.channel,
             "condition": self.condition,
             "readings": self.readings,
-            "rmse_K": self.rmse,
-            "mean_K": self.mean,
-            "max_K": self.largest,
+            **{key: value if np.isfinite(value) else None for key, value in errors.items()},
             "noise_K": self.noise,
         }
 
@@ -63,7 +62,8 @@ class Comparison:
     residual : (N, c) float64 ndarray, [K]
         Predicted minus read; NaN where the reading is missing or flagged.
     rows : tuple of ErrorRow
-        Condition "all" first for each channel; conditions without readings are left out.
+        Condition "all" first for each channel, with NaN where nothing was read;
+        other conditions without readings are left out.
     conditions : Conditions
     """
 
@@ -110,19 +110,23 @@ def compare(recording: Recording, predicted: NDArray[np.float64]) -> Comparison:
         for name, marks in kinds:
             values = residual[marks, column]
             values = values[np.isfinite(values)]
-            if values.size:
-                rows.append(
-                    ErrorRow(
-                        channel=channel,
-                        condition=name,
-                        readings=int(values.size),
-                        rmse=float(np.sqrt(np.mean(values**2))),
-                        mean=float(values.mean()),
-                        largest=float(values[np.abs(values).argmax()]),
-                        noise=float(recording.sigma[column]),
-                    )
-                )
+            if values.size or name == ALL:
+                rows.append(_error_row(channel, name, values, float(recording.sigma[column])))
     return Comparison(residual, tuple(rows), conditions)
+
+
+def _error_row(channel: str, condition: str, values: NDArray[np.float64], noise: float) -> ErrorRow:
+    if values.size == 0:
+        return ErrorRow(channel, condition, 0, np.nan, np.nan, np.nan, noise)
+    return ErrorRow(
+        channel=channel,
+        condition=condition,
+        readings=int(values.size),
+        rmse=float(np.sqrt(np.mean(values**2))),
+        mean=float(values.mean()),
+        largest=float(values[np.abs(values).argmax()]),
+        noise=noise,
+    )
 
 
 def simulation_summary(comparison: Comparison) -> dict[str, Any]:
@@ -139,6 +143,8 @@ def write_simulated(path: Path, recording: Recording, predicted: NDArray[np.floa
     """Write ``simulated.csv``: ``time_s`` and one column in °C for each temperature channel."""
     frame = pd.DataFrame(predicted - ZERO_CELSIUS_K, columns=list(recording.temperature_names))
     times = recording.times
-    whole = bool(np.all(times == np.round(times)))
-    frame.insert(0, "time_s", times.astype(np.int64) if whole else np.round(times, 6))
-    frame.to_csv(path, index=False, float_format="%.6g" if not whole else "%.4f", lineterminator="\n")
+    if np.all(times == np.round(times)):
+        frame.insert(0, "time_s", times.astype(np.int64))
+    else:
+        frame.insert(0, "time_s", [f"{time:.6f}".rstrip("0").rstrip(".") for time in times])
+    frame.to_csv(path, index=False, float_format="%.4f", lineterminator="\n")

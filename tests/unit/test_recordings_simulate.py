@@ -1,5 +1,6 @@
 """A network machine on a recording: prediction, initial states, errors by condition, refusals."""
 
+import json
 import tomllib
 from dataclasses import replace
 
@@ -301,6 +302,29 @@ def test_simulated_csv(tmp_path, network):
     assert list(frame.columns) == ["time_s", "T_bearing", "T_housing"]
     assert_allclose(frame["time_s"], recording.times)
     assert_allclose(frame["T_housing"] + 273.15, result.predicted[:, 1], atol=1e-3)
+
+
+def test_simulated_csv_keeps_fractions_of_long_times(tmp_path, network):
+    times = 1.0e6 + np.cumsum(np.tile([0.3, 0.3, 0.4], 20))
+    recording = make(tmp_path, network, times=times)
+    write_simulated(tmp_path / "simulated.csv", recording, recording.temperature)
+    frame = pd.read_csv(tmp_path / "simulated.csv")
+    assert_allclose(frame["time_s"], times - times[0], atol=1e-6)
+    assert frame["time_s"].diff().dropna().min() > 0.29
+
+
+def test_channel_that_reads_nothing_has_no_error(tmp_path, network):
+    make(tmp_path, network)
+    frame = pd.read_csv(tmp_path / "data.csv")
+    frame["T_housing"] = np.nan
+    frame.to_csv(tmp_path / "data.csv", index=False)
+    recording = read_recording(tmp_path)
+    result = simulate_on_recording(network, recording)
+    assert np.isfinite(result.predicted).all()
+    content = simulation_summary(compare(recording, result.predicted))
+    assert content["channels"][1]["rmse_K"] is None
+    assert content["channels"][1]["readings"] == 0
+    json.dumps(content, allow_nan=False)
 
 
 def test_every_misfit_of_machine_and_recording_at_once(tmp_path, network):
