@@ -65,6 +65,11 @@ class Faces:
         """Some of the faces."""
         return Faces(*(getattr(self, field)[rows] for field in self.__slots__))
 
+    @classmethod
+    def joined(cls, kinds: list[Faces]) -> Faces:
+        """Faces of several kinds together."""
+        return cls(*(np.concatenate([getattr(faces, field) for faces in kinds]) for field in cls.__slots__))
+
     @property
     def inside(self) -> NDArray[np.int64]:
         """The one cell of an exposed face."""
@@ -100,10 +105,12 @@ class MeridianCells:
         radial conduction its exact heat and mean temperature.
     conduction, contact, exposed, wall : Faces
         Inside parts, between parts, to the outside, to the coolant.
+    blocked : Faces
+        Inside a part, where the smeared channel lets nothing through.
     side_area : (n,) ndarray, [m²]
         Wetted walls that pass through the cell (smeared channel only).
-    wet_span : (n, 2) ndarray, [m]
-        Range along z of the coolant that those walls and the smeared faces see.
+    grid_index : (n, 2) int64 ndarray
+        Interval of each cell between the lines.
     channelling : {"smeared", "rings"} or None
     """
 
@@ -121,6 +128,7 @@ class MeridianCells:
     contact: Faces
     exposed: Faces
     wall: Faces
+    blocked: Faces
     side_area: Array
     grid_index: NDArray[np.int64]
     channelling: Channelling | None
@@ -282,6 +290,9 @@ def _assemble(assembly, channel, z_lines, r_lines, owner, void, smeared, channel
             (area * share)[mask], share[mask], names[mask],
         )  # fmt: skip
 
+    touch = (part_a != part_b) & (part_a != OUTSIDE) & (part_b != OUTSIDE)
+    outer = (part_a == OUTSIDE) != (part_b == OUTSIDE)
+    one = np.ones(len(area))
     names = np.array([*assembly.part_names, ""], dtype=object)[part_a]
     conducts = same & (free > 0.0) & (cell_a != OUTSIDE) & (cell_b != OUTSIDE)
     conduction = select(conducts, free, cell_a, cell_b, names)
@@ -290,9 +301,6 @@ def _assemble(assembly, channel, z_lines, r_lines, owner, void, smeared, channel
     wall = select(
         wetted > 0.0, wetted, np.where(dry_a, cell_a, OUTSIDE), np.where(dry_a, OUTSIDE, cell_b), names
     )
-    touch = (part_a != part_b) & (part_a != OUTSIDE) & (part_b != OUTSIDE)
-    outer = (part_a == OUTSIDE) != (part_b == OUTSIDE)
-    one = np.ones(len(area))
     labels = _edge_names(assembly, faces)
     side_area = np.zeros(len(i))
     if channel is not None and channelling == "smeared":
@@ -313,6 +321,7 @@ def _assemble(assembly, channel, z_lines, r_lines, owner, void, smeared, channel
         contact=select(touch, one, cell_a, cell_b, labels),
         exposed=select(outer & (labels != ""), one, cell_a, cell_b, labels),
         wall=wall,
+        blocked=select(same & ~conducts & (cell_a != OUTSIDE) & (cell_b != OUTSIDE), one, cell_a, cell_b, names),
         side_area=side_area,
         grid_index=np.column_stack([i, j]),
         channelling=None if channel is None else channelling,

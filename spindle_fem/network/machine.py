@@ -29,7 +29,7 @@ from spindle_fem.network.links import (
     solid_links,
     surface_patch,
 )
-from spindle_fem.network.partition import Partition, coarse_partition, fine_partition, plan_nodes
+from spindle_fem.network.partition import Partition, build_columns, coarse_partition, fine_partition, plan_nodes
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
@@ -175,18 +175,19 @@ def build_machine_network(
         raise SpecError("refinement", f"{refinement!r}.", "Allowed: a whole number from 1.")
     assembly = build_assembly(spec) if assembly is None else assembly
     spans = _gap_spans(spec, assembly)
+    lines = _column_lines(spec, assembly)
+    cuts = plan_nodes(spec, assembly, build_cells(assembly, extra_z=lines), spans)[2]
     if refinement == 1:
         if channelling != "smeared":
             raise SpecError("channelling", f'"{channelling}" needs refinement above 1.', 'Allowed: "smeared".')
-        draft = build_cells(assembly, extra_z=_column_lines(spec, assembly))
-        cuts = plan_nodes(spec, assembly, draft, spans)[2]
-        cells = build_cells(assembly, extra_z=_column_lines(spec, assembly), extra_r=cuts)
+        cells = build_cells(assembly, extra_z=lines, extra_r=cuts)
         partition = coarse_partition(spec, assembly, cells, spans)
     else:
         widths = [bearing.z[1] - bearing.z[0] for _, bearing in spec.bearings]
         base = min(widths) if widths else 0.02
+        # the lumps' own borders stay lines, so that cells gather into lumps
         cells = build_cells(
-            assembly, spacing=base / refinement, channelling=channelling, extra_z=_column_lines(spec, assembly)
+            assembly, spacing=base / refinement, channelling=channelling, extra_z=lines, extra_r=cuts
         )
         partition = fine_partition(spec, assembly, cells)
     materials = [spec.part_material(name) for name in assembly.part_names]
@@ -228,8 +229,6 @@ def build_machine_network(
 
 
 def _column_lines(spec: MachineSpec, assembly: AssemblyGeometry) -> tuple[float, ...]:
-    from spindle_fem.network.partition import build_columns
-
     return tuple(value for column in build_columns(spec, assembly) for value in column.z)
 
 

@@ -15,7 +15,6 @@ from spindle_fem.loads.films import film_coefficient, gap_coefficient
 from spindle_fem.loads.model import BearingHeat
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.network.laws import CoolantLaw, FrictionLaw, Law, WallFilmLaw
-from spindle_fem.network.links import SurfacePatch
 from spindle_fem.network.machine import MachineNetwork
 from spindle_fem.network.model import ThermalNetwork
 
@@ -31,12 +30,15 @@ class Raceway:
     """How the mean temperature of a raceway follows from nodes, balls and heat.
 
     ``T = node_weights @ T[nodes] + ball_weight * T_balls + per_heat * heat``.
+    ``bypass`` is the share of the heat that leaves the raceway straight to the
+    balls, node by node.
     """
 
     nodes: NDArray[np.int64]
     node_weights: Array
     ball_weight: float
     per_heat: float
+    bypass: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,7 @@ class OperatingNetwork:
     laws: tuple[Law, ...]
     raceways: Mapping[str, tuple[Raceway, Raceway]]
     bearing_heat: Mapping[str, BearingHeat]
-    heat_to: Mapping[str, float]
+    heat_to: Mapping[str, Mapping[str, float]]
     coolant_law: CoolantLaw | None
 
     @property
@@ -186,8 +188,8 @@ def operate(
         law = coolant_law(machine, point)
         rate = law.capacity_rate
         if isinstance(law.film, float):
-            h = np.full(len(law.nodes), law.film)
-            links.append((law.patch.node, law.nodes[law.cell], law.conductances(h)[0], "coolant"))
+            conductance = law.conductances(np.full(len(law.nodes), law.film))[0]
+            links.append((law.patch.node, law.nodes[law.cell], conductance, "coolant"))
         else:
             laws.append(law)
         inlet = machine.n_nodes + list(boundaries).index("coolant_inlet")
@@ -260,6 +262,7 @@ def _bearing(machine, group, name, heat: BearingHeat, friction, links, laws, nod
                 np.bincount(inverse.ravel(), part * loss, len(nodes)),
                 float(part @ (1.0 - loss)),
                 float(part @ (given * patch.resistance * loss)),
+                np.bincount(inverse.ravel(), given * (1.0 - loss), len(nodes)),
             )
         )
     if friction is None:
@@ -378,7 +381,3 @@ def tabulate_friction(
             values[name].append(heats[name].total)
     return {name: PchipInterpolator(temperatures, heat) for name, heat in values.items()}
 
-
-def joined_patch(patches: list[SurfacePatch]) -> SurfacePatch:
-    """Several patches as one."""
-    return SurfacePatch.joined(patches)
