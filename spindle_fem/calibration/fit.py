@@ -101,7 +101,9 @@ class Calibration:
         """Every parameter with its 90 % interval."""
         width = norm.ppf(0.5 + 0.5 * LEVEL)
         found = []
-        for prior, value, variance in zip(self.priors, self.log_factors, np.diag(self.covariance), strict=True):
+        for prior, value, variance in zip(
+            self.priors, self.log_factors, np.diag(self.covariance), strict=True
+        ):
             sigma = float(np.sqrt(variance))
             found.append(
                 Estimate(
@@ -268,26 +270,30 @@ class _Problem:
 
     def jacobian(self, scaled: Array) -> Array:
         blocks = []
-        for (_, sensitivity), items, factors in zip(self._predict(scaled), self.bins, self.factor, strict=True):
+        for (_, sensitivity), items, factors in zip(
+            self._predict(scaled), self.bins, self.factor, strict=True
+        ):
             for item, factor in zip(items, factors, strict=True):
                 blocks.append(whiten(factor, item.average(sensitivity[:, item.channel]) * self.sigma))
         return np.vstack([*blocks, np.eye(len(self.sigma))])
 
 
 def prediction_interval(
-    calibration: Calibration, sensitivity: Array, white: Array, *, level: float = LEVEL
+    covariance: Array, slow: SlowError, sensitivity: Array, white: Array, *, level: float = LEVEL
 ) -> Array:
     """Half width of the interval that holds a new reading, (N, c) [K].
 
     Parameters
     ----------
-    calibration : Calibration
+    covariance : (p, p) ndarray
+        Of the parameters' logarithms.
+    slow : SlowError
     sensitivity : (N, c, p) ndarray, [K]
-        Of the prediction, in the order of the calibration's priors.
+        Of the prediction to the same logarithms.
     white : (c,) ndarray, [K]
         Noise of the channels.
     level : float
     """
-    from_parameters = np.einsum("ncp,pq,ncq->nc", sensitivity, calibration.covariance, sensitivity, optimize=True)
-    total = from_parameters + calibration.slow.sigma**2 + np.asarray(white) ** 2
+    from_parameters = np.einsum("ncp,pq,ncq->nc", sensitivity, covariance, sensitivity, optimize=True)
+    total = from_parameters + slow.sigma**2 + np.asarray(white) ** 2
     return norm.ppf(0.5 + 0.5 * level) * np.sqrt(total)

@@ -134,7 +134,9 @@ class NetworkPredictor:
         self.recordings = tuple(recordings)
         self.initial = initial
         self.free = tuple(p for p in network.parameters if p.sigma_log > 0.0)
-        starts = [initial_parameters(network, r) if initial == "first_reading" else () for r in self.recordings]
+        starts = [
+            initial_parameters(network, r) if initial == "first_reading" else () for r in self.recordings
+        ]
         self.starts: tuple[tuple[Parameter, ...], ...] = tuple(starts)
         priors = [Prior(p.name, p.value, p.sigma_log, p.unit) for p in self.free]
         for number, items in enumerate(starts):

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from spindle_fem.conduction.evaluate import probe_matrix
 from spindle_fem.conduction.assemble import ThermalSystem
+from spindle_fem.conduction.evaluate import probe_matrix
 from spindle_fem.coupling import PreparedMachine
 from spindle_fem.errors import SpecError
 from spindle_fem.loads.build import FieldState
@@ -149,7 +149,8 @@ def build_affine_system(machine: PreparedMachine) -> AffineSystem:
     for material in dict.fromkeys(_materials(spec, operators.mesh.part_names).values()):
         own = [p for p, m in _materials(spec, operators.mesh.part_names).items() if m == material]
         coefficients[f"conductivity.{material}"] = _padded(
-            sum((operators.part_conduction(part) for part in own[1:]), operators.part_conduction(own[0])), size
+            sum((operators.part_conduction(part) for part in own[1:]), operators.part_conduction(own[0])),
+            size,
         )
     for contact in operators.mesh.joints:
         coefficients[f"joint.{contact}"] = _padded(operators.joint_matrix(contact), size)
@@ -159,7 +160,7 @@ def build_affine_system(machine: PreparedMachine) -> AffineSystem:
             name = f"film.{surface}"
             coefficients[name] = _padded(operators.film_matrix(surface), size)
             fluid_load[name] = coefficients[name] @ np.ones(size)
-    for index, (name, connections) in enumerate(lumped):
+    for index, (_, connections) in enumerate(lumped):
         for key, pieces in connections.items():
             matrix = _exchange_matrix(machine, operators.n_unknowns + index, pieces, size)
             coefficients[key] = coefficients[key] + matrix if key in coefficients else matrix
@@ -210,7 +211,10 @@ def _lumped_nodes(machine: PreparedMachine) -> list[tuple[str, dict[str, Pieces]
     """Every lumped node with unit exchange coefficients, by the coefficient that scales them."""
     spec, builder = machine.spec, machine.builder
     uniform = FieldState(
-        {name: np.full(rows.stop - rows.start, 293.15) for name, rows in machine.operators.surface_rows.items()},
+        {
+            name: np.full(rows.stop - rows.start, 293.15)
+            for name, rows in machine.operators.surface_rows.items()
+        },
         {},
         {},
     )
@@ -265,7 +269,9 @@ def _exchange_matrix(machine: PreparedMachine, index: int, pieces: Pieces, size:
     return matrix
 
 
-def _channel(machine: PreparedMachine, size: int) -> tuple[tuple[sparse.csr_array, ...], sparse.csr_array, Array]:
+def _channel(
+    machine: PreparedMachine, size: int
+) -> tuple[tuple[sparse.csr_array, ...], sparse.csr_array, Array]:
     cells = machine.builder.cells
     if cells is None:
         return (), sparse.csr_array((0, size)), np.zeros((1, 0))
@@ -294,7 +300,9 @@ def _storage(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> di
         key = f"capacity.{material}"
         found[key] = found[key] + matrix if key in found else matrix
     for _, bearing in spec.bearings:
-        nodes = [operators.n_unknowns + lumped.index(node) for node in machine.builder.ball_nodes(bearing.name)]
+        nodes = [
+            operators.n_unknowns + lumped.index(node) for node in machine.builder.ball_nodes(bearing.name)
+        ]
         share = np.full(len(nodes), 1.0 / len(nodes))
         found[f"capacity.{bearing.name}.balls"] = sparse.coo_array(
             (share, (nodes, nodes)), shape=(size, size)
@@ -328,7 +336,9 @@ def _places(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> Ite
                 vector = operators.facet_vector(np.ones(rows.stop - rows.start), rows)
                 yield f"{contact}@{number}", padded(vector)
     for _, bearing in spec.bearings:
-        nodes = [operators.n_unknowns + lumped.index(node) for node in machine.builder.ball_nodes(bearing.name)]
+        nodes = [
+            operators.n_unknowns + lumped.index(node) for node in machine.builder.ball_nodes(bearing.name)
+        ]
         vector = np.zeros(size)
         vector[nodes] = 1.0 / len(nodes)
         yield f"{bearing.name}.balls", vector

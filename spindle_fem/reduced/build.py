@@ -24,12 +24,9 @@ from spindle_fem.reduced.coefficients import (
 from spindle_fem.reduced.model import ReducedModel, project, reduced_digest, reduced_path
 from spindle_fem.reduced.snapshots import Sample, compress, helix_profiles, load_columns, solve_shifted
 from spindle_fem.spec.model import MachineSpec
-from spindle_fem.spec.parameters import with_parameters
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
-
-RPM = np.pi / 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +47,9 @@ class ReductionOptions:
         Largest error at any probe in the checks, for loads as large as they occur.
     largest : int
         Basis vectors at most.
+    highest_speed : float or None, [rad/s]
+        Of the sampled range; the heat table's last, or the definition's speed
+        where that is higher, when None.
     """
 
     samples: int = 8
@@ -58,6 +58,14 @@ class ReductionOptions:
     tolerance: float = 3.0e-6
     error: float = 5.0e-3
     largest: int = 140
+    highest_speed: float | None = None
+
+    def highest_speed_of(self, spec: MachineSpec) -> float:
+        """Highest speed that the range holds, rad/s."""
+        if self.highest_speed is not None:
+            return self.highest_speed
+        table = spec.heat.table
+        return max(spec.operation.speed, table.speed[-1] if table is not None else 0.0)
 
 
 # Laplace frequencies, 1/s: steady state, hours, minutes, half a minute.
@@ -66,7 +74,8 @@ FAST_SHIFT = 3.0e-2
 FRICTION_HEAT = 80.0
 PLACE_HEAT = 50.0
 FLUID_RISE = 10.0
-SPEEDS_RPM = (0.0, 3000.0, 1000.0, 4500.0, 2000.0)
+# Of the highest speed; the second is the nominal one.
+SPEED_SHARES = (0.0, 2.0 / 3.0, 0.25, 1.0, 0.45)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +95,9 @@ class _Workshop:
         chosen = self.table.factors(factors)
         chosen.pop("heat.inner_share", None)
         base = self.table.base(point)
-        coefficients = {name: base[name] * self.table.scale(name, chosen) for name in self.affine.coefficient_names}
+        coefficients = {
+            name: base[name] * self.table.scale(name, chosen) for name in self.affine.coefficient_names
+        }
         capacities = {
             name: value * self.table.scale(name, chosen) for name, value in self.table.capacities().items()
         }
@@ -96,6 +107,7 @@ class _Workshop:
     def random_samples(self, number: int, seed: int, sigmas: float) -> list[Sample]:
         """Latin hypercube over all parameters; the speeds take turns."""
         names = tuple(self.sigma)
+        highest = self.options.highest_speed_of(self.machine.spec)
         unit = qmc.LatinHypercube(max(1, len(names)), rng=seed).random(number)
         found = []
         for row, values in enumerate(unit):
@@ -103,16 +115,19 @@ class _Workshop:
                 name: float(np.exp(sigmas * self.sigma[name] * (2.0 * value - 1.0)))
                 for name, value in zip(names, values, strict=False)
             }
-            found.append(self.sample(factors, SPEEDS_RPM[row % len(SPEEDS_RPM)] * RPM))
+            found.append(self.sample(factors, SPEED_SHARES[row % len(SPEED_SHARES)] * highest))
         return found
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Lowest and highest coefficient that the samples may have."""
         ends = []
-        for speed in SPEEDS_RPM:
+        highest = self.options.highest_speed_of(self.machine.spec)
+        for share in SPEED_SHARES:
             for sign in (-1.0, 1.0):
-                factors = {name: float(np.exp(sign * self.options.sigmas * s)) for name, s in self.sigma.items()}
-                sample = self.sample(factors, speed * RPM)
+                factors = {
+                    name: float(np.exp(sign * self.options.sigmas * s)) for name, s in self.sigma.items()
+                }
+                sample = self.sample(factors, share * highest)
                 ends.append(
                     sample.coefficients
                     | sample.capacities
@@ -183,7 +198,7 @@ def build_reduced_model(
     radii = gap_radii_of(machine)
     table = build_coefficient_table(spec, machine.mesh.joints, radii)
     workshop = _Workshop(machine, affine, table, free_parameters(spec), chosen)
-    nominal = workshop.sample({}, 3000.0 * RPM)
+    nominal = workshop.sample({}, SPEED_SHARES[1] * chosen.highest_speed_of(spec))
     progress("reduced model: snapshots")
     snapshots = [_nominal_snapshots(affine, nominal, spec)]
     samples = workshop.random_samples(chosen.samples, 1, chosen.sigmas)
@@ -191,12 +206,16 @@ def build_reduced_model(
         for shift in SHIFTS:
             snapshots.append(solve_shifted(affine, sample, shift, physical_loads(affine, sample, spec)))
     energy = (
-        affine.conduction(nominal.coefficients, nominal.channel_film) + 1e-4 * affine.capacity(nominal.capacities)
+        affine.conduction(nominal.coefficients, nominal.channel_film)
+        + 1e-4 * affine.capacity(nominal.capacities)
     ).tocsr()
     uniform = np.ones((affine.size, 1))
     checks = workshop.random_samples(chosen.checks, 2, 0.9 * chosen.sigmas)
     exact = [
-        [(shift, solve_shifted(affine, sample, shift, physical_loads(affine, sample, spec))) for shift in SHIFTS]
+        [
+            (shift, solve_shifted(affine, sample, shift, physical_loads(affine, sample, spec)))
+            for shift in SHIFTS
+        ]
         for sample in checks
     ]
     for _ in range(3):
@@ -213,7 +232,10 @@ def build_reduced_model(
             ranges=workshop.ranges(),
             digest=reduced_digest(spec, asdict(chosen)),
         )
-        errors = [_check(affine, model, basis, sample, found, spec) for sample, found in zip(checks, exact, strict=True)]
+        errors = [
+            _check(affine, model, basis, sample, found, spec)
+            for sample, found in zip(checks, exact, strict=True)
+        ]
         worst = {key: max(error[key] for error in errors) for key in errors[0]}
         model = replace(model, errors=worst)
         if worst["probes"] <= chosen.error:
@@ -241,7 +263,9 @@ def _source_places(affine: AffineSystem, spec: MachineSpec) -> tuple[list[str], 
         for _, bearing in spec.bearings
         for side in ("inner_raceway", "outer_raceway", "balls")
     ]
-    rings = {f"{bearing.name}.{side}" for _, bearing in spec.bearings for side in ("inner_ring", "outer_ring")}
+    rings = {
+        f"{bearing.name}.{side}" for _, bearing in spec.bearings for side in ("inner_ring", "outer_ring")
+    }
     segments = {f"{part.name}.{segment.name}" for part in spec.part for segment in part.segment}
     single = {f"{part.name}.{part.segment[0].name}" for part in spec.part if len(part.segment) == 1}
     other = [name for name in affine.place_names if name in segments - single or name in rings]
@@ -307,8 +331,3 @@ def _check(
 
 def _largest(values: Array) -> float:
     return float(np.abs(values).max()) if values.size else 0.0
-
-
-def widened(spec: MachineSpec, factors: Mapping[str, float]) -> MachineSpec:
-    """The machine with its uncertain values moved to where a calibration went: the centre of a new range."""
-    return with_parameters(spec, dict(factors))

@@ -63,7 +63,8 @@ class CoefficientTable:
         spec = self.spec
         factor = spec.heat_capacity_factor.value
         values = {
-            f"capacity.{name}": factor * item.volumetric_heat_capacity for name, item in spec.materials.items()
+            f"capacity.{name}": factor * item.volumetric_heat_capacity
+            for name, item in spec.materials.items()
         }
         for group, bearing in spec.bearings:
             kind = spec.bearing_types[group.bearing_type]
@@ -101,7 +102,9 @@ class CoefficientTable:
         for target in targets:
             if target not in self.names:
                 raise SpecError(
-                    parameter, "is no parameter of this machine.", did_you_mean(parameter, [*shared, *self.names])
+                    parameter,
+                    "is no parameter of this machine.",
+                    did_you_mean(parameter, [*shared, *self.names]),
                 )
         return targets
 
@@ -142,7 +145,9 @@ def build_coefficient_table(
     groups: dict[str, tuple[str, ...]] = {
         f"conductivity.{name}": (f"conductivity.{name}",) for name in spec.materials
     }
-    groups |= {f"joint.{name}": (f"joint.{name}", group) for name, group in contact_group_names(spec, names).items()}
+    groups |= {
+        f"joint.{name}": (f"joint.{name}", group) for name, group in contact_group_names(spec, names).items()
+    }
     for number, film in enumerate(spec.film, 1):
         owner = f"film.{film.name}" if film.name else f"film[{number}]"
         groups |= {f"film.{surface}": (f"film.{surface}", owner) for surface in film.surface}
@@ -165,11 +170,15 @@ def gap_radii_of(machine: PreparedMachine) -> dict[str, tuple[float, float]]:
     points = machine.mesh.points
 
     def mean_radius(surfaces: tuple[str, ...]) -> float:
-        centres = np.concatenate([points[machine.mesh.surfaces[name][:, :3]].mean(axis=1) for name in surfaces])
+        centres = np.concatenate(
+            [points[machine.mesh.surfaces[name][:, :3]].mean(axis=1) for name in surfaces]
+        )
         areas = np.concatenate([operators.facet_areas(name) for name in surfaces])
         return float(areas @ np.hypot(centres[:, 0], centres[:, 1]) / areas.sum())
 
-    return {gap.name: (mean_radius((gap.rotating,)), mean_radius(tuple(gap.standing))) for gap in machine.spec.gap}
+    return {
+        gap.name: (mean_radius((gap.rotating,)), mean_radius(tuple(gap.standing))) for gap in machine.spec.gap
+    }
 
 
 def free_parameters(spec: MachineSpec) -> dict[str, float]:

@@ -62,10 +62,14 @@ def coolant_maps(
     """
     shape = model.cell_area.shape
     area = model.cell_area.ravel()
-    bulk_wall, bulk_inlet, bulk_friction, outlet = _march(film.reshape(shape), model.cell_area, capacity_rate, pumping_heat)
+    bulk_wall, bulk_inlet, bulk_friction, outlet = _march(
+        film.reshape(shape), model.cell_area, capacity_rate, pumping_heat
+    )
     load = model.cell_load
     weighted = film[:, None] * load
-    conduction = np.tensordot(film, model.cell_film, axes=1) - weighted.T @ (bulk_wall @ (load / area[:, None]))
+    conduction = np.tensordot(film, model.cell_film, axes=1) - weighted.T @ (
+        bulk_wall @ (load / area[:, None])
+    )
     return CoolantMaps(
         conduction,
         weighted.T @ bulk_inlet,

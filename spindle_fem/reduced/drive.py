@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -83,7 +84,9 @@ def standard_inputs(spec: MachineSpec) -> dict[str, float]:
     }
 
 
-def drive_of_recording(spec: MachineSpec, recording: Recording, *, largest_step: float = LARGEST_STEP) -> Drive:
+def drive_of_recording(
+    spec: MachineSpec, recording: Recording, *, largest_step: float = LARGEST_STEP
+) -> Drive:
     """Inputs of a recording on the steps of its own grid.
 
     Raises
@@ -104,7 +107,9 @@ def drive_of_recording(spec: MachineSpec, recording: Recording, *, largest_step:
             recording.source, "no channel drives the speed.", 'Add an input channel with drives = "speed".'
         )
     notes = [
-        f'"{name}" is not recorded: the definition\'s value is used' for name in known if name not in recording.input_names
+        f'"{name}" is not recorded: the definition\'s value is used'
+        for name in known
+        if name not in recording.input_names
     ]
     names = (*known, *(n for n in recording.input_names if n.startswith("heat.")))
     history = recording.input_history()
@@ -120,7 +125,12 @@ def drive_of_recording(spec: MachineSpec, recording: Recording, *, largest_step:
             columns.append(np.full(recording.times.size, known[name]))
             held.append(True)
     return make_drive(
-        recording.times, names, np.column_stack(columns), np.array(held), notes=tuple(notes), largest_step=largest_step
+        recording.times,
+        names,
+        np.column_stack(columns),
+        np.array(held),
+        notes=tuple(notes),
+        largest_step=largest_step,
     )
 
 
@@ -172,9 +182,11 @@ def _grid(times: Array, held: Array, largest: float) -> Array:
     step = min(largest, float(np.median(gaps)))
     edges = np.unique(np.concatenate(([times[0]], changes, [times[-1]])))
     parts = []
-    for begin, stop in zip(edges[:-1], edges[1:], strict=True):
+    for begin, stop in itertools.pairwise(edges):
         whole = int(np.floor((stop - begin) / step * (1.0 + 1e-9)))
-        parts.append(begin + step * np.arange(whole + 1 if begin + whole * step < stop - 1e-6 * step else whole))
+        parts.append(
+            begin + step * np.arange(whole + 1 if begin + whole * step < stop - 1e-6 * step else whole)
+        )
     return np.append(np.concatenate(parts), times[-1])
 
 
@@ -196,7 +208,8 @@ def _classes(inputs: Array) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ..
             break
         width, inlet_width, flow_width = 1.5 * width, 1.5 * inlet_width, 1.5 * flow_width
     means = [
-        np.bincount(label, weights=column) / np.bincount(label) for column in (speed, thrust, ambient, inlet, flow)
+        np.bincount(label, weights=column) / np.bincount(label)
+        for column in (speed, thrust, ambient, inlet, flow)
     ]
     return label, tuple(OperatingPoint(*(float(v) for v in values)) for values in zip(*means, strict=True))
 

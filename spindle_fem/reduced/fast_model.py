@@ -73,7 +73,9 @@ class FastModel:
         self.fixed_fluids = tuple(
             dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
         )
-        friction = [f"{name}.{side}" for name in self.bearings for side in ("inner_raceway", "outer_raceway", "balls")]
+        friction = [
+            f"{name}.{side}" for name in self.bearings for side in ("inner_raceway", "outer_raceway", "balls")
+        ]
         self.heat_places = tuple(friction)
         fixed = tuple(f"fixed[{number}]" for number in range(len(self.fixed_fluids)))
         self.load_names = (*self.heat_places, "ambient", "coolant_inlet", "coolant_friction", *fixed)
@@ -141,7 +143,9 @@ class FastModel:
         for column, place in enumerate(self.heat_places):
             loads[:, column] = model.place(place)
         for name in model.fluid_names:
-            loads[:, self._fluid_column(name)] += values[self._positions[name]] * model.fluid_load[self._fluid_rows[name]]
+            loads[:, self._fluid_column(name)] += (
+                values[self._positions[name]] * model.fluid_load[self._fluid_rows[name]]
+            )
         outputs = np.zeros((len(self.channels), model.size))
         outputs[self._point_rows] = model.probes
         output_inputs = np.zeros((len(self.channels), len(self.load_names)))
@@ -152,7 +156,9 @@ class FastModel:
             if not rows:
                 continue
             conduction_by[parameter] = np.tensordot(values[rows], model.operators[rows], axes=1)
-            films = [model.coefficient_names[i] for i in rows if model.coefficient_names[i] in self._fluid_rows]
+            films = [
+                model.coefficient_names[i] for i in rows if model.coefficient_names[i] in self._fluid_rows
+            ]
             if films:
                 by = np.zeros_like(loads)
                 for name in films:
@@ -252,5 +258,7 @@ class FastModel:
         """
         for probe in probes:
             if probe not in self.channels:
-                raise SpecError(where, f'reads "{probe}", no probe of this machine.', did_you_mean(probe, self.channels))
+                raise SpecError(
+                    where, f'reads "{probe}", no probe of this machine.', did_you_mean(probe, self.channels)
+                )
         return np.array([self.channels.index(probe) for probe in probes], dtype=np.int64)

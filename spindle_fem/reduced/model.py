@@ -192,7 +192,9 @@ def project(
         coefficient_names=affine.coefficient_names,
         operators=small(affine.operators),
         fluid_names=tuple(affine.fluid_load),
-        fluid_load=np.array([basis.T @ load for load in affine.fluid_load.values()]).reshape(-1, basis.shape[1]),
+        fluid_load=np.array([basis.T @ load for load in affine.fluid_load.values()]).reshape(
+            -1, basis.shape[1]
+        ),
         cell_film=small(affine.cell_film),
         cell_load=np.asarray(affine.cell_load @ basis),
         cell_area=affine.cell_area,
@@ -221,7 +223,12 @@ def reduced_digest(spec: MachineSpec, options: Mapping[str, float]) -> str:
     for key in ("operation", "name", "title", "description", "initial", "effects"):
         content.pop(key, None)
     text = json.dumps(
-        {"format": FORMAT, "revision": [REVISION, MESHER_REVISION], "spec": content, "options": dict(options)},
+        {
+            "format": FORMAT,
+            "revision": [REVISION, MESHER_REVISION],
+            "spec": content,
+            "options": dict(options),
+        },
         sort_keys=True,
         default=str,
     )

@@ -34,9 +34,7 @@ class Sample:
     capacities: dict[str, float]
 
 
-def solve_shifted(
-    affine: AffineSystem, sample: Sample, shift: float, loads: Array
-) -> Array:
+def solve_shifted(affine: AffineSystem, sample: Sample, shift: float, loads: Array) -> Array:
     """``(K + s M)⁻¹ F`` column by column.
 
     Parameters

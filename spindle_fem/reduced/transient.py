@@ -98,7 +98,8 @@ class _LinearRun:
         self.storage_by = fast.storage_by(self.factors, derivatives)
         self.groups = group_steps(drive.step_class, drive.steps)
         self.propagators: dict[tuple[int, float], Propagator] = {
-            key: build_propagator(self.storage, self.operators[key[0]].conduction, key[1]) for key in self.groups
+            key: build_propagator(self.storage, self.operators[key[0]].conduction, key[1])
+            for key in self.groups
         }
         self.start, self.start_by = self._load_inputs(drive.start)
         self.end, self.end_by = self._load_inputs(drive.end)
@@ -159,7 +160,10 @@ class _LinearRun:
                     load_end = end @ operators.loads_by[parameter].T
                 if parameter in self.start_by:
                     heat = operators.loads[:, : self.start_by[parameter].shape[1]].T
-                    by_start, by_end = self.start_by[parameter][rows] @ heat, self.end_by[parameter][rows] @ heat
+                    by_start, by_end = (
+                        self.start_by[parameter][rows] @ heat,
+                        self.end_by[parameter][rows] @ heat,
+                    )
                     load_start = by_start if load_start is None else load_start + by_start
                     load_end = by_end if load_end is None else load_end + by_end
                 forcing[rows, :, column] = sensitivity_forcing(
