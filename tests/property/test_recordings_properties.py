@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from spindle_fem.errors import BadInputError
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.checks import temperature_flags, white_noise
 
@@ -104,6 +105,52 @@ def test_held_input_at_its_own_stamps_and_between(data):
     assert_allclose(recording.input_at("speed", recording.times), rad)
     middle = 0.5 * (recording.times[1:] + recording.times[:-1])
     assert_allclose(recording.input_at("speed", middle), rad[:-1])
+
+
+PLAIN = "t,T,n\n" + "".join(f"{10 * k},{295 + 0.1 * k:.1f},{k % 3 * 100}\n" for k in range(12))
+SCRAPS = [
+    b"",
+    b",",
+    b"\n",
+    b'"',
+    b"\xff",
+    b"\0",
+    b"NaN",
+    b"-",
+    b"1e400",
+    b"inf",
+    b"text",
+    b";",
+    b"\r",
+    b" ",
+    b"2016-05-02",
+]
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(st.tuples(st.integers(0, len(PLAIN)), st.integers(0, 8), st.sampled_from(SCRAPS)), max_size=4)
+)
+def test_damaged_files_are_read_or_refused_but_never_crash(damages):
+    content = PLAIN.encode()
+    for at, length, scrap in damages:
+        content = content[:at] + scrap + content[at + length :]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "recording.toml").write_text(MANIFEST.format(unit="K", time="s"))
+        (folder / "data.csv").write_bytes(content)
+        recording, refusal = None, ""
+        try:
+            recording = read_recording(folder)
+        except BadInputError as error:
+            refusal = str(error)
+        assert recording is not None or str(folder) in refusal
+    if recording is None:
+        return
+    assert np.all(np.diff(recording.times) > 0.0)
+    assert np.all(np.isfinite(recording.temperature[recording.usable]))
+    assert np.all(np.isfinite(recording.input_history().values))
+    assert recording.defects.lines()
 
 
 @settings(max_examples=60, deadline=None)
