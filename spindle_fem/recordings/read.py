@@ -234,7 +234,7 @@ def _numbers(
         return np.full(len(column), np.nan), [(f"{word} {first_line}", f'"{column.iloc[0]}"')]
     if pd.api.types.is_numeric_dtype(column.dtype):
         return column.to_numpy(dtype=np.float64, na_value=np.nan), []
-    if pd.api.types.is_datetime64_any_dtype(column.dtype):
+    if pd.api.types.is_datetime64_any_dtype(column.dtype) or column.dtype.kind == "m":
         return np.full(len(column), np.nan), [(f"{word} {first_line}", f'"{column.iloc[0]}"')]
     numbers = pd.to_numeric(column, errors="coerce")
     blank = column.isna() | (column.astype(str).str.strip() == "")
@@ -248,6 +248,8 @@ def _read_time(
 ) -> tuple[NDArray[np.float64], str | None, float]:
     scale = time_scale(manifest)
     name = manifest.time.column
+    if column.dtype.kind == "m":  # durations carry their own unit
+        column, scale = column.dt.total_seconds(), 1.0
     if scale is not None:
         values, wrong = _numbers(column, first_line, word)
         if wrong:

@@ -250,6 +250,25 @@ def test_stamps_of_other_zones_are_one_time(tmp_path):
     np.testing.assert_allclose(recording.times, 30.0 * np.arange(30))
 
 
+@pytest.mark.parametrize("kind", ["naive", "aware", "milliseconds", "durations"])
+def test_times_that_parquet_knows(tmp_path, kind):
+    stamps = pd.date_range("2020-01-01", periods=30, freq="30s")
+    made = {
+        "naive": stamps,
+        "aware": stamps.tz_localize("UTC").tz_convert("Asia/Tokyo"),
+        "milliseconds": stamps.as_unit("ms"),
+        "durations": pd.to_timedelta(30.0 * np.arange(30), unit="s"),
+    }
+    write(
+        tmp_path, rows(), data="data.parquet", time=SECONDS if kind == "durations" else '{column = "time_s"}'
+    )
+    frame = pd.DataFrame({"time_s": made[kind], "SP01": 20.0, "SP03": np.arange(30.0), "speed": 0})
+    frame.to_parquet(tmp_path / "data.parquet")
+    recording = read_recording(tmp_path)
+    np.testing.assert_allclose(recording.times, 30.0 * np.arange(30))
+    assert recording.start == (None if kind == "durations" else "2020-01-01T00:00:00Z")
+
+
 def test_broken_stamp_is_named(tmp_path):
     lines = stamped()
     lines[11] = "yesterday,20,21,0"
