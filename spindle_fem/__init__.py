@@ -1,3 +1,30 @@
-"""Thermal design of grease-lubricated machine-tool spindles by finite elements."""
+"""Thermal design of grease-lubricated machine-tool spindles by finite elements.
+
+The functions named in ``__all__`` are loaded when they are first used, so that
+``import spindle_fem`` stays light.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
 
 __version__ = "0.1.0"
+
+_PLACES = {
+    "load_machine": "spindle_fem.spec.load",
+    "solve": "spindle_fem.solve",
+    "run_machine": "spindle_fem.commands",
+    "check_machine": "spindle_fem.commands",
+    "mesh_machine": "spindle_fem.commands",
+    "heat_table": "spindle_fem.commands",
+    "bearing_report": "spindle_fem.tribology.bearing_file",
+}
+__all__ = ["__version__", *_PLACES]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public function from its module on first use."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_PLACES[name]), name)
