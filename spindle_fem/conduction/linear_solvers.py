@@ -53,7 +53,8 @@ class LinearSolution:
     unknowns : (n,) ndarray
     iterations : int
     residual : float, [-]
-        2-norm of the true residual relative to the load's.
+        2-norm of the true residual relative to the load's; not a number where
+        an error tolerance ended the iteration.
     """
 
     unknowns: NDArray[np.float64]
@@ -109,7 +110,7 @@ def solve_linear(
     guess: NDArray[np.float64] | None = None,
     *,
     relative_tolerance: float = RELATIVE_TOLERANCE,
-    absolute_tolerance: float | None = None,
+    error_tolerance: float | None = None,
     max_iterations: int = MAX_ITERATIONS,
 ) -> LinearSolution:
     """Preconditioned conjugate gradients, checked on the true residual.
@@ -127,8 +128,10 @@ def solve_linear(
     guess : (n,) ndarray, optional
     relative_tolerance : float, [-]
         Of the residual's 2-norm against the load's.
-    absolute_tolerance : float, optional, [W]
-        Of the residual's 2-norm, instead of the relative one.
+    error_tolerance : float, optional, [K]
+        Ends instead where the preconditioned residual, which estimates the
+        error, is nowhere larger. The norm of the residual itself would let
+        small elements go wrong in short time steps.
     max_iterations : int
 
     Raises
@@ -149,7 +152,19 @@ def solve_linear(
     scale = float(np.linalg.norm(load))
     if scale == 0.0:
         scale = float(np.linalg.norm(residual))
-    target = relative_tolerance * scale if absolute_tolerance is None else absolute_tolerance
+    target = relative_tolerance * scale
+    if error_tolerance is not None:
+        floor = ROUND_OFF * float(np.abs(unknowns).max(initial=0.0))
+        correction, iterations = _conjugate_gradients(
+            matrix, residual, preconditioner.apply, 0.0, max_iterations, max(error_tolerance, floor)
+        )
+        if iterations >= max_iterations:
+            raise ConvergenceError(
+                "linear solver",
+                f"error above {error_tolerance:.1e} after {iterations} iterations.",
+                "Rebuild the preconditioner or allow more iterations.",
+            )
+        return LinearSolution(unknowns + correction, iterations, np.nan)
     iterations = 0
     restarts = 0
     while (norm := float(np.linalg.norm(residual))) > target:
@@ -172,11 +187,18 @@ def solve_linear(
 
 
 def _conjugate_gradients(
-    matrix: sparse.csr_array, load: NDArray[np.float64], precondition: Operator, target: float, limit: int
+    matrix: sparse.csr_array,
+    load: NDArray[np.float64],
+    precondition: Operator,
+    target: float,
+    limit: int,
+    error_target: float = 0.0,
 ) -> tuple[NDArray[np.float64], int]:
     unknowns = np.zeros_like(load)
     residual = load.copy()
     direction = precondition(residual).astype(float)
+    if float(np.abs(direction).max(initial=0.0)) <= error_target:
+        return direction if error_target else unknowns, 0
     energy = float(residual @ direction)
     for iteration in range(1, limit + 1):
         image = matrix @ direction
@@ -189,6 +211,8 @@ def _conjugate_gradients(
         if np.linalg.norm(residual) <= target:
             return unknowns, iteration
         preconditioned = precondition(residual)
+        if float(np.abs(preconditioned).max()) <= error_target:
+            return unknowns + preconditioned, iteration
         # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
         direction *= -step * float(preconditioned @ image) / energy
         direction += preconditioned

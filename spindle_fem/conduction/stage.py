@@ -29,7 +29,8 @@ WEIGHTS = np.array([OUTER_WEIGHT, OUTER_WEIGHT, DIAGONAL])
 EMBEDDED = np.array([(1.0 - OUTER_WEIGHT) / 3.0, (3.0 * OUTER_WEIGHT + 1.0) / 3.0, DIAGONAL / 3.0])
 
 MAX_STAGE_ITERATIONS = 30
-ERROR_SOLVE_TOLERANCE = 0.02
+# The error estimate itself is solved to this fraction of the tolerance.
+ERROR_SOLVE_FRACTION = 0.02
 # A preconditioner of other coefficients or steps serves until it costs this many iterations more.
 STALE_FACTOR, STALE_EXTRA = 1.5, 3
 
@@ -115,7 +116,6 @@ class StageSolver:
             if len(lumped_capacity)
             else self._tied_storage
         )
-        self._storage_scale = float(np.linalg.norm(self._storage @ np.ones(self._storage.shape[0])))
         self._kept = _Kept()
         self._current: Stage | None = None
         self.linear_iterations = 0
@@ -163,8 +163,9 @@ class StageSolver:
             for embedded, weight, stage in zip(EMBEDDED, WEIGHTS, stages, strict=True)
         )
         defect[self._n :][self._lumped_capacity == 0.0] = 0.0
+        tolerance = ERROR_SOLVE_FRACTION * (self._control.tolerance or 1.0)
         solution = solve_linear(
-            self._kept.matrix, defect, self._kept.preconditioner, relative_tolerance=ERROR_SOLVE_TOLERANCE
+            self._kept.matrix, defect, self._kept.preconditioner, error_tolerance=tolerance
         )
         self.linear_iterations += solution.iterations
         return float(np.abs(solution.unknowns).max(initial=0.0))
@@ -245,8 +246,9 @@ class StageSolver:
         self, matrix: sparse.csr_array, right: NDArray[np.float64], guess: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         kept = self._kept
-        target = self._control.linear * self._storage_scale
-        solution = solve_linear(matrix, right, kept.preconditioner, guess, absolute_tolerance=target)
+        solution = solve_linear(
+            matrix, right, kept.preconditioner, guess, error_tolerance=self._control.linear
+        )
         self.linear_iterations += solution.iterations
         if kept.fresh_iterations < 0:
             kept.fresh_iterations = max(solution.iterations, 1)

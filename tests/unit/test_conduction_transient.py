@@ -173,12 +173,14 @@ def _other_nodes(time, state):
     return PROBLEM if time == 0.0 else replace(PROBLEM, lumped_nodes=())
 
 
-def test_hidden_jump_is_an_error_that_asks_for_breakpoints():
+def test_hidden_jump_is_an_error_that_asks_for_breakpoints(monkeypatch):
+    monkeypatch.setattr("spindle_fem.conduction.transient.MAX_REJECTIONS", 4)
+
     def inputs(time, state):
-        return replace(PROBLEM, surface_heat={"inner.inner": 1e12 * (time > 50.0)})
+        return replace(PROBLEM, surface_heat={"inner.inner": 1e6 * (time > 50.0)})
 
     with pytest.raises(ConvergenceError, match="Name jumps of the inputs as breakpoints"):
-        integrate(inputs, START, 100.0, control=StepControl(tolerance=1e-9, first_step=40.0))
+        integrate(inputs, START, 100.0, control=StepControl(tolerance=1e-3, first_step=40.0))
 
 
 def test_same_coefficients_ignores_heat_and_surroundings():
