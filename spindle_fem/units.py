@@ -106,11 +106,15 @@ def _pure_number(number: Any, value: Any, unit: str, kind: str, where: str) -> f
             f"bare number {_shown(value)}, a unit is needed.",
             f"Write it as {quantity_example(unit, kind)}.",
         )
-    return float(number)
+    try:
+        return float(number)
+    except OverflowError:  # an integer beyond the floats: not finite, as the caller says
+        return math.inf
 
 
 def _shown(value: Any) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value)
+    text = f'"{value}"' if isinstance(value, str) else str(value)
+    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _convert(value: Any, unit: str, kind: str, where: str) -> float:

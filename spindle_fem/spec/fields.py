@@ -322,7 +322,7 @@ class SpecModel(BaseModel):
         faults += [
             Fault("" if key == "default" else key, f"{mark!r} is no mark.", f"Allowed: {letters}.")
             for key, mark in marks.items()
-            if mark not in MARKS
+            if not isinstance(mark, str) or mark not in MARKS
         ]
         raise_faults(faults)
         return dict(marks)

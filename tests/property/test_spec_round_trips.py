@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import copy
+import datetime
+import math
 import tomllib
 
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from spindle_fem.errors import SpecError, UnitError
+from spindle_fem.errors import FaultsError, SpecError, UnitError
 from spindle_fem.spec.fields import QuantityRule
 from spindle_fem.spec.inherit import merge
-from spindle_fem.spec.load import load_machine, validate, write_machine
+from spindle_fem.spec.load import load_machine, machine_folder, read_definition, validate, write_machine
 from spindle_fem.spec.parameters import uncertain_parameters, with_parameters
 from spindle_fem.units import Uncertain, registry, to_si, uncertain_to_si
 
@@ -125,3 +128,33 @@ def test_no_override_makes_the_loader_fail_in_another_way(path, value):
     with pytest.raises(SpecError) as caught:
         load_machine("wu_tan_2016", [f"{path}={value}"])
     assert caught.value.exit_status == 2
+
+
+def paths_of(node, path=()):
+    if path:
+        yield path
+    entries = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, entry in entries:
+        yield from paths_of(entry, (*path, key))
+
+
+DEFINITION = read_definition(machine_folder() / "small_two_start.toml")
+JUNK = [3, -1, "x", "", True, [], [1], {}, {"name": 3}, math.nan, [{}], "none", [["a"]], 10**400]
+JUNK += [{"value": "1 m", "sigma_rel": 0.1}, [{"name": "a"}, {"name": "a"}], datetime.date(2020, 1, 1)]
+
+
+@settings(max_examples=150, deadline=None)
+@given(path=st.sampled_from(list(paths_of(DEFINITION))), junk=st.sampled_from(JUNK))
+def test_junk_anywhere_in_a_definition_is_read_or_refused_never_a_crash(path, junk):
+    content = copy.deepcopy(DEFINITION)
+    node = content
+    for key in path[:-1]:
+        node = node[key]
+    node[path[-1]] = junk
+    try:
+        validate(content, "junk.toml")
+    except FaultsError as error:
+        faults = error.faults
+    else:
+        faults = ()
+    assert all(fault.where.startswith("junk.toml: ") and fault.what for fault in faults)
