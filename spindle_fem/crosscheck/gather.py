@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.crosscheck.axisymmetric import AxisymmetricState
+from spindle_fem.crosscheck.regions import cells_at
 from spindle_fem.network.machine import MachineNetwork
 from spindle_fem.network.machine_steady import MachineNetworkState
 
@@ -18,8 +19,6 @@ def gather(coarse: MachineNetwork, fine: MachineNetwork, solid: Array, balls: Ar
     Solids by volume, gap air by length along z, coolant at the end of each
     coarse cell.
     """
-    from spindle_fem.crosscheck.regions import cells_at
-
     cells = fine.cells
     middle = np.column_stack([np.zeros(cells.n_cells), cells.r.mean(axis=1), cells.z.mean(axis=1)])
     node = coarse.partition.node_of_cell[cells_at(coarse.cells, cells.part_names, cells.part, middle)]
@@ -31,9 +30,7 @@ def gather(coarse: MachineNetwork, fine: MachineNetwork, solid: Array, balls: Ar
         values.append(_overlap_mean(own.edges, air[start : start + own.n_bands], bands.edges))
         start += own.n_bands
     if coarse.coolant is not None:
-        inlet = np.nan
-        ends = np.concatenate([[inlet], coolant])
-        values.append(np.interp(coarse.coolant.edges[1:], fine.coolant.edges[1:], ends[1:]))
+        values.append(np.interp(coarse.coolant.edges[1:], fine.coolant.edges[1:], coolant))
     return np.concatenate(values)
 
 

@@ -29,7 +29,7 @@ from spindle_fem.network.links import (
     solid_links,
     surface_patch,
 )
-from spindle_fem.network.partition import Partition, build_columns, coarse_partition, fine_partition, plan_nodes
+from spindle_fem.network.partition import Partition, build_columns, coarse_partition, fine_partition, plan_nodes, sliced_partition
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
@@ -142,6 +142,7 @@ def build_machine_network(
     *,
     refinement: int = 1,
     channelling: Channelling = "smeared",
+    lumped_along_r: bool = False,
     assembly: AssemblyGeometry | None = None,
 ) -> MachineNetwork:
     """Network of a machine definition.
@@ -155,6 +156,8 @@ def build_machine_network(
     channelling : {"smeared", "rings"}
         How the helix becomes axisymmetric: spread over its pitch, or as closed
         rings. Both keep wetted area and coolant volume.
+    lumped_along_r : bool
+        Refine along z only; radially the paper's lumps stay.
     assembly : AssemblyGeometry, optional
         Of the same machine, where it is at hand.
 
@@ -189,7 +192,11 @@ def build_machine_network(
         cells = build_cells(
             assembly, spacing=base / refinement, channelling=channelling, extra_z=lines, extra_r=cuts
         )
-        partition = fine_partition(spec, assembly, cells)
+        partition = (
+            sliced_partition(spec, assembly, cells, spans)
+            if lumped_along_r
+            else fine_partition(spec, assembly, cells)
+        )
     materials = [spec.part_material(name) for name in assembly.part_names]
     conductivity = np.array([material.thermal_conductivity for material in materials])
     volumetric = np.array([material.volumetric_heat_capacity for material in materials])

@@ -21,6 +21,7 @@ from spindle_fem.network.cells import MeridianCells, channel_zone
 from spindle_fem.spec.model import MachineSpec
 
 NARROW_SPAN = 0.5
+SNAP = 0.35
 SHAFT, INNER, OUTER, HOUSING = "shaft", "inner", "outer", "housing"
 
 
@@ -127,6 +128,7 @@ class _Body:
     name: str
     cells: NDArray[np.int64]
     r: tuple[float, float]
+    steps: tuple[float, ...] = ()
     pieces: int = 1
 
     @property
@@ -134,7 +136,14 @@ class _Body:
         return float(np.log(self.r[1] / max(self.r[0], 1.0e-2 * self.r[1]))) / self.pieces
 
     def bounds(self) -> NDArray[np.float64]:
-        return np.linspace(self.r[0], self.r[1], self.pieces + 1)
+        """Radii between the pieces: even, moved to a step of the body that is near, so that no sliver is left."""
+        even = np.linspace(self.r[0], self.r[1], self.pieces + 1)
+        reach = SNAP * (even[1] - even[0])
+        for step in self.steps:
+            nearest = int(np.abs(even - step).argmin())
+            if 0 < nearest < self.pieces and abs(even[nearest] - step) < reach:
+                even[nearest] = step
+        return even
 
 
 def _bodies(
@@ -166,8 +175,16 @@ def _bodies(
     bodies = []
     for key, members in groups.items():
         rows = np.array(members)
-        bodies.append(_Body(key, rows, (float(cells.r[rows, 0].min()), float(cells.r[rows, 1].max()))))
+        steps = tuple(np.unique(np.round(_outer_steps(cells, rows), 9)).tolist())
+        bodies.append(_Body(key, rows, (float(cells.r[rows, 0].min()), float(cells.r[rows, 1].max())), steps))
     return sorted(bodies, key=lambda body: float(np.average(r_mid[body.cells], weights=cells.volume[body.cells])))
+
+
+def _outer_steps(cells: MeridianCells, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Inner and outer radius of a body in each interval along z."""
+    interval = cells.grid_index[rows, 0]
+    ends = [(cells.r[rows[interval == i], 0].min(), cells.r[rows[interval == i], 1].max()) for i in np.unique(interval)]
+    return np.array(ends).ravel()
 
 
 def _overlaps(one: tuple[float, float], other: tuple[float, float]) -> bool:
@@ -239,3 +256,20 @@ def fine_partition(spec: MachineSpec, assembly: AssemblyGeometry, cells: Meridia
         f"{cells.part_names[part]}[{i},{j}]" for part, (i, j) in zip(cells.part, cells.grid_index, strict=True)
     )
     return Partition(names, np.arange(cells.n_cells), column, columns, np.asarray(cells.z_lines))
+
+
+def sliced_partition(
+    spec: MachineSpec,
+    assembly: AssemblyGeometry,
+    cells: MeridianCells,
+    gap_spans: Mapping[str, tuple[float, float]],
+) -> Partition:
+    """The lumps of :func:`coarse_partition`, cut along z at every line of the cells."""
+    lumps = coarse_partition(spec, assembly, cells, gap_spans)
+    intervals = len(cells.z_lines)
+    key = lumps.node_of_cell * intervals + cells.grid_index[:, 0]
+    unique, node = np.unique(key, return_inverse=True)
+    names = tuple(f"{lumps.node_names[k // intervals]}[{k % intervals}]" for k in unique)
+    return Partition(
+        names, node.ravel(), lumps.column_of_node[unique // intervals], lumps.columns, np.asarray(cells.z_lines)
+    )

@@ -1,0 +1,158 @@
+"""Why network and elements differ, found by exchanging one assumption at a time.
+
+Between the paper's lumps and the three-dimensional elements stand models that
+differ from their neighbour in one thing only. The differences of neighbours
+add up to the whole difference, exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.coupling import CoupledState, PreparedMachine, prepare_machine, solve_coupled
+from spindle_fem.crosscheck.axisymmetric import solve_axisymmetric
+from spindle_fem.crosscheck.gather import gather_axisymmetric, gather_network
+from spindle_fem.crosscheck.regions import build_regions, node_temperatures
+from spindle_fem.loads.bearing_heat import HeatModel
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.machine import MachineNetwork, build_machine_network
+from spindle_fem.network.machine_steady import MachineNetworkState, solve_machine_network
+from spindle_fem.spec.model import MachineSpec
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+REFERENCE_REFINEMENT = 4
+
+CAUSES = {
+    "few_columns": "few nodes along z: a column is one temperature",
+    "few_rows": "few nodes along r: a body is one temperature, heat reaches its middle",
+    "smeared_helix": (
+        "helix smeared over its pitch: constriction of the heat between the turns and the drop along the lands"
+    ),
+    "closed_rings": "closed rings for a helix: ends of the channel, inclination, temperature around the axis",
+    "port_region": "no ports: drillings with a film of their own, metal missing there",
+}
+CHECKS = {
+    "perfect_fins": "lands between the turns without a drop along r (fin effect left out)",
+    "circumferential_averaging": "turning parts without averaging around the axis (elements)",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class CauseStudy:
+    """Contributions to network less elements, K, at every node.
+
+    Attributes
+    ----------
+    contribution : mapping of cause to (n_nodes,) ndarray, [K]
+        They add up to the difference.
+    check : mapping of further exchanged assumption to (n_nodes,) ndarray, [K]
+        What each changes by itself; not part of the sum.
+    """
+
+    contribution: Mapping[str, Array]
+    check: Mapping[str, Array]
+
+    def largest(self, node: int) -> tuple[str, float]:
+        """The cause that moves a node most, and by how much in K."""
+        name = max(self.contribution, key=lambda key: abs(float(self.contribution[key][node])))
+        return name, float(self.contribution[name][node])
+
+
+def without_ports(spec: MachineSpec) -> MachineSpec:
+    """The same machine with solid metal where its ports are."""
+    channel = spec.channel
+    if channel is None or channel.ports is None:
+        return spec
+    return spec.model_copy(update={"channel": channel.model_copy(update={"ports": None})})
+
+
+def study_causes(
+    coarse: MachineNetwork,
+    state: MachineNetworkState,
+    prepared: PreparedMachine,
+    coupled: CoupledState,
+    fem_temperature: Array,
+    heat_model: HeatModel,
+    *,
+    progress: Progress = lambda stage: None,
+) -> CauseStudy:
+    """Exchange one assumption after the other between the network and the elements.
+
+    Parameters
+    ----------
+    coarse, state : MachineNetwork, MachineNetworkState
+        The paper's lumps.
+    prepared, coupled : PreparedMachine, CoupledState
+        The three-dimensional elements, as defined.
+    fem_temperature : (n_nodes,) ndarray, [K]
+        Their averages over the lumps' regions.
+    heat_model : HeatModel
+    """
+    spec, point = coarse.spec, state.network.point
+    refinement = REFERENCE_REFINEMENT
+
+    def refined(**settings: object) -> MachineNetworkState:
+        network = build_machine_network(spec, refinement=refinement, assembly=coarse.assembly, **settings)
+        return solve_machine_network(network, point, heat_model=heat_model)
+
+    progress("network refined along z")
+    chain = [state.temperature, gather_network(coarse, refined(lumped_along_r=True))]
+    names = ["few_columns", "few_rows"]
+    progress("axisymmetric elements, helix smeared")
+    smeared = refined()
+    chain.append(gather_axisymmetric(coarse, smeared.network.machine, solve_axisymmetric(smeared)))
+    if spec.channel is not None:
+        progress("axisymmetric elements, closed rings")
+        rings = refined(channelling="rings")
+        chain.append(gather_axisymmetric(coarse, rings.network.machine, solve_axisymmetric(rings)))
+        names += ["smeared_helix", "closed_rings"]
+        if spec.channel.ports is not None:
+            progress("elements without ports")
+            bare = without_ports(spec)
+            chain.append(_elements_of(bare, coarse, point))
+            names.append("port_region")
+    else:
+        names.append("closed_rings")
+    chain.append(fem_temperature)
+    contribution = {name: chain[i] - chain[i + 1] for i, name in enumerate(names)}
+    check = _checks(coarse, smeared, heat_model)
+    if spec.mesh.circumferential_averaging:
+        progress("elements without averaging around the axis")
+        mesh = spec.mesh.model_copy(update={"circumferential_averaging": False})
+        plain = _elements_of(spec.model_copy(update={"mesh": mesh}), coarse, point)
+        check["circumferential_averaging"] = fem_temperature - plain
+    return CauseStudy(contribution, check)
+
+
+def _elements_of(spec: MachineSpec, coarse: MachineNetwork, point: OperatingPoint) -> Array:
+    prepared = prepare_machine(spec)
+    coupled = solve_coupled(prepared, point)
+    return node_temperatures(build_regions(prepared, coarse), prepared, coupled)
+
+
+def _checks(coarse: MachineNetwork, smeared: MachineNetworkState, heat_model: HeatModel) -> dict[str, Array]:
+    """Assumptions that both models make or that lie inside the chain's steps."""
+    machine, point = smeared.network.machine, smeared.network.point
+    base = gather_network(coarse, smeared)
+    found = {}
+    if machine.coolant is not None:
+        perfect = _with_perfect_lands(machine)
+        state = solve_machine_network(perfect, point, heat_model=heat_model)
+        found["perfect_fins"] = gather_network(coarse, state) - base
+    return found
+
+
+def _with_perfect_lands(machine: MachineNetwork) -> MachineNetwork:
+    """The network with lands that conduct along r a thousand times better."""
+    zone = machine.cells.side_area > 0.0
+    node = machine.partition.node_of_cell
+    in_zone = np.zeros(machine.n_solid, dtype=bool)
+    in_zone[node[zone]] = True
+    both = in_zone[machine.links.first] & in_zone[machine.links.second]
+    links = replace(machine.links, conductance=np.where(both, 1.0e3, 1.0) * machine.links.conductance)
+    return replace(machine, links=links)
