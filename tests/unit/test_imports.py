@@ -30,7 +30,18 @@ ALLOWED = {
 }
 LOWER = set(ALLOWED)
 # What puts the stages together; nothing below may import these.
-ABOVE = {"coupling", "checks", "solve", "design", "recordings", "diagnosis", "reporting"}
+ABOVE = {
+    "coupling",
+    "runaway",
+    "checks",
+    "solve",
+    "heat_study",
+    "crosscheck",
+    "reduced",
+    "simulate",
+    "calibration",
+}
+ABOVE |= {"design", "recordings", "diagnosis", "reporting"}
 COMMAND_LINE = {"cli", "commands", "console", "__main__"}
 MAY_LOAD_PYVISTA = {"reporting", "cli"}
 
