@@ -80,7 +80,7 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
                 )
             )
     for probe in result.spec.probe:
-        if probe.kind == "point":
+        if probe.kind == "point" and abs(math.sin(probe.angle)) < 0.02:
             axes.plot(
                 probe.z * _MM,
                 probe.r * math.cos(probe.angle) * _MM,
@@ -97,7 +97,7 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
     _title(
         figure,
         "Temperature in the vertical plane through the axis",
-        f"White isotherms every {step:g} K; probes as white dots.",
+        f"White isotherms every {step:g} K; probes in this plane as white dots.",
     )
     return figure
 
@@ -476,7 +476,7 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
     )
     right.set_ylim(0.0, 1.25 * high.max())
     right.legend(loc="upper right", ncols=3, columnspacing=1.2)
-    notes = f"{coolant.source}; dotted lines: full turns."
+    notes = "Dotted lines: full turns."
     if ports and place.size > 2:
         ends = coolant.film_coefficient[order][~inside]
         notes += f" Ports: {ends.min():.0f} to {ends.max():.0f} W/(m²·K)."

@@ -201,7 +201,7 @@ def _draw_channel(axes: Axes, spec: MachineSpec) -> None:
                     **style,
                 )
             )
-    for z, _theta, sign in _ports_in_plane(spec):
+    for z, sign in _ports_in_plane(spec):
         reach = _outside_radius(spec, z)
         start = inner + 0.5 * channel.depth
         low = start if sign > 0.0 else -reach
@@ -217,7 +217,7 @@ def _draw_channel(axes: Axes, spec: MachineSpec) -> None:
         )
 
 
-def _ports_in_plane(spec: MachineSpec) -> list[tuple[float, float, float]]:
+def _ports_in_plane(spec: MachineSpec) -> list[tuple[float, float]]:
     channel = spec.channel
     if channel is None or channel.ports is None:
         return []
@@ -227,9 +227,8 @@ def _ports_in_plane(spec: MachineSpec) -> list[tuple[float, float, float]]:
         for turns in (0.0, channel.turns):
             theta = hand * 2.0 * math.pi * (turns + start / channel.starts)
             if abs(math.sin(theta)) < 1.0e-6:
-                found.append(
-                    (channel.z_start + channel.pitch * turns, theta, math.copysign(1.0, math.cos(theta)))
-                )
+                place = channel.z_start + channel.pitch * turns
+                found.append((place, math.copysign(1.0, math.cos(theta))))
     return found
 
 
@@ -317,16 +316,21 @@ def _draw_films(axes: Axes, spec: MachineSpec, assembly: AssemblyGeometry) -> No
 
 
 def _above(spec: MachineSpec) -> list[Label]:
-    labels = [
-        Label(probe.name, np.array([probe.z * _MM, probe.r * math.cos(probe.angle) * _MM]))
-        for probe in spec.probe
-        if probe.kind == "point"
-    ]
-    for z, theta, sign in _ports_in_plane(spec):
+    labels = []
+    for probe in spec.probe:
+        if probe.kind != "point":
+            continue
+        # Out of the plane a probe is turned into the nearer half, and its angle is told.
+        side = (
+            math.copysign(1.0, round(math.cos(probe.angle), 9)) if abs(math.cos(probe.angle)) > 1e-9 else 1.0
+        )
+        away = abs(math.sin(probe.angle)) > 0.02
+        text = f"{probe.name}\nθ = {math.degrees(probe.angle):.0f}°" if away else probe.name
+        labels.append(Label(text, np.array([probe.z * _MM, side * probe.r * _MM])))
+    for z, sign in _ports_in_plane(spec):
         if sign > 0.0:
             text = "oil in" if abs(z - spec.channel.z_start) < 1.0e-9 else "oil out"
             labels.append(Label(text, np.array([z * _MM, _outside_radius(spec, z) * _MM])))
-        del theta
     return labels
 
 

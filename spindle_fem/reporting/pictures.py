@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -91,16 +92,19 @@ def add_half_machine(
     renderer.add_lines(clip_segments(edges, edges.points[..., 0]), width=1.0)
 
 
-def probe_labels(spec: MachineSpec, probes: dict[str, float]) -> list[Label]:
-    """Name and reading of every probe that sits at a point."""
-    return [
-        Label(
-            f"{probe.name}\n{probes[probe.name] - ZERO_CELSIUS_K:.1f} °C",
-            np.array([-probe.r * np.sin(probe.angle), probe.r * np.cos(probe.angle), probe.z]),
-        )
-        for probe in spec.probe
-        if probe.kind == "point" and probe.name in probes
-    ]
+def probe_labels(spec: MachineSpec, probes: Mapping[str, float]) -> tuple[list[Label], str]:
+    """Name and reading of every probe on the kept half, and a sentence for those on the removed one."""
+    labels, removed = [], []
+    for probe in spec.probe:
+        if probe.kind != "point" or probe.name not in probes:
+            continue
+        place = np.array([-probe.r * np.sin(probe.angle), probe.r * np.cos(probe.angle), probe.z])
+        reading = f"{probes[probe.name] - ZERO_CELSIUS_K:.1f} °C"
+        if place[0] > -1.0e-6:
+            labels.append(Label(f"{probe.name}\n{reading}", place))
+        else:
+            removed.append(f"{probe.name} (θ = {np.degrees(probe.angle):.0f}°) {reading}")
+    return labels, f" On the removed half: {', '.join(removed)}." if removed else ""
 
 
 def ball_labels(result: ThermalResult) -> list[Label]:
@@ -121,6 +125,7 @@ def temperature_cut(
     view = View(TOWARDS_HALF, UP, _kept_points(result, section))
     hottest = result.temperature_maximum - ZERO_CELSIUS_K
     place = result.temperature_maximum_at * 1.0e3
+    labels, removed = probe_labels(result.spec, result.probes)
     notes = (
         f"Near half removed. Warmest place of the solid {hottest:.1f} °C "
         f"at r = {np.hypot(*place[:2]):.0f} mm, z = {place[2]:.0f} mm; balls at their own temperature."
@@ -129,9 +134,9 @@ def temperature_cut(
         renderer.render(view),
         "Temperature of the machine, cut open",
         bars=[bar],
-        above=probe_labels(result.spec, dict(result.probes)),
+        above=labels,
         below=ball_labels(result),
-        notes=notes,
+        notes=notes + removed,
     )
 
 
@@ -226,8 +231,11 @@ def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | No
 
 
 def _film_scale(helix: NDArray[np.float64], film: NDArray[np.float64]) -> ColourBar:
-    # Ports are another section: on one scale with them the helix would be of one colour.
-    bar = scale_of(helix, FILM_MAP, "film coefficient / W/(m²·K)")
+    # Ports are another section: on one scale with them the helix would be of one colour. A scale
+    # narrower than a tenth either way would make a uniform film look uneven.
+    mean = float(helix.mean())
+    ends = [min(float(helix.min()), 0.9 * mean), max(float(helix.max()), 1.1 * mean)]
+    bar = scale_of(ends, FILM_MAP, "film coefficient / W/(m²·K)")
     above, below = film.max() > bar.high, film.min() < bar.low
     extend = {(True, True): "both", (True, False): "max", (False, True): "min"}.get((above, below), "neither")
     return replace(bar, extend=extend)

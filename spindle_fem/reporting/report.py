@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import resource
 import sys
@@ -12,11 +11,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from spindle_fem import __version__
 from spindle_fem.errors import BadInputError
 from spindle_fem.reporting import tables
+from spindle_fem.reporting.document import Illustration, illustration_of
 from spindle_fem.reporting.inputs import input_groups
 from spindle_fem.reporting.output import replace_text, require_complete
+from spindle_fem.reporting.page import render_page
 from spindle_fem.results.summary import SUMMARY_SCHEMA, build_summary
 
 if TYPE_CHECKING:
@@ -245,7 +245,7 @@ def render_run_report(
         ("limits", "Limits of validity", True),
         ("versions", "Versions", True),
     ]
-    return render_report(
+    return render_page(
         "run.html.j2",
         kind="Thermal run",
         title=dataset.attrs["title"],
@@ -273,45 +273,11 @@ def render_run_report(
     )
 
 
-def render_report(template: str, **context: Any) -> str:
-    """Render one of the templates; every report uses ``base.html.j2`` and its macros."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("spindle_fem.reporting", "templates"),
-        autoescape=jinja2.select_autoescape(["html", "j2"]),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals["program_version"] = __version__
-    return environment.get_template(template).render(**context)
-
-
-def embed_figures(folder: Path, captions: Mapping[str, str]) -> dict[str, dict[str, Any]]:
-    """Figures of a folder as WebP inside the page, by name; absent ones are simply not there.
-
-    WebP at this quality is a fifth of the PNG; the PNG files beside the report
-    are the originals.
-    """
-    import io
-
-    from PIL import Image
-
-    embedded = dict.fromkeys(captions)
+def embed_figures(folder: Path, captions: Mapping[str, str]) -> dict[str, Illustration | None]:
+    """Figures of a folder for the page, by name; None for a captioned one that is absent."""
+    embedded: dict[str, Illustration | None] = dict.fromkeys(captions)
     for path in sorted(folder.glob("*.png")):
-        buffer = io.BytesIO()
-        with Image.open(path) as image:
-            width, height = image.size
-            image.convert("RGB").save(buffer, "WEBP", quality=76, method=1)
-        caption = captions.get(path.stem) or _caption(path.stem)
-        embedded[path.stem] = {
-            "source": "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode(),
-            "alt": caption,
-            "caption": caption,
-            "width": width,
-            "height": height,
-        }
+        embedded[path.stem] = illustration_of(path, captions.get(path.stem) or _caption(path.stem))
     return embedded
 
 

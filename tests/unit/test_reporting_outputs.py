@@ -13,6 +13,8 @@ import xarray as xr
 
 from spindle_fem.errors import BadInputError
 from spindle_fem.meshing.simple import build_joined_tubes
+from spindle_fem.reporting import document, tables
+from spindle_fem.reporting.figures import new_figure
 from spindle_fem.reporting.interactive import SURFACE_GROUP, display_surface, viewer_payload
 from spindle_fem.reporting.output import MARKER, is_complete, output_folder, require_complete
 from spindle_fem.reporting.report import rebuild_report, render_run_report, write_outputs
@@ -206,6 +208,42 @@ def test_a_machine_without_channel_has_no_coolant_section():
     text = render(make_result("uncooled", film_coefficient={}, fluid_temperature={}))
     assert 'id="coolant"' not in text
     assert 'href="#coolant"' not in text
+
+
+def test_reports_of_other_commands_are_put_together_from_blocks():
+    table = document.Table(
+        (tables.column("channel"), tables.column("passed", verdict=True)),
+        tables.rows_of([["SP01", True], ["SP<02>", False]]),
+        caption="All channels",
+        folded="Details",
+    )
+    blocks = [
+        document.Text("a < b"),
+        document.Bullets(["first", "second"]),
+        document.Notice("Ambiguous.", "bad"),
+        document.Cards([{"value": "0.12 K", "name": "residual"}]),
+        document.Warnings([CodedWarning("gap", "Data end early.")]),
+        table,
+        document.illustration_of(new_figure(120, 200), "Residuals"),
+    ]
+    text = document.render_document(
+        "Diagnosis", "Recording 1", [document.Section("fit", "Fit", blocks)], subtitle="From Monday."
+    )
+    page = Page(text)
+    assert {"fit", "content"} <= set(page.ids)
+    assert all(link.startswith(("#", "data:")) for link in page.links)
+    for expected in (
+        "a &lt; b",
+        "SP&lt;02&gt;",
+        "Ambiguous.",
+        "0.12 K",
+        "Data end early.",
+        "Residuals",
+        "From Monday.",
+    ):
+        assert expected in text
+    assert text.count('class="passed"') == text.count('class="failed"') == 1
+    assert 'width="200" height="120"' in text
 
 
 # ------------------------------------------------------------------ the viewer
