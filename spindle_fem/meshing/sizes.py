@@ -118,7 +118,7 @@ def build_sizes(
 
     >>> from spindle_fem.geometry.assembly import AnnularSegment, PartGeometry, assemble
     >>> ring = PartGeometry("ring", (AnnularSegment(0.0, 0.02, 0.05, 0.06),))
-    >>> build_sizes(assemble([ring]), "normal").part["ring"]
+    >>> round(build_sizes(assemble([ring]), "normal").part["ring"], 6)
     0.01
     """
     if preset not in _PRESETS:

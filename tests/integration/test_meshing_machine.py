@@ -1,0 +1,257 @@
+"""Meshes of whole machines by gmsh: names, conformity, areas, the helix, solids."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spindle_fem.errors import GeometryError, MeshQualityError, MeshTagError
+from spindle_fem.geometry.assembly import (
+    AnnularSegment,
+    BallRowGeometry,
+    FaceBox,
+    PartGeometry,
+    SurfaceDefinition,
+    assemble,
+    build_assembly,
+)
+from spindle_fem.geometry.channel import ChannelDefinition
+from spindle_fem.geometry.design_space import draw_valid_designs
+from spindle_fem.geometry.solids import build_solids, export_step, gmsh_session
+from spindle_fem.meshing.build import build_mesh, generate_mesh
+from spindle_fem.meshing.cache import CACHE_VARIABLE
+from spindle_fem.meshing.classify import classify_face
+from spindle_fem.meshing.generate import Attempt
+from spindle_fem.meshing.quality import area_errors, facet_areas, gmsh_quality, volume_errors
+from spindle_fem.meshing.sizes import build_sizes
+from spindle_fem.spec.load import load_machine
+
+
+def ring(z_start, z_end, inner, outer):
+    """Segment in millimetres."""
+    return AnnularSegment(z_start * 1e-3, z_end * 1e-3, inner * 1e-3, outer * 1e-3)
+
+
+PARTS = (
+    PartGeometry("shaft", (ring(0, 70, 10, 20), ring(0, 8, 10, 24)), rotating=True),
+    PartGeometry("hub", (ring(8, 60, 20, 55),)),
+)
+CHANNEL = ChannelDefinition(
+    "hub", 0.034, 0.007, 0.007, 0.013, 2.5, starts=1, z_start=0.016, port_diameter=0.004
+)
+
+
+@pytest.fixture(scope="module")
+def machine():
+    surfaces = [
+        SurfaceDefinition("hub.outside", "hub", (FaceBox("outward"),)),
+        SurfaceDefinition("shaft.nose", "shaft", (FaceBox("front"), FaceBox("outward", r=(0.024, 0.024)))),
+    ]
+    return assemble(PARTS, surfaces, CHANNEL)
+
+
+@pytest.fixture(scope="module")
+def mesh(machine):
+    return build_mesh(machine, "coarse", use_cache=False, threads=1)
+
+
+def signed_volumes(mesh):
+    corners = mesh.points[mesh.tetrahedra[:, :4]]
+    a, b, c = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
+    return np.einsum("ei,ei->e", a, np.cross(b, c)) / 6.0
+
+
+def test_every_name_is_there(machine, mesh):
+    assert tuple(mesh.surfaces) == machine.surface_names
+    assert tuple(mesh.joints) == machine.joint_names == ("hub|shaft", "hub|shaft:face")
+    assert mesh.part_names == ("shaft", "hub")
+    assert dict(mesh.rotating) == {"shaft": True, "hub": False}
+    assert mesh.part_of_surface["hub.channel_wall"] == "hub"
+
+
+def test_layout_of_nodes(mesh):
+    assert mesh.tetrahedra[:, :4].max() == mesh.n_corners - 1
+    assert mesh.tetrahedra[:, 4:].min() == mesh.n_corners
+    assert np.array_equal(np.unique(mesh.tetrahedra), np.arange(len(mesh.points)))
+    assert signed_volumes(mesh).min() > 0.0
+
+
+def test_parts_share_no_node(mesh):
+    nodes = [set(np.unique(mesh.tetrahedra[mesh.part_of_element == part]).tolist()) for part in (0, 1)]
+    assert not nodes[0] & nodes[1]
+
+
+def test_joint_nodes_match(mesh):
+    for joint in mesh.joints.values():
+        part_a, part_b = joint.name.partition(":")[0].split("|")
+        assert np.abs(mesh.points[joint.facets_a] - mesh.points[joint.facets_b]).max() < 1e-12
+        for facets, part in ((joint.facets_a, part_a), (joint.facets_b, part_b)):
+            owned = np.unique(mesh.tetrahedra[mesh.part_of_element == mesh.part_names.index(part)])
+            assert np.isin(facets, owned).all()
+
+
+def test_facets_cover_the_boundary_once_and_point_outwards(mesh):
+    faces = mesh.tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
+    keys, count = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
+    boundary = {tuple(key) for key in keys[count == 1].tolist()}
+    listed = [*mesh.surfaces.values()]
+    for joint in mesh.joints.values():
+        listed += [joint.facets_a, joint.facets_b]
+    found = [tuple(sorted(facet)) for facets in listed for facet in facets[:, :3].tolist()]
+    assert len(found) == len(set(found))
+    assert set(found) == boundary
+    outward = mesh.points[mesh.surfaces["hub.outside"][:, :3]]
+    normal = np.cross(outward[:, 1] - outward[:, 0], outward[:, 2] - outward[:, 0])
+    assert (np.einsum("fi,fi->f", normal[:, :2], outward.mean(axis=1)[:, :2]) > 0.0).all()
+    wall = mesh.points[mesh.surfaces["hub.channel_wall"][:, :3]]
+    radius = np.hypot(wall[..., 0], wall[..., 1])
+    inner = np.abs(radius - 0.034).max(axis=1) < 1e-5
+    normal = np.cross(wall[:, 1] - wall[:, 0], wall[:, 2] - wall[:, 0])
+    # Metal lies inside the inner wall, so its normal points away from the axis.
+    assert (np.einsum("fi,fi->f", normal[inner, :2], wall[inner].mean(axis=1)[:, :2]) > 0.0).all()
+
+
+def test_middles_lie_on_curved_faces(mesh):
+    outside = mesh.points[mesh.surfaces["hub.outside"]]
+    assert np.abs(np.hypot(outside[..., 0], outside[..., 1]) - 0.055).max() < 1e-7
+    seat = mesh.points[mesh.joints["hub|shaft"].facets_a]
+    assert np.abs(np.hypot(seat[..., 0], seat[..., 1]) - 0.020).max() < 1e-9
+
+
+def test_channel_is_the_right_handed_helix(mesh):
+    """Every node of a wall lies on r = inner or outer, or z = z_start ± w/2 + pitch θ / 2π."""
+    nodes = np.unique(mesh.surfaces["hub.channel_wall"])
+    x, y, z = mesh.points[nodes].T
+    radius, theta = np.hypot(x, y), np.arctan2(-x, y)
+    on_cylinder = np.minimum(np.abs(radius - 0.034), np.abs(radius - 0.041)) < 5e-6
+    heights = [z - 0.016 - side * 0.007 - 0.013 * theta / (2 * np.pi) for side in (-0.5, 0.5)]
+    off = np.min([np.abs(h - 0.013 * np.round(h / 0.013)) for h in heights], axis=0)
+    assert (on_cylinder | (off < 5e-6)).all()
+    assert np.count_nonzero(~on_cylinder) > 100
+
+
+def test_areas_and_volumes_against_formulas(mesh):
+    area = {name: facet_areas(mesh.points, facets).sum() for name, facets in mesh.surfaces.items()}
+    ports = 2 * math.pi * 0.002**2
+    assert area["hub.outside"] == pytest.approx(2 * math.pi * 0.055 * 0.052 - ports, rel=2e-4)
+    shaft = math.pi * ((0.020**2 - 0.010**2) * 0.070 + (0.024**2 - 0.020**2) * 0.008)
+    assert mesh.cad_volume["shaft"] == pytest.approx(shaft, rel=1e-6)
+    assert max(map(abs, area_errors(mesh).values())) < 1e-3
+    assert max(map(abs, volume_errors(mesh).values())) < 1e-3
+    assert gmsh_quality(mesh.points, mesh.tetrahedra).min() == pytest.approx(mesh.min_quality, abs=1e-6)
+    assert mesh.min_quality > 0.15
+
+
+@pytest.mark.parametrize(
+    ("starts", "hand", "turns", "pitch"),
+    [(1, "right", 2.75, 0.013), (1, "left", 2.3, 0.013), (2, "right", 1.5, 0.024), (2, "left", 0.6, 0.030)],
+)
+def test_channel_area_and_volume_without_ports(starts, hand, turns, pitch):
+    """Exact wall area and volume of the sweep: closed form of the helicoid."""
+    definition = ChannelDefinition(
+        "hub", 0.034, 0.007, 0.007, pitch, turns, starts=starts, hand=hand, z_start=0.016
+    )
+    assembly = assemble(PARTS, channel=definition)
+    mesh = build_mesh(assembly, "coarse", use_cache=False, threads=1)
+    exact = assembly.channel
+    assert mesh.cad_area["hub.channel_wall"] == pytest.approx(exact.wall_area, rel=2e-5)
+    assert mesh.cad_area["hub.channel_ends"] == pytest.approx(starts * 2 * 0.007**2, rel=1e-6)
+    body = math.pi * (0.055**2 - 0.020**2) * 0.052
+    assert body - mesh.cad_volume["hub"] == pytest.approx(exact.volume, rel=2e-5)
+    wall = facet_areas(mesh.points, mesh.surfaces["hub.channel_wall"]).sum()
+    assert wall == pytest.approx(exact.wall_area, rel=1e-3)
+
+
+def test_port_that_straddles_a_step():
+    stepped = PartGeometry("hub", (ring(8, 38, 20, 65), ring(38, 60, 20, 55)))
+    channel = ChannelDefinition("hub", 0.034, 0.007, 0.012, 0.016, 1.0, z_start=0.021, port_diameter=0.010)
+    mesh = build_mesh(assemble([PARTS[0], stepped], channel=channel), "coarse", use_cache=False, threads=1)
+    assert mesh.min_quality > 0.05
+
+
+def test_reference_spindle_mesh():
+    """The whole machine: names, CAD within 0.1 %, worst element above 0.15, channel area of spindle.md."""
+    assembly = build_assembly(load_machine("recorded_spindle"))
+    mesh = build_mesh(assembly, "coarse", use_cache=False, threads=1)
+    assert tuple(mesh.surfaces) == assembly.surface_names
+    assert tuple(mesh.joints) == assembly.joint_names
+    assert mesh.cad_area["housing.channel_wall"] == pytest.approx(0.1562, abs=5e-5)
+    assert mesh.min_quality > 0.15
+    assert max(map(abs, area_errors(mesh).values())) < 1e-3
+
+
+def test_twenty_random_designs_mesh():
+    """Housing of the reference spindle with 20 channels of the design space."""
+    reference = build_assembly(load_machine("wu_tan_2016"))
+    housing = [part for part in reference.parts if part.name == "housing"]
+    for assembly in draw_valid_designs(housing, reference.channel.definition, 20, seed=2026):
+        mesh = generate_mesh(assembly, build_sizes(assembly, "coarse"), threads=1)
+        assert mesh.min_quality > 0.05, assembly.channel.definition
+        assert max(map(abs, area_errors(mesh).values())) < 1e-3
+
+
+def test_cache_returns_the_same_mesh(machine, tmp_path, monkeypatch):
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+    made = build_mesh(machine, "coarse", threads=1)
+    monkeypatch.setattr("spindle_fem.meshing.build.generate_mesh", None)
+    read = build_mesh(machine, "coarse", threads=1)
+    assert np.array_equal(made.points, read.points)
+    assert made.digest == read.digest
+
+
+def test_second_attempt_is_noted(machine):
+    bad = Attempt(6, 10, 40.0)
+    good = Attempt(6, 10, 1.0)
+    sizes = build_sizes(machine, "coarse")
+    mesh = generate_mesh(machine, sizes, ladder=(bad, good), threads=1)
+    assert any(note.startswith("meshed with frontal Delaunay surfaces") for note in mesh.notes) or (
+        mesh.min_quality > 0.15
+    )
+
+
+def test_no_attempt_left(machine, monkeypatch):
+    def fail(*_):
+        raise MeshQualityError("mesh", "gmsh failed", "Change it.")
+
+    monkeypatch.setattr("spindle_fem.meshing.build.mesh_once", fail)
+    with pytest.raises(MeshQualityError, match="no settings gave a sound mesh: frontal Delaunay surfaces, HXT"):
+        generate_mesh(machine, build_sizes(machine, "coarse"), threads=1)
+
+
+def test_face_of_nothing_is_refused(machine):
+    stray = np.array([[0.03, 0.0, 0.02], [0.0, 0.03, 0.02], [0.0, 0.031, 0.021]])
+    with pytest.raises(MeshTagError, match="a face of hub at z 0.02 to 0.021 m, .* belongs to no surface"):
+        classify_face(machine, stray, ("hub",))
+
+
+def test_solids_share_contact_faces(machine):
+    import gmsh
+
+    with gmsh_session() as geometry:
+        solids = build_solids(machine, geometry)
+        assert set(solids.volume_of_part) == {"shaft", "hub"}
+        shared = [tag for _, tag in gmsh.model.getEntities(2) if len(gmsh.model.getAdjacencies(2, tag)[0]) == 2]
+        assert len(shared) == 2
+
+
+def test_step_holds_every_solid_in_millimetres(machine, tmp_path):
+    import gmsh
+
+    balls = BallRowGeometry("B1", 0.080, 0.030, 0.006, 12)
+    path = export_step(replace(machine, balls=(balls,)), tmp_path / "machine.step")
+    with gmsh_session():
+        gmsh.model.occ.importShapes(str(path))
+        gmsh.model.occ.synchronize()
+        volumes = sorted(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
+    assert len(volumes) == 2 + 12
+    assert volumes[:12] == pytest.approx([math.pi / 6 * 6.0**3] * 12, rel=1e-6)
+    shaft = math.pi * ((20**2 - 10**2) * 70 + (24**2 - 20**2) * 8)
+    assert volumes[12] == pytest.approx(shaft, rel=1e-6)
+
+
+def test_step_needs_its_suffix(machine, tmp_path):
+    with pytest.raises(GeometryError, match=r'suffix ".stl". Allowed: .step, .stp.'):
+        export_step(machine, tmp_path / "machine.stl")
