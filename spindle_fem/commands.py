@@ -6,11 +6,14 @@ import contextlib
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spindle_fem.errors import SpecError
 from spindle_fem.spec.load import load_machine
 from spindle_fem.units import to_si
+
+if TYPE_CHECKING:
+    from spindle_fem.spec.model import MachineSpec
 
 
 def run_machine(
@@ -54,7 +57,7 @@ def run_machine(
     from spindle_fem.solve import estimate_refinement, solve_prepared
 
     started = time.perf_counter()
-    spec = load_machine(machine, overrides)
+    spec = _load_buildable(machine, overrides)
     with output_folder(folder) as place, _stages(progress) as tell:
         result = solve_prepared(prepare_machine(spec, progress=tell), progress=tell)
         if estimate_mesh_error:
@@ -76,7 +79,7 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
     from spindle_fem.geometry.assembly import build_assembly
     from spindle_fem.loads.joints import group_of_contacts
 
-    spec = load_machine(machine, overrides)
+    spec = _load_buildable(machine, overrides)
     assembly = build_assembly(spec)
     groups = group_of_contacts(spec, assembly.joint_names)
 
@@ -110,7 +113,7 @@ def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = 
     endings = (".msh", ".vtu", ".step")
     if file.suffix not in endings:
         raise SpecError(str(file), f'"{file.suffix}" is no format of the mesh.', f"Allowed: {', '.join(endings)}.")
-    spec = load_machine(machine, overrides)
+    spec = _load_buildable(machine, overrides)
     assembly = build_assembly(spec)
     if file.suffix == ".step":
         from spindle_fem.geometry.step import export_step
@@ -176,6 +179,17 @@ def rebuild(folder: Path) -> Path:
     from spindle_fem.reporting.report import rebuild_report
 
     return rebuild_report(folder)
+
+
+def _load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:
+    """Machine whose parts fit together; faults of its tables and of its geometry at once."""
+    from spindle_fem.geometry.assembly import build_assembly
+    from spindle_fem.loads.joints import group_of_contacts
+
+    def fits_together(spec: MachineSpec) -> None:
+        group_of_contacts(spec, build_assembly(spec).joint_names)
+
+    return load_machine(machine, overrides, checks=(fits_together,))
 
 
 @contextlib.contextmanager

@@ -27,7 +27,7 @@ def group_of_contacts(spec: MachineSpec, contacts: Iterable[str]) -> dict[str, J
             if not matched:
                 faults.append(
                     UnknownSurfaceError(
-                        f"{spec.name}: joint.{group.name}.contacts",
+                        f"joint.{group.name}.contacts",
                         f'"{pattern}" is no contact of this machine.',
                         did_you_mean(pattern, names),
                     )
@@ -38,11 +38,11 @@ def group_of_contacts(spec: MachineSpec, contacts: Iterable[str]) -> dict[str, J
     for name, owners in groups.items():
         if not owners:
             faults.append(
-                SpecError(f"{spec.name}: joint", f'the contact "{name}" has no conductance.', "Add it to a [[joint]].")
+                SpecError("joint", f'the contact "{name}" has no conductance.', "Add it to a [[joint]].")
             )
         elif len(owners) > 1:
             listing = " and ".join(owner.name for owner in owners)
-            faults.append(SpecError(f"{spec.name}: joint", f'the contact "{name}" is claimed by {listing}.'))
+            faults.append(SpecError("joint", f'the contact "{name}" is claimed by {listing}.'))
     if faults:
         raise FaultsError(spec.name, faults)
     return {name: owners[0] for name, owners in groups.items()}

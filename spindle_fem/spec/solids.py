@@ -225,8 +225,6 @@ class BallRow(SpecModel):
     """Balls of one bearing to each raceway, with ``kind = "constant"`` only."""
     capacity: HeatCapacity | None = None
     """Heat capacity of the balls of one bearing; from their volume where none is given."""
-    grease_conductance: UncertainConductance | None = None
-    """Grease path from raceway to raceway beside the balls, of one bearing."""
 
     @model_validator(mode="after")
     def _check(self) -> BallRow:
