@@ -39,7 +39,9 @@ def small_spindle(channel: ChannelDefinition | None) -> AssemblyGeometry:
         SurfaceDefinition("B1.inner_raceway", "B1.inner_ring", (FaceBox("outward"),)),
         SurfaceDefinition("B1.outer_raceway", "B1.outer_ring", (FaceBox("inward"),)),
         SurfaceDefinition(
-            "housing.outside", "housing", (FaceBox("outward"), FaceBox("front"), FaceBox("rear", z=(0.07, 0.07)))
+            "housing.outside",
+            "housing",
+            (FaceBox("outward"), FaceBox("front"), FaceBox("rear", z=(0.07, 0.07))),
         ),
         SurfaceDefinition("shaft.ends", "shaft", (FaceBox("front"), FaceBox("rear"))),
     ]

@@ -38,13 +38,12 @@ def main() -> int:
         channel = assembly.channel.definition
         label = (
             f"{index + 1:4d} depth {channel.depth * 1e3:5.2f} width {channel.width * 1e3:5.2f} "
-            f"pitch {channel.pitch * 1e3:5.2f} turns {channel.turns:g} starts {channel.starts} {channel.hand:5s}"
+            f"pitch {channel.pitch * 1e3:5.2f} turns {channel.turns:g} "
+            f"starts {channel.starts} {channel.hand:5s}"
         )
         start = time.perf_counter()
         try:
-            mesh = generate_mesh(
-                assembly, build_sizes(assembly, arguments.preset), threads=arguments.threads
-            )
+            mesh = generate_mesh(assembly, build_sizes(assembly, arguments.preset), threads=arguments.threads)
         except SpindleFemError as error:
             failures += 1
             print(f"{label}  FAILED {error}", flush=True)

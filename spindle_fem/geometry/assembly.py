@@ -19,7 +19,8 @@ from spindle_fem.geometry.channel import (
     ChannelGeometry,
     build_channel,
 )
-from spindle_fem.geometry.meridian import Facing, MeridianEdge, MeridianMap
+from spindle_fem.geometry.faces import Facing, MeridianEdge
+from spindle_fem.geometry.meridian import MeridianMap
 
 if TYPE_CHECKING:
     from spindle_fem.spec.model import MachineSpec

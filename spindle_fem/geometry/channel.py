@@ -13,7 +13,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from spindle_fem.errors import GeometryError, did_you_mean
-from spindle_fem.geometry.meridian import VOID, MeridianMap, in_millimetres, to_nanometres
+from spindle_fem.geometry.faces import VOID, in_millimetres, to_nanometres
+from spindle_fem.geometry.meridian import MeridianMap
 
 MINIMUM_WALL = 2.0e-3
 MINIMUM_LAND = 3.0e-3
@@ -208,8 +209,8 @@ def build_channel(
             if 2.0 * port.radius < definition.port_diameter - 1.0e-9:
                 note = (
                     f"{key} port at z {z * 1e3:g} mm drilled Ø{2e3 * port.radius:.3g} mm instead of "
-                    f"Ø{definition.port_diameter * 1e3:g} mm: the channel is {definition.width * 1e3:g} mm wide "
-                    "and walls of 2 mm are kept."
+                    f"Ø{definition.port_diameter * 1e3:g} mm: the channel is {definition.width * 1e3:g} mm "
+                    "wide and walls of 2 mm are kept."
                 )
                 if note not in notes:
                     notes.append(note)

@@ -5,7 +5,6 @@ Coordinates are whole nanometres, so that touching is equality.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -14,78 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import GeometryError, did_you_mean
+from spindle_fem.geometry.faces import (
+    VOID,
+    MeridianEdge,
+    Piece,
+    describe_box,
+    in_millimetres,
+    list_faces,
+    merge_pieces,
+    to_nanometres,
+)
 
 if TYPE_CHECKING:
-    from spindle_fem.geometry.assembly import FaceBox, PartGeometry, SurfaceDefinition
-
-Facing = Literal["outward", "inward", "front", "rear"]
-
-NANOMETRES = 1.0e9
-VOID = -1
-AXIS_NAME = ""
-
-
-def to_nanometres(length: float) -> int:
-    """Length in m as whole nanometres.
-
-    >>> to_nanometres(0.019)
-    19000000
-    """
-    return round(length * NANOMETRES)
-
-
-def in_millimetres(nanometres: int) -> str:
-    """Length for a message.
-
-    >>> in_millimetres(2_500_000)
-    '2.5 mm'
-    """
-    return f"{nanometres * 1e-6:g} mm"
-
-
-@dataclass(frozen=True, slots=True)
-class MeridianEdge:
-    """A face of revolution as a line in the meridian plane.
-
-    Attributes
-    ----------
-    name : str
-        Surface or joint; empty on the axis.
-    parts : tuple of str
-        The part it bounds, or the two parts of a contact in sorted order.
-    facings : tuple of {"outward", "inward", "front", "rear"}
-        Normal as seen from each of ``parts``.
-    z, r : (low, high), [m]
-        Equal bounds of ``r`` make a cylinder, of ``z`` a plane.
-    """
-
-    name: str
-    parts: tuple[str, ...]
-    facings: tuple[Facing, ...]
-    z: tuple[float, float]
-    r: tuple[float, float]
-
-    @property
-    def is_contact(self) -> bool:
-        """Whether two parts meet here."""
-        return len(self.parts) == 2
-
-    @property
-    def is_cylinder(self) -> bool:
-        """Whether the face is a cylinder (else a plane)."""
-        return self.r[0] == self.r[1]
-
-    @property
-    def is_axis(self) -> bool:
-        """Whether the line lies on the axis and makes no face."""
-        return self.r[1] == 0.0
-
-    @property
-    def area(self) -> float:
-        """Area of the face of revolution without channel and ports, m²."""
-        if self.is_cylinder:
-            return 2.0 * np.pi * self.r[0] * (self.z[1] - self.z[0])
-        return np.pi * (self.r[1] ** 2 - self.r[0] ** 2)
+    from spindle_fem.geometry.assembly import PartGeometry, SurfaceDefinition
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +108,7 @@ class MeridianMap:
         pieces = self._boundary_pieces()
         self._check_connection(pieces, faults)
         labels = self._label(pieces, surfaces, remaining, faults)
-        return _merge(pieces, labels, self.part_names)
+        return merge_pieces(pieces, labels, self.part_names)
 
     def cell_boxes(self) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
         """Bounds (z low, z high, r low, r high) in nm and owner of every cell.
@@ -186,12 +126,12 @@ class MeridianMap:
         inside = (r_index > 0).ravel()
         return boxes.reshape(-1, 4)[inside], self.owner.ravel()[inside]
 
-    def _boundary_pieces(self) -> list[_Piece]:
+    def _boundary_pieces(self) -> list[Piece]:
         pieces = []
         owner = self.owner
         for low, high in zip(*np.nonzero(owner[:, 1:] != owner[:, :-1]), strict=True):
             pieces.append(
-                _Piece(
+                Piece(
                     "cylinder",
                     (self.z_lines[low - 1].item(), self.z_lines[low].item()),
                     (self.r_lines[high].item(),) * 2,
@@ -201,7 +141,7 @@ class MeridianMap:
             )
         for low, high in zip(*np.nonzero(owner[1:] != owner[:-1]), strict=True):
             pieces.append(
-                _Piece(
+                Piece(
                     "plane",
                     (self.z_lines[low].item(),) * 2,
                     (self.r_lines[high - 1].item(), self.r_lines[high].item()),
@@ -211,7 +151,7 @@ class MeridianMap:
             )
         return pieces
 
-    def _check_connection(self, pieces: list[_Piece], faults: list[GeometryError]) -> None:
+    def _check_connection(self, pieces: list[Piece], faults: list[GeometryError]) -> None:
         from scipy.ndimage import label
 
         touching = {part for piece in pieces if piece.is_contact for part in (piece.below, piece.above)}
@@ -242,14 +182,14 @@ class MeridianMap:
                     GeometryError(
                         f'part "{name}"',
                         f"has zero thickness at z {in_millimetres(self.z_lines[z_index])}, "
-                        f"r {in_millimetres(self.r_lines[r_index])}, where two segments meet in an edge only.",
+                        f"r {in_millimetres(self.r_lines[r_index])}, where segments meet in an edge only.",
                         "Allowed: segments that share a face.",
                     )
                 )
 
     def _label(
         self,
-        pieces: list[_Piece],
+        pieces: list[Piece],
         surfaces: Sequence[SurfaceDefinition],
         remaining: Literal["adiabatic", "error"],
         faults: list[GeometryError],
@@ -278,8 +218,8 @@ class MeridianMap:
                     faults.append(
                         GeometryError(
                             f'surface "{surface.name}", where[{number}]',
-                            f'{_describe(box)} matches no exposed face of part "{surface.part}".',
-                            f"Faces that look {box.facing}: {_list_faces(pieces, part, box.facing)}.",
+                            f'{describe_box(box)} matches no exposed face of part "{surface.part}".',
+                            f"Faces that look {box.facing}: {list_faces(pieces, part, box.facing)}.",
                         )
                     )
                 for index in hits:
@@ -310,57 +250,6 @@ class MeridianMap:
         return labels
 
 
-@dataclass(frozen=True, slots=True)
-class _Piece:
-    """Part of a face between neighbouring grid lines; below and above along its normal."""
-
-    kind: Literal["cylinder", "plane"]
-    z: tuple[int, int]
-    r: tuple[int, int]
-    below: int
-    above: int
-
-    @property
-    def is_contact(self) -> bool:
-        return self.below != VOID and self.above != VOID
-
-    @property
-    def is_axis(self) -> bool:
-        return self.r == (0, 0)
-
-    def is_exposed_of(self, part: int) -> bool:
-        return not self.is_contact and not self.is_axis and part in (self.below, self.above)
-
-    def facing(self, of_below: bool) -> Facing:
-        if self.kind == "cylinder":
-            return "outward" if of_below else "inward"
-        return "rear" if of_below else "front"
-
-    def joint_name(self, names: Sequence[str]) -> str:
-        pair = "|".join(sorted((names[self.below], names[self.above])))
-        return pair if self.kind == "cylinder" else f"{pair}:face"
-
-    def lies_in(self, box: FaceBox) -> bool:
-        if self.facing(self.above == VOID) != box.facing:
-            return False
-        for own, bounds in ((self.z, box.z), (self.r, box.r)):
-            if bounds is not None and not (
-                to_nanometres(bounds[0]) <= own[0] and own[1] <= to_nanometres(bounds[1])
-            ):
-                return False
-        return True
-
-    def describe(self) -> str:
-        facing = self.facing(self.above == VOID)
-        if self.kind == "cylinder":
-            return f"the {facing} face r {in_millimetres(self.r[0])}, z {_span(self.z)}"
-        return f"the {facing} face z {in_millimetres(self.z[0])}, r {_span(self.r)}"
-
-
-def _span(bounds: tuple[int, int]) -> str:
-    return f"{bounds[0] * 1e-6:g} to {in_millimetres(bounds[1])}"
-
-
 def _check_segment(part: str, bounds: list[int], faults: list[GeometryError]) -> bool:
     z_start, z_end, inner, outer = bounds
     where = f'part "{part}"'
@@ -368,8 +257,8 @@ def _check_segment(part: str, bounds: list[int], faults: list[GeometryError]) ->
         faults.append(
             GeometryError(
                 where,
-                f"a segment z {in_millimetres(z_start)} to {in_millimetres(z_end)}, r {in_millimetres(inner)} to "
-                f"{in_millimetres(outer)} has no thickness.",
+                f"a segment z {in_millimetres(z_start)} to {in_millimetres(z_end)}, "
+                f"r {in_millimetres(inner)} to {in_millimetres(outer)} has no thickness.",
                 "Allowed: z and r that grow.",
             )
         )
@@ -380,61 +269,3 @@ def _check_segment(part: str, bounds: list[int], faults: list[GeometryError]) ->
         )
         return False
     return True
-
-
-def _describe(box: FaceBox) -> str:
-    text = f'facing "{box.facing}"'
-    for key, bounds in (("z", box.z), ("r", box.r)):
-        if bounds is not None:
-            low, high = (to_nanometres(value) for value in bounds)
-            text += f", {key} {in_millimetres(low)}" if low == high else f", {key} {_span((low, high))}"
-    return text
-
-
-def _list_faces(pieces: list[_Piece], part: int, facing: Facing) -> str:
-    faces = [
-        piece for piece in pieces if piece.is_exposed_of(part) and piece.facing(piece.above == VOID) == facing
-    ]
-    if not faces:
-        return "none"
-    if faces[0].kind == "cylinder":
-        return "; ".join(f"r {in_millimetres(piece.r[0])}, z {_span(piece.z)}" for piece in faces)
-    return "; ".join(f"z {in_millimetres(piece.z[0])}, r {_span(piece.r)}" for piece in faces)
-
-
-def _merge(pieces: list[_Piece], labels: list[str], names: Sequence[str]) -> tuple[MeridianEdge, ...]:
-    """Join pieces in line that bound the same parts under the same name."""
-    meeting: dict[tuple[int, int], list[int]] = defaultdict(list)
-    for index, piece in enumerate(pieces):
-        meeting[piece.z[0], piece.r[0]].append(index)
-        meeting[piece.z[1], piece.r[1]].append(index)
-
-    def signature(index: int) -> tuple[object, ...]:
-        piece = pieces[index]
-        return piece.kind, piece.below, piece.above, labels[index]
-
-    follows = {}
-    for (z, r), indices in meeting.items():
-        if len(indices) == 2 and signature(indices[0]) == signature(indices[1]):
-            before, after = sorted(indices, key=lambda index: (pieces[index].z, pieces[index].r))
-            follows[before] = after
-    started = set(range(len(pieces))) - set(follows.values())
-    edges = []
-    for first in sorted(started):
-        last = first
-        while last in follows:
-            last = follows[last]
-        piece = pieces[first]
-        sides = [(names[piece.below], True)] * (piece.below != VOID)
-        sides += [(names[piece.above], False)] * (piece.above != VOID)
-        sides.sort()
-        edges.append(
-            MeridianEdge(
-                AXIS_NAME if piece.is_axis else labels[first],
-                tuple(name for name, _ in sides),
-                tuple(piece.facing(below) for _, below in sides),
-                (piece.z[0] / NANOMETRES, pieces[last].z[1] / NANOMETRES),
-                (piece.r[0] / NANOMETRES, pieces[last].r[1] / NANOMETRES),
-            )
-        )
-    return tuple(edges)

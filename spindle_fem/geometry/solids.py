@@ -216,7 +216,8 @@ def _in_millimetres(assembly: AssemblyGeometry) -> AssemblyGeometry:
             channel,
             definition=scaled(channel.definition, "inner_radius", "depth", "width", "pitch", "z_start"),
             ports=tuple(
-                scaled(port, "z", "radius", "start_radius", "seam_radius", "end_radius") for port in channel.ports
+                scaled(port, "z", "radius", "start_radius", "seam_radius", "end_radius")
+                for port in channel.ports
             ),
         )
     return replace(

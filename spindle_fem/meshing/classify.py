@@ -12,7 +12,8 @@ from spindle_fem.errors import MeshTagError
 from spindle_fem.geometry.assembly import AssemblyGeometry
 from spindle_fem.geometry.channel import ChannelGeometry, PortGeometry
 
-# Boolean operations leave points within a tenth of a micrometre; sweeps follow the helix to well below a micrometre.
+# Boolean operations leave points within a tenth of a micrometre of their face;
+# sweeps follow the helix to a few micrometres.
 EXACT = 1.0e-6
 SWEPT = 5.0e-6
 

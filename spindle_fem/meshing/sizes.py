@@ -10,7 +10,7 @@ from typing import Literal
 
 from spindle_fem.errors import BadInputError, did_you_mean
 from spindle_fem.geometry.assembly import AssemblyGeometry, PartGeometry
-from spindle_fem.geometry.meridian import MeridianEdge
+from spindle_fem.geometry.faces import MeridianEdge
 
 Preset = Literal["coarse", "normal", "fine"]
 

@@ -217,13 +217,15 @@ def test_no_attempt_left(machine, monkeypatch):
         raise MeshQualityError("mesh", "gmsh failed", "Change it.")
 
     monkeypatch.setattr("spindle_fem.meshing.build.mesh_once", fail)
-    with pytest.raises(MeshQualityError, match="no settings gave a sound mesh: frontal Delaunay surfaces, HXT"):
+    with pytest.raises(
+        MeshQualityError, match="no settings gave a sound mesh: frontal Delaunay surfaces, HXT"
+    ):
         generate_mesh(machine, build_sizes(machine, "coarse"), threads=1)
 
 
 def test_face_of_nothing_is_refused(machine):
     stray = np.array([[0.03, 0.0, 0.02], [0.0, 0.03, 0.02], [0.0, 0.031, 0.021]])
-    with pytest.raises(MeshTagError, match="a face of hub at z 0.02 to 0.021 m, .* belongs to no surface"):
+    with pytest.raises(MeshTagError, match=r"a face of hub at z 0.02 to 0.021 m, .* belongs to no surface"):
         classify_face(machine, stray, ("hub",))
 
 
@@ -233,7 +235,9 @@ def test_solids_share_contact_faces(machine):
     with gmsh_session() as geometry:
         solids = build_solids(machine, geometry)
         assert set(solids.volume_of_part) == {"shaft", "hub"}
-        shared = [tag for _, tag in gmsh.model.getEntities(2) if len(gmsh.model.getAdjacencies(2, tag)[0]) == 2]
+        shared = [
+            tag for _, tag in gmsh.model.getEntities(2) if len(gmsh.model.getAdjacencies(2, tag)[0]) == 2
+        ]
         assert len(shared) == 2
 
 

@@ -149,7 +149,10 @@ def test_face_in_two_surfaces():
         SurfaceDefinition("two", "shaft", (FaceBox("outward", z=(0.04, 0.1)),)),
     ]
     (text,) = faults_of([shaft()], surfaces)
-    assert text == 'surface "two": claims a face that surface "one" has already. Allowed: each face in one surface.'
+    assert (
+        text
+        == 'surface "two": claims a face that surface "one" has already. Allowed: each face in one surface.'
+    )
 
 
 def test_unnamed_faces_may_be_faults():
@@ -205,8 +208,12 @@ def test_reference_spindle_areas(reference):
     assert total_area(reference, "housing.flange_back") == pytest.approx(
         math.pi * (0.190**2 - 0.150**2), rel=1e-12
     )
-    assert total_area(reference, "F1.inner_ring|shaft") == pytest.approx(2 * math.pi * 0.070 * 0.024, rel=1e-12)
-    assert total_area(reference, "shaft.gap") == pytest.approx(2 * math.pi * 0.065 * (0.410 - 0.157), rel=1e-12)
+    assert total_area(reference, "F1.inner_ring|shaft") == pytest.approx(
+        2 * math.pi * 0.070 * 0.024, rel=1e-12
+    )
+    assert total_area(reference, "shaft.gap") == pytest.approx(
+        2 * math.pi * 0.065 * (0.410 - 0.157), rel=1e-12
+    )
     assert total_area(reference, "F1.outer_ring|shaft:face") == pytest.approx(
         math.pi * (0.090**2 - 0.086**2), rel=1e-12
     )

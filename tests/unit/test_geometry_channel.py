@@ -96,8 +96,8 @@ def test_second_start_begins_opposite():
 def test_land_between_turns():
     (text,) = faults_of(pitch=0.0149)
     assert text == (
-        "channel.width: 12 mm + 3 mm exceeds pitch / starts = 14.9 mm, neighbouring turns leave less than 3 mm "
-        "of metal. Allowed: a width up to 11.9 mm."
+        "channel.width: 12 mm + 3 mm exceeds pitch / starts = 14.9 mm, neighbouring turns leave less than "
+        "3 mm of metal. Allowed: a width up to 11.9 mm."
     )
     assert fit(pitch=0.015).channel is not None
 
@@ -116,7 +116,10 @@ def test_two_starts_halve_the_room():
         ({"inner_radius": 0.090}, "breaks through the inner wall"),
         ({"z_start": 0.0479}, "front edge z 41.9 mm (z_start - width/2), leaves a wall of only 1.9 mm"),
         ({"z_start": 0.040}, "breaks through the front wall"),
-        ({"turns": 18.125}, "rear edge z 489 mm (z_start + pitch * turns + width/2), leaves a wall of only 1 mm"),
+        (
+            {"turns": 18.125},
+            "rear edge z 489 mm (z_start + pitch * turns + width/2), leaves a wall of only 1 mm",
+        ),
     ],
 )
 def test_thin_walls_are_refused_by_name(changes, message):
@@ -142,7 +145,9 @@ def test_corner_distance_counts_as_a_wall():
     assert fit(far, port_diameter=None, turns=4.0).channel is not None
 
 
-@pytest.mark.parametrize("key", ["inner_radius", "depth", "width", "pitch", "turns", "starts", "port_diameter"])
+@pytest.mark.parametrize(
+    "key", ["inner_radius", "depth", "width", "pitch", "turns", "starts", "port_diameter"]
+)
 def test_values_must_be_positive(key):
     assert any(f"channel.{key}: is 0. Allowed: above 0." in text for text in faults_of(**{key: 0}))
 
@@ -153,7 +158,7 @@ def test_unknown_hand_and_part():
 
 
 def test_channel_in_a_part_that_is_not_there():
-    with pytest.raises(FaultsError, match='part "housng" does not exist. Did you mean "housing"'):
+    with pytest.raises(FaultsError, match=r'part "housng" does not exist. Did you mean "housing"'):
         assemble([HOUSING], channel=replace(REFERENCE, part="housng"))
 
 

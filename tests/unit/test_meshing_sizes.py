@@ -40,7 +40,9 @@ def test_factor_halves_every_length(assembly):
     assert half.channel == pytest.approx(0.5 * whole.channel)
     assert dict(half.part) == pytest.approx({name: 0.5 * size for name, size in whole.part.items()})
     assert half.port_segments == 2 * whole.port_segments
-    assert edge_sizes(assembly, half) == pytest.approx([0.5 * size for size in edge_sizes(assembly, whole)], rel=0.5)
+    assert edge_sizes(assembly, half) == pytest.approx(
+        [0.5 * size for size in edge_sizes(assembly, whole)], rel=0.5
+    )
 
 
 def test_overrides(assembly):
@@ -56,7 +58,9 @@ def test_circles_keep_their_segments(assembly):
 
 
 def test_chords_stay_out_of_narrow_gaps():
-    inner = PartGeometry("inner", (AnnularSegment(0.0, 0.1, 0.02, 0.0895), AnnularSegment(0.0, 0.01, 0.08, 0.1)))
+    inner = PartGeometry(
+        "inner", (AnnularSegment(0.0, 0.1, 0.02, 0.0895), AnnularSegment(0.0, 0.01, 0.08, 0.1))
+    )
     outer = PartGeometry("outer", (AnnularSegment(0.01, 0.1, 0.09, 0.1),))
     assembly = assemble([inner, outer])
     sizes = build_sizes(assembly, "coarse")

@@ -41,6 +41,7 @@ def test_quarter_ring_area_converges_with_fourth_order():
     """One quadratic triangle pair on a cylinder patch: error of the chord's fourth power."""
     errors = []
     for angle in (0.4, 0.2):
+
         def at(a, z):
             return [np.cos(a), np.sin(a), z]
 
@@ -129,7 +130,9 @@ def test_small_mesh_matches_its_solid_model(tiny):
 
 def test_area_off_is_named(tiny):
     wrong = replace(tiny, cad_area=MappingProxyType({**tiny.cad_area, "housing.outside": 0.05}))
-    with pytest.raises(MeshQualityError, match=r"area of housing\.outside [-+]\d+\.\d+% away from the solid model"):
+    with pytest.raises(
+        MeshQualityError, match=r"area of housing\.outside [-+]\d+\.\d+% away from the solid model"
+    ):
         require_quality(wrong)
 
 
@@ -141,5 +144,7 @@ def test_volume_off_is_named(tiny):
 
 @pytest.mark.parametrize(("quality", "state"), [(-0.1, "inverted"), (0.0, "inverted"), (0.1, "distorted")])
 def test_poor_elements_are_an_error(tiny, quality, state):
-    with pytest.raises(MeshQualityError, match=rf"{state} elements: the worst minSICN is .*Allowed: above 0\.15"):
+    with pytest.raises(
+        MeshQualityError, match=rf"{state} elements: the worst minSICN is .*Allowed: above 0\.15"
+    ):
         require_quality(replace(tiny, min_quality=quality))
