@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,12 @@ from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
 from spindle_fem.reduced.coolant import CoolantMaps, coolant_maps, film_derivative
 from spindle_fem.reduced.model import ReducedModel
+from spindle_fem.reduced.terms import FLOW
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
+
+NO_CHANGES: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +73,7 @@ class FastModel:
             (row for row, probe in enumerate(spec.probe) if probe.kind == "coolant_outlet"), None
         )
         self._point_rows = [row for row, probe in enumerate(spec.probe) if probe.kind == "point"]
+        self._base: dict[tuple[float, float], dict[str, float]] = {}
         self.loop = CoolantLoop(spec, model.channel_cells()) if spec.channel is not None else None
         self.fixed_fluids = tuple(
             dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
@@ -83,11 +88,15 @@ class FastModel:
         self._fluid_rows = {name: i for i, name in enumerate(model.fluid_names)}
 
     # ------------------------------------------------------------- operators
-    def storage(self, factors: Mapping[str, float]) -> Array:
-        """Capacity matrix, (r, r) J/K."""
+    def storage(self, factors: Mapping[str, float], added: Mapping[str, float] = NO_CHANGES) -> Array:
+        """Capacity matrix, (r, r) J/K; ``added`` is further capacity at places, J/K."""
         capacities = self.table.capacities()
         weights = [capacities[name] * self.table.scale(name, factors) for name in self.model.storage_names]
-        return np.tensordot(np.array(weights), self.model.storage, axes=1)
+        matrix = np.tensordot(np.array(weights), self.model.storage, axes=1)
+        for place, capacity in added.items():
+            mean = self.model.place(place)
+            matrix += capacity * np.outer(mean, mean)
+        return matrix
 
     def storage_by(self, factors: Mapping[str, float], parameters: Sequence[str]) -> dict[str, Array]:
         """Derivatives of the capacity matrix to the logarithms of parameters; absent where zero."""
@@ -102,28 +111,46 @@ class FastModel:
                 found[parameter] = np.tensordot(weights, self.model.storage[rows], axes=1)
         return found
 
-    def channel_film(self, point: OperatingPoint, factors: Mapping[str, float]) -> tuple[Array, float, float]:
+    def channel_film(
+        self, point: OperatingPoint, factors: Mapping[str, float], changes: Mapping[str, float] = NO_CHANGES
+    ) -> tuple[Array, float, float]:
         """Film of each cell [W/(m²·K)], capacity rate of each start [W/K], friction heat [W].
 
         Film and properties at inlet temperature; where the definition asks for
         those at bulk temperature, this is the first step of that iteration.
         """
         wall = np.full(self.model.cell_area.shape, point.coolant_inlet_temperature)
-        state = self.loop.at(point, wall)
+        flow = point.coolant_flow * changes.get(FLOW, 1.0)
+        state = self.loop.at(replace(point, coolant_flow=flow), wall)
         rate = float(state.march.mass_flow * np.mean(state.march.march.specific_heat_capacity))
         friction = float(state.march.march.pumping_heat.sum()) if self.spec.coolant.pumping_heat else 0.0
-        return state.film_coefficient.ravel() * self.table.scale(CHANNEL_FILM, factors), rate, friction
+        scale = self.table.scale(CHANNEL_FILM, factors) * changes.get(CHANNEL_FILM, 1.0)
+        return state.film_coefficient.ravel() * scale, rate, friction
 
-    def coefficients(self, point: OperatingPoint, factors: Mapping[str, float]) -> dict[str, float]:
+    def coefficients(
+        self, point: OperatingPoint, factors: Mapping[str, float], changes: Mapping[str, float] = NO_CHANGES
+    ) -> dict[str, float]:
         """Every coefficient of a class, the mean channel film included."""
-        base = self.table.base(point)
-        found = {name: base[name] * self.table.scale(name, factors) for name in self.model.coefficient_names}
+        key = (point.speed, point.ambient_temperature)
+        if key not in self._base:
+            self._base[key] = self.table.base(point)
+        base = self._base[key]
+        found = {
+            name: base[name] * self.table.scale(name, factors) * changes.get(name, 1.0)
+            for name in self.model.coefficient_names
+        }
         if self.loop is not None:
-            found[CHANNEL_FILM] = float(self.channel_film(point, factors)[0].mean())
+            found[CHANNEL_FILM] = float(self.channel_film(point, factors, changes)[0].mean())
         return found
 
     def operators(
-        self, point: OperatingPoint, factors: Mapping[str, float], parameters: Sequence[str] = ()
+        self,
+        point: OperatingPoint,
+        factors: Mapping[str, float],
+        parameters: Sequence[str] = (),
+        *,
+        changes: Mapping[str, float] = NO_CHANGES,
+        conductances: Mapping[str, float] = NO_CHANGES,
     ) -> ClassOperators:
         """Operators at an operating point with factors, and derivatives to some parameters.
 
@@ -134,10 +161,14 @@ class FastModel:
         factors : mapping of str to float
             As :meth:`CoefficientTable.factors` gives them.
         parameters : sequence of str
+        changes : mapping of str to float
+            Further factors on single coefficients, and on the flow.
+        conductances : mapping of str to float, [W/K]
+            From places to the ambient, beside the machine's own films.
         """
         model, table = self.model, self.table
-        base = table.base(point)
-        values = np.array([base[name] * table.scale(name, factors) for name in model.coefficient_names])
+        found = self.coefficients(point, factors, changes)
+        values = np.array([found[name] for name in model.coefficient_names])
         conduction = np.tensordot(values, model.operators, axes=1)
         loads = np.zeros((model.size, len(self.load_names)))
         for column, place in enumerate(self.heat_places):
@@ -146,6 +177,10 @@ class FastModel:
             loads[:, self._fluid_column(name)] += (
                 values[self._positions[name]] * model.fluid_load[self._fluid_rows[name]]
             )
+        for place, conductance in conductances.items():
+            mean = model.place(place)
+            conduction = conduction + conductance * np.outer(mean, mean)
+            loads[:, self.load_names.index("ambient")] += conductance * mean
         outputs = np.zeros((len(self.channels), model.size))
         outputs[self._point_rows] = model.probes
         output_inputs = np.zeros((len(self.channels), len(self.load_names)))
@@ -166,7 +201,7 @@ class FastModel:
                     by[:, self._fluid_column(name)] += values[self._positions[name]] * load
                 loads_by[parameter] = by
         if self.loop is not None:
-            film, rate, friction = self.channel_film(point, factors)
+            film, rate, friction = self.channel_film(point, factors, changes)
             maps = coolant_maps(model, film, rate, friction)
             conduction = conduction + maps.conduction
             self._add_coolant(loads, outputs, output_inputs, maps)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import SpecError
+from spindle_fem.reduced.assemble import RunOperators, run_operators
 from spindle_fem.reduced.drive import Drive, heat_of_table
-from spindle_fem.reduced.fast_model import ClassOperators, FastModel
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.nonlinear import DynamicTerms, Evaluation, solve_added
 from spindle_fem.reduced.stepping import (
     Propagator,
     build_propagator,
@@ -19,6 +22,7 @@ from spindle_fem.reduced.stepping import (
     sensitivity_forcing,
     stage_values,
 )
+from spindle_fem.reduced.terms import Term
 
 Array = NDArray[np.float64]
 
@@ -33,11 +37,14 @@ class FastTransient:
     channels : tuple of str
     temperature : (N, c) ndarray, [K]
     sensitivity : (N, c, p) ndarray, [K]
-        Derivative to the natural logarithm of each parameter.
+        Derivative to the natural logarithm of each parameter; to the value
+        itself for term parameters that say so.
     parameters : tuple of str
     grid : (G + 1,) ndarray, [s]
     states : (G + 1, r) ndarray
         Reduced unknowns at the ends of the steps.
+    added : (G + 1, m) ndarray
+        What the terms added just before each of them.
     """
 
     times: Array
@@ -47,6 +54,7 @@ class FastTransient:
     parameters: tuple[str, ...]
     grid: Array
     states: Array
+    added: Array
 
 
 def simulate_fast(
@@ -56,6 +64,7 @@ def simulate_fast(
     *,
     parameters: Mapping[str, float] | None = None,
     derivatives: Sequence[str] = (),
+    terms: Sequence[Term] = (),
 ) -> FastTransient:
     """Follow a drive from a uniform temperature.
 
@@ -65,13 +74,23 @@ def simulate_fast(
     drive : Drive
     initial_temperature : float, [K]
     parameters : mapping of str to float, optional
-        Factors, 1 where absent.
+        Factors of the machine's parameters, 1 where absent; values of the
+        terms' (``<term>.<parameter>``), nominal where absent.
     derivatives : sequence of str
         Parameters to differentiate by.
+    terms : sequence of Term
+        Physics beside the machine's own.
 
     Returns
     -------
     FastTransient
+
+    Raises
+    ------
+    SpecError
+        A parameter or place that does not exist; heat that is not by table.
+    ConvergenceError
+        The terms run away.
     """
     if fast.spec.heat.model != "table":
         raise SpecError(
@@ -79,36 +98,42 @@ def simulate_fast(
             f'"{fast.spec.heat.model}" follows the temperatures of every bearing.',
             'The fast model takes heat.model = "table".',
         )
-    run = _LinearRun(fast, drive, parameters or {}, tuple(derivatives))
+    run = _Run(fast, drive, parameters or {}, tuple(derivatives), tuple(terms))
     return run.solve(initial_temperature)
 
 
-class _LinearRun:
+class _Run:
     """One drive with one set of parameters."""
 
     def __init__(
-        self, fast: FastModel, drive: Drive, parameters: Mapping[str, float], derivatives: tuple[str, ...]
+        self,
+        fast: FastModel,
+        drive: Drive,
+        parameters: Mapping[str, float],
+        derivatives: tuple[str, ...],
+        terms: tuple[Term, ...],
     ) -> None:
         self.fast, self.drive, self.derivatives = fast, drive, derivatives
-        self.factors = fast.table.factors(parameters)
-        self.operators: list[ClassOperators] = [
-            fast.operators(point, self.factors, derivatives) for point in drive.points
-        ]
-        self.storage = fast.storage(self.factors)
-        self.storage_by = fast.storage_by(self.factors, derivatives)
+        self.built: RunOperators = run_operators(fast, drive.points, parameters, derivatives, terms)
+        self.operators = self.built.classes
         self.groups = group_steps(drive.step_class, drive.steps)
         self.propagators: dict[tuple[int, float], Propagator] = {
-            key: build_propagator(self.storage, self.operators[key[0]].conduction, key[1])
+            key: build_propagator(self.built.storage, self.operators[key[0]].conduction, key[1])
             for key in self.groups
         }
+        self.group_of_step = np.empty(len(drive.steps), dtype=np.int64)
+        for number, rows in enumerate(self.groups.values()):
+            self.group_of_step[rows] = number
         self.start, self.start_by = self._load_inputs(drive.start)
         self.end, self.end_by = self._load_inputs(drive.end)
+        dynamic = [term for term in terms if term.is_dynamic]
+        self.dynamic = DynamicTerms(fast, drive, dynamic, parameters, derivatives) if dynamic else None
 
     def _load_inputs(self, inputs: Array) -> tuple[Array, dict[str, Array]]:
         """Load inputs of every step at one of its ends, and their derivatives."""
         fast, drive = self.fast, self.drive
         heat = heat_of_table(fast.spec, inputs[:, drive.column("speed")], inputs[:, drive.column("thrust")])
-        friction, by = fast.friction_loads(heat, self.factors, self.derivatives)
+        friction, by = fast.friction_loads(heat, self.built.factors, self.built.machine_derivatives)
         found = np.zeros((len(inputs), len(fast.load_names)))
         found[:, : friction.shape[1]] = friction
         found[:, fast.load_names.index("ambient")] = inputs[:, drive.column("ambient")]
@@ -119,70 +144,156 @@ class _LinearRun:
         return found, by
 
     def solve(self, initial_temperature: float) -> FastTransient:
-        states = self._march(initial_temperature)
-        sensitivities = self._march_sensitivities(states) if self.derivatives else None
-        return self._outputs(states, sensitivities)
-
-    def _march(self, initial_temperature: float) -> Array:
-        drive, size = self.drive, self.fast.model.size
-        added = np.empty((len(drive.steps), size))
+        size, steps = self.fast.model.size, len(self.drive.steps)
+        response = np.empty((steps, size))
         for key, rows in self.groups.items():
             loads = self.operators[key[0]].loads
-            added[rows] = load_response(self.propagators[key], self.start[rows], self.end[rows], loads)
-        states = np.empty((len(drive.steps) + 1, size))
+            response[rows] = load_response(self.propagators[key], self.start[rows], self.end[rows], loads)
+        states = np.empty((steps + 1, size))
         states[0] = initial_temperature * self.fast.model.one
-        advance = self._advance_by_step()
-        for step, matrix in enumerate(advance):
-            np.dot(matrix, states[step], out=states[step + 1])
-            states[step + 1] += added[step]
-        return states
+        tracks = None
+        if self.dynamic is None:
+            advance = [self.propagators[key].advance for key in self.groups]
+            for step, group in enumerate(self.group_of_step):
+                np.dot(advance[group], states[step], out=states[step + 1])
+                states[step + 1] += response[step]
+        else:
+            tracks = self._march_terms(states, response)
+        sensitivities = self._march_sensitivities(states, tracks) if self.derivatives else None
+        return self._outputs(states, sensitivities, tracks)
 
-    def _advance_by_step(self) -> list[Array]:
-        by_step: list[Array] = [None] * len(self.drive.steps)
-        for key, rows in self.groups.items():
-            matrix = self.propagators[key].advance
-            for row in rows:
-                by_step[row] = matrix
-        return by_step
+    # ------------------------------------------------------------------ terms
+    def _term_inputs(self, values: Array) -> dict[str, float]:
+        return dict(zip(self.drive.names, values.tolist(), strict=True))
 
-    def _march_sensitivities(self, states: Array) -> Array:
-        drive, size = self.drive, self.fast.model.size
-        forcing = np.zeros((len(drive.steps), size, len(self.derivatives)))
-        for key, rows in self.groups.items():
+    def _evaluator(self, step: int, *, at_end: bool, memory: Array) -> Callable[[Array], Evaluation]:
+        """Added quantities at one end of a step as a function of the sensed temperatures."""
+        drive, number = self.drive, int(self.drive.step_class[step])
+        return partial(
+            self.dynamic.evaluate,
+            float(drive.grid[step + 1] if at_end else drive.grid[step]),
+            self._term_inputs(drive.end[step] if at_end else drive.start[step]),
+            self.built.coefficients[number],
+            self.built.touched,
+            states=memory,
+        )
+
+    def _march_terms(self, states: Array, response: Array) -> _Tracks:
+        dynamic, drive = self.dynamic, self.drive
+        keys = list(self.groups)
+        columns = [dynamic.columns(self._inlet_load(key[0])) for key in keys]
+        from_start = [self.propagators[k].from_start @ c for k, c in zip(keys, columns, strict=True)]
+        from_end = [self.propagators[k].from_end @ c for k, c in zip(keys, columns, strict=True)]
+        answer = [dynamic.sense @ matrix for matrix in from_end]
+        steps = len(drive.steps)
+        tracks = _Tracks(columns, from_start, from_end, answer, dynamic, steps)
+        memory = dynamic.initial_states()
+        for step, group in enumerate(self.group_of_step):
+            sensed = dynamic.sense @ states[step]
+            begin = self._evaluator(step, at_end=False, memory=memory)(sensed)
+            tracks.begin.append(begin)
+            if dynamic.n_states:
+                inputs = self._term_inputs(drive.start[step])
+                moved = dynamic.advance(
+                    float(drive.grid[step]), float(drive.steps[step]), inputs, sensed, memory
+                )
+                memory = moved[0]
+                tracks.moved.append(moved)
+            base = self.propagators[keys[group]].advance @ states[step] + response[step]
+            base += from_start[group] @ begin.value
+            added, end = solve_added(
+                self._evaluator(step, at_end=True, memory=memory),
+                dynamic.sense @ base,
+                answer[group],
+                begin.value,
+                f"t = {drive.grid[step + 1]:.0f} s",
+            )
+            tracks.end.append(end)
+            tracks.added_start[step], tracks.added_end[step] = begin.value, added
+            states[step + 1] = base + from_end[group] @ added
+        return tracks
+
+    def _inlet_load(self, number: int) -> Array:
+        return self.operators[number].loads[:, self.fast.load_names.index("coolant_inlet")]
+
+    # ---------------------------------------------------------- sensitivities
+    def _forcing(self, states: Array, tracks: _Tracks | None) -> Array:
+        """What parameters add to the derivative of each step's end, (G, r, p)."""
+        forcing = np.zeros((len(self.drive.steps), states.shape[1], len(self.derivatives)))
+        for group, (key, rows) in enumerate(self.groups.items()):
             operators, propagator = self.operators[key[0]], self.propagators[key]
-            start, end = self.start[rows], self.end[rows]
+            start, end, loads = self.start[rows], self.end[rows], operators.loads
+            if tracks is not None:
+                start = np.hstack((start, tracks.added_start[rows]))
+                end = np.hstack((end, tracks.added_end[rows]))
+                loads = np.hstack((loads, tracks.columns[group]))
             before, after = states[rows], states[rows + 1]
-            stage = stage_values(propagator, before, start, end, operators.loads)
+            stage = stage_values(propagator, before, start, end, loads)
             for column, parameter in enumerate(self.derivatives):
-                load_start = load_end = None
-                if parameter in operators.loads_by:
-                    load_start = start @ operators.loads_by[parameter].T
-                    load_end = end @ operators.loads_by[parameter].T
-                if parameter in self.start_by:
-                    heat = operators.loads[:, : self.start_by[parameter].shape[1]].T
-                    by_start, by_end = (
-                        self.start_by[parameter][rows] @ heat,
-                        self.end_by[parameter][rows] @ heat,
-                    )
-                    load_start = by_start if load_start is None else load_start + by_start
-                    load_end = by_end if load_end is None else load_end + by_end
+                load_start, load_end = self._load_derivatives(parameter, key[0], rows, tracks)
                 forcing[rows, :, column] = sensitivity_forcing(
                     propagator,
                     before,
                     stage,
                     after,
                     operators.conduction_by.get(parameter),
-                    self.storage_by.get(parameter),
+                    self.built.storage_by.get(parameter),
                     load_start,
                     load_end,
                 )
-        found = np.zeros((len(drive.steps) + 1, size, len(self.derivatives)))
-        for step, matrix in enumerate(self._advance_by_step()):
-            np.dot(matrix, found[step], out=found[step + 1])
-            found[step + 1] += forcing[step]
+        return forcing
+
+    def _load_derivatives(
+        self, parameter: str, number: int, rows: NDArray[np.int64], tracks: _Tracks | None
+    ) -> tuple[Array | None, Array | None]:
+        """Derivative of the loads at both ends of some steps at fixed temperatures, the terms' own apart."""
+        operators = self.operators[number]
+        start = end = None
+        if parameter in operators.loads_by:
+            by = operators.loads_by[parameter]
+            inputs_start, inputs_end = self.start[rows], self.end[rows]
+            if tracks is not None and self.dynamic.inlet_columns():
+                inlet = self.fast.load_names.index("coolant_inlet")
+                shift = self.dynamic.inlet_columns()
+                inputs_start, inputs_end = inputs_start.copy(), inputs_end.copy()
+                inputs_start[:, inlet] += tracks.added_start[np.ix_(rows, shift)].sum(axis=1)
+                inputs_end[:, inlet] += tracks.added_end[np.ix_(rows, shift)].sum(axis=1)
+            start, end = inputs_start @ by.T, inputs_end @ by.T
+        if parameter in self.start_by:
+            heat = operators.loads[:, : self.start_by[parameter].shape[1]].T
+            more_start, more_end = self.start_by[parameter][rows] @ heat, self.end_by[parameter][rows] @ heat
+            start = more_start if start is None else start + more_start
+            end = more_end if end is None else end + more_end
+        return start, end
+
+    def _march_sensitivities(self, states: Array, tracks: _Tracks | None) -> Array:
+        forcing = self._forcing(states, tracks)
+        found = np.zeros((len(states), states.shape[1], len(self.derivatives)))
+        advance = [self.propagators[key].advance for key in self.groups]
+        if tracks is None:
+            for step, group in enumerate(self.group_of_step):
+                np.dot(advance[group], found[step], out=found[step + 1])
+                found[step + 1] += forcing[step]
+            return found
+        sense = self.dynamic.sense
+        memory = np.zeros((self.dynamic.n_states, len(self.derivatives)))
+        identity = np.eye(self.dynamic.n_added)
+        for step, group in enumerate(self.group_of_step):
+            begin, end = tracks.begin[step], tracks.end[step]
+            sensed = sense @ found[step]
+            added = begin.by_sensed @ sensed + begin.by_state @ memory + begin.by_parameter
+            if self.dynamic.n_states:
+                _, by_sensed, by_state, by_parameter = tracks.moved[step]
+                memory = by_sensed @ sensed + by_state @ memory + by_parameter
+            base = advance[group] @ found[step] + forcing[step] + tracks.from_start[group] @ added
+            right = end.by_sensed @ (sense @ base) + end.by_state @ memory + end.by_parameter
+            added = np.linalg.solve(identity - end.by_sensed @ tracks.answer[group], right)
+            found[step + 1] = base + tracks.from_end[group] @ added
+            tracks.added_by[step] = added
         return found
 
-    def _outputs(self, states: Array, sensitivities: Array | None) -> FastTransient:
+    # ----------------------------------------------------------------- outputs
+    def _outputs(self, states: Array, sensitivities: Array | None, tracks: _Tracks | None) -> FastTransient:
         """Outputs at the wanted times; the class is that of the step that begins there."""
         fast, drive = self.fast, self.drive
         n_out, n_par = len(fast.channels), len(self.derivatives)
@@ -191,12 +302,17 @@ class _LinearRun:
         last = len(drive.steps) - 1
         owner = np.append(drive.step_class, drive.step_class[last])
         inputs = np.vstack((self.start, self.end[last:]))
+        added = np.zeros((len(states), 0)) if tracks is None else tracks.added()
+        shift_by = self._shift_inlet(inputs, tracks)
+        inlet = fast.load_names.index("coolant_inlet")
         for number, operators in enumerate(self.operators):
             rows = np.flatnonzero(owner == number)
             at_grid[rows] = states[rows] @ operators.outputs.T + inputs[rows] @ operators.output_inputs.T
             if sensitivities is None:
                 continue
             by_grid[rows] = np.einsum("or,nrp->nop", operators.outputs, sensitivities[rows], optimize=True)
+            if shift_by is not None:
+                by_grid[rows] += operators.output_inputs[None, :, inlet, None] * shift_by[rows, None, :]
             for column, parameter in enumerate(self.derivatives):
                 if parameter in operators.outputs_by:
                     by_grid[rows, :, column] += states[rows] @ operators.outputs_by[parameter].T
@@ -209,7 +325,42 @@ class _LinearRun:
             self.derivatives,
             drive.grid,
             states,
+            added,
         )
+
+    def _shift_inlet(self, inputs: Array, tracks: _Tracks | None) -> Array | None:
+        """Add the terms' shift of the inlet temperature in place; its derivatives (G + 1, p)."""
+        if tracks is None or not self.dynamic.inlet_columns():
+            return None
+        shift = self.dynamic.inlet_columns()
+        values = np.vstack((tracks.added_start, tracks.added_end[-1:]))
+        inputs[:, self.fast.load_names.index("coolant_inlet")] += values[:, shift].sum(axis=1)
+        return np.concatenate((np.zeros_like(tracks.added_by[:1]), tracks.added_by))[:, shift].sum(axis=1)
+
+
+class _Tracks:
+    """What the terms did in every step, kept for the derivatives."""
+
+    def __init__(
+        self,
+        columns: list[Array],
+        from_start: list[Array],
+        from_end: list[Array],
+        answer: list[Array],
+        dynamic: DynamicTerms,
+        steps: int,
+    ) -> None:
+        self.columns, self.from_start, self.from_end, self.answer = columns, from_start, from_end, answer
+        self.added_start = np.zeros((steps, dynamic.n_added))
+        self.added_end = np.zeros((steps, dynamic.n_added))
+        self.added_by = np.zeros((steps, dynamic.n_added, len(dynamic.derivatives)))
+        self.begin: list[Evaluation] = []
+        self.end: list[Evaluation] = []
+        self.moved: list[tuple[Array, Array, Array, Array]] = []
+
+    def added(self) -> Array:
+        """Added quantities at the ends of the steps, (G + 1, m)."""
+        return np.vstack((self.added_start[:1], self.added_end))
 
 
 def _at(times: Array, grid: Array, values: Array) -> Array:

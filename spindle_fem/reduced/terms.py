@@ -1,0 +1,151 @@
+"""Physics that the linear model lacks, as terms that can be added to it one by one.
+
+A term may do any of four things, each with parameters of its own:
+
+- put heat into named places, or shift the temperature of a fluid, as a
+  function of inputs, temperatures, a state of its own, time and parameters
+  (:meth:`Term.heat`);
+- multiply named coefficients by such a function (:meth:`Term.factor`);
+- multiply coefficients by a function of the operating point alone
+  (:meth:`Term.operating_factor`), the coolant's flow included;
+- add heat capacity to a place, or a conductance from a place to the ambient
+  (:meth:`Term.place_capacity`, :meth:`Term.place_conductance`).
+
+Functions of temperatures are called with complex arguments, several columns at
+once, and differentiated by complex steps: write them with numpy's analytic
+functions and choose branches by ``np.real``.
+
+Source of the complex step: Squire & Trapp (1998), SIAM Review 40, 110-112.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.loads.operating_point import OperatingPoint
+
+Array = NDArray[np.float64]
+
+FLOW = "coolant.flow"
+FLUID_PREFIX = "fluid."
+COOLANT_INLET = "fluid.coolant_inlet"
+
+
+@dataclass(frozen=True, slots=True)
+class TermParameter:
+    """One number of a term.
+
+    Attributes
+    ----------
+    name : str
+        Within the term; ``<term>.<name>`` outside.
+    value : float
+        SI, before any data.
+    sigma : float
+        One standard deviation: of the logarithm when ``logarithmic``, else in
+        the value's unit; 0 means fixed.
+    unit : str
+    logarithmic : bool
+        Whether derivatives are taken to the logarithm.
+    """
+
+    name: str
+    value: float
+    sigma: float = 0.0
+    unit: str = ""
+    logarithmic: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class TermContext:
+    """What a term sees; the last axis counts complex perturbations.
+
+    Attributes
+    ----------
+    time : float, [s]
+    inputs : mapping of str to float
+        As :class:`spindle_fem.reduced.drive.Drive` names them.
+    temperatures : (n_reads, k) ndarray, [K]
+        Of the term's ``reads``.
+    state : (n_states, k) ndarray
+    parameters : mapping of str to (k,) ndarray
+    """
+
+    time: float
+    inputs: Mapping[str, float]
+    temperatures: NDArray[np.complex128]
+    state: NDArray[np.complex128]
+    parameters: Mapping[str, NDArray[np.complex128]]
+
+
+class Term:
+    """A term that does nothing; give what differs.
+
+    Attributes
+    ----------
+    name : str
+    parameters : tuple of TermParameter
+    heat_places : tuple of str
+        Places of :class:`spindle_fem.reduced.model.ReducedModel`, in W; or
+        ``fluid.<surface>`` (the film's fluid) and ``fluid.coolant_inlet``, in
+        K above what the inputs say.
+    coefficients : tuple of str
+        Coefficients that :meth:`factor` multiplies.
+    reads : tuple of str
+        Places whose mean temperatures it needs.
+    n_states : int
+        Numbers that it remembers from step to step.
+    """
+
+    name: str = ""
+    parameters: tuple[TermParameter, ...] = ()
+    heat_places: tuple[str, ...] = ()
+    coefficients: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    n_states: int = 0
+
+    def heat(self, context: TermContext) -> NDArray[np.complex128]:
+        """Heat of every heat place, (n_heat_places, k) W; K for fluids."""
+        return np.zeros((len(self.heat_places), context.temperatures.shape[-1]), dtype=complex)
+
+    def factor(self, context: TermContext) -> NDArray[np.complex128]:
+        """Factor on every coefficient, (n_coefficients, k)."""
+        return np.ones((len(self.coefficients), context.temperatures.shape[-1]), dtype=complex)
+
+    def initial_state(self, parameters: Mapping[str, float]) -> Array:
+        """State at time zero, (n_states,); must not depend on parameters that are fitted."""
+        return np.zeros(self.n_states)
+
+    def advance(self, context: TermContext, step: float) -> NDArray[np.complex128]:
+        """State after a step, (n_states, k), from what holds at its start."""
+        return context.state
+
+    def operating_factor(self, point: OperatingPoint, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Factors by coefficient at an operating point; ``coolant.flow`` is the flow itself."""
+        return {}
+
+    def place_capacity(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Heat capacity added to places, J/K."""
+        return {}
+
+    def place_conductance(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Conductance from places to the ambient, W/K."""
+        return {}
+
+    # -------------------------------------------------------------- helpers
+    def names(self) -> dict[str, TermParameter]:
+        """Parameters by the names that they have outside."""
+        return {f"{self.name}.{item.name}": item for item in self.parameters}
+
+    def values(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Values by inner name, the nominal one where none is given."""
+        return {item.name: given.get(f"{self.name}.{item.name}", item.value) for item in self.parameters}
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether anything depends on temperatures, time or state."""
+        return bool(self.heat_places or self.coefficients)
