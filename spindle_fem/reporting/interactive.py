@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.reporting.figures import TEMPERATURE_MAP
-from spindle_fem.reporting.sections import facet_normals, section_of_volume
+from spindle_fem.reporting.sections import TRIANGLE_SPLIT, facet_normals, section_of_volume
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 SURFACE_GROUP = "display_surface"
 TRIANGLE_BUDGET = 60_000
+BULGE = 4.0e-4  # m; more than this off its chord shows as a corner
 
 
 def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGET) -> xr.Dataset:
@@ -52,7 +53,7 @@ def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGE
     facets = np.concatenate([np.zeros((0, 6), np.int64), *(mesh.surfaces[name] for name in names)])
     counts = [len(mesh.surfaces[name]) for name in names]
     part = np.repeat([part_index[mesh.part_of_surface[name]] for name in names], counts).astype(np.int64)
-    points, triangles, normals, values = _welded(mesh.points, facets, part, result.temperature)
+    points, triangles, normals, values, part = _welded(mesh.points, facets, part, result.temperature)
     if len(triangles) > triangle_budget:
         points, triangles, normals, values, part = _clustered(
             points, triangles, normals, values, part, triangle_budget
@@ -169,14 +170,28 @@ def _welded(
     facets: NDArray[np.int64],
     part: NDArray[np.int64],
     temperature: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Corner triangles; points shared where the surface is smooth, doubled at sharp edges."""
-    normals = facet_normals(points, facets)[:, :3].reshape(-1, 3)
-    coarse = np.round(normals * 2.0).astype(np.int64) + 2
-    key = ((facets[:, :3].ravel() * 5 + coarse[:, 0]) * 5 + coarse[:, 1]) * 5 + coarse[:, 2]
+) -> tuple[
+    NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]
+]:
+    """Straight triangles; points shared where the surface is smooth, doubled at sharp edges.
+
+    Facets with an edge that bulges visibly become four. Both facets of an edge
+    see the same bulge, so no gap opens.
+    """
+    chord_middles = 0.5 * (points[facets[:, [0, 1, 2]]] + points[facets[:, [1, 2, 0]]])
+    bulge = np.linalg.norm(points[facets[:, 3:]] - chord_middles, axis=2).max(axis=1)
+    round_ones = bulge > BULGE
+    nodes = np.concatenate([facets[~round_ones, :3], facets[round_ones][:, TRIANGLE_SPLIT].reshape(-1, 3)])
+    normals = facet_normals(points, facets)
+    at_nodes = np.concatenate(
+        [normals[~round_ones, :3], normals[round_ones][:, TRIANGLE_SPLIT].reshape(-1, 3, 3)]
+    ).reshape(-1, 3)
+    owner = np.concatenate([part[~round_ones], np.repeat(part[round_ones], 4)])
+    coarse = np.round(at_nodes * 2.0).astype(np.int64) + 2
+    key = ((nodes.ravel() * 5 + coarse[:, 0]) * 5 + coarse[:, 1]) * 5 + coarse[:, 2]
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
-    nodes = facets[:, :3].ravel()[first]
-    return points[nodes], inverse.reshape(-1, 3), normals[first], temperature[nodes]
+    kept = nodes.ravel()[first]
+    return points[kept], inverse.reshape(-1, 3), at_nodes[first], temperature[kept], owner
 
 
 def _clustered(

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from spindle_fem.reporting.figures import (
     BODY_NAMES,
     FILM_MAP,
-    TEMPERATURE_LABEL,
     TEMPERATURE_MAP,
     ColourBar,
     Label,
@@ -42,13 +41,6 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 TOWARDS_HALF = (-1.0, 0.28, -0.45)
 UP = (0.0, 1.0, 0.0)
-
-
-def temperature_scale(result: ThermalResult) -> ColourBar:
-    """The one temperature scale of all pictures of a run, in °C, balls included."""
-    values = [result.temperature.min(), result.temperature.max()]
-    values += [bearing.temperature_ball for bearing in result.bearings.values()]
-    return scale_of(np.array(values) - ZERO_CELSIUS_K, TEMPERATURE_MAP, TEMPERATURE_LABEL)
 
 
 def _kept_points(result: ThermalResult, section: MeridianSection) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.reporting.figures import TEMPERATURE_LABEL, TEMPERATURE_MAP, ColourBar, scale_of
 from spindle_fem.reporting.sections import (
     SegmentSet,
     TriangleSet,
@@ -16,6 +17,8 @@ from spindle_fem.reporting.sections import (
     section_of_triangles,
     section_of_volume,
 )
+from spindle_fem.results.thermal_result import ThermalResult
+from spindle_fem.units import ZERO_CELSIUS_K
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,13 @@ def meridian_section(mesh: TaggedMesh, temperature: NDArray[np.float64]) -> Meri
     return MeridianSection(
         section_of_volume(mesh, temperature, level), boundary_lines(mesh, temperature, level), mesh.part_names
     )
+
+
+def temperature_scale(result: ThermalResult) -> ColourBar:
+    """The one temperature scale of all pictures of a run, in °C, balls included."""
+    values = [result.temperature.min(), result.temperature.max()]
+    values += [bearing.temperature_ball for bearing in result.bearings.values()]
+    return scale_of(np.array(values) - ZERO_CELSIUS_K, TEMPERATURE_MAP, TEMPERATURE_LABEL)
 
 
 def radial_profile(

@@ -83,34 +83,62 @@ def write_outputs(
     Returns
     -------
     dict of str to float, [s]
-        Time of each step, also in ``summary.json``.
+        Time of each step, also in ``summary.json``. Steps ``files: ...`` ran
+        beside ``pictures``; ``files`` is what was waited for them.
     """
+    from spindle_fem.reporting.beside import start_beside
+    from spindle_fem.reporting.interactive import SURFACE_GROUP
+    from spindle_fem.results.dataset import read_dataset
+
+    folder = Path(folder)
+    figures = folder / FIGURE_FOLDER
+    figures.mkdir(exist_ok=True)
+    for old in figures.glob("*.png"):
+        old.unlink()
+    clock = _Clock(notify)
+    wait = start_beside(lambda: _write_files(result, folder))
+    try:
+        with clock.step("pictures"):
+            _write_pictures(result, figures)
+    finally:  # also after an error nothing must go on writing here
+        with clock.step("files"):
+            beside = wait()
+    with clock.step("report"):
+        dataset, surface = (
+            read_dataset(folder / "result.nc", group=group) for group in (None, SURFACE_GROUP)
+        )
+        wall_time = time.perf_counter() - started if started is not None else sum(clock.times.values())
+        summary = build_summary(result, wall_time, peak_memory_MB())
+        summary["timings_s"] = {**summary["timings_s"], **clock.times, **beside}
+        replace_text(
+            folder / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        )
+        replace_text(folder / "report.html", render_run_report(summary, dataset, surface, figures))
+    return {**clock.times, **beside}
+
+
+def _write_files(result: ThermalResult, folder: Path) -> dict[str, float]:
+    """Everything of a run that needs no rendering; times of its steps."""
+    from spindle_fem.reporting.figures import save_png
     from spindle_fem.reporting.interactive import SURFACE_GROUP, display_surface
     from spindle_fem.results.dataset import build_dataset, write_dataset
     from spindle_fem.results.fields import write_fields
     from spindle_fem.spec.load import write_machine
 
-    folder = Path(folder)
-    clock = _Clock(notify)
-    with clock.step("fields"):
+    clock = _Clock(None)
+    with clock.step("files: fields"):
         write_fields(result, folder / "fields.vtu")
-    with clock.step("data"):
-        dataset = build_dataset(result)
-        surface = display_surface(result)
-        write_dataset(dataset, folder / "result.nc")
-        write_dataset(surface, folder / "result.nc", group=SURFACE_GROUP)
+    with clock.step("files: data"):
+        write_dataset(build_dataset(result), folder / "result.nc")
+        write_dataset(display_surface(result), folder / "result.nc", group=SURFACE_GROUP)
         replace_text(folder / "machine.toml", write_machine(result.spec))
-    _write_figures(result, folder / FIGURE_FOLDER, clock)
-    with clock.step("report"):
-        wall_time = time.perf_counter() - started if started is not None else sum(clock.times.values())
-        summary = build_summary(result, wall_time, peak_memory_MB())
-        summary["timings_s"] = {**summary["timings_s"], **clock.times}
-        replace_text(
-            folder / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-        )
-        replace_text(
-            folder / "report.html", render_run_report(summary, dataset, surface, folder / FIGURE_FOLDER)
-        )
+    with clock.step("files: charts"):
+        for name, draw in draw_figures(result).items():
+            figure = draw()
+            if figure is not None:
+                save_png(
+                    figure, folder / FIGURE_FOLDER / f"{name}.png", colours=0 if name in _SHADED else 256
+                )
     return clock.times
 
 
@@ -118,8 +146,7 @@ def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | No
     """Charts of a run by file name, drawn when called (the 3-D pictures are in ``pictures``)."""
     from spindle_fem.reporting import charts
     from spindle_fem.reporting.machine_drawing import machine_drawing
-    from spindle_fem.reporting.pictures import temperature_scale
-    from spindle_fem.reporting.profiles import meridian_section
+    from spindle_fem.reporting.profiles import meridian_section, temperature_scale
 
     section = meridian_section(result.mesh, result.temperature)
     bar = temperature_scale(result)
@@ -138,23 +165,15 @@ def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | No
     }
 
 
-def _write_figures(result: ThermalResult, folder: Path, clock: _Clock) -> None:
+def _write_pictures(result: ThermalResult, folder: Path) -> None:
     from spindle_fem.reporting import pictures
     from spindle_fem.reporting.figures import save_png
-    from spindle_fem.reporting.profiles import meridian_section
+    from spindle_fem.reporting.profiles import meridian_section, temperature_scale
     from spindle_fem.reporting.scenes import SceneRenderer
     from spindle_fem.reporting.sections import part_edges
 
-    folder.mkdir(exist_ok=True)
-    for old in folder.glob("*.png"):
-        old.unlink()
-    with clock.step("charts"):
-        for name, draw in draw_figures(result).items():
-            figure = draw()
-            if figure is not None:
-                save_png(figure, folder / f"{name}.png", colours=0 if name in _SHADED else 256)
-    with clock.step("pictures"), SceneRenderer() as renderer:
-        bar = pictures.temperature_scale(result)
+    with SceneRenderer() as renderer:
+        bar = temperature_scale(result)
         section = meridian_section(result.mesh, result.temperature)
         pictures.add_half_machine(renderer, result, section, part_edges(result.mesh), bar)
         save_png(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
 # Corners 0-2, then the middles of edges 01, 12, 20.
-_TRIANGLE_SPLIT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+TRIANGLE_SPLIT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 # Corners 0-3, then the middles of edges 01, 12, 02, 03, 13, 23.
 _TETRAHEDRON_SPLIT = np.array(
     [
@@ -30,6 +30,8 @@ _TETRAHEDRON_SPLIT = np.array(
         [4, 9, 8, 5],
     ]
 )
+_EDGE_ENDS = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+VISIBLE_BEND = 3.0e-5  # m, a tenth of a pixel in the largest picture
 _TETRAHEDRON_FACES = ((0, 2, 1, 6, 5, 4), (0, 1, 3, 4, 8, 7), (1, 2, 3, 5, 9, 8), (0, 3, 2, 7, 9, 6))
 _TRIANGLE_NODES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
 
@@ -57,7 +59,7 @@ def _refinement(split: NDArray[np.int64], corners: int) -> NDArray[np.float64]:
 
 
 # Nodes of the pieces of one quadratic element, each a quadratic element again.
-_TRIANGLE_REFINEMENT = _refinement(_TRIANGLE_SPLIT, 3)
+_TRIANGLE_REFINEMENT = _refinement(TRIANGLE_SPLIT, 3)
 _TETRAHEDRON_REFINEMENT = _refinement(_TETRAHEDRON_SPLIT, 4)
 
 
@@ -157,7 +159,7 @@ def facet_triangles(
     first = 6 * np.arange(number)[:, None, None]
     return TriangleSet(
         points=points[facets].reshape(-1, 3),
-        triangles=(first + _TRIANGLE_SPLIT).reshape(-1, 3),
+        triangles=(first + TRIANGLE_SPLIT).reshape(-1, 3),
         values=facet_values.reshape(6 * number, -1),
         label=np.repeat(np.asarray(label, dtype=np.int32), 4),
         normals=facet_normals(points, facets).reshape(-1, 3),
@@ -230,7 +232,7 @@ def section_of_volume(
     level : (n_nodes,) ndarray
         Signed distance from the plane at every mesh node.
     curved : bool
-        Follow the quadratic elements in 64 pieces each; otherwise their
+        Follow the quadratic elements in pieces; otherwise take their
         straight-edged corners alone.
 
     Returns
@@ -243,14 +245,9 @@ def section_of_volume(
     crossed = np.flatnonzero((at_nodes.min(axis=1) < 0.0) & (at_nodes.max(axis=1) > 0.0))
     columns = np.column_stack([mesh.points, np.reshape(values, (len(mesh.points), -1)), level])
     if curved:
-        # Twice: into eight quadratic elements, and each of these into eight flat ones.
-        nodes = np.einsum(
-            "pab,nbk->npak", _TETRAHEDRON_REFINEMENT, columns[mesh.tetrahedra[crossed]], optimize=True
+        columns, pieces, label = _flat_pieces(
+            columns[mesh.tetrahedra[crossed]], mesh.part_of_element[crossed]
         )
-        columns = nodes.reshape(-1, columns.shape[1])
-        whole = np.arange(len(columns)).reshape(-1, 10)
-        pieces = whole[:, _TETRAHEDRON_SPLIT].reshape(-1, 4)
-        label = np.repeat(mesh.part_of_element[crossed], 64)
     else:
         pieces = mesh.tetrahedra[crossed][:, :4]
         label = mesh.part_of_element[crossed]
@@ -275,6 +272,28 @@ def section_of_volume(
     corners = np.concatenate(found).reshape(-1, columns.shape[1])
     return TriangleSet(
         corners[:, :3], np.arange(len(corners)).reshape(-1, 3), corners[:, 3:], np.concatenate(labels)
+    )
+
+
+def _flat_pieces(
+    elements: NDArray[np.float64], part: NDArray[np.int32]
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int32]]:
+    """Straight tetrahedra of quadratic ones (n, 10, k), whose last column is the level.
+
+    Eight of each; 64 where the level is visibly curved, that is where the
+    plane cuts a curved face at a slant.
+    """
+    level = elements[..., -1]
+    bend = np.abs(level[:, 4:] - 0.5 * (level[:, _EDGE_ENDS[:, 0]] + level[:, _EDGE_ENDS[:, 1]])).max(axis=1)
+    curved = bend > VISIBLE_BEND
+    finer = np.einsum("pab,nbk->npak", _TETRAHEDRON_REFINEMENT, elements[curved], optimize=True)
+    nodes = np.concatenate([elements[~curved], finer.reshape(-1, *elements.shape[1:])])
+    label = np.concatenate([part[~curved], np.repeat(part[curved], 8)])
+    whole = np.arange(10 * len(nodes)).reshape(-1, 10)
+    return (
+        nodes.reshape(-1, elements.shape[2]),
+        whole[:, _TETRAHEDRON_SPLIT].reshape(-1, 4),
+        np.repeat(label, 8),
     )
 
 
@@ -309,7 +328,7 @@ def boundary_lines(mesh: TaggedMesh, values: NDArray[np.float64], level: NDArray
     columns = np.column_stack([mesh.points, np.reshape(values, (len(mesh.points), -1)), level])
     nodes = np.einsum("pab,nbk->npak", _TRIANGLE_REFINEMENT, columns[facets[crossed]], optimize=True)
     columns = nodes.reshape(-1, columns.shape[1])
-    triangles = np.arange(len(columns)).reshape(-1, 6)[:, _TRIANGLE_SPLIT].reshape(-1, 3)
+    triangles = np.arange(len(columns)).reshape(-1, 6)[:, TRIANGLE_SPLIT].reshape(-1, 3)
     shape = TriangleSet(columns[:, :3], triangles, columns[:, 3:-1], np.repeat(owner[crossed], 16))
     return section_of_triangles(shape, columns[:, -1])
 

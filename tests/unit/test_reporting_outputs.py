@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import re
 from html.parser import HTMLParser
 
@@ -14,6 +15,7 @@ import xarray as xr
 from spindle_fem.errors import BadInputError
 from spindle_fem.meshing.simple import build_joined_tubes
 from spindle_fem.reporting import document, tables
+from spindle_fem.reporting.beside import start_beside
 from spindle_fem.reporting.figures import new_figure
 from spindle_fem.reporting.interactive import SURFACE_GROUP, display_surface, viewer_payload
 from spindle_fem.reporting.output import MARKER, is_complete, output_folder, require_complete
@@ -246,6 +248,27 @@ def test_reports_of_other_commands_are_put_together_from_blocks():
     assert 'width="200" height="120"' in text
 
 
+# ------------------------------------------------------------------ a second process
+def test_a_task_beside_answers_from_another_process():
+    parent = os.getpid()
+    wait = start_beside(lambda: os.getpid())
+    if len(os.sched_getaffinity(0)) > 1:
+        assert wait() != parent
+
+
+def test_an_error_of_a_task_beside_is_raised_here():
+    def fail():
+        raise BadInputError("task", "cannot be done.")
+
+    wait = start_beside(fail)
+    with pytest.raises(BadInputError, match="cannot be done"):
+        wait()
+
+
+def test_an_answer_larger_than_a_pipe_arrives_whole():
+    assert len(start_beside(lambda: "x" * 500_000)()) == 500_000
+
+
 # ------------------------------------------------------------------ the viewer
 def test_viewer_data_restore_the_surface(result):
     import base64
@@ -377,7 +400,8 @@ def run_folder(result, tmp_path_factory):
     steps: list[str] = []
     with output_folder(tmp_path_factory.mktemp("runs") / "run") as folder:
         times = write_outputs(result, folder, notify=steps.append)
-    assert steps == list(times) == ["fields", "data", "charts", "pictures", "report"]
+    assert steps == ["pictures", "files", "report"]
+    assert list(times) == [*steps, "files: fields", "files: data", "files: charts"]
     return folder
 
 
