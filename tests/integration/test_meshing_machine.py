@@ -20,7 +20,8 @@ from spindle_fem.geometry.assembly import (
 )
 from spindle_fem.geometry.channel import ChannelDefinition
 from spindle_fem.geometry.design_space import draw_valid_designs
-from spindle_fem.geometry.solids import build_solids, export_step, gmsh_session
+from spindle_fem.geometry.solids import build_solids, gmsh_session
+from spindle_fem.geometry.step import export_step
 from spindle_fem.meshing.build import build_mesh, generate_mesh
 from spindle_fem.meshing.cache import CACHE_VARIABLE
 from spindle_fem.meshing.classify import classify_face
