@@ -33,6 +33,8 @@ from spindle_fem.tribology.traction import LubricantState, TractionOptions
 from spindle_fem.validity import CodedWarning
 
 FloatArray = NDArray[np.float64]
+# Cage slip from which a bearing is said to slide
+_GROSS_SLIP = 0.1
 
 
 def solve_bearing_set(
@@ -93,6 +95,7 @@ def solve_bearing_set(
         film_temperatures=[entry.film for entry in temperatures.bearings],
         roughness=(bearing_set.raceway_roughness, bearing_set.ball_roughness),
     )  # fmt: skip
+    states = tuple(_with_sliding_note(state) for state in states)
     if not bearing_set.has_counter_bearings:
         return states
     if external == ExternalLoad():
@@ -100,6 +103,59 @@ def solve_bearing_set(
     return _with_preloads(
         states, bearing_set, speed, temperatures, lubricant=lubricant, control=control, options=options
     )
+
+
+def gross_sliding_onset(
+    bearing_set: BearingSet,
+    highest_speed: float,
+    load: ExternalLoad | float,
+    temperatures: SetTemperatures,
+    lubricant: Lubricant,
+    *,
+    tolerance: float = 0.02,
+    options: TractionOptions | None = None,
+) -> float:
+    """Speed from which friction no longer keeps the balls rolling, rad/s.
+
+    Bisection on the speed at which a cage slips by a tenth or the equilibrium
+    ends; between standstill and the onset the balls are taken to roll.
+
+    Parameters
+    ----------
+    highest_speed : float, [rad/s]
+    tolerance : float, [-]
+        Of the onset, relative to ``highest_speed``.
+
+    Returns
+    -------
+    float
+        Infinite where the balls still roll at ``highest_speed``.
+    """
+
+    def slides(speed: float) -> bool:
+        try:
+            states = solve_bearing_set(
+                bearing_set, speed, load, temperatures, lubricant=lubricant, options=options,
+                heat=HeatOptions("paper"),
+            )  # fmt: skip
+        except NoEquilibriumError:
+            return True
+        return any(state.cage_slip > _GROSS_SLIP for state in states)
+
+    if not slides(highest_speed):
+        return math.inf
+    low, high = 0.0, highest_speed
+    while high - low > tolerance * highest_speed:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if slides(middle) else (middle, high)
+    return high
+
+
+def _with_sliding_note(state: BearingState) -> BearingState:
+    if not state.cage_slip > _GROSS_SLIP:
+        return state
+    text = f"{state.name}: gross sliding, the balls orbit {state.cage_slip:.0%} slower than rolling asks."
+    return replace(state, warnings=(*state.warnings, CodedWarning("gross_sliding", text)))
 
 
 def _with_preloads(
@@ -115,10 +171,12 @@ def _with_preloads(
     """Add the axial forces that remain without external load."""
     if bearing_set.preload == 0.0 and speed != 0.0:
         return states
+    # a loose set leaves friction nothing to decide
+    loose = any(note.code == "counter_bearing_unloaded" for state in states for note in state.warnings)
     try:
         bare = solve_bearing_set(
-            bearing_set, speed, ExternalLoad(), temperatures, lubricant=lubricant, control=control,
-            heat=HeatOptions("paper"), options=options,
+            bearing_set, speed, ExternalLoad(), temperatures, lubricant=lubricant,
+            control="outer" if loose else control, heat=HeatOptions("paper"), options=options,
         )  # fmt: skip
     except NoEquilibriumError as error:
         note = CodedWarning("preload_unknown", f"without external load: {error.what}")
@@ -365,6 +423,7 @@ __all__ = [
     "ExternalLoad",
     "MountedBearing",
     "SetTemperatures",
+    "gross_sliding_onset",
     "solve_bearing",
     "solve_bearing_set",
     "uniform_temperatures",

@@ -22,6 +22,7 @@ from spindle_fem.tribology.hertz import INNER, OUTER
 from spindle_fem.tribology.race_control import (
     race_control_evaluation,
     race_control_speeds,
+    seat_light_balls,
     static_centres,
     static_evaluation,
 )
@@ -34,7 +35,9 @@ _SMALLEST_FORCE = 1e-6
 _SMALLEST_SPEED_STEP = 1.0 / 100.0
 # Widths (m) of softened contact, and softened traction, on the way to a solution
 _SMOOTHINGS = (2e-6, 3e-7, 5e-8, 1e-8, 1e-9, 1e-10, 1e-11, 0.0)
-_CREEP_RATIOS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
+_CREEP_RATIOS = (2e-2, 3e-3, 5e-4)
+# A ball counts as free below this share of the ball load of preload and thrust
+_FREE_LOAD = 1e-3
 # A ball is left to the cage below this multiple of the traction it needs
 _DRIVE_MARGIN = 2.0
 
@@ -186,9 +189,12 @@ class _Solver:
         rows = self._forces(speed)
         if self.control == "equilibrium" and ball_speeds is not None:
             guess = np.column_stack([centre, ball_speeds])
-            solution = self._frictional(speed, guess, displacement, rows, self.options, self.nobody)
+            free = self._free_balls(centre, displacement)
+            solution = self._frictional(speed, guess, displacement, rows, self.options, free)
             if solution.converged:
-                return _Attempt(solution, self.nobody)
+                return _Attempt(solution, free)
+        distance = system.groove_distances(displacement)
+        centre = seat_light_balls(system, centre, *distance, speed)
         rough = self.control == "equilibrium"
         plain = self._race_control(speed, centre, displacement, rows, 1e-6 if rough else 1e-11)
         if self.control != "equilibrium" or not plain.converged:
@@ -196,11 +202,12 @@ class _Solver:
         distance = system.groove_distances(plain.displacement)
         speeds = np.full(system.number, speed)
         guess = start_from_race_control(system, speeds, plain.unknowns, distance)
-        solution = self._frictional(speed, guess, plain.displacement, rows, self.options, self.nobody)
+        free = self._free_balls(plain.unknowns, plain.displacement)
+        solution = self._frictional(speed, guess, plain.displacement, rows, self.options, free)
         if solution.converged:
-            return _Attempt(solution, self.nobody)
-        carried = weakly_driven(system, self.lubricant, self.options, guess, distance)
-        for mask in (self.nobody, carried) if carried.any() else (self.nobody,):
+            return _Attempt(solution, free)
+        carried = free | weakly_driven(system, self.lubricant, self.options, guess, distance)
+        for mask in (free, carried) if np.any(carried != free) else (free,):
             state, ring = guess, plain.displacement
             for creep in (*_CREEP_RATIOS, self.options.creep_ratio):
                 softer = replace(self.options, creep_ratio=max(creep, self.options.creep_ratio))
@@ -209,7 +216,14 @@ class _Solver:
                     state, ring = solution.unknowns, solution.displacement
             if solution.converged:
                 return _Attempt(solution, mask)
-        return _Attempt(solution, self.nobody)
+        return _Attempt(solution, free)
+
+    def _free_balls(self, centre: FloatArray, displacement: FloatArray) -> NDArray[np.bool_]:
+        """Balls that only centrifugal force holds, (n,): their traction cannot decide anything."""
+        contacts = evaluate_contacts(
+            self.system, (centre[:, 0], centre[:, 1]), self.system.groove_distances(displacement)
+        )
+        return contacts.load[:, INNER] < _FREE_LOAD * self.ball_load
 
     def _race_control(
         self,

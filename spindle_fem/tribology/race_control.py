@@ -109,6 +109,46 @@ def static_centres(system: BallSystem, axial: FloatArray, radial: FloatArray) ->
     return np.column_stack([axial, radial]) * (reach / length)[:, None]
 
 
+def seat_light_balls(
+    system: BallSystem, centre: FloatArray, axial: FloatArray, radial: FloatArray, speed: float
+) -> FloatArray:
+    """Ball centres with lightly loaded balls moved to where centrifugal force holds them, (n, 2), m.
+
+    A ball whose load at rest is below its centrifugal force lies in the bottom
+    of the outer groove, or is wedged between both grooves where the inner one
+    reaches into its way. Newton's method cannot find this from a touching
+    ball, whose contacts have no stiffness.
+    """
+    contacts = evaluate_contacts(system, (centre[:, 0], centre[:, 1]), (axial, radial))
+    orbital = 0.5 * (1.0 - system.diameter_ratio) * speed
+    centrifugal = 0.5 * system.mass * system.pitch_diameter * orbital**2
+    light = contacts.load[:, INNER] < centrifugal
+    if not light.any():
+        return centre
+    constant = load_constant(system, contacts.cosine)
+    rest_inner, rest_outer = system.rest_length[:, INNER], system.rest_length[:, OUTER]
+    bottom = rest_outer + (centrifugal / constant[:, OUTER]) ** (2.0 / 3.0)
+    wedged = np.hypot(axial, radial - bottom) > rest_inner
+    seated = np.column_stack([np.zeros_like(bottom), bottom])
+    length = np.hypot(axial, radial)
+    reach_inner, reach_outer = rest_inner.copy(), rest_outer.copy()
+    for _ in range(4):
+        # the triangle of both groove centres and the ball, on the side of the smaller outer angle
+        along = 0.5 * (length + (reach_outer**2 - reach_inner**2) / length)
+        across = np.sqrt(np.maximum(reach_outer**2 - along**2, 0.0))
+        x1 = (along * axial - across * radial) / length
+        x2 = (along * radial + across * axial) / length
+        outer = np.arctan2(x1, x2)
+        inner = np.arctan2(axial - x1, radial - x2)
+        opening = np.maximum(np.sin(inner - outer), 1e-3)
+        push_outer = centrifugal * np.maximum(np.sin(inner), 0.0) / opening
+        push_inner = centrifugal * np.maximum(np.sin(outer), 0.0) / opening
+        reach_inner = rest_inner + (push_inner / constant[:, INNER]) ** (2.0 / 3.0)
+        reach_outer = rest_outer + (push_outer / constant[:, OUTER]) ** (2.0 / 3.0)
+    seated[wedged] = np.column_stack([x1, x2])[wedged]
+    return np.where(light[:, None], seated, centre)
+
+
 def race_control_evaluation(
     system: BallSystem,
     speed: FloatArray,

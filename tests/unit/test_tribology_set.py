@@ -16,6 +16,7 @@ from spindle_fem.tribology.bearing_set import (
     ExternalLoad,
     MountedBearing,
     SetTemperatures,
+    gross_sliding_onset,
     solve_bearing,
     solve_bearing_set,
     uniform_temperatures,
@@ -87,6 +88,35 @@ def test_unloading_of_the_counter_bearing_is_said() -> None:
     turning = solve_bearing_set(TBT, turn(1000), 1.2 * limit, WARM, lubricant=GREASE)
     assert "counter_bearing_unloaded" in {warning.code for warning in turning[2].warnings}
     assert "counter_bearing_unloaded" not in codes(turning[:2])
+
+
+@pytest.mark.parametrize("rpm", [5.0, 50.0, 1000.0])
+@pytest.mark.parametrize("thrust", [0.0, 1750.0, -1750.0])
+def test_a_loose_set_still_turns(rpm: float, thrust: float) -> None:
+    """A cold inner ring loosens the set: its free balls are held by centrifugal force alone."""
+    rings = BearingTemperatures(300.0, 310.0, 306.0)
+    cold = SetTemperatures((rings,) * 3, 300.0, 310.0, 293.15)
+    states = solve_bearing_set(TBT, turn(rpm), thrust, cold, lubricant=GREASE)
+    forces = [state.axial_force for state in states]
+    assert forces[0] + forces[1] - forces[2] == pytest.approx(thrust, abs=1e-2)
+    assert "counter_bearing_unloaded" in codes(states)
+
+
+def test_gross_sliding_is_said_and_its_onset_found() -> None:
+    heavy = BearingGeometry(22.225e-3, 16, 125.26e-3, math.radians(40.0), 0.5232, 0.5232)
+    single = BearingSet((MountedBearing("A", heavy),))
+    one = uniform_temperatures(1, 313.15)
+    rolling = solve_bearing(heavy, turn(1000), 50.0, lubricant=GREASE)
+    assert abs(rolling.cage_slip) < 0.1
+    assert "gross_sliding" not in codes([rolling])
+    sliding = solve_bearing(heavy, turn(10_000), 50.0, lubricant=GREASE)
+    assert sliding.cage_slip > 0.3
+    assert "gross_sliding" in codes([sliding])
+    onset = gross_sliding_onset(single, turn(10_000), 50.0, one, GREASE)
+    assert turn(1000) < onset < turn(10_000)
+    assert solve_bearing(heavy, 0.95 * onset, 50.0, lubricant=GREASE).cage_slip < 0.1
+    assert solve_bearing(heavy, 1.05 * onset, 50.0, lubricant=GREASE).cage_slip > 0.1
+    assert gross_sliding_onset(single, turn(500), 50.0, one, GREASE) == math.inf
 
 
 def test_spring_preload_keeps_its_force() -> None:
