@@ -13,6 +13,8 @@ from spindle_fem.meshing.sizes import MeshSizes, edge_sizes
 
 # A wall is tight when it asks for sizes below this share of the channel's.
 _TIGHT = 0.7
+# Growth of size per distance between corners of the meridian section.
+_CORNER_GROWTH = 0.8
 
 
 def set_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
@@ -30,6 +32,7 @@ def set_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
         for z, r in ((edge.z[0], edge.r[0]), (edge.z[1], edge.r[1])):
             key = _micrometres(z, r)
             wanted[key] = min(wanted.get(key, size), size)
+    wanted = _graded(wanted)
     tags = [tag for _, tag in gmsh.model.getEntities(0)]
     points = np.array([gmsh.model.getValue(0, tag, []) for tag in tags]).reshape(-1, 3)
     radius = np.hypot(points[:, 0], points[:, 1])
@@ -68,6 +71,15 @@ def port_size(port: PortGeometry, assembly: AssemblyGeometry, sizes: MeshSizes) 
     return min(
         2.0 * np.pi * port.radius / sizes.port_segments, float(np.sqrt(8.0 * port.radius * 0.1 * strip))
     )
+
+
+def _graded(wanted: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+    """Sizes at meridian corners, none much larger than a neighbour's for the distance between them."""
+    places = 1e-6 * np.array(list(wanted), dtype=np.float64)
+    sizes = np.array(list(wanted.values()))
+    distance = np.linalg.norm(places[:, None] - places[None], axis=2)
+    graded = (sizes[None] + _CORNER_GROWTH * distance).min(axis=1)
+    return dict(zip(wanted, graded.tolist(), strict=True))
 
 
 def _micrometres(z: float, r: float) -> tuple[int, int]:
