@@ -203,6 +203,7 @@ class _Solver:
         speeds = np.full(system.number, speed)
         guess = start_from_race_control(system, speeds, plain.unknowns, distance)
         free = self._free_balls(plain.unknowns, plain.displacement)
+        guess[free, 4] = 0.0
         solution = self._frictional(speed, guess, plain.displacement, rows, self.options, free)
         if solution.converged:
             return _Attempt(solution, free)
