@@ -272,10 +272,10 @@ def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
     sinks = {name: value for name, value in energy.heat_out.items() if value > 0.0}
     sources = dict(sorted(sources.items(), key=lambda item: -item[1]))
     sinks = dict(sorted(sinks.items(), key=lambda item: -item[1]))
-    figure = new_figure(592.0)
-    axes = pixel_axes(figure, 24.0, 100.0, 1552.0, 480.0)
+    figure = new_figure(632.0)
+    axes = pixel_axes(figure, 24.0, 100.0, 1552.0, 520.0)
     axes.axis("off")
-    axes.set(xlim=(0.0, 1552.0), ylim=(480.0, 0.0))
+    axes.set(xlim=(0.0, 1552.0), ylim=(520.0, 0.0))
     total = max(sum(sources.values()), sum(sinks.values()))
     _title(
         figure,
@@ -283,12 +283,12 @@ def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
         f"{energy.heat_in:.1f} W put in; imbalance {energy.imbalance_relative:.1e} of it.",
     )
     if total <= 0.0:
-        axes.text(776.0, 240.0, "No heat flows.", ha="center", va="center")
+        axes.text(776.0, 260.0, "No heat flows.", ha="center", va="center")
         return figure
-    body = 420.0
+    body = 410.0
     _bands(axes, sources, body, total, left=True)
     _bands(axes, sinks, body, total, left=False)
-    top = 0.5 * (480.0 - body)
+    top = 0.5 * (520.0 - body)
     axes.add_patch(
         Rectangle(
             (710.0, top), 132.0, body * sum(sources.values()) / total, facecolor="#c9d2da", linewidth=0.0
@@ -309,9 +309,9 @@ def _bands(axes: Axes, flows: Mapping[str, float], body: float, total: float, *,
     if not flows:
         return
     heights = np.array(list(flows.values())) / total * body
-    top = 0.5 * (480.0 - body)
+    top = 0.5 * (520.0 - body)
     at_body = top + np.cumsum(heights) - 0.5 * heights
-    at_end = spread(at_body, np.maximum(heights + 8.0, 32.0), 0.0, 480.0)
+    at_end = spread(at_body, np.maximum(heights + 8.0, 32.0), 0.0, 520.0)
     near, far = (710.0, 480.0) if left else (842.0, 1072.0)
     middle = 0.5 * (near + far)
     palette = (CYCLE[1], CYCLE[4]) if left else (CYCLE[0], CYCLE[5])
@@ -463,18 +463,18 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
         item[order][inside] for item in (coolant.film_coefficient, coolant.film_low, coolant.film_high)
     )
     right.fill_between(along, low, high, color=CYCLE[2], alpha=0.2, linewidth=0.0, label="low to high")
-    right.plot(along, film, color=CYCLE[2], label="film coefficient")
+    right.plot(along, film, color=CYCLE[2], label="value")
     right.axhline(
         coolant.mean_film_coefficient,
         color=INK,
         linewidth=0.9,
         linestyle=(0, (4, 3)),
-        label="area mean, ports included" if ports else "area mean",
+        label="mean with ports" if ports else "mean",
     )
     right.set(
         xlabel="length along the channel / m", ylabel="film coefficient / W/(m²·K)", title="Film coefficient"
     )
-    right.set_ylim(0.0, 1.25 * high.max())
+    right.set_ylim(0.0, 1.3 * high.max())
     right.legend(loc="upper right", ncols=3, columnspacing=1.2)
     notes = "Dotted lines: full turns."
     if ports and place.size > 2:

@@ -454,6 +454,26 @@ def test_pictures_fill_their_page(run_folder):
             assert np.ptp(columns) > 0.85 * ink.shape[1], path.name
 
 
+@pytest.mark.render
+def test_a_machine_without_bearings_and_channel_is_reported_as_well(tmp_path):
+    full = make_result("uncooled", film_coefficient={}, fluid_temperature={})
+    spec = full.spec.model_copy(update={"bearing_set": (), "probe": ()})
+    mesh = build_joined_tubes((0.03, 0.07, 0.15), 0.1, ((2, 2), 12, 3), parts=("shaft", "housing"))
+    temperature = 300.0 + mesh.points[:, 2]
+    bare = dataclasses.replace(
+        full,
+        **{"spec": spec, "mesh": mesh, "temperature": temperature, "energy": EnergyBalance(0.0, {}, {})},
+        **{"bearings": {}, "probes": {}, "heat_flows": {}, "warnings": ()},
+    )
+    with output_folder(tmp_path / "run") as folder:
+        write_outputs(bare, folder)
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert Page(text).ids
+    assert "No warnings." in text
+    assert 'id="bearings"' not in text
+    assert not (folder / "figures" / "heat_by_bearing.png").exists()
+
+
 def test_broken_summary_is_refused(tmp_path):
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(BadInputError, match="is not valid JSON"):

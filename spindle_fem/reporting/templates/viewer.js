@@ -85,6 +85,7 @@
     }
     let running = 0;
     for (let i = 0; i < 3 * m; i++) { running += d[i]; index[i] = running; }
+    spots = place;
     return buffers(place, normal, value, index);
   }
   function ballBuffers() {
@@ -112,7 +113,7 @@
   const state = { yaw: -0.423, pitch: 0.255, zoom: 1, x: 0, y: 0, open: true, hidden: new Set(), balls: true };
   const start = Object.assign({}, state);
   const centre = data.low.map(function (v, k) { return v + data.size[k] / 2; });
-  let solid = null, balls = null, asked = false;
+  let solid = null, balls = null, asked = false, spots = null;
   function turn() {
     // Viewer at -x with z to the right and y up, then yaw about y and pitch about the screen's x.
     const c = Math.cos(state.yaw), s = Math.sin(state.yaw), d = Math.cos(state.pitch), e = Math.sin(state.pitch);
@@ -126,10 +127,16 @@
     gl.clearColor(1, 1, 1, pick ? 0 : 1); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     const reach = Math.hypot(data.size[0], data.size[1], data.size[2]), m = turn();
-    const wide = Math.abs(m[0]) * data.size[0] + Math.abs(m[3]) * data.size[1] + Math.abs(m[6]) * data.size[2];
-    const tall = Math.abs(m[1]) * data.size[0] + Math.abs(m[4]) * data.size[1] + Math.abs(m[7]) * data.size[2];
-    // Fitted to the view buttons' direction, so that turning does not pump the size.
-    if (!state.fit) state.fit = Math.min(1.9 * w / h / wide, 1.9 / tall);
+    // Fitted on load and by the view buttons only, so that turning does not pump the size.
+    if (!state.fit) {
+      let wide = 1e-9, tall = 1e-9;
+      for (let i = 0; i < spots.length; i += 9) {
+        const x = spots[i] - centre[0], y = spots[i + 1] - centre[1], z = spots[i + 2] - centre[2];
+        wide = Math.max(wide, Math.abs(m[0] * x + m[3] * y + m[6] * z));
+        tall = Math.max(tall, Math.abs(m[1] * x + m[4] * y + m[7] * z));
+      }
+      state.fit = 0.95 * Math.min(w / h / wide, 1 / tall);
+    }
     const fit = state.fit * state.zoom;
     gl.uniformMatrix3fv(at.turn, false, m);
     gl.uniform3fv(at.centre, centre);
