@@ -82,7 +82,7 @@ class _Preset:
 # channel channel_fraction * the shorter side of its section, at most half bulk.
 _PRESETS: Mapping[str, _Preset] = MappingProxyType(
     {
-        "coarse": _Preset(0.036, 2.0, 1.8, 14, 16, 5.0, 2.5, 0.7),
+        "coarse": _Preset(0.040, 2.0, 1.8, 14, 14, 5.0, 2.5, 0.8),
         "normal": _Preset(0.020, 1.0, 0.75, 18, 16, 3.0, 1.6, 0.4),
         "fine": _Preset(0.010, 0.5, 0.38, 24, 24, 2.0, 1.0, 0.4),
     }
