@@ -1,0 +1,1 @@
+"""Machines in time: heat, films, coolant and preload coupled while the inputs change."""

@@ -1,0 +1,195 @@
+"""Loads that follow the temperatures while time runs.
+
+Each stage of a time step asks for the loads at its own time and at its own
+latest temperatures and is solved again until they agree, so the coupled
+scheme keeps the second order of the time steps. Coefficients of the matrix
+(films, ball contacts) are only renewed when they have moved by more than a
+small share: the matrix then serves many steps. Heat and surrounding
+temperatures are always those of the temperatures themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.conduction.problem import ConductionProblem
+from spindle_fem.conduction.stage import WEIGHTS
+from spindle_fem.conduction.transient import ThermalState
+from spindle_fem.coolant.marching import march_enthalpy
+from spindle_fem.coupling import PreparedMachine
+from spindle_fem.errors import NoEquilibriumError, NoSteadyStateError, OutOfValidityError
+from spindle_fem.loads.coolant_loop import CoolantState
+from spindle_fem.loads.model import FilmLoad, Loads
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.transients.history import OperatingHistory
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Loads as the solver asked for them at one time."""
+
+    time: float
+    point: OperatingPoint
+    loads: Loads
+    coolant: CoolantState | None
+
+
+class CoupledInputs:
+    """Callable ``(time, state) -> ConductionProblem`` of a machine.
+
+    Parameters
+    ----------
+    machine : PreparedMachine
+    history : OperatingHistory
+    coefficient_tolerance : float, [-]
+        Relative change of a film or contact coefficient below which the
+        matrix keeps the old one; 0 renews it at every stage.
+    """
+
+    def __init__(
+        self, machine: PreparedMachine, history: OperatingHistory, coefficient_tolerance: float
+    ) -> None:
+        self.machine = machine
+        self.history = history
+        self.coefficient_tolerance = coefficient_tolerance
+        self._kept: dict[tuple[str, ...], Array] = {}
+        self._names: tuple[str, ...] | None = None
+        self._channel: tuple[Array, dict[str, Array]] | None = None
+        self._asked: list[Evaluation] = []
+        self.evaluations = 0
+
+    def lumped_names(self, start: Array) -> tuple[str, ...]:
+        """Names of the lumped nodes, in the order of their unknowns."""
+        return tuple(node.name for node in self._loads(self.history.inputs.times[0], start, {})[1].lumped)
+
+    def __call__(self, time: float, state: ThermalState) -> ConductionProblem:
+        """Problem at a time and a state.
+
+        Raises
+        ------
+        NoSteadyStateError
+            A bearing has no equilibrium at these temperatures.
+        """
+        if self._names is None:
+            self._names = self.lumped_names(state.temperature)
+        lumped = dict(zip(self._names, state.lumped_temperature.tolist(), strict=True))
+        point, loads, coolant = self._loads(time, state.temperature, lumped)
+        loads = replace(loads, films=self._films(loads), lumped=self._lumped(loads))
+        if coolant is not None:
+            coolant = self._coolant(point, coolant, state.temperature)
+            loads = replace(loads, films={**loads.films, **self._channel_films(coolant)})
+        self.evaluations += 1
+        self._asked.append(Evaluation(time, point, loads, coolant))
+        return self.machine.problem(loads)
+
+    def stages_of_step(self, begin: float) -> tuple[Evaluation, Evaluation, Evaluation]:
+        """Evaluations of the three stages of the step that was just accepted; forgets older ones.
+
+        Parameters
+        ----------
+        begin : float, [s]
+            Start of the step.
+        """
+        found = [self._asked[-1]]
+        for evaluation in reversed(self._asked):
+            if evaluation.time != found[-1].time:
+                found.append(evaluation)
+            if found[-1].time <= begin:
+                break
+        self._asked.clear()
+        last, middle, first = found
+        return first, middle, last
+
+    # -------------------------------------------------------------- details
+    def _loads(
+        self, time: float, temperature: Array, lumped: Mapping[str, float]
+    ) -> tuple[OperatingPoint, Loads, CoolantState | None]:
+        point = self.history.at(time)
+        try:
+            loads, coolant = self.machine.builder.at(point, self.machine.field_state(temperature, lumped))
+        except (NoEquilibriumError, OutOfValidityError) as error:
+            raise NoSteadyStateError(
+                f"{self.machine.spec.name} after {time / 3600.0:.2f} h",
+                f"no loads at {point.speed * 30.0 / np.pi:.0f} rpm with these temperatures: {error}",
+            ) from error
+        return point, loads, coolant
+
+    def _keep(self, key: tuple[str, ...], fresh: Array) -> Array:
+        """The kept coefficient where the fresh one is as good, else the fresh one."""
+        kept = self._kept.get(key)
+        if kept is not None and kept.shape == fresh.shape:
+            allowed = self.coefficient_tolerance * float(np.abs(kept).max(initial=0.0))
+            if float(np.abs(fresh - kept).max(initial=0.0)) <= allowed:
+                return kept
+        self._kept[key] = fresh
+        return fresh
+
+    def _films(self, loads: Loads) -> dict[str, FilmLoad]:
+        cells = self.machine.builder.cells
+        own = () if cells is None else cells.surfaces
+        return {
+            surface: replace(film, coefficient=self._keep(("film", surface), film.coefficient))
+            for surface, film in loads.films.items()
+            if surface not in own
+        }
+
+    def _lumped(self, loads: Loads) -> tuple:
+        return tuple(
+            replace(
+                node,
+                connections={
+                    surface: self._keep(("lumped", node.name, surface), value)
+                    for surface, value in node.connections.items()
+                },
+            )
+            for node in loads.lumped
+        )
+
+    def _coolant(self, point: OperatingPoint, fresh: CoolantState, temperature: Array) -> CoolantState:
+        """The march with the coefficients that the matrix has, so that walls and coolant agree."""
+        kept = self._keep(("channel",), fresh.film_coefficient)
+        if kept is fresh.film_coefficient:
+            return fresh
+        builder = self.machine.builder
+        march = march_enthalpy(
+            point.coolant_inlet_temperature,
+            fresh.march.mass_flow,
+            fresh.march.march.specific_heat_capacity,
+            builder.wall_temperature(self.machine.field_state(temperature, {})),
+            builder.cells.cell_area,
+            kept,
+            fresh.march.march.pumping_heat,
+        )
+        return replace(fresh, march=replace(fresh.march, march=march), film_coefficient=kept)
+
+    def _channel_films(self, coolant: CoolantState) -> dict[str, FilmLoad]:
+        cells = self.machine.builder.cells
+        bulk = np.broadcast_to(coolant.march.march.bulk_temperature, cells.cell_area.shape).ravel()
+        if self._channel is None or self._channel[0] is not coolant.film_coefficient:
+            flat = coolant.film_coefficient.ravel()
+            spread = {surface: flat[index] for surface, index in cells.facet_cell.items()}
+            self._channel = (coolant.film_coefficient, spread)
+        return {
+            surface: FilmLoad(surface, self._channel[1][surface], bulk[index])
+            for surface, index in cells.facet_cell.items()
+        }
+
+
+def coolant_heat(stages: tuple[Evaluation, Evaluation, Evaluation], step: float) -> tuple[float, float]:
+    """Enthalpy that the coolant carried away in a step, and friction heat made in it, both in J.
+
+    Weighted as the time step weights its stages.
+    """
+    rise = pumping = 0.0
+    for weight, stage in zip(WEIGHTS, stages, strict=True):
+        if stage.coolant is not None:
+            march = stage.coolant.march.march
+            rise += step * weight * march.enthalpy_rise
+            pumping += step * weight * float(np.sum(march.pumping_heat))
+    return rise, pumping
