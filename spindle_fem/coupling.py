@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,17 +122,26 @@ def prepare_machine(
     )
     clock.begin("assembly")
     operators = build_operators(mesh, spec.mesh.order)
+    machine = machine_on_mesh(spec, mesh, operators)
+    clock.end()
+    return replace(machine, timings=clock.timings)
+
+
+def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOperators) -> PreparedMachine:
+    """A machine on a mesh and operators that exist: its geometry must be the one that was meshed.
+
+    Heat, films, flow, oil, joints and materials may differ from those of the
+    machine that the mesh was made for.
+    """
     groups = group_of_contacts(spec, mesh.joints)
     facet_area = {surface: operators.facet_areas(surface) for surface in mesh.surfaces}
-    builder = LoadsBuilder(spec, mesh, facet_area, heat_model_of(spec))
     materials = {part: spec.part_material(part) for part in mesh.part_names}
     capacity_factor = spec.heat_capacity_factor.value
-    clock.end()
     return PreparedMachine(
         spec=spec,
         mesh=mesh,
         operators=operators,
-        builder=builder,
+        builder=LoadsBuilder(spec, mesh, facet_area, heat_model_of(spec)),
         joint_conductance={
             contact: np.inf if group.conductance == "perfect" else group.conductance.value
             for contact, group in groups.items()
@@ -141,7 +150,6 @@ def prepare_machine(
         volumetric_capacity={
             part: capacity_factor * material.volumetric_heat_capacity for part, material in materials.items()
         },
-        timings=clock.timings,
     )
 
 
