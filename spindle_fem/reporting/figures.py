@@ -332,6 +332,14 @@ def _place(figure: Figure, picture: Picture, left: float, top: float) -> None:
     figure.backdrops = [*getattr(figure, "backdrops", []), (picture.image, round(left), round(top))]
 
 
+def set_title(figure: Figure, title: str, notes: str = "") -> None:
+    """Title in the upper left corner, with a line of notes under it; both lie in the first 82 pixels."""
+    width, height = figure.get_size_inches() * DPI
+    figure.text(24.0 / width, 1.0 - 34.0 / height, title, fontsize=12.5, fontweight="bold", va="center")
+    if notes:
+        figure.text(24.0 / width, 1.0 - 66.0 / height, notes, fontsize=9.0, color=MUTED, va="center")
+
+
 def draw_colour_bar(axes: Axes, bar: ColourBar) -> None:
     """Horizontal colour bar with its label."""
     figure = axes.figure

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.reporting.figures import TEMPERATURE_MAP
-from spindle_fem.reporting.sections import TRIANGLE_SPLIT, facet_normals, section_of_volume
+from spindle_fem.reporting.sections import section_of_volume
+from spindle_fem.reporting.surfaces import TRIANGLE_SPLIT, facet_normals
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 

@@ -23,11 +23,10 @@ from spindle_fem.reporting.figures import (
 from spindle_fem.reporting.machine_drawing import part_colours
 from spindle_fem.reporting.profiles import MeridianSection
 from spindle_fem.reporting.scenes import SceneRenderer, View, ball_triangles
-from spindle_fem.reporting.sections import (
+from spindle_fem.reporting.sections import clip_segments, clip_triangles
+from spindle_fem.reporting.surfaces import (
     SegmentSet,
     TriangleSet,
-    clip_segments,
-    clip_triangles,
     element_faces,
     exposed_triangles,
     facet_edges,

@@ -10,13 +10,8 @@ from numpy.typing import NDArray
 
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.reporting.figures import TEMPERATURE_LABEL, TEMPERATURE_MAP, ColourBar, scale_of
-from spindle_fem.reporting.sections import (
-    SegmentSet,
-    TriangleSet,
-    boundary_lines,
-    section_of_triangles,
-    section_of_volume,
-)
+from spindle_fem.reporting.sections import boundary_lines, section_of_triangles, section_of_volume
+from spindle_fem.reporting.surfaces import SegmentSet, TriangleSet
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 

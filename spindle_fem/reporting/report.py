@@ -144,7 +144,7 @@ def _write_files(result: ThermalResult, folder: Path) -> dict[str, float]:
 
 def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | None]]:
     """Charts of a run by file name, drawn when called (the 3-D pictures are in ``pictures``)."""
-    from spindle_fem.reporting import charts
+    from spindle_fem.reporting import balance_charts, charts
     from spindle_fem.reporting.machine_drawing import machine_drawing
     from spindle_fem.reporting.profiles import meridian_section, temperature_scale
 
@@ -155,12 +155,12 @@ def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | No
         "meridian_temperature": lambda: charts.meridian_temperature(result, section, bar),
         "radial_profiles": lambda: charts.radial_profiles(result, section),
         "axial_profiles": lambda: charts.axial_profiles(result, section),
-        "heat_balance": lambda: charts.heat_balance(result.energy, result.bearings),
-        "heat_by_bearing": lambda: charts.heat_by_bearing(result),
+        "heat_balance": lambda: balance_charts.heat_balance(result.energy, result.bearings),
+        "heat_by_bearing": lambda: balance_charts.heat_by_bearing(result),
         "coolant": lambda: (
             None
             if result.coolant is None
-            else charts.coolant_along_channel(result.coolant, ports=_wetted_ports(result))
+            else balance_charts.coolant_along_channel(result.coolant, ports=_wetted_ports(result))
         ),
     }
 
@@ -170,7 +170,7 @@ def _write_pictures(result: ThermalResult, folder: Path) -> None:
     from spindle_fem.reporting.figures import save_png
     from spindle_fem.reporting.profiles import meridian_section, temperature_scale
     from spindle_fem.reporting.scenes import SceneRenderer
-    from spindle_fem.reporting.sections import part_edges
+    from spindle_fem.reporting.surfaces import part_edges
 
     with SceneRenderer() as renderer:
         bar = temperature_scale(result)

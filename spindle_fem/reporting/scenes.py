@@ -20,7 +20,7 @@ from vtkmodules.vtkCommonCore import vtkLogger
 from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 from spindle_fem.reporting.figures import ColourBar
-from spindle_fem.reporting.sections import SegmentSet, TriangleSet
+from spindle_fem.reporting.surfaces import SegmentSet, TriangleSet
 from spindle_fem.spec.model import MachineSpec
 
 EDGE_COLOUR = "#1b2127"

@@ -1,22 +1,17 @@
-"""Triangles to draw: curved faces, plane sections and sharp edges of a tagged mesh.
+"""Plane sections and clipping, of the quadratic field on curved elements.
 
-Plain numpy on the mesh's own arrays; nothing here runs a filter over the
-whole volume. Curved (six-node) triangles are drawn as four flat ones with the
-normals of the curved surface, sections cut the quadratic field.
+Plain numpy on the few elements that the plane meets; nothing here runs a
+filter over the whole volume.
 """
 
 from __future__ import annotations
-
-from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.reporting.surfaces import TRIANGLE_SPLIT, SegmentSet, TriangleSet, all_facets, compact
 
-# Corners 0-2, then the middles of edges 01, 12, 20.
-TRIANGLE_SPLIT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 # Corners 0-3, then the middles of edges 01, 12, 02, 03, 13, 23.
 _TETRAHEDRON_SPLIT = np.array(
     [
@@ -32,8 +27,6 @@ _TETRAHEDRON_SPLIT = np.array(
 )
 _EDGE_ENDS = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 VISIBLE_BEND = 3.0e-5  # m, a tenth of a pixel in the largest picture
-_TETRAHEDRON_FACES = ((0, 2, 1, 6, 5, 4), (0, 1, 3, 4, 8, 7), (1, 2, 3, 5, 9, 8), (0, 3, 2, 7, 9, 6))
-_TRIANGLE_NODES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
 
 
 def _quadratic_values(local: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -61,109 +54,6 @@ def _refinement(split: NDArray[np.int64], corners: int) -> NDArray[np.float64]:
 # Nodes of the pieces of one quadratic element, each a quadratic element again.
 _TRIANGLE_REFINEMENT = _refinement(TRIANGLE_SPLIT, 3)
 _TETRAHEDRON_REFINEMENT = _refinement(_TETRAHEDRON_SPLIT, 4)
-
-
-@dataclass(frozen=True, slots=True)
-class TriangleSet:
-    """Flat triangles with values at their points.
-
-    Attributes
-    ----------
-    points : (n, 3) float64 ndarray, [m]
-    triangles : (m, 3) int64 ndarray
-    values : (n, k) float64 ndarray
-        What was asked for, for example temperature in K.
-    label : (m,) int32 ndarray
-        Part or surface that each triangle belongs to.
-    normals : (n, 3) float64 ndarray or None
-        Unit normals of the curved surface, out of the part.
-    """
-
-    points: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    values: NDArray[np.float64]
-    label: NDArray[np.int32]
-    normals: NDArray[np.float64] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class SegmentSet:
-    """Straight segments: ``points`` (m, 2, 3) in m, ``values`` (m, 2, k), ``label`` (m,)."""
-
-    points: NDArray[np.float64]
-    values: NDArray[np.float64]
-    label: NDArray[np.int32]
-
-
-def facet_normals(points: NDArray[np.float64], facets: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Unit normals of quadratic triangles at their six nodes.
-
-    Parameters
-    ----------
-    points : (n_nodes, 3) ndarray, [m]
-    facets : (n, 6) ndarray of int
-
-    Returns
-    -------
-    (n, 6, 3) ndarray, [-]
-    """
-    u, v = _TRIANGLE_NODES.T
-    w = 1.0 - u - v
-    zero = np.zeros_like(u)
-    along_u = np.stack([1.0 - 4.0 * w, 4.0 * u - 1.0, zero, 4.0 * (w - u), 4.0 * v, -4.0 * v], axis=1)
-    along_v = np.stack([1.0 - 4.0 * w, zero, 4.0 * v - 1.0, -4.0 * u, 4.0 * u, 4.0 * (w - v)], axis=1)
-    corners = points[facets]
-    normals = np.cross(
-        np.einsum("ij,njk->nik", along_u, corners), np.einsum("ij,njk->nik", along_v, corners), axis=2
-    )
-    return normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1.0e-300)
-
-
-def exposed_triangles(
-    mesh: TaggedMesh, values: NDArray[np.float64], surfaces: Iterable[str] | None = None
-) -> TriangleSet:
-    """Exposed faces as flat triangles that shade like the curved ones.
-
-    Parameters
-    ----------
-    mesh : TaggedMesh
-    values : (n_nodes,) or (n_nodes, k) ndarray
-    surfaces : iterable of str, optional
-        Names of the surfaces; all exposed ones when left out.
-
-    Returns
-    -------
-    TriangleSet
-        ``label`` is the index of the part in ``mesh.part_names``.
-    """
-    names = list(mesh.surfaces if surfaces is None else surfaces)
-    part_index = {name: index for index, name in enumerate(mesh.part_names)}
-    facets = _stack([mesh.surfaces[name] for name in names], 6)
-    owner = _repeat(
-        [part_index[mesh.part_of_surface[name]] for name in names], [len(mesh.surfaces[n]) for n in names]
-    )
-    return facet_triangles(mesh.points, facets, np.reshape(values, (len(mesh.points), -1))[facets], owner)
-
-
-def facet_triangles(
-    points: NDArray[np.float64],
-    facets: NDArray[np.int64],
-    facet_values: NDArray[np.float64],
-    label: NDArray[np.int32],
-) -> TriangleSet:
-    """Four flat triangles for each quadratic one; facets share no points.
-
-    ``facet_values`` is (n, 6, k), at the nodes of each facet.
-    """
-    number = len(facets)
-    first = 6 * np.arange(number)[:, None, None]
-    return TriangleSet(
-        points=points[facets].reshape(-1, 3),
-        triangles=(first + TRIANGLE_SPLIT).reshape(-1, 3),
-        values=facet_values.reshape(6 * number, -1),
-        label=np.repeat(np.asarray(label, dtype=np.int32), 4),
-        normals=facet_normals(points, facets).reshape(-1, 3),
-    )
 
 
 def clip_triangles(shape: TriangleSet, level: NDArray[np.float64]) -> TriangleSet:
@@ -209,7 +99,7 @@ def clip_triangles(shape: TriangleSet, level: NDArray[np.float64]) -> TriangleSe
     columns = np.concatenate([columns, *added])
     split = np.cumsum([field.shape[1] for field in fields])[:-1]
     separated = np.split(columns, split, axis=1)
-    return _compact(
+    return compact(
         TriangleSet(
             separated[0],
             np.concatenate(pieces),
@@ -321,7 +211,7 @@ def boundary_lines(mesh: TaggedMesh, values: NDArray[np.float64], level: NDArray
     level : (n_nodes,) ndarray
         Signed distance from the plane.
     """
-    facets, owner = _all_facets(mesh)
+    facets, owner = all_facets(mesh)
     level = _off_plane(level)
     at_nodes = level[facets]
     crossed = np.flatnonzero((at_nodes.min(axis=1) < 0.0) & (at_nodes.max(axis=1) > 0.0))
@@ -331,53 +221,6 @@ def boundary_lines(mesh: TaggedMesh, values: NDArray[np.float64], level: NDArray
     triangles = np.arange(len(columns)).reshape(-1, 6)[:, TRIANGLE_SPLIT].reshape(-1, 3)
     shape = TriangleSet(columns[:, :3], triangles, columns[:, 3:-1], np.repeat(owner[crossed], 16))
     return section_of_triangles(shape, columns[:, -1])
-
-
-def sharp_edges(
-    points: NDArray[np.float64], facets: NDArray[np.int64], label: NDArray[np.int32], angle_deg: float = 25.0
-) -> SegmentSet:
-    """Edges where facets that share nodes meet at more than ``angle_deg``; curved edges as two segments."""
-    normals = facet_normals(points, facets)
-    ends = np.concatenate([facets[:, [0, 1, 3]], facets[:, [1, 2, 4]], facets[:, [2, 0, 5]]])
-    at_middle = np.concatenate([normals[:, 3], normals[:, 4], normals[:, 5]])
-    label = np.tile(label, 3)
-    key = ends[:, :2].min(axis=1) * len(points) + ends[:, :2].max(axis=1)
-    order = np.argsort(key, kind="stable")
-    same = key[order][1:] == key[order][:-1]
-    first, second = order[:-1][same], order[1:][same]
-    sharp = np.einsum("ij,ij->i", at_middle[first], at_middle[second]) < np.cos(np.radians(angle_deg))
-    chosen = first[sharp]
-    lines = np.concatenate([ends[chosen][:, [0, 2]], ends[chosen][:, [2, 1]]])
-    return SegmentSet(points[lines], np.zeros((len(lines), 2, 0)), np.tile(label[chosen], 2))
-
-
-def part_edges(mesh: TaggedMesh, angle_deg: float = 25.0) -> SegmentSet:
-    """Sharp edges of every part."""
-    return sharp_edges(mesh.points, *_all_facets(mesh), angle_deg)
-
-
-def facet_edges(points: NDArray[np.float64], facets: NDArray[np.int64]) -> SegmentSet:
-    """Every element edge of quadratic triangles once, as two segments."""
-    ends = np.concatenate([facets[:, [0, 1, 3]], facets[:, [1, 2, 4]], facets[:, [2, 0, 5]]])
-    _, first = np.unique(ends[:, 2], return_index=True)
-    ends = ends[first]
-    lines = np.concatenate([ends[:, [0, 2]], ends[:, [2, 1]]])
-    return SegmentSet(points[lines], np.zeros((len(lines), 2, 0)), np.zeros(len(lines), dtype=np.int32))
-
-
-def element_faces(mesh: TaggedMesh, chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Outer faces (n, 6) of the chosen elements, and the part of each."""
-    tetrahedra = mesh.tetrahedra[chosen]
-    faces = np.concatenate([tetrahedra[:, face] for face in _TETRAHEDRON_FACES])
-    part = np.tile(mesh.part_of_element[chosen], len(_TETRAHEDRON_FACES))
-    # The three edge middles name a face as well as its corners do.
-    key = np.sort(faces[:, 3:], axis=1) @ np.array([1, len(mesh.points), 0], dtype=np.int64)
-    order = np.argsort(key, kind="stable")
-    same = key[order][1:] == key[order][:-1]
-    single = np.ones(len(key), dtype=bool)
-    single[order[1:][same]] = False
-    single[order[:-1][same]] = False
-    return faces[single], part[single]
 
 
 def clip_segments(lines: SegmentSet, level: NDArray[np.float64]) -> SegmentSet:
@@ -393,49 +236,6 @@ def clip_segments(lines: SegmentSet, level: NDArray[np.float64]) -> SegmentSet:
     return SegmentSet(columns[..., :3], columns[..., 3:], lines.label[touched])
 
 
-def merge_triangles(shapes: Iterable[TriangleSet]) -> TriangleSet:
-    """One set of several with the same number of values; normals kept when all have them."""
-    shapes = list(shapes)
-    offset = np.cumsum([0] + [len(shape.points) for shape in shapes])
-    normals = None
-    if all(shape.normals is not None for shape in shapes):
-        normals = np.concatenate([shape.normals for shape in shapes])
-    return TriangleSet(
-        np.concatenate([shape.points for shape in shapes]),
-        np.concatenate([shape.triangles + first for shape, first in zip(shapes, offset, strict=False)]),
-        np.concatenate([shape.values for shape in shapes]),
-        np.concatenate([shape.label for shape in shapes]),
-        normals,
-    )
-
-
-def select_triangles(shape: TriangleSet, chosen: NDArray[np.bool_]) -> TriangleSet:
-    """The triangles where ``chosen`` (m,) holds, without points that nothing uses."""
-    return _compact(
-        TriangleSet(shape.points, shape.triangles[chosen], shape.values, shape.label[chosen], shape.normals)
-    )
-
-
-def triangle_area(shape: TriangleSet) -> NDArray[np.float64]:
-    """Area of each flat triangle, (m,) in m²."""
-    a, b, c = (shape.points[shape.triangles[:, k]] for k in range(3))
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-
-
-def _all_facets(mesh: TaggedMesh) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    part_index = {name: index for index, name in enumerate(mesh.part_names)}
-    facets = [*mesh.surfaces.values()]
-    owner = [part_index[mesh.part_of_surface[name]] for name in mesh.surfaces]
-    part_of_node = np.zeros(len(mesh.points), dtype=np.int32)
-    part_of_node[mesh.tetrahedra] = mesh.part_of_element[:, None]
-    labels = [np.full(len(item), index, dtype=np.int32) for item, index in zip(facets, owner, strict=True)]
-    for joint in mesh.joints.values():
-        for side in (joint.facets_a, joint.facets_b):
-            facets.append(side)
-            labels.append(part_of_node[side[:, 0]])
-    return _stack(facets, 6), np.concatenate([np.zeros(0, np.int32), *labels])
-
-
 def _off_plane(level: NDArray[np.float64]) -> NDArray[np.float64]:
     # Points exactly on the plane count as a nanometre in front, so that a face in it is found once.
     return np.where(np.abs(level) < 1.0e-9, 1.0e-9, level)
@@ -446,24 +246,3 @@ def _between(
 ) -> NDArray[np.float64]:
     fraction = (level[start] / (level[start] - level[end]))[:, None]
     return columns[start] + fraction * (columns[end] - columns[start])
-
-
-def _compact(shape: TriangleSet) -> TriangleSet:
-    used = np.zeros(len(shape.points), dtype=bool)
-    used[shape.triangles] = True
-    renumber = np.cumsum(used) - 1
-    return TriangleSet(
-        shape.points[used],
-        renumber[shape.triangles],
-        shape.values[used],
-        shape.label,
-        None if shape.normals is None else shape.normals[used],
-    )
-
-
-def _stack(arrays: list[NDArray[np.int64]], width: int) -> NDArray[np.int64]:
-    return np.concatenate([np.zeros((0, width), dtype=np.int64), *arrays])
-
-
-def _repeat(labels: list[int], counts: list[int]) -> NDArray[np.int32]:
-    return np.repeat(np.asarray(labels, dtype=np.int32), counts)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.meshing.simple import build_box, build_joined_tubes, build_tube
-from spindle_fem.reporting import sections
+from spindle_fem.reporting import sections, surfaces
 from spindle_fem.reporting.profiles import axial_profile, meridian_section, radial_profile
 
 INNER, OUTER, LENGTH = 0.05, 0.08, 0.1
@@ -24,14 +24,14 @@ def pair():
 
 def test_meridian_section_has_the_area_of_both_halves(tube):
     section = sections.section_of_volume(tube, tube.points[:, 2], tube.points[:, 0])
-    area = sections.triangle_area(section).sum()
+    area = surfaces.triangle_area(section).sum()
     assert area == pytest.approx(2.0 * LENGTH * (OUTER - INNER), rel=1.0e-3)
 
 
 def test_straight_section_is_coarser_than_the_curved_one(tube):
     exact = 2.0 * LENGTH * (OUTER - INNER)
     areas = [
-        sections.triangle_area(
+        surfaces.triangle_area(
             sections.section_of_volume(tube, tube.points[:, 2], tube.points[:, 0], curved=curved)
         ).sum()
         for curved in (True, False)
@@ -42,7 +42,7 @@ def test_straight_section_is_coarser_than_the_curved_one(tube):
 def test_section_in_a_plane_of_nodes_is_found_once():
     box = build_box((1.0, 1.0, 1.0), (2, 2, 2))
     section = sections.section_of_volume(box, box.points[:, 0], box.points[:, 0] - 0.5)
-    assert sections.triangle_area(section).sum() == pytest.approx(1.0, rel=1.0e-6)
+    assert surfaces.triangle_area(section).sum() == pytest.approx(1.0, rel=1.0e-6)
     assert np.allclose(section.points[:, 0], 0.5, atol=2.0e-9)
 
 
@@ -54,23 +54,23 @@ def test_section_interpolates_a_linear_field_exactly(tube):
 
 
 def test_clipping_keeps_half_of_the_surface_and_its_values(tube):
-    shape = sections.exposed_triangles(tube, tube.points[:, 0])
+    shape = surfaces.exposed_triangles(tube, tube.points[:, 0])
     half = sections.clip_triangles(shape, shape.points[:, 0])
-    whole_area = sections.triangle_area(shape).sum()
-    assert sections.triangle_area(half).sum() == pytest.approx(0.5 * whole_area, rel=1.0e-9)
+    whole_area = surfaces.triangle_area(shape).sum()
+    assert surfaces.triangle_area(half).sum() == pytest.approx(0.5 * whole_area, rel=1.0e-9)
     assert half.points[:, 0].min() >= -1.0e-12
     assert np.allclose(half.values[:, 0], half.points[:, 0], atol=1.0e-12)
     assert half.normals is not None
 
 
 def test_clipping_keeps_all_or_nothing_where_the_plane_misses(tube):
-    shape = sections.exposed_triangles(tube, tube.points[:, 0])
+    shape = surfaces.exposed_triangles(tube, tube.points[:, 0])
     assert len(sections.clip_triangles(shape, np.ones(len(shape.points))).triangles) == len(shape.triangles)
     assert len(sections.clip_triangles(shape, -np.ones(len(shape.points))).triangles) == 0
 
 
 def test_normals_point_out_of_the_part(tube):
-    shape = sections.exposed_triangles(tube, tube.points[:, 2])
+    shape = surfaces.exposed_triangles(tube, tube.points[:, 2])
     radius = np.hypot(shape.points[:, 0], shape.points[:, 1])
     outer = np.isclose(radius, OUTER, atol=1.0e-6) & (np.abs(shape.normals[:, 2]) < 0.5)
     radial = (shape.normals[outer, :2] * shape.points[outer, :2]).sum(axis=1) / OUTER
@@ -79,19 +79,19 @@ def test_normals_point_out_of_the_part(tube):
 
 
 def test_sharp_edges_of_a_tube_are_its_four_circles(tube):
-    edges = sections.part_edges(tube)
+    edges = surfaces.part_edges(tube)
     length = np.linalg.norm(edges.points[:, 1] - edges.points[:, 0], axis=1).sum()
     assert length == pytest.approx(2.0 * 2.0 * np.pi * (INNER + OUTER), rel=5.0e-3)
 
 
 def test_edges_of_two_parts_in_contact_are_drawn_for_both(pair):
-    edges = sections.part_edges(pair)
+    edges = surfaces.part_edges(pair)
     length = np.linalg.norm(edges.points[:, 1] - edges.points[:, 0], axis=1).sum()
     assert length == pytest.approx(2.0 * 2.0 * np.pi * (0.03 + 0.05 + 0.05 + 0.08), rel=5.0e-3)
 
 
 def test_clipped_segments_end_on_the_plane():
-    line = sections.SegmentSet(
+    line = surfaces.SegmentSet(
         np.array([[[-1.0, 0, 0], [3.0, 0, 0]], [[-2.0, 0, 0], [-1.0, 0, 0]]]),
         np.array([[[0.0], [4.0]], [[0.0], [0.0]]]),
         np.zeros(2, dtype=np.int32),
@@ -104,8 +104,8 @@ def test_clipped_segments_end_on_the_plane():
 
 def test_outer_faces_of_chosen_elements_close(tube):
     chosen = tube.points[tube.tetrahedra[:, :4], 0].mean(axis=1) > 0.0
-    faces, part = sections.element_faces(tube, chosen)
-    normals = sections.facet_normals(tube.points, faces)
+    faces, part = surfaces.element_faces(tube, chosen)
+    normals = surfaces.facet_normals(tube.points, faces)
     assert part.shape == (len(faces),)
     assert normals.shape == (len(faces), 6, 3)
     # A closed surface: each corner edge belongs to exactly two faces.
