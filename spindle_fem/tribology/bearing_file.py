@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from spindle_fem.errors import (
     BadInputError,
     FaultsError,
@@ -21,17 +19,15 @@ from spindle_fem.errors import (
     did_you_mean,
 )
 from spindle_fem.tribology.bearing import BearingGeometry, bearing_faults, select_orientations
+from spindle_fem.tribology.bearing_report import report_of_states
 from spindle_fem.tribology.bearing_set import solve_bearing_set
 from spindle_fem.tribology.grease import Lubricant
 from spindle_fem.tribology.heat import HEAT_LEVELS, HeatOptions
-from spindle_fem.tribology.hertz import INNER, OUTER
 from spindle_fem.tribology.mounting import BearingSet, ExternalLoad, MountedBearing, uniform_temperatures
-from spindle_fem.tribology.state import BearingState
 from spindle_fem.units import to_si
 from spindle_fem.validity import CodedWarning
 
 SCHEMA = "spindle-fem/bearing/1"
-REPORT_SCHEMA = "spindle-fem/bearing-report/1"
 _SPACING_OVER_BALL = 1.7
 
 Reader = Callable[[Any, str], Any]
@@ -192,7 +188,7 @@ def bearing_report(path: str | Path) -> dict[str, Any]:
         )
     except OutOfValidityError as error:
         raise SpecError(f"{path}: operation.temperature", error.what, error.how_to_fix) from error
-    return report_of_states(states, case)
+    return report_of_states(states, case.warnings)
 
 
 def read_bearing_file(path: str | Path) -> BearingCase:
@@ -378,84 +374,3 @@ def _lubricant(values: dict[str, Any] | None, file: str, faults: list[SpindleFem
     except SpecError as error:
         faults.append(SpecError(f"{file}: lubricant.{error.where}", error.what, error.how_to_fix))
         return None
-
-
-def report_of_states(states: tuple[BearingState, ...], case: BearingCase) -> dict[str, Any]:
-    """The report of solved bearings as plain numbers (see ``bearing_report``)."""
-    first = states[0]
-    has_heat = first.heat is not None
-    report: dict[str, Any] = {
-        "schema": REPORT_SCHEMA,
-        "axial_deflection_um": first.axial_displacement * 1e6,
-        "radial_deflection_um": first.radial_displacement * 1e6,
-        "axial_stiffness_N_um": first.axial_stiffness * 1e-6,
-        "heat_W": sum(state.heat_W for state in states) if has_heat else None,
-        "terms_W": _sum_terms(states),
-    }
-    if len(states) == 1:
-        report["balls"] = _ball_reports(first)
-    else:
-        report["bearings"] = [
-            {
-                "name": state.name,
-                "axial_deflection_um": state.axial_displacement * 1e6,
-                "radial_deflection_um": state.radial_displacement * 1e6,
-                "axial_load_N": state.axial_force,
-                "preload_N": _number(state.preload),
-                "heat_W": state.heat_W if has_heat else None,
-                "terms_W": state.terms_W,
-                "balls": _ball_reports(state),
-            }
-            for state in states
-        ]
-    found = [warning for state in states for warning in state.warnings]
-    report["warnings"] = [{"code": entry.code, "text": entry.text} for entry in (*case.warnings, *found)]
-    return report
-
-
-def _sum_terms(states: tuple[BearingState, ...]) -> dict[str, float]:
-    total: dict[str, float] = {}
-    for state in states:
-        for name, value in state.terms_W.items():
-            total[name] = total.get(name, 0.0) + value
-    return total
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _ball_reports(state: BearingState) -> list[dict[str, Any]]:
-    """One record a ball; equal balls under axial load are written out one by one."""
-    count, balls = state.geometry.ball_count, state.balls
-    reports = []
-    for ball in range(count):
-        row = ball if len(balls.weight) == count else 0
-        record: dict[str, Any] = {"azimuth_deg": 360.0 * ball / count}
-        for name, field, factor in (
-            ("contact_angle_{}_deg", "contact_angle", 180.0 / math.pi),
-            ("load_{}_N", "load", 1.0),
-            ("pressure_{}_GPa", "pressure", 1e-9),
-            ("semi_major_{}_mm", "semi_major", 1e3),
-            ("semi_minor_{}_mm", "semi_minor", 1e3),
-            ("deformation_{}_um", "deformation", 1e6),
-        ):
-            for side, ring in ((INNER, "inner"), (OUTER, "outer")):
-                record[name.format(ring)] = float(getattr(balls, field)[row, side]) * factor
-        record |= {
-            "centrifugal_force_N": float(balls.centrifugal_force[row]),
-            "gyroscopic_moment_Nmm": float(balls.gyroscopic_moment[row]) * 1e3,
-            "orbital_speed_rad_s": float(balls.orbital_speed[row]),
-            "spin_speed_rad_s": float(balls.spin_speed[row]),
-        }
-        for name, field, factor in (
-            ("film_central{}_um", "film_central", 1e6),
-            ("film_minimum{}_um", "film_minimum", 1e6),
-            ("lambda{}", "film_thickness_ratio", 1.0),
-        ):
-            values = getattr(balls, field)[row] * factor
-            record[name.format("")] = _number(float(np.fmin(*values)))
-            for side, ring in ((INNER, "_inner"), (OUTER, "_outer")):
-                record[name.format(ring)] = _number(float(values[side]))
-        reports.append(record)
-    return reports

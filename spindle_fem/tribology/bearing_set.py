@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from spindle_fem.errors import NoEquilibriumError, SpecError
-from spindle_fem.tribology.ball_system import BallSystem, build_ball_rows, join_rows
+from spindle_fem.tribology.ball_system import build_ball_rows, join_rows
 from spindle_fem.tribology.bearing import BearingGeometry
 from spindle_fem.tribology.equilibrium import Equilibrium, RacewayControl, solve_equilibrium
 from spindle_fem.tribology.grease import Lubricant
 from spindle_fem.tribology.heat import HeatOptions
-from spindle_fem.tribology.hertz import mean_load_constant
 from spindle_fem.tribology.mounting import (
     BearingSet,
     BearingTemperatures,
@@ -25,8 +23,7 @@ from spindle_fem.tribology.mounting import (
     rotation_growth,
     uniform_temperatures,
 )
-from spindle_fem.tribology.preload import tandem_approach
-from spindle_fem.tribology.race_control import static_evaluation
+from spindle_fem.tribology.set_problem import SetProblem, start_displacement
 from spindle_fem.tribology.state import BearingState
 from spindle_fem.tribology.state_report import build_states, lubricant_state, require_seated
 from spindle_fem.tribology.traction import LubricantState, TractionOptions
@@ -221,16 +218,6 @@ def solve_bearing(
     )[0]  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Problem:
-    bearing_set: BearingSet
-    rows: list[dict[str, FloatArray]]
-    system: BallSystem
-    load: FloatArray
-    spring: bool
-    ball_load: float
-
-
 def _require_consistent(
     bearing_set: BearingSet, temperatures: SetTemperatures, control: str, lubricant: Lubricant | None
 ) -> None:
@@ -250,7 +237,7 @@ def _require_consistent(
 
 def _build_problem(
     bearing_set: BearingSet, speed: float, external: ExternalLoad, temperatures: SetTemperatures
-) -> _Problem:
+) -> SetProblem:
     approaches = bearing_set.assembly_approaches()
     middle = float(np.mean([bearing.axial_position for bearing in bearing_set.bearings]))
     shaft_rise = temperatures.shaft - temperatures.assembly
@@ -293,7 +280,7 @@ def _build_problem(
             radial_map=np.hstack([system.radial_map, np.zeros_like(floating)]),
         )  # fmt: skip
         load = np.append(load, bearing_set.preload)
-    return _Problem(bearing_set, rows, system, load, spring, _ball_load(bearing_set, external))
+    return SetProblem(bearing_set, rows, system, load, spring, _ball_load(bearing_set, external))
 
 
 def _ball_load(bearing_set: BearingSet, external: ExternalLoad) -> float:
@@ -307,7 +294,7 @@ def _ball_load(bearing_set: BearingSet, external: ExternalLoad) -> float:
 
 
 def _solve(
-    problem: _Problem,
+    problem: SetProblem,
     speed: float,
     control: RacewayControl,
     film: LubricantState | None,
@@ -319,97 +306,14 @@ def _solve(
             where, "a turning bearing without load or preload has no equilibrium: nothing seats its balls.",
             "Give an axial load or a preload.",
         )  # fmt: skip
-    start = _start(problem, where)
+    start = start_displacement(problem, where)
     return solve_equilibrium(
         problem.system, speed, problem.load, control, start=start, ball_load=problem.ball_load,
         lubricant=film, options=options, where=where,
     )  # fmt: skip
 
 
-def _start(problem: _Problem, where: str) -> FloatArray:
-    """Displacements at rest under the axial part of the load."""
-    system, load = problem.system, problem.load
-    displacement = np.zeros(system.axial_map.shape[1])
-    axial = problem.spring or not problem.bearing_set.has_counter_bearings
-
-    def approach_of(side: int, force: float) -> float:
-        group = [b.geometry for b in problem.bearing_set.bearings if b.orientation == side]
-        return tandem_approach(tuple(group), force) if len(group) else 0.0
-
-    if axial:
-        side = 1 if not problem.spring else None
-        if problem.spring:
-            front = problem.bearing_set.preload + load[0]
-            if front < 0.0:
-                raise NoEquilibriumError(
-                    where, f"thrust {load[0]:g} N lifts the set off its spring of "
-                    f"{problem.bearing_set.preload:g} N.", "Raise the preload or lower the thrust.",
-                )  # fmt: skip
-            offsets = system.start[:, 0] - _free_axial(problem)
-            sides = _row_sides(problem)
-            displacement[0] = approach_of(1, front) - float(offsets[sides > 0].mean())
-            rear = approach_of(-1, problem.bearing_set.preload) - float(offsets[sides < 0].mean())
-            displacement[-1] = rear + displacement[0]
-        else:
-            side = problem.bearing_set.bearings[0].orientation
-            if side * load[0] < 0.0:
-                raise NoEquilibriumError(
-                    where, f"thrust {load[0]:g} N unloads bearings that all face the other way.",
-                    "Turn the thrust round, or add a counter bearing.",
-                )  # fmt: skip
-            group = tuple(b.geometry for b in problem.bearing_set.bearings)
-            alpha_free = load[0] == 0.0 and problem.ball_load > 0.0
-            approach = -group[0].curvature_centre_distance * math.sin(group[0].contact_angle)
-            displacement[0] = side * (approach if alpha_free else tandem_approach(group, abs(load[0])))
-    else:
-        displacement[0] = _balanced_shift(problem, load[0], where)
-    if len(load) >= 5 and load[1] != 0.0:
-        geometry = problem.bearing_set.bearings[0].geometry
-        count = float(system.weight.sum())
-        share = 4.37 * abs(load[1]) / (count * math.cos(geometry.contact_angle))
-        guess = (share / mean_load_constant(geometry)) ** (2.0 / 3.0)
-        loosened = 0.0 if load[0] or problem.bearing_set.preload else 1.0
-        displacement[1] = math.copysign(guess * (loosened or 0.3), load[1])
-    return displacement
-
-
-def _free_axial(problem: _Problem) -> FloatArray:
-    """BD sin α_0 of every row, m."""
-    values = [b.geometry.curvature_centre_distance * math.sin(b.geometry.contact_angle)
-              for b in problem.bearing_set.bearings]  # fmt: skip
-    return np.repeat(values, [len(row["weight"]) for row in problem.rows])
-
-
-def _row_sides(problem: _Problem) -> NDArray[np.int64]:
-    sides = [bearing.orientation for bearing in problem.bearing_set.bearings]
-    return np.repeat(sides, [len(row["weight"]) for row in problem.rows])
-
-
-def _balanced_shift(problem: _Problem, thrust: float, where: str) -> float:
-    """Shaft displacement of a rigid set that balances the thrust at rest, m."""
-    system = problem.system
-    direction = np.zeros(system.axial_map.shape[1])
-    direction[0] = 1.0
-
-    def excess(shift: float) -> float:
-        axial, radial = system.groove_distances(direction * shift)
-        force = static_evaluation(system, axial, radial).ring_force[:, 0]
-        return float(system.axial_map[:, 0] @ (system.weight * force)) - thrust
-
-    if excess(0.0) == 0.0:
-        return 0.0
-    reach = 1e-6
-    largest = 20.0 * float(np.max(system.rest_length))
-    while excess(-reach) * excess(reach) > 0.0:
-        reach *= 2.0
-        if reach > largest:
-            raise NoEquilibriumError(
-                where, f"thrust {thrust:g} N is more than the set can carry.", "Lower the thrust."
-            )
-    return float(brentq(excess, -reach, reach, xtol=1e-15, rtol=1e-13))
-
-
-def _rows_of_bearings(problem: _Problem) -> tuple[list[str], FloatArray]:
+def _rows_of_bearings(problem: SetProblem) -> tuple[list[str], FloatArray]:
     """Bearing name and largest contact angle (rad) of every ball row."""
     counts = [len(row["weight"]) for row in problem.rows]
     bearings = problem.bearing_set.bearings
