@@ -294,6 +294,7 @@ class _Run:
             begin, end = tracks.begin[step], tracks.end[step]
             sensed = sense @ found[step]
             added = begin.by_sensed @ sensed + begin.by_state @ memory + begin.by_parameter
+            tracks.start_by[step] = added
             if self.dynamic.n_states:
                 _, by_sensed, by_state, by_parameter = tracks.moved[step]
                 memory = by_sensed @ sensed + by_state @ memory + by_parameter
@@ -301,7 +302,7 @@ class _Run:
             right = end.by_sensed @ (sense @ base) + end.by_state @ memory + end.by_parameter
             added = np.linalg.solve(identity - end.by_sensed @ tracks.answer[group], right)
             found[step + 1] = base + tracks.from_end[group] @ added
-            tracks.added_by[step] = added
+            tracks.end_by[step] = added
         return found
 
     # ----------------------------------------------------------------- outputs
@@ -347,7 +348,7 @@ class _Run:
         shift = self.dynamic.inlet_columns()
         values = np.vstack((tracks.added_start, tracks.added_end[-1:]))
         inputs[:, self.fast.load_names.index("coolant_inlet")] += values[:, shift].sum(axis=1)
-        return np.concatenate((np.zeros_like(tracks.added_by[:1]), tracks.added_by))[:, shift].sum(axis=1)
+        return np.concatenate((tracks.start_by, tracks.end_by[-1:]))[:, shift].sum(axis=1)
 
 
 class _Tracks:
@@ -365,7 +366,8 @@ class _Tracks:
         self.columns, self.from_start, self.from_end, self.answer = columns, from_start, from_end, answer
         self.added_start = np.zeros((steps, dynamic.n_added))
         self.added_end = np.zeros((steps, dynamic.n_added))
-        self.added_by = np.zeros((steps, dynamic.n_added, len(dynamic.derivatives)))
+        self.start_by = np.zeros((steps, dynamic.n_added, len(dynamic.derivatives)))
+        self.end_by = np.zeros_like(self.start_by)
         self.begin: list[Evaluation] = []
         self.end: list[Evaluation] = []
         self.moved: list[tuple[Array, Array, Array, Array]] = []
