@@ -19,6 +19,7 @@ from spindle_fem.network.links import SurfacePatch
 Array = NDArray[np.float64]
 Triplets = tuple[NDArray[np.int64], NDArray[np.int64], Array]
 _NEWTON_STEPS = 12
+_SETTLED = 1.0e-11
 
 
 def require_inside(values: Array, low: float, high: float, where: str) -> None:
@@ -28,10 +29,11 @@ def require_inside(values: Array, low: float, high: float, where: str) -> None:
     ------
     OutOfValidityError
     """
-    if np.any(values < low) or np.any(values > high):
+    least, most = values.min(), values.max()
+    if least < low or most > high:
         raise OutOfValidityError(
             where,
-            f"a temperature between {float(np.min(values)) - 273.15:.1f} and {float(np.max(values)) - 273.15:.1f} °C "
+            f"a temperature between {float(least) - 273.15:.1f} and {float(most) - 273.15:.1f} °C "
             f"leaves the range {low - 273.15:.0f} to {high - 273.15:.0f} °C.",
             "The machine runs hotter or colder than its films are known for.",
         )
@@ -44,29 +46,47 @@ class WallFilmLaw:
     Attributes
     ----------
     patch : SurfacePatch
-    flux : CubicSpline
-        Heat flux from the wall [W/m²] over wall temperature [K].
+    flux, flux_slope : CubicSpline
+        Heat flux from the wall [W/m²] over wall temperature [K], and its derivative.
     name : str
     """
 
     patch: SurfacePatch
     flux: CubicSpline
+    flux_slope: CubicSpline
     name: str
+
+    @classmethod
+    def of(cls, patch: SurfacePatch, wall: Array, flux: Array, name: str) -> WallFilmLaw:
+        """Law of tabulated fluxes."""
+        spline = CubicSpline(wall, flux)
+        return cls(patch, spline, spline.derivative(), name)
+
+    def wall(self, temperature: Array) -> Array:
+        """Temperature of each face of the wall, K."""
+        node = temperature[self.patch.node]
+        wall, scale = node.copy(), self.patch.resistance * self.patch.area
+        for _ in range(_NEWTON_STEPS):
+            step = (wall + scale * self.flux(wall) - node) / (1.0 + scale * self.flux_slope(wall))
+            wall = wall - step
+            if np.abs(step).max(initial=0.0) < _SETTLED:
+                break
+        return wall
+
+    def require_valid(self, temperature: Array) -> None:
+        """Refuse a state beyond the law's table."""
+        require_inside(temperature[self.patch.node], self.flux.x[0], self.flux.x[-1], self.name)
 
     def heat(self, temperature: Array) -> tuple[Array, Array]:
         """Heat that leaves through each face [W] and its derivative to the node's temperature."""
-        node = temperature[self.patch.node]
-        low, high = self.flux.x[0], self.flux.x[-1]
-        require_inside(node, low, high, self.name)
-        wall, slope = node.copy(), self.flux.derivative()
-        for _ in range(_NEWTON_STEPS):
-            defect = wall + self.patch.resistance * self.patch.area * self.flux(wall) - node
-            step = defect / (1.0 + self.patch.resistance * self.patch.area * slope(wall))
-            wall = wall - step
-            if np.abs(step).max(initial=0.0) < 1.0e-11:
-                break
-        by_wall = self.patch.area * slope(wall)
+        wall = self.wall(temperature)
+        by_wall = self.patch.area * self.flux_slope(wall)
         return self.patch.area * self.flux(wall), by_wall / (1.0 + self.patch.resistance * by_wall)
+
+    def value(self, temperature: Array) -> Array:
+        """Heat into every node, W."""
+        heat = self.patch.area * self.flux(self.wall(temperature))
+        return np.bincount(self.patch.node, -heat, len(temperature))
 
     def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
         """Heat into every node and its derivative."""
@@ -86,29 +106,53 @@ class CoolantLaw:
     Attributes
     ----------
     patch : SurfacePatch
-    cell : (n,) int64 ndarray
-        Coolant node of each face.
+    cell : (k,) int64 ndarray
+        Coolant cell of each face.
     upstream : (n_cells,) int64 ndarray
         Node that feeds each coolant node; -1 for the inlet.
     nodes : (n_cells,) int64 ndarray
         The coolant nodes, in the order of the flow.
+    share : (k,) ndarray, [-]
+        Area of each face over that of its cell.
+    pairs : (2, m) int64 ndarray
+        Faces that feel each other through the mean wall temperature of their cell.
     capacity_rate : float, [W/K]
         Mass flow times heat capacity, all starts.
     inlet : float, [K]
     film : RectBivariateSpline or float
         Film coefficient over bulk and wall temperature, or one value.
     bulk_range, wall_range : (low, high), [K]
+        Of the film's table; a wall beyond it counts as at its end, as the
+        correlations take it too.
     """
 
     patch: SurfacePatch
     cell: NDArray[np.int64]
     upstream: NDArray[np.int64]
     nodes: NDArray[np.int64]
+    share: Array
+    pairs: NDArray[np.int64]
     capacity_rate: float
     inlet: float
     film: RectBivariateSpline | float
     bulk_range: tuple[float, float]
     wall_range: tuple[float, float]
+
+    def coefficient(self, temperature: Array) -> Array:
+        """Film coefficient of each coolant cell, W/(m²·K)."""
+        if isinstance(self.film, float):
+            return np.full(len(self.nodes), self.film)
+        return self.film.ev(*self._inside(temperature))
+
+    def require_valid(self, temperature: Array) -> None:
+        """Refuse a state beyond the law's table."""
+        if not isinstance(self.film, float):
+            require_inside(self.bulk_and_wall(temperature)[0], *self.bulk_range, "coolant")
+
+    def _inside(self, temperature: Array) -> tuple[Array, Array]:
+        # iterates may stray beyond the table, where the film keeps its last value; results may not
+        bulk, wall = self.bulk_and_wall(temperature)
+        return np.clip(bulk, *self.bulk_range), np.clip(wall, *self.wall_range)
 
     def coefficients(self, temperature: Array) -> tuple[Array, Array, Array]:
         """Film coefficient of each coolant cell and its derivatives to bulk and wall temperature."""
@@ -116,19 +160,14 @@ class CoolantLaw:
         if isinstance(self.film, float):
             return np.full(number, self.film), np.zeros(number), np.zeros(number)
         bulk, wall = self.bulk_and_wall(temperature)
-        require_inside(bulk, *self.bulk_range, "coolant film")
-        require_inside(wall, *self.wall_range, "coolant film")
-        return (
-            self.film.ev(bulk, wall),
-            self.film.ev(bulk, wall, dx=1),
-            self.film.ev(bulk, wall, dy=1),
-        )
+        at = self._inside(temperature)
+        by_bulk = np.where(at[0] == bulk, self.film.ev(*at, dx=1), 0.0)
+        return self.film.ev(*at), by_bulk, np.where(at[1] == wall, self.film.ev(*at, dy=1), 0.0)
 
     def bulk_and_wall(self, temperature: Array) -> tuple[Array, Array]:
         """Mean of each cell's ends, and area mean of the nodes around it, K."""
         before = np.where(self.upstream >= 0, temperature[self.upstream], self.inlet)
-        area = np.bincount(self.cell, self.patch.area, len(self.nodes))
-        wall = np.bincount(self.cell, self.patch.area * temperature[self.patch.node], len(self.nodes)) / area
+        wall = np.bincount(self.cell, self.share * temperature[self.patch.node], len(self.nodes))
         return 0.5 * (before + temperature[self.nodes]), wall
 
     def conductances(self, coefficient: Array) -> tuple[Array, Array]:
@@ -145,92 +184,138 @@ class CoolantLaw:
         value = stretch[self.cell] * plain
         return value, stretch[self.cell] * plain_by_h + stretch_by_h[self.cell] * plain
 
+    def _spread(self, flow: Array, size: int) -> Array:
+        return np.bincount(self.nodes[self.cell], flow, size) - np.bincount(self.patch.node, flow, size)
+
+    def value(self, temperature: Array) -> Array:
+        """Heat into every node, W."""
+        conductance, _ = self.conductances(self.coefficient(temperature))
+        difference = temperature[self.patch.node] - temperature[self.nodes[self.cell]]
+        return self._spread(conductance * difference, len(temperature))
+
     def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
         """Heat into every node (walls and coolant) and its derivative."""
         h, by_bulk, by_wall = self.coefficients(temperature)
         conductance, by_h = self.conductances(h)
         node, coolant = self.patch.node, self.nodes[self.cell]
         difference = temperature[node] - temperature[coolant]
-        flow = conductance * difference
-        heat = np.bincount(coolant, flow, len(temperature)) - np.bincount(node, flow, len(temperature))
-        rows = [node, node, coolant, coolant]
-        columns = [node, coolant, node, coolant]
-        values = [-conductance, conductance, conductance, -conductance]
+        heat = self._spread(conductance * difference, len(temperature))
+        # derivative of the flow through each face: (face, column, value)
+        faces = [np.arange(len(node))] * 2
+        columns, values = [node, coolant], [conductance, -conductance]
         if not isinstance(self.film, float):
             sensitivity = by_h * difference
-            terms = [(coolant, 0.5 * by_bulk[self.cell])]
+            half = 0.5 * sensitivity * by_bulk[self.cell]
             fed = self.upstream[self.cell]
-            terms.append((np.where(fed >= 0, fed, coolant), np.where(fed >= 0, 0.5 * by_bulk[self.cell], 0.0)))
-            for column, weight in terms:
-                rows += [coolant, node]
-                columns += [column, column]
-                values += [sensitivity * weight, -sensitivity * weight]
-            # every face of a cell feels the mean wall of all its faces
-            area = np.bincount(self.cell, self.patch.area, len(self.nodes))
-            order = np.argsort(self.cell, kind="stable")
-            counts = np.bincount(self.cell, minlength=len(self.nodes))
-            starts = np.concatenate([[0], np.cumsum(counts)])
-            for c in range(len(self.nodes)):
-                own = order[starts[c] : starts[c + 1]]
-                weight = by_wall[c] * self.patch.area[own] / area[c]
-                block = np.outer(sensitivity[own], weight).ravel()
-                repeated = np.repeat(own, len(own))
-                column = np.tile(node[own], len(own))
-                rows += [coolant[repeated], node[repeated]]
-                columns += [column, column]
-                values += [block, -block]
-        return heat, (np.concatenate(rows), np.concatenate(columns), np.concatenate(values))
+            from_inlet = fed < 0
+            faces += [faces[0], faces[0]]
+            columns += [coolant, np.where(from_inlet, coolant, fed)]
+            values += [half, np.where(from_inlet, 0.0, half)]
+            one, other = self.pairs
+            faces.append(one)
+            columns.append(node[other])
+            values.append(sensitivity[one] * by_wall[self.cell[one]] * self.share[other])
+        face, column, slope = np.concatenate(faces), np.concatenate(columns), np.concatenate(values)
+        rows = np.concatenate([coolant[face], node[face]])
+        return heat, (rows, np.tile(column, 2), np.concatenate([slope, -slope]))
+
+
+def faces_by_cell(cell: NDArray[np.int64]) -> NDArray[np.int64]:
+    """All ordered pairs of faces that share a cell, (2, m).
+
+    >>> faces_by_cell(np.array([0, 1, 0])).tolist()
+    [[0, 0, 2, 2, 1], [0, 2, 0, 2, 1]]
+    """
+    order = np.argsort(cell, kind="stable")
+    counts = np.bincount(cell)
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    groups = [order[low:high] for low, high in zip(starts[:-1], starts[1:], strict=True)]
+    one = np.concatenate([np.repeat(group, len(group)) for group in groups])
+    other = np.concatenate([np.tile(group, len(group)) for group in groups])
+    return np.stack([one, other])
 
 
 @dataclass(frozen=True, slots=True)
 class FrictionLaw:
-    """Friction heat of a bearing over the temperature of its lubricant film.
+    """Friction heat of every bearing over the temperature of its lubricant film.
 
-    The film's temperature is ``weights @ T + feedback * heat``: the raceways
-    are hotter than the ring nodes by the heat that enters there.
+    A film's temperature is ``weights @ T + feedback * heat``: the raceways are
+    hotter than the ring nodes by the heat that enters there. The heat is
+    therefore tabulated over ``weights @ T``.
 
     Attributes
     ----------
-    nodes : (k,) int64 ndarray
-    weights : (k,) ndarray, [-]
-    feedback : float, [K/W]
-    spread_nodes : (m,) int64 ndarray
-    spread : (m,) ndarray, [-]
-        Where the heat goes, sum 1.
-    heat : PchipInterpolator
-        W over film temperature in K.
-    name : str
+    names : tuple of str
+        Bearings.
+    weights : (n_bearings, n_nodes) ndarray, [-]
+    feedback : (n_bearings,) ndarray, [K/W]
+    spread : (n_nodes, n_bearings) ndarray, [-]
+        Where the heat goes, columns sum to 1.
+    breaks : (n_bearings, k + 1) ndarray, [K]
+    coefficients : (4, k, n_bearings) ndarray
+        Of the cubic pieces, highest power first, W.
     """
 
-    nodes: NDArray[np.int64]
+    names: tuple[str, ...]
     weights: Array
-    feedback: float
-    spread_nodes: NDArray[np.int64]
+    feedback: Array
     spread: Array
-    heat: PchipInterpolator
-    name: str
+    breaks: Array
+    coefficients: Array
 
-    def film_temperature(self, temperature: Array) -> tuple[float, float]:
-        """Temperature of the film [K] and the heat [W] that belongs to it."""
-        base = float(self.weights @ temperature[self.nodes])
-        film, slope = base, self.heat.derivative()
-        for _ in range(_NEWTON_STEPS):
-            require_inside(np.array([film]), self.heat.x[0], self.heat.x[-1], f"friction heat of {self.name}")
-            step = (film - base - self.feedback * float(self.heat(film))) / (1.0 - self.feedback * float(slope(film)))
-            film -= step
-            if abs(step) < 1.0e-11:
-                break
-        return film, float(self.heat(film))
+    @classmethod
+    def of(cls, tables: dict[str, PchipInterpolator], weights: Array, feedback: Array, spread: Array) -> FrictionLaw:
+        """Law of tables of heat over film temperature."""
+        pieces = []
+        for table, gain in zip(tables.values(), feedback, strict=True):
+            heat = table(table.x)
+            pieces.append(PchipInterpolator(table.x - gain * heat, heat))
+        return cls(
+            tuple(tables),
+            weights,
+            feedback,
+            spread,
+            np.stack([piece.x for piece in pieces]),
+            np.stack([piece.c for piece in pieces], axis=-1),
+        )
+
+    def heat(self, temperature: Array) -> tuple[Array, Array]:
+        """Heat [W] of each bearing and its slope to ``weights @ T`` [W/K]."""
+        base = self.weights @ temperature
+        # iterates may stray beyond the table, where the heat goes straight on; results may not
+        at = np.minimum(np.maximum(base, self.breaks[:, 0]), self.breaks[:, -1])
+        piece = (at[:, None] >= self.breaks[:, 1:-1]).sum(axis=1)
+        bearing = np.arange(len(at))
+        x = at - self.breaks[bearing, piece]
+        c3, c2, c1, c0 = self.coefficients[:, piece, bearing]
+        slope = (3.0 * c3 * x + 2.0 * c2) * x + c1
+        return ((c3 * x + c2) * x + c1) * x + c0 + slope * (base - at), slope
+
+    def film_temperature(self, temperature: Array) -> Array:
+        """Of each bearing, K."""
+        return self.weights @ temperature + self.feedback * self.heat(temperature)[0]
+
+    def require_valid(self, temperature: Array) -> None:
+        """Refuse a state beyond the law's table."""
+        base = self.weights @ temperature
+        for name, value, breaks in zip(self.names, base, self.breaks, strict=True):
+            require_inside(np.array([value]), breaks[0], breaks[-1], f"friction heat of {name}, film")
+
+    def value(self, temperature: Array) -> Array:
+        """Heat into every node, W."""
+        return self.spread @ self.heat(temperature)[0]
 
     def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
         """Heat into every node and its derivative."""
-        film, heat = self.film_temperature(temperature)
-        slope = float(self.heat.derivative()(film))
-        slope /= 1.0 - self.feedback * slope
-        into = np.bincount(self.spread_nodes, heat * self.spread, len(temperature))
-        block = np.outer(self.spread, slope * self.weights)
-        rows = np.repeat(self.spread_nodes, len(self.nodes))
-        return into, (rows, np.tile(self.nodes, len(self.spread_nodes)), block.ravel())
+        heat, slope = self.heat(temperature)
+        rows, columns, values = [], [], []
+        for bearing in range(len(self.names)):
+            into = np.flatnonzero(self.spread[:, bearing])
+            feels = np.flatnonzero(self.weights[bearing])
+            rows.append(np.repeat(into, len(feels)))
+            columns.append(np.tile(feels, len(into)))
+            values.append(slope[bearing] * np.outer(self.spread[into, bearing], self.weights[bearing, feels]).ravel())
+        return self.spread @ heat, (np.concatenate(rows), np.concatenate(columns), np.concatenate(values))
 
 
 Law = WallFilmLaw | CoolantLaw | FrictionLaw

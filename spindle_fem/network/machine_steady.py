@@ -96,6 +96,13 @@ class SparseBalance:
         self.load = network.heat - whole[:n, n:] @ network.boundary_temperature
         self.n = n
 
+    def net_heat(self, temperature: Array) -> Array:
+        """Net heat into every node, (n,) [W]."""
+        net = self.load - self.matrix @ temperature
+        for law in self.network.laws:
+            net = net + law.value(temperature)
+        return net
+
     def __call__(self, temperature: Array) -> tuple[Array, sparse.csc_array]:
         """Net heat (n,) [W] and derivative (n, n) [W/K]."""
         net = self.load - self.matrix @ temperature
@@ -246,6 +253,7 @@ def _state(network: OperatingNetwork, temperature: Array, iterations: int) -> Ma
         out[str(kind)] = float(flow[outward & (network.kind == kind)].sum())
     heat_in = float(network.heat.sum())
     for law in network.laws:
+        law.require_valid(temperature)
         if isinstance(law, WallFilmLaw):
             out[law.name] = float(law.heat(temperature)[0].sum())
         elif not isinstance(law, CoolantLaw):

@@ -7,21 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, PchipInterpolator, RectBivariateSpline
+from scipy.interpolate import PchipInterpolator, RectBivariateSpline
 
 from spindle_fem.coolant.regimes import ChannelState, select_film
+from spindle_fem.errors import OutOfValidityError
 from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.loads.films import film_coefficient, gap_coefficient
 from spindle_fem.loads.model import BearingHeat
 from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.laws import CoolantLaw, FrictionLaw, Law, WallFilmLaw
+from spindle_fem.network.laws import CoolantLaw, FrictionLaw, Law, WallFilmLaw, faces_by_cell
 from spindle_fem.network.machine import MachineNetwork
 from spindle_fem.network.model import ThermalNetwork
 
 Array = NDArray[np.float64]
 FILM_RANGE = 150.0
-HEAT_RANGE = (-30.0, 170.0)
-HEAT_POINTS = 15
+HEAT_RANGE = (-15.0, 120.0)
+HEAT_POINTS = 19
+FEWEST_HEAT_POINTS = 4
 TABLE_POINTS = 24
 
 
@@ -138,7 +140,7 @@ class OperatingNetwork:
         heat = {name: value.total for name, value in self.bearing_heat.items()}
         for law in self.laws:
             if isinstance(law, FrictionLaw):
-                heat[law.name] = law.film_temperature(temperature)[1]
+                heat |= dict(zip(law.names, law.heat(temperature)[0].tolist(), strict=True))
         return heat
 
 
@@ -176,11 +178,15 @@ def operate(
     ]
     laws: list[Law] = []
     heat = np.zeros(machine.n_nodes)
-    raceways, heat_to = {}, {}
+    raceways, heat_to, spreads = {}, {}, {}
     for group, bearing in spec.bearings:
-        raceways[bearing.name], heat_to[bearing.name] = _bearing(
-            machine, group, bearing.name, heats[bearing.name], friction, links, laws, heat
-        )
+        name = bearing.name
+        raceways[name], heat_to[name], spreads[name] = _bearing(machine, group, name, heats[name], links)
+    if friction is None:
+        for name, spread in spreads.items():
+            heat += heats[name].total * spread
+    else:
+        laws.append(_friction_law(machine, friction, raceways, spreads))
     _air(machine, point, boundaries, links, laws)
     streams, rate, law = (np.empty(0, int), np.empty(0, int)), 0.0, None
     if machine.coolant is not None:
@@ -230,7 +236,7 @@ def _merged(first, second, conductance, kind):
     return unique[:, :2], summed, kinds.astype(object)[unique[:, 2]]
 
 
-def _bearing(machine, group, name, heat: BearingHeat, friction, links, laws, node_heat):
+def _bearing(machine, group, name, heat: BearingHeat, links):
     """Links of a ball row, and where its heat goes."""
     settings = machine.spec.heat
     rings = 1.0 - settings.ball_share
@@ -265,21 +271,21 @@ def _bearing(machine, group, name, heat: BearingHeat, friction, links, laws, nod
                 np.bincount(inverse.ravel(), given * (1.0 - loss), len(nodes)),
             )
         )
-    if friction is None:
-        node_heat += heat.total * spread
-    else:
-        into = np.flatnonzero(spread)
-        nodes = np.concatenate([ways[0].nodes, ways[1].nodes, [ball]])
-        weights = np.concatenate(
-            [
-                0.25 * ways[0].node_weights,
-                0.25 * ways[1].node_weights,
-                [0.5 + 0.25 * (ways[0].ball_weight + ways[1].ball_weight)],
-            ]
-        )
-        feedback = 0.25 * (ways[0].per_heat + ways[1].per_heat)
-        laws.append(FrictionLaw(nodes, weights, feedback, into, spread[into], friction[name], name))
-    return tuple(ways), shares
+    return tuple(ways), shares, spread
+
+
+def _friction_law(machine, friction, raceways, spreads) -> FrictionLaw:
+    """Heat over the film's temperature: a quarter of each raceway's, half of the balls'."""
+    weights = np.zeros((len(friction), machine.n_nodes))
+    feedback = np.zeros(len(friction))
+    for row, name in enumerate(friction):
+        weights[row, machine.ball_nodes[name]] += 0.5
+        for way in raceways[name]:
+            weights[row, way.nodes] += 0.25 * way.node_weights
+            weights[row, machine.ball_nodes[name]] += 0.25 * way.ball_weight
+            feedback[row] += 0.25 * way.per_heat
+    return FrictionLaw.of(friction, weights, feedback, np.column_stack([spreads[name] for name in friction]))
+
 
 
 def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws) -> None:
@@ -297,7 +303,7 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
             if film.kind == "natural":
                 wall = np.linspace(fluid - FILM_RANGE, fluid + FILM_RANGE, 16 * TABLE_POINTS + 1)
                 value, _ = film_coefficient(film, point, wall, fluid)
-                laws.append(WallFilmLaw(patch, CubicSpline(wall, value * (wall - fluid)), surface))
+                laws.append(WallFilmLaw.of(patch, wall, value * (wall - fluid), surface))
                 continue
             value, _ = film_coefficient(film, point, np.array([fluid]), fluid)
             links.append(
@@ -340,7 +346,7 @@ def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
         state = ChannelState(loop.coolant, point.coolant_flow, bulk, wall)
         return factor * np.asarray(select_film(settings.film_model, loop.section, state).value, dtype=float)
 
-    bulk_range, wall_range = (inlet - 5.0, inlet + 30.0), (inlet - 15.0, inlet + 90.0)
+    bulk_range = wall_range = (loop.coolant.lowest_temperature, loop.coolant.highest_temperature)
     film: RectBivariateSpline | float = float(coefficient(np.float64(inlet), None))
     if settings.properties_at == "bulk":
         bulk = np.linspace(*bulk_range, TABLE_POINTS)
@@ -352,6 +358,8 @@ def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
         cell=coolant.cell,
         upstream=np.concatenate([[-1], nodes[:-1]]),
         nodes=nodes,
+        share=coolant.patch.area / coolant.area[coolant.cell],
+        pairs=faces_by_cell(coolant.cell),
         capacity_rate=rate,
         inlet=inlet,
         film=film,
@@ -373,11 +381,21 @@ def tabulate_friction(
         return None
     base = point.ambient_temperature
     temperatures = np.linspace(base + HEAT_RANGE[0], base + HEAT_RANGE[1], HEAT_POINTS)
-    values: dict[str, list[float]] = {bearing.name: [] for _, bearing in spec.bearings}
-    for temperature in temperatures:
-        around = {name: BearingTemperatures(*(float(temperature),) * 5) for name in values}
-        heats, _ = heat_model(point, around)
-        for name in values:
+    names = [bearing.name for _, bearing in spec.bearings]
+    known: list[float] = []
+    values: dict[str, list[float]] = {name: [] for name in names}
+    refused: OutOfValidityError | None = None
+    for temperature in temperatures.tolist():
+        around = {name: BearingTemperatures(*(temperature,) * 5) for name in names}
+        try:
+            heats, _ = heat_model(point, around)
+        except OutOfValidityError as error:
+            # beyond the grease's own range the law ends; a state out there is refused by name
+            refused = error
+            continue
+        known.append(temperature)
+        for name in names:
             values[name].append(heats[name].total)
-    return {name: PchipInterpolator(temperatures, heat) for name, heat in values.items()}
-
+    if len(known) < FEWEST_HEAT_POINTS:
+        raise refused
+    return {name: PchipInterpolator(known, heat) for name, heat in values.items()}

@@ -1,0 +1,152 @@
+"""A machine's network over time: exponential steps of second order.
+
+The equations are linear but for films and friction, so a step solves its
+linearisation exactly and corrects for the rest: the stiff modes of coolant and
+air cost nothing, and at ten-second steps the error is far below a millikelvin.
+
+Source: Hochbruck & Ostermann (2010), Acta Numerica 19, 209-286, sections 2.3
+(exponential Rosenbrock methods) and 2.1 (phi functions).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from spindle_fem.errors import NoSteadyStateError, SpecError
+from spindle_fem.loads.bearing_heat import HeatModel, heat_model_of
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.machine import MachineNetwork
+from spindle_fem.network.machine_steady import SparseBalance
+from spindle_fem.network.operating import OperatingNetwork, operate, tabulate_friction
+
+Array = NDArray[np.float64]
+RELINEARISE_AFTER = 4.0
+RUNAWAY_TEMPERATURE = 600.0
+# Steps between looks at whether films and friction are still inside their tables.
+CHECK_EVERY = 10
+
+
+@dataclass(frozen=True, slots=True)
+class MachineTransient:
+    """Temperatures over time.
+
+    Attributes
+    ----------
+    times : (N,) ndarray, [s]
+    temperature : (N, n) ndarray, [K]
+    node_names : tuple of str
+    linearisations : int
+        How often the propagators were made.
+    """
+
+    times: Array
+    temperature: Array
+    node_names: tuple[str, ...]
+    linearisations: int
+
+
+class _Propagator:
+    """Exact solution of the linearised equations over one step length."""
+
+    def __init__(self, balance: SparseBalance, network: OperatingNetwork, state: Array, step: float) -> None:
+        self.rate = (balance(state)[1].toarray()) / network.machine.capacity[:, None]
+        self.inverse_capacity = 1.0 / network.machine.capacity
+        self.state, self.step = state.copy(), step
+        scaled = step * self.rate
+        decay = scipy.linalg.expm(scaled)
+        identity = np.eye(len(state))
+        factored = scipy.linalg.lu_factor(scaled)
+        phi_one = scipy.linalg.lu_solve(factored, decay - identity)
+        self.level = step * phi_one
+        self.slope = step * scipy.linalg.lu_solve(factored, phi_one - identity)
+
+
+def simulate_machine_network(
+    machine: MachineNetwork,
+    times: ArrayLike,
+    schedule: Sequence[tuple[float, OperatingPoint]],
+    initial: ArrayLike | None = None,
+    *,
+    heat_model: HeatModel | None = None,
+) -> MachineTransient:
+    """Follow a machine's network through operating points that hold until the next.
+
+    Parameters
+    ----------
+    machine : MachineNetwork
+        Of the paper's size: the propagators are dense.
+    times : (N,) array_like, [s]
+        Increasing; one step between neighbours.
+    schedule : sequence of (start [s], OperatingPoint)
+        Increasing; each must start at one of ``times``, the first at or before the first.
+    initial : (n,) array_like, [K], optional
+        The first point's ambient temperature by default.
+    heat_model : HeatModel, optional
+
+    Raises
+    ------
+    SpecError
+        Times or schedule out of order.
+    NoSteadyStateError
+        The temperatures run away.
+    OutOfValidityError
+        Films or friction beyond the range they are known for.
+
+    Contacts of the balls conduct as at the ambient temperature; they hardly
+    change with it.
+    """
+    instants = np.asarray(times, dtype=float)
+    starts = np.array([start for start, _ in schedule])
+    if instants.size < 2 or np.any(np.diff(instants) <= 0.0):
+        raise SpecError("times", "they do not increase.", "Allowed: two or more increasing times in s.")
+    if not len(starts) or starts[0] > instants[0] or np.any(np.diff(starts) <= 0.0):
+        raise SpecError("schedule", "it does not cover the times.", "Allowed: increasing starts, the first in time.")
+    if not np.isin(starts[1:], instants).all():
+        raise SpecError("schedule", "a change falls between two times.", "Allowed: changes at one of the times.")
+    heat_model = heat_model_of(machine.spec) if heat_model is None else heat_model
+    ambient = schedule[0][1].ambient_temperature
+    state = np.full(machine.n_nodes, ambient) if initial is None else np.array(initial, dtype=float)
+    temperature = np.empty((instants.size, machine.n_nodes))
+    temperature[0] = state
+    linearisations, segment = 0, -1
+    propagators: dict[float, _Propagator] = {}
+    for k, step in enumerate(np.diff(instants)):
+        current = int(np.searchsorted(starts, instants[k], side="right")) - 1
+        if current != segment:
+            segment = current
+            point = schedule[segment][1]
+            network = operate(machine, point, heat_model, friction=tabulate_friction(machine, point, heat_model))
+            balance, propagators = SparseBalance(network), {}
+        length = round(float(step), 9)
+        stored = propagators.get(length)
+        moved = np.inf if stored is None else float(np.abs(state - stored.state).max())
+        if stored is None or (network.laws and moved > RELINEARISE_AFTER):
+            stored = propagators[length] = _Propagator(balance, network, state, length)
+            linearisations += 1
+        state = _advance(stored, balance, state)
+        if not np.all(np.isfinite(state)) or state.max() > RUNAWAY_TEMPERATURE:
+            raise NoSteadyStateError(
+                machine.spec.name,
+                f"the network runs away at {instants[k + 1]:.0f} s.",
+                "Lower the speed or the preload, or cool more.",
+            )
+        temperature[k + 1] = state
+        if k % CHECK_EVERY == 0 or k == instants.size - 2:
+            for law in network.laws:
+                law.require_valid(state)
+    return MachineTransient(instants, temperature, machine.node_names, linearisations)
+
+
+def _advance(propagator: _Propagator, balance: SparseBalance, state: Array) -> Array:
+    """One step: exponential Euler, then the change of what is not linear."""
+    rate = propagator.inverse_capacity * balance.net_heat(state)
+    euler = state + propagator.level @ rate
+    if not balance.network.laws:
+        return euler
+    change = propagator.inverse_capacity * balance.net_heat(euler) - rate - propagator.rate @ (euler - state)
+    return euler + propagator.slope @ change
