@@ -36,7 +36,7 @@ def main() -> None:
     parser.add_argument("--machine", default="wu_tan_2016")
     parser.add_argument("--preset", default="normal")
     parser.add_argument("--size-factor", type=float, default=1.0)
-    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--threads", type=int, default=1)
     arguments = parser.parse_args()
     spec = load_machine(arguments.machine)
     assembly = timed("meridian faces and checks", lambda: build_assembly(spec))

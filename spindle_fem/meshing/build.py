@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -30,7 +29,7 @@ def build_mesh(
     size_factor: float = 1.0,
     sizes: Mapping[str, float] | None = None,
     use_cache: bool = True,
-    threads: int | None = None,
+    threads: int = 1,
 ) -> TaggedMesh:
     """Mesh an assembly.
 
@@ -44,8 +43,9 @@ def build_mesh(
         Sizes of single parts, and ``"channel"``, in place of the preset's.
     use_cache : bool
         Read a mesh made before from the user's cache, and keep this one there.
-    threads : int, optional
-        For the 2-D and 3-D mesher; the number of cores, at most four.
+    threads : int
+        Of the mesher. One gives the same mesh every time; more give one of the
+        same quality but never quite the same, and are faster only on idle cores.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def generate_mesh(
     sizes: MeshSizes,
     *,
     ladder: tuple[Attempt, ...] = LADDER,
-    threads: int | None = None,
+    threads: int = 1,
     digest: str = "",
 ) -> TaggedMesh:
     """Mesh with the first settings of ``ladder`` that pass every check.
@@ -87,7 +87,6 @@ def generate_mesh(
     MeshQualityError
         With the reason of each attempt.
     """
-    threads = threads or min(4, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
     failures: list[str] = []
     best: TaggedMesh | None = None
     for attempt in ladder:

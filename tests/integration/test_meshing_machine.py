@@ -203,14 +203,34 @@ def test_cache_returns_the_same_mesh(machine, tmp_path, monkeypatch):
     assert made.digest == read.digest
 
 
-def test_second_attempt_is_noted(machine):
-    bad = Attempt(6, 10, 40.0)
-    good = Attempt(6, 10, 1.0)
-    sizes = build_sizes(machine, "coarse")
-    mesh = generate_mesh(machine, sizes, ladder=(bad, good), threads=1)
-    assert any(note.startswith("meshed with frontal Delaunay surfaces") for note in mesh.notes) or (
-        mesh.min_quality > 0.15
-    )
+def test_same_input_same_mesh(machine, mesh):
+    again = build_mesh(machine, "coarse", use_cache=False)
+    assert np.array_equal(again.points, mesh.points)
+    assert np.array_equal(again.tetrahedra, mesh.tetrahedra)
+    assert again.digest == mesh.digest
+
+
+def test_second_attempt_is_noted(machine, monkeypatch):
+    from spindle_fem.meshing import build
+
+    first, second = build.LADDER[:2]
+    genuine = build.mesh_once
+
+    def fail_first(assembly, sizes, attempt, threads):
+        if attempt == first:
+            raise MeshQualityError("mesh", "gmsh gave up.", "Change it.")
+        return genuine(assembly, sizes, attempt, threads)
+
+    monkeypatch.setattr(build, "mesh_once", fail_first)
+    made = generate_mesh(machine, build_sizes(machine, "coarse"))
+    (note,) = made.notes
+    assert note == f"meshed with {second.describe()} after {first.describe()}: gmsh gave up."
+
+
+def test_best_attempt_below_the_aim_is_kept_and_said_so(machine, monkeypatch):
+    monkeypatch.setattr("spindle_fem.meshing.build.MINIMUM_QUALITY", 0.9)
+    made = generate_mesh(machine, build_sizes(machine, "coarse"), ladder=(Attempt(6, 10, 1.0),))
+    assert made.notes[-1] == f"worst element has minSICN {made.min_quality:.3f}, below the 0.9 aimed at"
 
 
 def test_no_attempt_left(machine, monkeypatch):
