@@ -1,0 +1,256 @@
+"""One design solved, as one row of the table; designs of one geometry share mesh and operators."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from spindle_fem import __version__
+from spindle_fem.checks import require_checks
+from spindle_fem.conduction.operators import ThermalOperators, build_operators
+from spindle_fem.coupling import machine_on_mesh
+from spindle_fem.design.designs import Design
+from spindle_fem.design.outputs import derived_values, value_of
+from spindle_fem.design.table import FAILED, IMPOSSIBLE, OK, Row
+from spindle_fem.errors import FaultsError, SpecError, SpindleFemError
+from spindle_fem.geometry.assembly import AssemblyGeometry, build_assembly
+from spindle_fem.loads.joints import group_of_contacts
+from spindle_fem.meshing.build import build_mesh
+from spindle_fem.meshing.cache import cache_directory, mesh_digest
+from spindle_fem.meshing.sizes import build_sizes
+from spindle_fem.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.results.summary import build_summary
+from spindle_fem.results.thermal_result import ThermalResult
+from spindle_fem.solve import solve_prepared
+from spindle_fem.spec.inherit import apply_overrides
+from spindle_fem.spec.load import validate
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.units import Uncertain
+
+# Tables of a definition that shape the mesh; designs that agree in them share it.
+_SHAPING = ("part", "bearing_types", "bearing_set", "channel", "surface", "remaining_surfaces", "mesh")
+# What does not change a result.
+_NOT_IN_KEY = ("name", "title", "description", "marks")
+FILM_LOW, FILM_HIGH = "@film_low", "@film_high"
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What is asked of every design of a study: outputs, and whether the film's band is carried."""
+
+    outputs: tuple[str, ...]
+    film_uncertainty: bool
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the answers: each output, and its values at the low and the high film."""
+        ends = (FILM_LOW, FILM_HIGH) if self.film_uncertainty else ()
+        return tuple(path + end for path in self.outputs for end in ("", *ends))
+
+
+@dataclass(frozen=True, slots=True)
+class DesignTask:
+    """A design ready to be solved by any process.
+
+    Attributes
+    ----------
+    design : Design
+    key : str
+        Hash of all that the result depends on: the same key, the same numbers.
+    spec : MachineSpec or None
+        None where the design is impossible.
+    geometry : str
+        Hash of mesh and order of the temperature's polynomials.
+    reason : str
+        Why the design is impossible.
+    """
+
+    design: Design
+    key: str
+    spec: MachineSpec | None
+    geometry: str
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    geometry: str
+    joints: tuple[str, ...]
+    reason: str = ""
+
+
+class TaskBuilder:
+    """Turns designs into tasks; geometries that were seen are not built again.
+
+    Parameters
+    ----------
+    content : mapping
+        Raw tables of the machine.
+    question : Question
+    """
+
+    def __init__(self, content: Mapping[str, Any], question: Question) -> None:
+        self._content = content
+        self._question = question
+        self._geometries: dict[str, _Shape] = {}
+
+    def task(self, design: Design) -> DesignTask:
+        """Task of a design, checked as ``spindle-fem check`` would."""
+        try:
+            spec = validate(apply_overrides(self._content, design.overrides), "design")
+        except SpecError as error:
+            return self._impossible(design, error)
+        dump = spec.model_dump(mode="json", by_alias=True, exclude_none=True)
+        shape = _digest(_without_marks({key: dump.get(key) for key in _SHAPING}))
+        if shape not in self._geometries:
+            self._geometries[shape] = _examine_geometry(spec)
+        found = self._geometries[shape]
+        machine = _without_marks({key: value for key, value in dump.items() if key not in _NOT_IN_KEY})
+        key = self._key(machine)
+        if found.reason:
+            return DesignTask(design, key, None, "", found.reason)
+        try:
+            group_of_contacts(spec, found.joints)
+        except SpindleFemError as error:
+            return DesignTask(design, key, None, "", reason_of(error))
+        return DesignTask(design, key, spec, found.geometry)
+
+    def _impossible(self, design: Design, error: SpindleFemError) -> DesignTask:
+        return DesignTask(design, self._key(list(design.overrides)), None, "", reason_of(error))
+
+    def _key(self, machine: Any) -> str:
+        asked = [self._question.outputs, self._question.film_uncertainty]
+        return _digest([__version__, asked, machine])[:24]
+
+
+def _examine_geometry(spec: MachineSpec) -> _Shape:
+    try:
+        assembly = build_assembly(spec)
+        sizes = build_sizes(
+            assembly, spec.mesh.preset, size_factor=spec.mesh.size_factor, overrides=spec.mesh.size
+        )
+    except SpindleFemError as error:
+        return _Shape("", (), reason_of(error))
+    return _Shape(f"{mesh_digest(assembly, sizes)}/{spec.mesh.order}", assembly.joint_names)
+
+
+def _digest(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _without_marks(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _without_marks(item) for key, item in value.items() if key != "marks"}
+    return [_without_marks(item) for item in value] if isinstance(value, list) else value
+
+
+def reason_of(error: BaseException) -> str:
+    """One line that says what was wrong."""
+    if isinstance(error, FaultsError):
+        return "; ".join(reason_of(fault) for fault in error.faults)
+    text = str(error) if isinstance(error, SpindleFemError) else f"{type(error).__name__}: {error}"
+    return " ".join(text.removeprefix("design: ").split())
+
+
+# The mesh and operators that this process used last: tasks come sorted by geometry.
+_LAST: dict[str, tuple[TaggedMesh, ThermalOperators]] = {}
+
+
+def evaluate_tasks(tasks: Sequence[DesignTask], question: Question) -> list[Row]:
+    """Rows of some tasks, the same numbers in whatever process, order or company they are solved.
+
+    Every design is solved from a cold start and with one thread of the linear
+    algebra, so that no row depends on what was solved before it.
+    """
+    with threadpool_limits(1):
+        return [evaluate(task, question) for task in tasks]
+
+
+def evaluate(task: DesignTask, question: Question) -> Row:
+    """Row of one task; an error of the model becomes a row with its reason."""
+    empty = {**dict.fromkeys(question.columns), "geometry": task.geometry[:12]}
+    head = {"design": task.design.number, **task.design.values, "key": task.key}
+    if task.spec is None:
+        return {**head, **empty, "status": IMPOSSIBLE, "reason": task.reason}
+    try:
+        answers = _answers(task, question)
+    except (SpindleFemError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return {**head, **empty, "status": FAILED, "reason": reason_of(error)}
+    return {**head, **empty, **answers, "status": OK, "reason": ""}
+
+
+def _answers(task: DesignTask, question: Question) -> dict[str, Any]:
+    spec = task.spec
+    mesh, operators = shared_operators(spec, task.geometry)
+    result = _solved(spec, mesh, operators)
+    answers = _values(result, spec, question.outputs)
+    if not question.film_uncertainty:
+        return answers
+    coolant = result.coolant
+    for ending, film in ((FILM_LOW, coolant.mean_film_low), (FILM_HIGH, coolant.mean_film_high)):
+        changed = _with_film_factor(spec, film / coolant.mean_film_coefficient)
+        at_end = _values(_solved(changed, mesh, operators), spec, question.outputs)
+        answers |= {path + ending: value for path, value in at_end.items()}
+    return answers
+
+
+def _solved(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOperators) -> ThermalResult:
+    result = solve_prepared(machine_on_mesh(spec, mesh, operators))
+    require_checks(result.checks, spec.name)
+    return result
+
+
+def _values(result: ThermalResult, spec: MachineSpec, outputs: Iterable[str]) -> dict[str, Any]:
+    summary = build_summary(result, 0.0, 0.0)
+    summary["derived"] = derived_values(summary, spec)
+    return {path: value_of(summary, path) for path in outputs}
+
+
+def _with_film_factor(spec: MachineSpec, ratio: float) -> MachineSpec:
+    """The machine with its channel film scaled; the band of a film is a factor on all of it."""
+    factor = spec.coolant.film_factor
+    scaled = Uncertain(factor.value * ratio, factor.sigma_log)
+    return spec.model_copy(update={"coolant": spec.coolant.model_copy(update={"film_factor": scaled})})
+
+
+def shared_operators(spec: MachineSpec, geometry: str) -> tuple[TaggedMesh, ThermalOperators]:
+    """Mesh and operators of a geometry, those used last without any work."""
+    if geometry not in _LAST:
+        _LAST.clear()  # a normal mesh with its operators takes hundreds of megabytes
+        assembly = build_assembly(spec)
+        mesh = _meshed(assembly, spec, geometry)
+        _LAST[geometry] = mesh, build_operators(mesh, spec.mesh.order)
+    return _LAST[geometry]
+
+
+def _meshed(assembly: AssemblyGeometry, spec: MachineSpec, geometry: str) -> TaggedMesh:
+    with _one_at_a_time(geometry.partition("/")[0]):
+        return build_mesh(
+            assembly,
+            preset=spec.mesh.preset,
+            size_factor=spec.mesh.size_factor,
+            sizes=spec.mesh.size,
+            threads=1,
+        )
+
+
+@contextlib.contextmanager
+def _one_at_a_time(digest: str) -> Iterator[None]:
+    """Keeps two processes from making the same mesh; the second finds it in the cache."""
+    try:
+        import fcntl
+    except ImportError:  # not on Windows: there it is only made twice
+        yield
+        return
+    folder = cache_directory()
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / f"{digest}.lock").open("w") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)  # released by the system when a process dies
+        yield

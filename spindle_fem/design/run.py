@@ -1,0 +1,143 @@
+"""Tasks of a study to workers: this process, processes of this machine, or a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from spindle_fem.design.evaluate import DesignTask, Question, evaluate_tasks
+from spindle_fem.design.table import Row
+from spindle_fem.errors import BadInputError, SpindleFemError
+
+# Rows that a worker holds before they land in the table: few are lost when it dies,
+# and its mesh is not prepared again for each.
+CHUNK = 4
+
+Land = Callable[[Row], None]
+
+
+def run_tasks(
+    tasks: Sequence[DesignTask],
+    question: Question,
+    land: Land,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+) -> None:
+    """Solve tasks and hand over each row as it comes, in any order.
+
+    Parameters
+    ----------
+    tasks : sequence of DesignTask
+    question : Question
+    land : callable
+        Called in this process only.
+    jobs : int
+        Worker processes of this machine; below 1 for one a core.
+    scheduler : str, optional
+        Address of a Dask scheduler, in place of ``jobs``.
+
+    Raises
+    ------
+    BadInputError
+        Dask is not installed, or no scheduler answers there.
+    SpindleFemError
+        The cluster lost a task for good.
+    """
+    ready = [task for task in tasks if task.spec is not None]
+    for task in tasks:
+        if task.spec is None:
+            land(evaluate_tasks([task], question)[0])
+    if scheduler is not None:
+        found: Iterable[list[Row]] = _on_cluster(ready, question, scheduler)
+    elif worker_count(jobs) == 1 or len(ready) <= 1:
+        found = (evaluate_tasks([task], question) for task in _sorted(ready))
+    else:
+        found = _in_processes(ready, question, worker_count(jobs))
+    for rows in found:
+        for row in rows:
+            land(row)
+
+
+def worker_count(jobs: int) -> int:
+    """Number of worker processes; one a usable core where ``jobs`` is below 1."""
+    if jobs >= 1:
+        return jobs
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def chunks_of(tasks: Sequence[DesignTask], workers: int) -> list[list[DesignTask]]:
+    """Tasks in pieces of one geometry each, small enough that every worker gets some."""
+    size = max(1, min(CHUNK, len(tasks) // (2 * workers)))
+    chunks: list[list[DesignTask]] = []
+    for task in _sorted(tasks):
+        last = chunks[-1] if chunks else []
+        if last and last[0].geometry == task.geometry and len(last) < size:
+            last.append(task)
+        else:
+            chunks.append([task])
+    return chunks
+
+
+def _sorted(tasks: Sequence[DesignTask]) -> list[DesignTask]:
+    """By geometry, geometries and designs in the order of the study."""
+    first: dict[str, int] = {}
+    for position, task in enumerate(tasks):
+        first.setdefault(task.geometry, position)
+    return sorted(tasks, key=lambda task: first[task.geometry])
+
+
+def _in_processes(tasks: Sequence[DesignTask], question: Question, jobs: int) -> Iterator[list[Row]]:
+    from joblib import Parallel, delayed, parallel_config
+
+    with parallel_config(backend="loky", inner_max_num_threads=1):
+        parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
+        yield from parallel(delayed(evaluate_tasks)(chunk, question) for chunk in chunks_of(tasks, jobs))
+
+
+def _on_cluster(tasks: Sequence[DesignTask], question: Question, address: str) -> Iterator[list[Row]]:
+    with _client(address) as client:
+        from distributed import as_completed
+        from distributed.scheduler import KilledWorker
+
+        workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+        chunks = chunks_of(tasks, workers)
+        # A chunk that dies with its worker goes to another one; Dask gives up after some.
+        futures = client.map(_evaluate_chunk, chunks, question=question, pure=False)
+        for future in as_completed(futures):
+            try:
+                rows = future.result()
+            except KilledWorker as error:
+                raise SpindleFemError(
+                    f"scheduler {address}",
+                    f"several workers died on the same designs ({error}).",
+                    "The rows so far are kept; give the workers more memory and run the command again.",
+                ) from error
+            future.release()
+            yield rows
+
+
+def _evaluate_chunk(chunk: Sequence[DesignTask], question: Question) -> list[Row]:
+    return evaluate_tasks(chunk, question)
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise BadInputError(
+            "--scheduler", "needs the package distributed.", "Install spindle-fem[cluster]."
+        ) from error
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise BadInputError(
+            f"--scheduler {address}",
+            f"no Dask scheduler answers ({error}).",
+            "For example tcp://127.0.0.1:8786.",
+        ) from error
+    with client:
+        yield client

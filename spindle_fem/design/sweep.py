@@ -1,0 +1,296 @@
+"""A study from its files to its table and report: the function behind ``spindle-fem sweep``."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.design.designs import Axis, Design, build_axes, plan_designs
+from spindle_fem.design.evaluate import DesignTask, Question, TaskBuilder
+from spindle_fem.design.judge import Limit, judged, limits_of
+from spindle_fem.design.outputs import WORDS, output_fault
+from spindle_fem.design.run import run_tasks
+from spindle_fem.design.study import Study, load_study
+from spindle_fem.design.table import FAILED, IMPOSSIBLE, OK, RESULTS, ResultTable, Row
+from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
+from spindle_fem.reporting.output import output_folder, replace_text
+from spindle_fem.results.summary import package_versions
+from spindle_fem.spec.load import apply_overrides, find_machine, load_machine, read_definition, write_machine
+from spindle_fem.spec.model import MachineSpec
+
+SWEEP_SCHEMA = "spindle-fem/sweep/1"
+SUMMARY_FILE, STUDY_FILE, MACHINE_FILE = "sweep.json", "study.toml", "machine.toml"
+# Rows that stand in the table for designs of a study, besides parameters and outputs.
+_HEAD, _TAIL = ("design",), ("status", "reason", "feasible", "geometry", "key")
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedStudy:
+    """A study that was checked against its machine.
+
+    Attributes
+    ----------
+    name : str
+    study : Study
+    spec : MachineSpec
+        The machine as defined, before any design.
+    content : mapping
+        Its raw tables.
+    axes : tuple of Axis
+    limits : tuple of Limit
+    question : Question
+    tasks : tuple of DesignTask
+        The planned designs in order.
+    """
+
+    name: str
+    study: Study
+    spec: MachineSpec
+    content: Mapping[str, Any]
+    axes: tuple[Axis, ...]
+    limits: tuple[Limit, ...]
+    question: Question
+    tasks: tuple[DesignTask, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the table."""
+        return (*_HEAD, *(axis.path for axis in self.axes), *self.question.columns, *_TAIL)
+
+
+def sweep_machine(
+    machine: str | Path,
+    study: str | Path,
+    folder: str | Path,
+    overrides: Iterable[str] = (),
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: bool = False,
+) -> dict[str, Any]:
+    """Solve every design of a study and report what they say.
+
+    A study that was stopped goes on where it ended; rows that are in the
+    folder's table already are not solved again.
+
+    Parameters
+    ----------
+    machine : str or Path
+        A definition file, or the name of a machine that ships.
+    study : str or Path
+        A study file.
+    folder : str or Path
+        Gets ``results.csv``, ``results.parquet``, ``sweep.json``, ``figures``,
+        ``report.html``, and the machine and study that made them.
+    overrides : iterable of str
+        ``path=value`` texts for the machine, under those of the designs.
+    jobs : int
+        Worker processes; below 1 for one a core. The results do not depend on it.
+    scheduler : str, optional
+        Address of a Dask scheduler, in place of ``jobs``.
+    progress : bool
+        Show rows done and time left on the terminal.
+
+    Returns
+    -------
+    dict
+        The content of ``sweep.json``.
+
+    Raises
+    ------
+    SpindleFemError
+        Bad input, before anything runs; or a cluster that fails. A design
+        that fails is a row.
+    """
+    started = time.perf_counter()
+    prepared = prepare_study(machine, study, overrides)
+    _require_own_table(Path(folder), prepared.columns)
+    with output_folder(folder) as place, _progress(progress, len(prepared.tasks)) as tell:
+        replace_text(place / MACHINE_FILE, write_machine(prepared.spec))
+        replace_text(place / STUDY_FILE, Path(study).read_text(encoding="utf-8"))
+        table = ResultTable(place, prepared.columns)
+        before = set(table.rows)
+        tasks = list(prepared.tasks)
+
+        def solve(batch: Sequence[DesignTask]) -> None:
+            _solve_missing(batch, prepared, table, tell, jobs=jobs, scheduler=scheduler)
+
+        solve(tasks)
+        rows = _final_rows(table, tasks, prepared.limits)
+        reused = len({task.key for task in tasks} & before)
+        rows = table.finish(rows)
+        summary = _summary(prepared, rows, reused=reused)
+        summary["wall_time_s"] = time.perf_counter() - started
+        replace_text(
+            place / SUMMARY_FILE, json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        )
+    return summary
+
+
+def prepare_study(machine: str | Path, study: str | Path, overrides: Iterable[str] = ()) -> PreparedStudy:
+    """Read a machine and a study and check each against the other, without solving.
+
+    Raises
+    ------
+    SpecError
+        Everything that is wrong with either file, at once for each of them; or
+        no design of the study is possible.
+    """
+    overrides = tuple(overrides)
+    spec = load_machine(machine, overrides)
+    content = apply_overrides(read_definition(find_machine(machine)), overrides)
+    read = load_study(study)
+    where = Path(study).name
+    faults: list[SpindleFemError] = []
+    axes: tuple[Axis, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    try:
+        axes = build_axes(read, content, where)
+    except FaultsError as error:
+        faults += error.faults
+    faults += _output_faults(read, spec, where)
+    if not faults:
+        limits = limits_of(read, where)
+    if faults:
+        raise FaultsError(where, faults)
+    question = Question(read.judged, read.study.film_uncertainty)
+    builder = TaskBuilder(content, question)
+    tasks = tuple(builder.task(design) for design in plan_designs(read, axes, where))
+    if all(task.spec is None for task in tasks):
+        reasons = "; ".join(dict.fromkeys(task.reason for task in tasks[:3]))
+        raise SpecError(
+            where, f"none of its {len(tasks)} designs is possible: {reasons}", "Change the parameters."
+        )
+    name = read.name or Path(study).stem
+    return PreparedStudy(name, read, spec, content, axes, limits, question, tasks)
+
+
+def _output_faults(study: Study, spec: MachineSpec, where: str) -> list[SpindleFemError]:
+    named = [(f"study.outputs[{i + 1}]", path) for i, path in enumerate(study.study.outputs)]
+    numeric = [(f"constraint[{i + 1}].output", item.output) for i, item in enumerate(study.constraint)]
+    numeric += [(f"objective[{i + 1}].output", item.output) for i, item in enumerate(study.objective)]
+    faults: list[SpindleFemError] = []
+    for key, path in (*named, *numeric):
+        fault = output_fault(path, spec, f"{where}: {key}")
+        if fault is not None:
+            faults.append(fault)
+    faults += [
+        SpecError(f"{where}: {key}", f'"{path}" is a word.', "Allowed: an output that is a number.")
+        for key, path in numeric
+        if path in WORDS
+    ]
+    if study.study.film_uncertainty and spec.channel is None:
+        faults.append(
+            SpecError(
+                f"{where}: study.film_uncertainty",
+                "is asked for, but the machine has no channel.",
+                "Leave it out.",
+            )
+        )
+    return faults
+
+
+def _require_own_table(folder: Path, columns: Sequence[str]) -> None:
+    """Refuse the folder of another study before it is touched."""
+    path = folder / RESULTS
+    if not path.is_file() or path.stat().st_size == 0:
+        return
+    with path.open(encoding="utf-8", newline="") as stream:
+        heading = stream.readline()
+    if heading.endswith("\n") and heading.strip() != ",".join(columns):
+        raise BadInputError(
+            str(path),
+            "is the table of another study.",
+            "Give a new folder, or the study that the folder belongs to.",
+        )
+
+
+def _solve_missing(
+    tasks: Sequence[DesignTask],
+    prepared: PreparedStudy,
+    table: ResultTable,
+    tell: Callable[[int], None],
+    *,
+    jobs: int,
+    scheduler: str | None,
+) -> None:
+    """Solve the tasks that have no row yet, each machine once."""
+    missing: dict[str, DesignTask] = {}
+    for task in tasks:
+        if task.key not in table:
+            missing.setdefault(task.key, task)
+    tell(len(tasks) - len(missing))
+
+    def land(row: Row) -> None:
+        table.append({**row, **judged(row, prepared.limits)})
+        tell(1)
+
+    run_tasks(list(missing.values()), prepared.question, land, jobs=jobs, scheduler=scheduler)
+
+
+def _final_rows(table: ResultTable, tasks: Sequence[DesignTask], limits: Sequence[Limit]) -> list[Row]:
+    """What each row gets from the study as it is now: its place, its design, and the verdict of the limits."""
+    return [
+        {
+            "design": task.design.number,
+            **task.design.values,
+            "key": task.key,
+            **judged(table.rows[task.key], limits),
+        }
+        for task in tasks
+    ]
+
+
+def _summary(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> dict[str, Any]:
+    statuses = [row["status"] for row in rows]
+    return {
+        "schema": SWEEP_SCHEMA,
+        "study": prepared.name,
+        "machine": prepared.spec.name,
+        "parameters": [{"path": axis.path, "unit": axis.unit} for axis in prepared.axes],
+        "outputs": list(prepared.question.outputs),
+        "designs": len(rows),
+        "ok": statuses.count(OK),
+        "failed": statuses.count(FAILED),
+        "impossible": statuses.count(IMPOSSIBLE),
+        "feasible": sum(row["feasible"] == "yes" for row in rows),
+        "geometries": len({row["geometry"] for row in rows if row["geometry"]}),
+        "reused_rows": reused,
+        "versions": package_versions(),
+    }
+
+
+@contextlib.contextmanager
+def _progress(show: bool, total: int) -> Iterator[Callable[[int], None]]:
+    """Rows done and time left on the terminal; the callable takes how many more are done."""
+    if not show:
+        yield lambda done: None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("designs"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(elapsed_when_finished=False),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("designs", total=total)
+        yield lambda done: bar.advance(task, done)
+
+
+__all__ = ["Design", "PreparedStudy", "prepare_study", "sweep_machine"]
