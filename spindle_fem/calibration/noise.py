@@ -55,6 +55,8 @@ class ChannelBins:
         Mean time of each bin.
     number : (b,) ndarray
         Readings in each.
+    spacing : (b,) ndarray, [s]
+        Mean distance of the readings in each; 0 where there is one.
     white : float, [K]
         Of a single reading, rounding included.
     """
@@ -64,6 +66,7 @@ class ChannelBins:
     owner: NDArray[np.int64]
     times: Array
     number: Array
+    spacing: Array
     white: float
 
     def average(self, values: Array) -> Array:
@@ -75,9 +78,19 @@ class ChannelBins:
 
     def factor(self, slow: SlowError) -> Array:
         """Lower Cholesky factor of the covariance of the bin means, (b, b) [K]."""
+        # Exact for readings at equal distances: what an average keeps of the slow error, ...
+        half = 0.5 * self.spacing / slow.time
+        kept = np.ones_like(half)
+        several = half > 0.0
+        n, h = self.number[several], half[several]
+        kept[several] = np.sinh(n * h) / (n * np.sinh(h))
         apart = np.abs(self.times[:, None] - self.times)
-        covariance = slow.sigma**2 * np.exp(-apart / slow.time)
-        covariance[np.diag_indices_from(covariance)] += self.white**2 / self.number
+        covariance = slow.sigma**2 * np.exp(-apart / slow.time) * np.outer(kept, kept)
+        # ... and its variance.
+        own = np.ones_like(half)
+        ratio = np.exp(-2.0 * h)
+        own[several] = (n * (1.0 - ratio**2) - 2.0 * ratio * (1.0 - ratio**n)) / (n * (1.0 - ratio)) ** 2
+        covariance[np.diag_indices_from(covariance)] = slow.sigma**2 * own + self.white**2 / self.number
         return np.linalg.cholesky(covariance)
 
 
@@ -104,7 +117,11 @@ def channel_bins(recording: Recording, use: NDArray[np.bool_] | None = None) -> 
         # A declared sigma is that of the sensor; rounding of the file comes on top where it is coarse.
         white = float(np.hypot(recording.sigma[channel], rounding))
         mean_time = np.bincount(owner, weights=times[rows]) / number
-        found.append(ChannelBins(channel, rows, owner, mean_time, number, white))
+        first, last = np.full(number.size, np.inf), np.full(number.size, -np.inf)
+        np.minimum.at(first, owner, times[rows])
+        np.maximum.at(last, owner, times[rows])
+        spacing = (last - first) / np.maximum(number - 1.0, 1.0)
+        found.append(ChannelBins(channel, rows, owner, mean_time, number, spacing, white))
     return tuple(found)
 
 
