@@ -43,13 +43,15 @@ class TransientOptions:
     error: float = 0.05
     coupling_tolerance: float = 5.0e-6
     coefficient_tolerance: float = 5.0e-4
-    first_step: float = 1.0
+    first_step: float = 0.1
     fixed_step: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("error", "coupling_tolerance", "first_step"):
             if not getattr(self, name) > 0.0:
-                raise SpecError(f"transient options: {name}", f"{getattr(self, name)!r}.", "Allowed: above 0.")
+                raise SpecError(
+                    f"transient options: {name}", f"{getattr(self, name)!r}.", "Allowed: above 0."
+                )
         if not self.coefficient_tolerance >= 0.0:
             raise SpecError(
                 "transient options: coefficient_tolerance",
@@ -178,9 +180,7 @@ def start_at(machine: PreparedMachine, history: OperatingHistory, temperature: f
     """State of one temperature [K] at the first time of a history."""
     unknowns = np.full(machine.operators.n_unknowns, float(temperature))
     names = CoupledInputs(machine, history, 0.0).lumped_names(unknowns)
-    return ThermalState(
-        float(history.inputs.times[0]), unknowns, np.full(len(names), float(temperature))
-    )
+    return ThermalState(float(history.inputs.times[0]), unknowns, np.full(len(names), float(temperature)))
 
 
 def start_from(coupled: CoupledState, time: float = 0.0) -> ThermalState:
