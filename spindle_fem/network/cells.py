@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import GeometryError, SpecError
+from spindle_fem.errors import SpecError
 from spindle_fem.geometry.assembly import AssemblyGeometry
 from spindle_fem.geometry.channel import ChannelDefinition
 
@@ -205,8 +205,8 @@ def build_cells(
 
     Raises
     ------
-    GeometryError
-        Neighbouring turns of the channel leave no land.
+    SpecError
+        Another channelling.
     """
     if channelling not in ("smeared", "rings"):
         raise SpecError("channelling", f'"{channelling}".', 'Allowed: "smeared", "rings".')
@@ -217,8 +217,6 @@ def build_cells(
     r_values += [value for edge in assembly.edges for value in edge.r if value > 0.0] + list(extra_r)
     rings: list[tuple[float, float, float]] = []
     if channel is not None:
-        if channel.starts * channel.width >= channel.pitch:
-            raise GeometryError("channel", "its turns leave no land between them.", "Allowed: starts · width < pitch.")
         r_values += [channel.inner_radius, channel.inner_radius + channel.depth]
         rings = _ring_fractions(channel) if channelling == "rings" else []
         z_values += [value for ring in rings for value in ring[:2]] or list(channel_zone(channel))

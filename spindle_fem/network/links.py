@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.network.cells import OUTSIDE, Faces, MeridianCells
+from spindle_fem.network.cells import Faces, MeridianCells
 from spindle_fem.network.partition import Partition
 
 Array = NDArray[np.float64]
@@ -139,12 +139,13 @@ def solid_links(
         ends = np.sort(
             np.column_stack([partition.node_of_cell[faces.first], partition.node_of_cell[faces.second]]), axis=1
         )
-        pieces.append((ends, 1.0 / resistance))
+        # inside a node a face may pass through the very centre; it joins nothing
+        apart = (ends[:, 0] != ends[:, 1]) & np.isfinite(resistance)
+        pieces.append((ends[apart], 1.0 / resistance[apart]))
     ends = np.concatenate([item[0] for item in pieces])
     conductance = np.concatenate([item[1] for item in pieces])
-    apart = (ends[:, 0] != ends[:, 1]) & (conductance > 0.0)
-    pairs, inverse = np.unique(ends[apart], axis=0, return_inverse=True)
-    summed = np.bincount(inverse.ravel(), conductance[apart], len(pairs))
+    pairs, inverse = np.unique(ends, axis=0, return_inverse=True)
+    summed = np.bincount(inverse.ravel(), conductance, len(pairs))
     return SolidLinks(pairs[:, 0].copy(), pairs[:, 1].copy(), summed)
 
 
@@ -183,16 +184,3 @@ def exposed_surfaces(cells: MeridianCells) -> dict[str, Faces]:
     names = cells.exposed.name
     return {str(name): cells.exposed.pick(names == name) for name in dict.fromkeys(names)}
 
-
-__all__ = [
-    "OUTSIDE",
-    "NodeCentres",
-    "SolidLinks",
-    "SurfacePatch",
-    "exposed_surfaces",
-    "half_resistance",
-    "node_centres",
-    "side_wall_patch",
-    "solid_links",
-    "surface_patch",
-]

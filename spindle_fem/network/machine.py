@@ -166,7 +166,7 @@ def build_machine_network(
     SpecError
         A refinement that is not a whole number from 1.
     GeometryError
-        A gap whose sides do not face each other, a channel without lands.
+        Parts or channel that do not fit; a gap whose sides do not face each other.
 
     Examples
     --------

@@ -1,0 +1,224 @@
+"""The paper's network of a machine definition: its nodes, what they hold, and its laws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spindle_fem.errors import FaultsError, NoSteadyStateError, OutOfValidityError, SpecError
+from spindle_fem.geometry.assembly import build_assembly
+from spindle_fem.loads.bearing_heat import heat_model_of
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.cells import build_cells, channel_zone, side_wall_area
+from spindle_fem.network.machine import build_machine_network
+from spindle_fem.network.machine_steady import SparseBalance, newton, solve_machine_network
+from spindle_fem.network.machine_transient import simulate_machine_network
+from spindle_fem.network.operating import operate, tabulate_friction
+from spindle_fem.network.steady import solve_steady
+from spindle_fem.spec.load import load_machine
+
+MACHINES = ("recorded_spindle", "small_two_start", "uncooled")
+
+
+@pytest.fixture(scope="module")
+def spindle():
+    return load_machine("recorded_spindle")
+
+
+@pytest.fixture(scope="module")
+def network(spindle):
+    return build_machine_network(spindle)
+
+
+def test_the_reference_spindle_has_nine_columns_of_eight_nodes(network):
+    columns = [column.name for column in network.partition.columns]
+    assert columns == ["front_end", "F1", "F2", "F2_F3", "F3", "F3_R1", "R1", "R2", "rear_end"]
+    assert network.n_nodes == 72
+    of_column = [sum(name.startswith(f"{column}.") for name in network.node_names) for column in columns]
+    assert of_column == [8] * 9
+
+
+def test_nodes_are_named_by_part(network):
+    of_f1 = {name for name in network.node_names if name.startswith("F1.")}
+    assert of_f1 == {
+        "F1.shaft", "F1.inner_ring", "F1.balls", "F1.outer_ring",
+        "F1.housing.inside", "F1.housing.lands", "F1.coolant", "F1.housing.outside",
+    }  # fmt: skip
+
+
+def test_more_bearings_make_more_columns():
+    network = build_machine_network(load_machine("uncooled"))
+    assert [column.bearing for column in network.partition.columns if column.bearing] == ["F1", "F2", "R1", "R2"]
+    assert network.n_nodes % len(network.partition.columns) == 0
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_volume_and_capacity_are_those_of_the_parts(machine):
+    spec = load_machine(machine)
+    assembly = build_assembly(spec)
+    network = build_machine_network(spec)
+    cells = network.cells
+    full = {
+        part.name: sum(
+            np.pi * (s.outer_radius**2 - s.inner_radius**2) * (s.z_end - s.z_start) for s in part.segments
+        )
+        for part in assembly.parts
+    }
+    if spec.channel is not None:
+        c = spec.channel
+        section = np.pi * ((c.inner_radius + c.depth) ** 2 - c.inner_radius**2)
+        full[c.part] -= section * c.starts * c.width * c.turns
+    for index, name in enumerate(cells.part_names):
+        # shoulders overlap no other segment in these machines
+        assert cells.volume[cells.part == index].sum() == pytest.approx(full[name], rel=1e-9), name
+    materials = [spec.part_material(name).volumetric_heat_capacity for name in cells.part_names]
+    expected = sum(volume * capacity for volume, capacity in zip(full.values(), materials, strict=True))
+    solid = network.capacity[: network.n_solid].sum()
+    assert solid == pytest.approx(expected * spec.heat_capacity_factor.value, rel=1e-9)
+
+
+@pytest.mark.parametrize("channelling", ["smeared", "rings"])
+def test_smeared_helix_and_rings_keep_wetted_area_and_volume(spindle, channelling):
+    network = build_machine_network(spindle, refinement=2, channelling=channelling)
+    # exact area of the reference spindle's channel, end faces apart
+    assert network.coolant.area.sum() == pytest.approx(0.1562, abs=5e-5)
+    smeared = build_machine_network(spindle, refinement=2)
+    assert network.cells.volume.sum() == pytest.approx(smeared.cells.volume.sum(), rel=1e-9)
+
+
+def test_side_walls_are_helicoids(spindle):
+    channel = spindle.channel
+    lead = channel.pitch / (2.0 * np.pi)
+    r = np.linspace(0.108, 0.118, 200_001)
+    middle = 0.5 * (r[1:] + r[:-1])
+    exact = 2.0 * 5.0 * 2.0 * np.pi * float(np.sum(np.hypot(middle, lead) * np.diff(r)))
+    assert side_wall_area(channel, 0.108, 0.118, 5.0) == pytest.approx(exact, rel=1e-9)
+    assert channel_zone(channel) == pytest.approx((0.048, 0.168))
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_energy_balance_closes_to_1e_10(machine):
+    state = solve_machine_network(build_machine_network(load_machine(machine)))
+    assert state.imbalance_relative < 1e-10
+    assert sum(state.boundary_heat.values()) == pytest.approx(state.heat_in, rel=1e-10)
+
+
+@pytest.mark.parametrize("machine", ["recorded_spindle", "small_two_start", "uncooled"])
+def test_jacobian_is_the_derivative_of_the_balance(machine):
+    network = build_machine_network(load_machine(machine))
+    state = solve_machine_network(network)
+    balance = SparseBalance(state.network)
+    temperature = state.temperature + np.random.default_rng(0).normal(size=network.n_nodes)
+    analytic = balance(temperature)[1].toarray()
+    step = 1e-4
+    moved = step * np.eye(network.n_nodes)
+    numeric = np.array([(balance.net_heat(temperature + e) - balance.net_heat(temperature - e)) / (2 * step) for e in moved]).T
+    assert np.abs(analytic - numeric).max() < 1e-6 * np.abs(analytic).max()
+    assert balance.net_heat(temperature) == pytest.approx(balance(temperature)[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("machine", ["recorded_spindle", "small_two_start"])
+def test_the_general_solver_finds_the_same_state(machine):
+    state = solve_machine_network(build_machine_network(load_machine(machine)))
+    ambient = np.full(state.temperature.size, state.network.point.ambient_temperature)
+    general = solve_steady(state.network.thermal_network(), initial=ambient)
+    assert general.temperature == pytest.approx(state.temperature, abs=1e-8)
+    assert general.imbalance_relative < 1e-10
+
+
+def test_coolant_nodes_are_the_enthalpy_march(network):
+    """The march over the walls that the network found gives the network's coolant."""
+    state = solve_machine_network(network)
+    law, loop = state.network.coolant_law, network.coolant.loop
+    h = law.coefficient(state.temperature)
+    link = [(a, b, q) for a, b, kind, q in state.links() if kind == "coolant"]
+    heat = np.bincount([b - network.coolant_start for _, b, _ in link], [q for _, _, q in link])
+    end = state.temperature[network.coolant_start :]
+    start = np.concatenate([[law.inlet], end[:-1]])
+    units = np.bincount(law.cell, law.conductances(h)[0]) / law.capacity_rate
+    units = np.log1p(units)
+    wall = end + (end - start) / np.expm1(units)
+    march = loop.at(state.network.point, wall[None])
+    # the march knows no resistance of metal: compare with its film times the same share
+    assert (march.march.march.mixed_outlet_temperature - law.inlet) > 0.9 * (state.coolant_outlet - law.inlet)
+    assert heat.sum() == pytest.approx(law.capacity_rate * (state.coolant_outlet - law.inlet), rel=1e-10)
+    assert np.diff(np.concatenate([[law.inlet], end])) * law.capacity_rate == pytest.approx(heat, rel=1e-9)
+
+
+def test_a_long_transient_ends_in_the_steady_state(network):
+    point = OperatingPoint.of(network.spec)
+    steady = solve_machine_network(network, point).temperature
+    run = simulate_machine_network(network, np.arange(0.0, 40 * 3600.0 + 1.0, 600.0), [(0.0, point)])
+    assert run.temperature[-1] == pytest.approx(steady, abs=1e-6)
+    assert run.temperature[0] == pytest.approx(np.full(72, point.ambient_temperature))
+
+
+def test_transient_does_not_depend_on_the_step():
+    network = build_machine_network(load_machine("small_two_start"))
+    point = OperatingPoint.of(network.spec)
+    runs = [simulate_machine_network(network, np.arange(0.0, 3600.1, step), [(0.0, point)]) for step in (20.0, 5.0)]
+    assert runs[0].temperature == pytest.approx(runs[1].temperature[::4], abs=5e-3)
+
+
+def test_first_step_of_a_transient_stores_what_goes_in(network):
+    """Heat put in less heat given off is the change of what is stored, over one short step."""
+    point = OperatingPoint.of(network.spec)
+    ambient = np.full(network.n_nodes, point.ambient_temperature)
+    balance = SparseBalance(operate(network, point, heat_model_of(network.spec)))
+    run = simulate_machine_network(network, [0.0, 1e-3], [(0.0, point)])
+    stored = network.capacity @ (run.temperature[1] - ambient)
+    assert stored == pytest.approx(1e-3 * balance.net_heat(ambient).sum(), rel=2e-3)
+
+
+def test_double_heat_doubles_the_rise(network):
+    """Linear machine: table heat, fixed films."""
+    point = OperatingPoint.of(network.spec)
+    model = heat_model_of(network.spec)
+    net = operate(network, point, model)
+    temperature = newton(net, np.full(72, 300.0))[0]
+    matrix, load = SparseBalance(net).matrix, SparseBalance(net).load
+    twice = np.linalg.solve(matrix.toarray(), load + net.heat)
+    none = np.linalg.solve(matrix.toarray(), load - net.heat)
+    assert twice - none == pytest.approx(2.0 * (temperature - none), rel=1e-9)
+
+
+def test_bad_arguments_are_refused_by_name(spindle, network):
+    for wrong in (0, 1.5, True):
+        with pytest.raises(SpecError, match="refinement"):
+            build_machine_network(spindle, refinement=wrong)
+    with pytest.raises(SpecError, match="channelling"):
+        build_machine_network(spindle, channelling="rings")
+    with pytest.raises(SpecError, match='"spiral"'):
+        build_cells(build_assembly(spindle), channelling="spiral")
+    wide = spindle.model_copy(update={"channel": spindle.channel.model_copy(update={"width": 0.025})})
+    with pytest.raises(FaultsError, match="neighbouring turns"):
+        build_machine_network(wide)
+    point = OperatingPoint.of(spindle)
+    for times, schedule, said in (
+        ([0.0, 0.0], [(0.0, point)], "times"),
+        ([0.0, 10.0], [(5.0, point)], "schedule"),
+        ([0.0, 10.0], [(0.0, point), (5.0, point)], "schedule"),
+    ):
+        with pytest.raises(SpecError, match=said):
+            simulate_machine_network(network, times, schedule)
+
+
+def test_a_film_hotter_than_its_table_is_refused():
+    spec = load_machine("small_two_start")
+    network = build_machine_network(spec)
+    point, model = OperatingPoint.of(spec), heat_model_of(spec)
+    net = operate(network, point, model, friction=tabulate_friction(network, point, model))
+    with pytest.raises(OutOfValidityError, match="friction heat of B1"):
+        for law in net.laws:
+            law.require_valid(np.full(network.n_nodes, 500.0))
+
+
+def test_a_machine_that_loses_no_heat_has_no_steady_state(spindle):
+    network = build_machine_network(spindle)
+    net = operate(network, OperatingPoint.of(spindle), heat_model_of(spindle))
+    from dataclasses import replace
+
+    outward = net.second >= network.n_nodes
+    sealed = replace(net, conductance=np.where(outward, 0.0, net.conductance), streams=(np.empty(0, int),) * 2)
+    with pytest.raises(NoSteadyStateError):
+        newton(sealed, np.full(network.n_nodes, 300.0))
