@@ -29,6 +29,9 @@ RELINEARISE_AFTER = 4.0
 RUNAWAY_TEMPERATURE = 600.0
 # Steps between looks at whether films and friction are still inside their tables.
 CHECK_EVERY = 10
+# The second-order part of a step; its own error is a small share of this.
+LARGEST_CORRECTION = 0.02
+SHORTEST_STEP = 1.0e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,22 +116,17 @@ def simulate_machine_network(
     state = np.full(machine.n_nodes, ambient) if initial is None else np.array(initial, dtype=float)
     temperature = np.empty((instants.size, machine.n_nodes))
     temperature[0] = state
-    linearisations, segment = 0, -1
-    propagators: dict[float, _Propagator] = {}
+    segment, stepper, linearisations = -1, None, 0
     for k, step in enumerate(np.diff(instants)):
         current = int(np.searchsorted(starts, instants[k], side="right")) - 1
         if current != segment:
             segment = current
+            linearisations += 0 if stepper is None else stepper.linearisations
             point = schedule[segment][1]
-            network = operate(machine, point, heat_model, friction=tabulate_friction(machine, point, heat_model))
-            balance, propagators = SparseBalance(network), {}
-        length = round(float(step), 9)
-        stored = propagators.get(length)
-        moved = np.inf if stored is None else float(np.abs(state - stored.state).max())
-        if stored is None or (network.laws and moved > RELINEARISE_AFTER):
-            stored = propagators[length] = _Propagator(balance, network, state, length)
-            linearisations += 1
-        state = _advance(stored, balance, state)
+            stepper = _Stepper(
+                operate(machine, point, heat_model, friction=tabulate_friction(machine, point, heat_model))
+            )
+        state = stepper.cross(state, float(step))
         if not np.all(np.isfinite(state)) or state.max() > RUNAWAY_TEMPERATURE:
             raise NoSteadyStateError(
                 machine.spec.name,
@@ -137,16 +135,42 @@ def simulate_machine_network(
             )
         temperature[k + 1] = state
         if k % CHECK_EVERY == 0 or k == instants.size - 2:
-            for law in network.laws:
+            for law in stepper.network.laws:
                 law.require_valid(state)
-    return MachineTransient(instants, temperature, machine.node_names, linearisations)
+    return MachineTransient(instants, temperature, machine.node_names, linearisations + stepper.linearisations)
 
 
-def _advance(propagator: _Propagator, balance: SparseBalance, state: Array) -> Array:
-    """One step: exponential Euler, then the change of what is not linear."""
+class _Stepper:
+    """Steps at one operating point, with the propagators made so far."""
+
+    def __init__(self, network: OperatingNetwork) -> None:
+        self.network, self.balance = network, SparseBalance(network)
+        self.propagators: dict[float, _Propagator] = {}
+        self.linearisations = 0
+
+    def cross(self, state: Array, length: float) -> Array:
+        """Over one interval, in halves where the equations bend too much within it."""
+        after, correction = _advance(self._propagator(state, length), self.balance, state)
+        if correction <= LARGEST_CORRECTION or length <= SHORTEST_STEP:
+            return after
+        return self.cross(self.cross(state, 0.5 * length), 0.5 * length)
+
+    def _propagator(self, state: Array, length: float) -> _Propagator:
+        key = round(length, 9)
+        stored = self.propagators.get(key)
+        moved = np.inf if stored is None else float(np.abs(state - stored.state).max())
+        if stored is None or (self.network.laws and moved > RELINEARISE_AFTER):
+            stored = self.propagators[key] = _Propagator(self.balance, self.network, state, key)
+            self.linearisations += 1
+        return stored
+
+
+def _advance(propagator: _Propagator, balance: SparseBalance, state: Array) -> tuple[Array, float]:
+    """One step: exponential Euler, then the change of what is not linear; and how large that is, K."""
     rate = propagator.inverse_capacity * balance.net_heat(state)
     euler = state + propagator.level @ rate
     if not balance.network.laws:
-        return euler
+        return euler, 0.0
     change = propagator.inverse_capacity * balance.net_heat(euler) - rate - propagator.rate @ (euler - state)
-    return euler + propagator.slope @ change
+    correction = propagator.slope @ change
+    return euler + correction, float(np.abs(correction).max())
