@@ -143,6 +143,42 @@ def bearing(
 
 
 @app.command()
+def crosscheck(machine: Machine, output: Folder, set_: Overrides = None, as_json: AsJson = False) -> None:
+    """Lumped network beside the FEM, node by node, and why they differ."""
+    from spindle_fem.commands import stages
+    from spindle_fem.console import print_crosscheck
+    from spindle_fem.crosscheck.run import crosscheck_machine
+
+    with stages(not as_json) as tell:
+        content = crosscheck_machine(machine, output, overrides=set_ or (), progress=tell)
+    _print_json(content) if as_json else print_crosscheck(content, output)
+
+
+@app.command()
+def simulate(
+    machine: Machine,
+    recording: Annotated[Path, typer.Argument(help="Folder or .toml file of a recording.")],
+    output: Folder,
+    calibrate: Annotated[
+        list[Path] | None,
+        typer.Option("--calibrate", metavar="FILE", help="Recording that may move the uncertain parameters; repeatable."),
+    ] = None,
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """What every channel of a recording should have read, beside what it read."""
+    from spindle_fem.commands import stages
+    from spindle_fem.console import print_simulation
+    from spindle_fem.simulate import simulate_machine
+
+    with stages(not as_json) as tell:
+        content = simulate_machine(
+            machine, recording, output, calibrate=calibrate or (), overrides=set_ or (), progress=tell
+        )
+    _print_json(content) if as_json else print_simulation(content, output)
+
+
+@app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier command.")],
 ) -> None:

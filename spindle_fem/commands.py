@@ -58,7 +58,7 @@ def run_machine(
 
     started = time.perf_counter()
     spec = _load_buildable(machine, overrides)
-    with output_folder(folder) as place, _stages(progress) as tell:
+    with output_folder(folder) as place, stages(progress) as tell:
         result = solve_prepared(prepare_machine(spec, progress=tell), progress=tell)
         if estimate_mesh_error:
             tell("second mesh")
@@ -193,7 +193,7 @@ def _load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpe
 
 
 @contextlib.contextmanager
-def _stages(show: bool) -> Iterator[Any]:
+def stages(show: bool) -> Iterator[Any]:
     """Stage names on the terminal while they run."""
     if not show:
         yield lambda stage: None

@@ -137,3 +137,28 @@ def print_bearing(content: dict[str, Any]) -> None:
         for ball in balls:
             table.add_row(*("–" if ball[key] is None else f"{ball[key]:.4g}" for key in keys))
         console.print(table)
+
+
+def print_crosscheck(content: dict[str, Any], folder: Path) -> None:
+    """Largest differences between network and elements."""
+    console = _console()
+    table = _table("Largest differences", "node", "network °C", "FEM °C", "difference K")
+    for node in sorted(content["nodes"], key=lambda item: -abs(item["difference_K"]))[:12]:
+        table.add_row(
+            node["node"],
+            _number(node["network_degC"], 2),
+            _number(node["fem_degC"], 2),
+            _number(node["difference_K"], 2),
+        )
+    console.print(table)
+    console.print(f"{len(content['nodes'])} nodes, {len(content['links'])} links; report: {folder / 'report.html'}")
+
+
+def print_simulation(content: dict[str, Any], folder: Path) -> None:
+    """Error of every temperature channel."""
+    console = _console()
+    table = _table("Channels", "channel", "rmse K", "noise K")
+    for channel in content["channels"]:
+        table.add_row(channel["channel"], _number(channel["rmse_K"], 3), _number(channel["noise_K"], 3))
+    console.print(table)
+    console.print(f"Files: {folder}")
