@@ -126,7 +126,9 @@ def test_whitened_errors_have_unit_variance_and_no_memory(recording):
     slow = SlowError(0.2, 900.0)
     white = []
     for _ in range(200):
-        error = slow_error(rng, recording.times, slow.sigma, slow.time) + rng.normal(0, 0.1, recording.times.size)
+        error = slow_error(rng, recording.times, slow.sigma, slow.time) + rng.normal(
+            0, 0.1, recording.times.size
+        )
         white.append(whiten(bins.factor(slow), bins.average(error)))
     white = np.array(white)
     assert white.var() == pytest.approx(1.0, abs=0.05)

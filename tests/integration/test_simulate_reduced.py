@@ -1,0 +1,217 @@
+"""The reduced model of a meshed machine against the full model, and the way to its files."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.coupling import prepare_machine, solve_coupled
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.history import InputHistory
+from spindle_fem.reduced.affine import build_affine_system
+from spindle_fem.reduced.build import ReductionOptions, build_reduced_model, reduced_model_of
+from spindle_fem.reduced.drive import STANDARD, make_drive
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.transient import simulate_fast
+from spindle_fem.simulate import fast_model_for, simulate_machine
+from spindle_fem.spec.load import load_machine
+from spindle_fem.spec.parameters import with_parameters
+from spindle_fem.transients.run import TransientOptions, simulate_full
+
+RPM = np.pi / 30.0
+OVERRIDES = ("mesh.preset=coarse", "mesh.order=1")
+HELD = np.array([True, True, False, False, True])
+FLOW = 20.0e-3 / 60.0
+
+
+@pytest.fixture(scope="module")
+def machine():
+    """The recorded spindle, linear temperatures on the coarse mesh: small enough for direct solves."""
+    return prepare_machine(load_machine("recorded_spindle", OVERRIDES))
+
+
+@pytest.fixture(scope="module")
+def fast(machine):
+    return FastModel(build_reduced_model(machine), machine.spec)
+
+
+def history(times, speed, ambient, inlet):
+    columns = [speed, 1750.0, ambient, inlet, FLOW]
+    return np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), times.shape) for c in columns])
+
+
+def test_its_own_check_is_within_what_was_asked(fast):
+    assert fast.model.errors["probes"] <= ReductionOptions().error
+    assert fast.model.size <= ReductionOptions().largest
+
+
+def test_every_operator_conserves_heat(machine):
+    affine = build_affine_system(machine)
+    one = np.ones(affine.size)
+    for name, matrix in zip(affine.coefficient_names, affine.operators, strict=True):
+        leaving = matrix @ one
+        if name in affine.fluid_load:
+            surface = name.removeprefix("film.")
+            area = machine.operators.surface_area(surface)
+            assert leaving.sum() == pytest.approx(area, rel=1e-12), name
+        else:
+            assert np.abs(leaving).max() < 1e-12 * np.abs(matrix).max(), name
+    assert affine.cell_load.sum() == pytest.approx(affine.cell_area.sum(), rel=1e-12)
+
+
+def test_reduced_operators_are_positive_and_hold_the_uniform_field(fast):
+    model = fast.model
+    for name, matrix in zip(model.coefficient_names, model.operators, strict=True):
+        values = np.linalg.eigvalsh(matrix)
+        assert values[0] > -1e-9 * max(values[-1], 1e-300), name
+    assert model.probes @ model.one == pytest.approx(1.0, abs=1e-9)
+    assert model.places @ model.one == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("speed", "inlet", "factors"),
+    [
+        (3000.0, 288.15, {}),
+        (4500.0, 303.15, {"joint.rear_outer_ring_seats": 0.5, "film.outside": 1.6, "heat.front": 1.15}),
+    ],
+)
+def test_its_steady_state_is_that_of_the_coupled_full_model(machine, fast, speed, inlet, factors):
+    point = replace(
+        OperatingPoint.of(machine.spec),
+        speed=speed * RPM,
+        coolant_inlet_temperature=inlet,
+        ambient_temperature=293.15,
+        coolant_flow=FLOW,
+    )
+    spec = with_parameters(machine.spec, factors)
+    full = solve_coupled(prepare_machine(spec), point)
+    times = np.linspace(0.0, 4.0e6, 8000)
+    values = history(times, speed * RPM, 293.15, inlet)
+    drive = make_drive(times, STANDARD, values, HELD, largest_step=1.0e4)
+    run = simulate_fast(fast, drive, 293.15, parameters=factors)
+    outlet = full.coolant.march.march.mixed_outlet_temperature
+    assert run.temperature[-1, fast.channels.index("COOLANT_OUT")] == pytest.approx(outlet, abs=2e-3)
+    state = machine.field_state(full.solution.temperature, {})
+    for name in ("F1.inner_raceway", "F2.outer_raceway", "R2.inner_raceway", "housing.gap", "shaft.nose_end"):
+        expected = machine.builder.surface_mean(name, state)
+        assert fast.model.place(name) @ run.states[-1] == pytest.approx(expected, abs=5e-3), name
+
+
+def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fast):
+    times = np.arange(0.0, 5401.0, 20.0)
+    speed = RPM * np.select([times < 600, times < 2400, times < 4200], [0.0, 3000.0, 4500.0], 500.0)
+    values = history(times, speed, 293.15 + 1e-4 * times, 290.0 + 0.5 * np.sin(times / 1000.0))
+    inputs = InputHistory(times, STANDARD, values, HELD)
+    samples = np.arange(0.0, 5401.0, 60.0)
+    full = simulate_full(machine, inputs, sample_times=samples, options=TransientOptions(error=0.01))
+    run = simulate_fast(fast, make_drive(times, STANDARD, values, HELD), 293.15)
+    for probe in full.probes:
+        reduced = run.temperature[::3, fast.channels.index(probe)]
+        assert np.abs(reduced - full.reading(probe)).max() < 0.02, probe
+    assert np.ptp(full.reading("SP05")) > 3.0
+
+
+def test_it_is_found_again_in_the_cache(machine, monkeypatch, tmp_path):
+    monkeypatch.setenv("SPINDLE_FEM_CACHE", str(tmp_path))
+    small = ReductionOptions(samples=1, checks=1, sigmas=0.1, tolerance=1e-3, error=5.0, largest=60)
+    from spindle_fem.reduced import build
+
+    monkeypatch.setattr(build, "prepare_machine", lambda spec, progress=None: machine)
+    first = reduced_model_of(machine.spec, options=small)
+    stages = []
+    again = reduced_model_of(machine.spec, options=small, progress=stages.append)
+    assert stages == []
+    assert np.array_equal(first.operators, again.operators)
+    assert reduced_model_of(machine.spec, options=replace(small, tolerance=1e-2)).digest != first.digest
+
+
+MANIFEST = """
+schema = "spindle-fem/recording/1"
+name = "made"
+data = "made.csv"
+time = {column = "time", unit = "s"}
+[[channel]]
+column = "rear seat"
+role = "temperature"
+probe = "SP05"
+unit = "degC"
+sigma = 0.1
+[[channel]]
+column = "oil"
+role = "temperature"
+probe = "COOLANT_OUT"
+unit = "degC"
+sigma = 0.1
+[[channel]]
+column = "n"
+role = "input"
+drives = "speed"
+unit = "rpm"
+hold = "previous"
+[[channel]]
+column = "room"
+role = "input"
+drives = "ambient"
+unit = "degC"
+"""
+
+
+@pytest.fixture(scope="module")
+def made(fast, tmp_path_factory):
+    """A recording of a spindle whose rear bearings make 15 % more heat than the definition says."""
+    folder = tmp_path_factory.mktemp("made")
+    times = np.arange(0.0, 9000.0, 30.0)
+    speed = np.where((times > 600) & (times < 6000), 3000.0, 0.0)
+    values = history(times, speed * RPM, 293.15, OperatingPoint.of(fast.spec).coolant_inlet_temperature)
+    exact = simulate_fast(
+        fast, make_drive(times, STANDARD, values, HELD), 293.15, parameters={"heat.rear": 1.15}
+    ).temperature
+    noise = np.random.default_rng(3).normal(0.0, 0.1, exact.shape)
+    read = exact + noise - 273.15
+    frame = pd.DataFrame({"time": times, "n": speed, "room": 20.0})
+    frame["rear seat"] = read[:, fast.channels.index("SP05")]
+    frame["oil"] = read[:, fast.channels.index("COOLANT_OUT")]
+    frame.to_csv(folder / "made.csv", index=False)
+    (folder / "recording.toml").write_text(MANIFEST)
+    return folder
+
+
+def test_simulate_writes_what_every_channel_should_have_read(fast, made, tmp_path, monkeypatch):
+    monkeypatch.setattr("spindle_fem.simulate.reduced_model_of", lambda spec, **options: fast.model)
+    folder = tmp_path / "out"
+    plain = simulate_machine("recorded_spindle", made, folder, overrides=OVERRIDES)
+    assert json.loads((folder / "simulation.json").read_text())["channels"] == plain["channels"]
+    table = pd.read_csv(folder / "simulated.csv")
+    assert list(table.columns) == ["time_s", "rear seat", "oil"]
+    assert len(table) == 300
+    assert not (folder / "calibrated_machine.toml").exists()
+    assert (folder / "figures" / "residual_rear_seat.png").stat().st_size > 10_000
+    assert any('"thrust" is not recorded' in note for note in plain["notes"])
+    errors = {row["channel"]: row["rmse_K"] for row in plain["channels"]}
+    assert errors["rear seat"] > 0.3
+    fitted = simulate_machine("recorded_spindle", made, folder, calibrate=[made], overrides=OVERRIDES)
+    errors = {row["channel"]: row["rmse_K"] for row in fitted["channels"]}
+    assert errors["rear seat"] < 0.12
+    assert 0.84 < fitted["channels"][0]["inside_90_percent_interval"] < 0.97
+    rear = next(item for item in fitted["calibration"]["parameters"] if item["name"] == "heat.rear")
+    assert rear["low"] < 1.15 < rear["high"]
+    # The written machine predicts the same without a fit of its own.
+    again = simulate_machine(folder / "calibrated_machine.toml", made, tmp_path / "again")
+    assert again["channels"][0]["rmse_K"] == pytest.approx(errors["rear seat"], abs=2e-3)
+
+
+def test_speeds_beyond_the_table_get_a_range_of_their_own(fast, monkeypatch):
+    asked = []
+
+    def remember(spec, *, options, progress):
+        asked.append(options)
+        return fast.model
+
+    monkeypatch.setattr("spindle_fem.simulate.reduced_model_of", remember)
+    for speed in (4000.0, 6000.0):
+        recording = type("R", (), {"input_names": ("speed",), "inputs": np.array([[speed * RPM]])})()
+        fast_model_for(fast.spec, [recording])
+    assert asked[0].highest_speed is None
+    assert asked[1].highest_speed == pytest.approx(6000.0 * RPM)
