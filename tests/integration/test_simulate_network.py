@@ -1,0 +1,140 @@
+"""``simulate`` on a machine without drawings."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.errors import BadInputError, RecordingError
+from spindle_fem.simulate import simulate_machine
+
+MACHINE = """
+schema = "spindle-fem/machine/1"
+name = "two lumps"
+[[network.node]]
+name = "winding"
+capacity = {value = "300 J/K", sigma_rel = 0.4}
+[[network.node]]
+name = "body"
+capacity = {value = "900 J/K", sigma_rel = 0.4}
+[[network.boundary]]
+name = "ambient"
+temperature = "ambient"
+[[network.link]]
+between = ["winding", "body"]
+conductance = {value = "2 W/K", sigma_rel = 0.5}
+[[network.link]]
+between = ["body", "ambient"]
+conductance = {value = "1 W/K", sigma_rel = 0.5}
+[[network.source]]
+node = "winding"
+input = "power"
+gain = "1 W/W"
+"""
+
+MANIFEST = """
+schema = "spindle-fem/recording/1"
+name = "made"
+data = "made.csv"
+time = {column = "time", unit = "s"}
+[[channel]]
+column = "W"
+role = "temperature"
+probe = "winding"
+unit = "degC"
+sigma = 0.1
+[[channel]]
+column = "B"
+role = "temperature"
+probe = "body"
+unit = "degC"
+sigma = 0.1
+[[channel]]
+column = "P"
+role = "input"
+drives = "power"
+unit = "W"
+hold = "previous"
+[[channel]]
+column = "room"
+role = "input"
+drives = "ambient"
+unit = "degC"
+"""
+
+# winding and body [J/K], between them and to the room [W/K]
+TRUE = (400.0, 700.0, 1.5, 1.4)
+
+
+def record(folder: Path, seed: int, power) -> Path:
+    """Readings of the true machine: explicit Euler with steps far below its time constants."""
+    folder.mkdir()
+    times = np.arange(0.0, 6000.0, 20.0)
+    state, rows = np.array([20.0, 20.0]), []
+    for time in times:
+        rows.append(state.copy())
+        for _ in range(200):
+            between = TRUE[2] * (state[0] - state[1])
+            out = TRUE[3] * (state[1] - 20.0)
+            state = state + 0.1 * np.array([(power(time) - between) / TRUE[0], (between - out) / TRUE[1]])
+    read = np.array(rows) + np.random.default_rng(seed).normal(0.0, 0.1, (times.size, 2))
+    frame = pd.DataFrame({"time": times, "W": read[:, 0], "B": read[:, 1], "room": 20.0})
+    frame["P"] = [power(time) for time in times]
+    frame.to_csv(folder / "made.csv", index=False)
+    (folder / "recording.toml").write_text(MANIFEST)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("network")
+    (folder / "machine.toml").write_text(MACHINE)
+    first = record(folder / "first", 1, lambda t: 30.0 if t < 3000 else 0.0)
+    second = record(folder / "second", 2, lambda t: 15.0 if t > 1000 else 40.0)
+    return folder / "machine.toml", first, second
+
+
+def test_a_calibrated_network_predicts_another_recording(files, tmp_path):
+    machine, first, second = files
+    plain = simulate_machine(machine, second, tmp_path / "plain")
+    fitted = simulate_machine(machine, second, tmp_path / "fitted", calibrate=[first])
+    assert max(row["rmse_K"] for row in plain["channels"]) > 1.0
+    for row in fitted["channels"]:
+        assert row["rmse_K"] < 0.13
+        assert 0.8 < row["inside_90_percent_interval"] < 1.0
+    true = dict(zip(("capacity.winding", "capacity.body"), TRUE[:2], strict=True))
+    true |= {"conductance.winding|body": TRUE[2], "conductance.body|ambient": TRUE[3]}
+    for item in fitted["calibration"]["parameters"]:
+        if item["name"] in true:
+            assert item["low"] * 0.99 < true[item["name"]] < item["high"] * 1.01, item
+    # The network's own calibrated file predicts what the fit did.
+    again = simulate_machine(tmp_path / "fitted" / "calibrated_machine.toml", second, tmp_path / "again")
+    assert [row["rmse_K"] for row in again["channels"]] == pytest.approx(
+        [row["rmse_K"] for row in fitted["channels"]], abs=1e-6
+    )
+    written = json.loads((tmp_path / "fitted" / "simulation.json").read_text())
+    assert written["schema"] == "spindle-fem/simulation/1"
+    assert {"channel", "rmse_K", "noise_K"} <= set(written["channels"][0])
+    errors = pd.read_csv(tmp_path / "fitted" / "error_table.csv")
+    assert set(errors["condition"]) >= {"all", "heating", "cooling"}
+
+
+def test_overrides_reach_the_network(files, tmp_path):
+    machine, first, _ = files
+    text = "network.node.body.capacity=1 J/K"
+    changed = simulate_machine(machine, first, tmp_path / "changed", overrides=[text])
+    plain = simulate_machine(machine, first, tmp_path / "plain")
+    assert changed["channels"][1]["rmse_K"] != pytest.approx(plain["channels"][1]["rmse_K"], rel=0.01)
+
+
+def test_a_bad_recording_leaves_no_folder(files, tmp_path):
+    machine, first, _ = files
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / "recording.toml").write_text(MANIFEST)
+    (broken / "made.csv").write_text("time,W\n0,x\n")
+    with pytest.raises((RecordingError, BadInputError)):
+        simulate_machine(machine, broken, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
