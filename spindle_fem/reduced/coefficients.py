@@ -33,12 +33,15 @@ class CoefficientTable:
         Mean radius of the turning side and of what faces it.
     groups : mapping of coefficient to tuple of str
         Names whose factors multiply it: its own, and that of its group.
+    names : tuple of str
+        Every name that a factor may have.
     """
 
     spec: MachineSpec
     contacts: tuple[str, ...]
     gap_radii: Mapping[str, tuple[float, float]]
     groups: Mapping[str, tuple[str, ...]]
+    names: tuple[str, ...]
 
     def base(self, point: OperatingPoint) -> dict[str, float]:
         """Every coefficient at an operating point, SI; only films and gaps depend on it."""
@@ -80,14 +83,6 @@ class CoefficientTable:
         """Names whose factors multiply a bearing's friction heat."""
         owner = next(group.name for group, item in self.spec.bearings if item.name == bearing)
         return (f"heat.{bearing}", f"heat.{owner}")
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Every name that a factor may have."""
-        found = dict.fromkeys(name for names in self.groups.values() for name in names)
-        for _, bearing in self.spec.bearings:
-            found |= dict.fromkeys(self.heat_groups(bearing.name))
-        return (*found, INNER_SHARE)
 
     def targets(self, parameter: str) -> tuple[str, ...]:
         """Factors that a parameter stands for: a shared factor's, or its own name.
@@ -161,7 +156,10 @@ def build_coefficient_table(
     for _, bearing in spec.bearings:
         name = f"capacity.{bearing.name}.balls"
         groups[name] = (name, "heat_capacity_factor")
-    return CoefficientTable(spec, names, dict(gap_radii), groups)
+    known = dict.fromkeys(name for entry in groups.values() for name in entry)
+    for group, bearing in spec.bearings:
+        known |= dict.fromkeys((f"heat.{bearing.name}", f"heat.{group.name}"))
+    return CoefficientTable(spec, names, dict(gap_radii), groups, (*known, INNER_SHARE))
 
 
 def gap_radii_of(machine: PreparedMachine) -> dict[str, tuple[float, float]]:

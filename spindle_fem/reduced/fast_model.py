@@ -74,6 +74,7 @@ class FastModel:
         )
         self._point_rows = [row for row, probe in enumerate(spec.probe) if probe.kind == "point"]
         self._base: dict[tuple[float, float], dict[str, float]] = {}
+        self._films: dict[tuple[float, float], tuple[Array, float, float]] = {}
         self.loop = CoolantLoop(spec, model.channel_cells()) if spec.channel is not None else None
         self.fixed_fluids = tuple(
             dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
@@ -119,13 +120,20 @@ class FastModel:
         Film and properties at inlet temperature; where the definition asks for
         those at bulk temperature, this is the first step of that iteration.
         """
-        wall = np.full(self.model.cell_area.shape, point.coolant_inlet_temperature)
         flow = point.coolant_flow * changes.get(FLOW, 1.0)
-        state = self.loop.at(replace(point, coolant_flow=flow), wall)
-        rate = float(state.march.mass_flow * np.mean(state.march.march.specific_heat_capacity))
-        friction = float(state.march.march.pumping_heat.sum()) if self.spec.coolant.pumping_heat else 0.0
-        scale = self.table.scale(CHANNEL_FILM, factors) * changes.get(CHANNEL_FILM, 1.0)
-        return state.film_coefficient.ravel() * scale, rate, friction
+        key = (flow, point.coolant_inlet_temperature)
+        if key not in self._films:
+            wall = np.full(self.model.cell_area.shape, point.coolant_inlet_temperature)
+            state = self.loop.at(replace(point, coolant_flow=flow), wall)
+            rate = float(state.march.mass_flow * np.mean(state.march.march.specific_heat_capacity))
+            friction = float(state.march.march.pumping_heat.sum()) if self.spec.coolant.pumping_heat else 0.0
+            self._films[key] = (state.film_coefficient.ravel(), rate, friction)
+        film, rate, friction = self._films[key]
+        return (
+            film * (self.table.scale(CHANNEL_FILM, factors) * changes.get(CHANNEL_FILM, 1.0)),
+            rate,
+            friction,
+        )
 
     def coefficients(
         self, point: OperatingPoint, factors: Mapping[str, float], changes: Mapping[str, float] = NO_CHANGES

@@ -130,18 +130,24 @@ def sensitivity_forcing(
     (n, r) ndarray
     """
     weight = SHARE * propagator.step
-    first = np.zeros_like(before)
-    second = np.zeros_like(before)
+    carried, inverse = propagator.carried, propagator.inverse
+    found = np.zeros_like(before)
     if conduction_by is not None:
-        first -= weight * (before + stage) @ conduction_by.T
-        second -= weight * after @ conduction_by.T
+        if len(before) > len(inverse):
+            # Many steps: small products first.
+            found -= (before + stage) @ (weight * carried @ conduction_by).T
+            found -= after @ (weight * inverse @ conduction_by).T
+        else:
+            found -= weight * (
+                (before + stage) @ conduction_by.T @ carried.T + after @ conduction_by.T @ inverse.T
+            )
     if storage_by is not None:
-        first += (before - stage) @ storage_by.T
-        second += (STAGE_WEIGHT * stage - START_WEIGHT * before - after) @ storage_by.T
+        found += (before - stage) @ (carried @ storage_by).T
+        found += (STAGE_WEIGHT * stage - START_WEIGHT * before - after) @ (inverse @ storage_by).T
     if load_start is not None:
-        first += weight * ((2.0 - GAMMA) * load_start + GAMMA * load_end)
-        second += weight * load_end
-    return first @ propagator.carried.T + second @ propagator.inverse.T
+        found += (weight * ((2.0 - GAMMA) * load_start + GAMMA * load_end)) @ carried.T
+        found += (weight * load_end) @ inverse.T
+    return found
 
 
 def group_steps(step_class: NDArray[np.int64], steps: Array) -> Mapping[tuple[int, float], NDArray[np.int64]]:
