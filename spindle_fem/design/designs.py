@@ -310,6 +310,32 @@ def plan_designs(study: Study, axes: Sequence[Axis], where: str = "study") -> tu
     return tuple(designs)
 
 
+def reference_designs(
+    study: Study, axes: Sequence[Axis], content: Mapping[str, Any], where: str, first: int
+) -> tuple[Design, ...]:
+    """Designs of the ``[[reference]]`` tables, numbered from ``first``.
+
+    Raises
+    ------
+    SpecError
+        A value of the wrong kind.
+    """
+    designs = []
+    for position, reference in enumerate(study.reference):
+        place = f"{where}: reference[{position + 1}].values"
+        choices = [
+            _listed(
+                axis.path,
+                reference.values[axis.path],
+                annotation_at(content, axis.path),
+                f"{place}.{axis.path}",
+            )
+            for axis in axes
+        ]
+        designs.append(make_design(first + position, choices, axes))
+    return tuple(designs)
+
+
 def make_design(number: int, choices: Sequence[Choice], axes: Sequence[Axis]) -> Design:
     """Design of one choice an axis."""
     return Design(

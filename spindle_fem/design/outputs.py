@@ -119,8 +119,8 @@ def output_fault(path: str, spec: MachineSpec, where: str) -> UnknownKeyError | 
 def unit_of(path: str) -> OutputUnit:
     """Unit of an output.
 
-    >>> unit_of("bearings.F2.ring_difference_K").text, unit_of("probes.SP01").text, unit_of("coolant.reynolds").text
-    ('K', '°C', '')
+    >>> [unit_of(path).text for path in ("bearings.F2.ring_difference_K", "probes.SP01", "coolant.reynolds")]
+    ['K', '°C', '']
     """
     if path.startswith("probes."):
         return _CELSIUS

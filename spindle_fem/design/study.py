@@ -127,6 +127,15 @@ class Objective(SpecModel):
     """What is better."""
 
 
+class Reference(SpecModel):
+    """A design to compare with, solved besides those of the plan."""
+
+    name: str
+    """For the report."""
+    values: dict[str, Any]
+    """A value for every parameter of the study, by path, with its unit."""
+
+
 class Search(SpecModel):
     """Further designs inside the ranges, chosen from what the first ones gave."""
 
@@ -153,6 +162,8 @@ class Study(SpecModel):
     """Limits that a design must keep."""
     objective: tuple[Objective, ...] = ()
     """What the designs are judged by."""
+    reference: tuple[Reference, ...] = ()
+    """Designs to compare with."""
     search: Search | None = None
     """Further designs; needs an objective."""
 
@@ -174,6 +185,19 @@ class Study(SpecModel):
             )
         if self.search is not None and not self.objective:
             faults.append(Fault("search", "has nothing to search for.", "Add an [[objective]]."))
+        if self.search is not None and self.study.speeds:
+            faults.append(Fault("search", "is given together with study.speeds.", "Search at one speed."))
+        wanted = {*paths, *(("operation.speed",) if self.study.speeds else ())}
+        for position, reference in enumerate(self.reference):
+            odd = wanted ^ set(reference.values)
+            if odd:
+                faults.append(
+                    Fault(
+                        f"reference[{position + 1}].values",
+                        f"and the parameters differ in {', '.join(sorted(odd))}.",
+                        "Give a value for every parameter, and no other.",
+                    )
+                )
         if self.search is not None and not any(item.is_range for item in self.parameter):
             faults.append(Fault("search", "has no range to search in.", "Give low and high of a parameter."))
         raise_faults(faults)
@@ -183,14 +207,10 @@ class Study(SpecModel):
         faults = []
         sampled = self.study.design != "grid"
         kinds = {item.sample for item in self.parameter if item.sample is not None}
-        if sampled and kinds - {self.study.design}:
-            faults.append(
-                Fault(
-                    "parameter",
-                    f'asks for sample = "{(kinds - {self.study.design}).pop()}" in a design = "{self.study.design}".',
-                    "Leave sample out, or let both agree.",
-                )
-            )
+        odd = min(kinds - {self.study.design}, default="") if sampled else ""
+        if odd:
+            what = f'asks for sample = "{odd}" in design = "{self.study.design}".'
+            faults.append(Fault("parameter", what, "Leave sample out, or let both agree."))
         if not sampled and len(kinds) > 1:
             faults.append(
                 Fault("parameter", "asks for two kinds of sample.", "Allowed: one kind in a study.")

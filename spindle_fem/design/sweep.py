@@ -10,20 +10,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.design.designs import Axis, Design, build_axes, plan_designs
+from spindle_fem.design.designs import Axis, Design, build_axes, plan_designs, reference_designs
 from spindle_fem.design.evaluate import DesignTask, Question, TaskBuilder
 from spindle_fem.design.judge import Limit, judged, limits_of
+from spindle_fem.design.optimise import search_designs
 from spindle_fem.design.outputs import WORDS, output_fault
 from spindle_fem.design.run import run_tasks
 from spindle_fem.design.study import Study, load_study
-from spindle_fem.design.table import FAILED, IMPOSSIBLE, OK, RESULTS, ResultTable, Row
+from spindle_fem.design.summary import summarise
+from spindle_fem.design.table import RESULTS, ResultTable, Row
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
 from spindle_fem.reporting.output import output_folder, replace_text
-from spindle_fem.results.summary import package_versions
+from spindle_fem.reporting.sweep_report import write_sweep_report
 from spindle_fem.spec.load import apply_overrides, find_machine, load_machine, read_definition, write_machine
 from spindle_fem.spec.model import MachineSpec
 
-SWEEP_SCHEMA = "spindle-fem/sweep/1"
 SUMMARY_FILE, STUDY_FILE, MACHINE_FILE = "sweep.json", "study.toml", "machine.toml"
 # Rows that stand in the table for designs of a study, besides parameters and outputs.
 _HEAD, _TAIL = ("design",), ("status", "reason", "feasible", "geometry", "key")
@@ -45,7 +46,10 @@ class PreparedStudy:
     limits : tuple of Limit
     question : Question
     tasks : tuple of DesignTask
-        The planned designs in order.
+        The planned designs in order, then those to compare with.
+    references : mapping of str to int
+        Number of each design to compare with, by its name.
+    builder : TaskBuilder
     """
 
     name: str
@@ -56,11 +60,18 @@ class PreparedStudy:
     limits: tuple[Limit, ...]
     question: Question
     tasks: tuple[DesignTask, ...]
+    references: Mapping[str, int]
+    builder: TaskBuilder
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of the table."""
         return (*_HEAD, *(axis.path for axis in self.axes), *self.question.columns, *_TAIL)
+
+    @property
+    def size(self) -> int:
+        """Number of designs, those of a search included."""
+        return len(self.tasks) + (self.study.search.trials if self.study.search is not None else 0)
 
 
 def sweep_machine(
@@ -109,25 +120,37 @@ def sweep_machine(
     started = time.perf_counter()
     prepared = prepare_study(machine, study, overrides)
     _require_own_table(Path(folder), prepared.columns)
-    with output_folder(folder) as place, _progress(progress, len(prepared.tasks)) as tell:
+    with output_folder(folder) as place, _progress(progress, prepared.size) as tell:
         replace_text(place / MACHINE_FILE, write_machine(prepared.spec))
         replace_text(place / STUDY_FILE, Path(study).read_text(encoding="utf-8"))
         table = ResultTable(place, prepared.columns)
         before = set(table.rows)
         tasks = list(prepared.tasks)
 
-        def solve(batch: Sequence[DesignTask]) -> None:
+        def solve(batch: Sequence[DesignTask]) -> list[Row]:
             _solve_missing(batch, prepared, table, tell, jobs=jobs, scheduler=scheduler)
+            return [
+                table.rows[task.key] | head
+                for task, head in zip(batch, _heads(table, batch, prepared), strict=True)
+            ]
 
-        solve(tasks)
-        rows = _final_rows(table, tasks, prepared.limits)
+        rows = solve(tasks)
+        if prepared.study.search is not None:
+
+            def attempt(designs: Sequence[Design]) -> list[Row]:
+                batch = [prepared.builder.task(design) for design in designs]
+                tasks.extend(batch)
+                return solve(batch)
+
+            search_designs(prepared.study, prepared.axes, prepared.limits, rows, attempt)
+        rows = table.finish(_heads(table, tasks, prepared))
         reused = len({task.key for task in tasks} & before)
-        rows = table.finish(rows)
-        summary = _summary(prepared, rows, reused=reused)
+        summary = summarise(prepared, rows, reused=reused)
         summary["wall_time_s"] = time.perf_counter() - started
         replace_text(
             place / SUMMARY_FILE, json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
         )
+        write_sweep_report(place, summary, rows, prepared.spec)
     return summary
 
 
@@ -159,14 +182,17 @@ def prepare_study(machine: str | Path, study: str | Path, overrides: Iterable[st
         raise FaultsError(where, faults)
     question = Question(read.judged, read.study.film_uncertainty)
     builder = TaskBuilder(content, question)
-    tasks = tuple(builder.task(design) for design in plan_designs(read, axes, where))
+    designs = plan_designs(read, axes, where)
+    compared = reference_designs(read, axes, content, where, len(designs) + 1)
+    tasks = tuple(builder.task(design) for design in (*designs, *compared))
     if all(task.spec is None for task in tasks):
         reasons = "; ".join(dict.fromkeys(task.reason for task in tasks[:3]))
         raise SpecError(
             where, f"none of its {len(tasks)} designs is possible: {reasons}", "Change the parameters."
         )
     name = read.name or Path(study).stem
-    return PreparedStudy(name, read, spec, content, axes, limits, question, tasks)
+    references = {item.name: one.number for item, one in zip(read.reference, compared, strict=True)}
+    return PreparedStudy(name, read, spec, content, axes, limits, question, tasks, references, builder)
 
 
 def _output_faults(study: Study, spec: MachineSpec, where: str) -> list[SpindleFemError]:
@@ -232,36 +258,17 @@ def _solve_missing(
     run_tasks(list(missing.values()), prepared.question, land, jobs=jobs, scheduler=scheduler)
 
 
-def _final_rows(table: ResultTable, tasks: Sequence[DesignTask], limits: Sequence[Limit]) -> list[Row]:
-    """What each row gets from the study as it is now: its place, its design, and the verdict of the limits."""
+def _heads(table: ResultTable, tasks: Sequence[DesignTask], prepared: PreparedStudy) -> list[Row]:
+    """What each row gets from the study as it is now: its place, its design, the verdict of the limits."""
     return [
         {
             "design": task.design.number,
             **task.design.values,
             "key": task.key,
-            **judged(table.rows[task.key], limits),
+            **judged(table.rows[task.key], prepared.limits),
         }
         for task in tasks
     ]
-
-
-def _summary(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> dict[str, Any]:
-    statuses = [row["status"] for row in rows]
-    return {
-        "schema": SWEEP_SCHEMA,
-        "study": prepared.name,
-        "machine": prepared.spec.name,
-        "parameters": [{"path": axis.path, "unit": axis.unit} for axis in prepared.axes],
-        "outputs": list(prepared.question.outputs),
-        "designs": len(rows),
-        "ok": statuses.count(OK),
-        "failed": statuses.count(FAILED),
-        "impossible": statuses.count(IMPOSSIBLE),
-        "feasible": sum(row["feasible"] == "yes" for row in rows),
-        "geometries": len({row["geometry"] for row in rows if row["geometry"]}),
-        "reused_rows": reused,
-        "versions": package_versions(),
-    }
 
 
 @contextlib.contextmanager

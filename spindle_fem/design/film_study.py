@@ -1,0 +1,120 @@
+"""The paper's choice of depth and oil temperature, by its equations and by those of a helical duct."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.coolant.film_map import FilmMap, film_map
+from spindle_fem.coolant.friction import channel_pressure_drop
+from spindle_fem.coolant.properties import coolant_by_name
+from spindle_fem.coolant.section import ChannelSection
+from spindle_fem.coolant.transition import critical_reynolds_schmidt
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.units import ZERO_CELSIUS_K
+
+PAPER_DEPTH, PAPER_TEMPERATURE = 19.0e-3, 31.0 + ZERO_CELSIUS_K
+# The paper takes Re on the depth and calls it turbulent from here.
+PAPER_CRITICAL_REYNOLDS = 2300.0
+DEPTHS = np.linspace(5.0e-3, 30.0e-3, 51)
+TEMPERATURES = np.linspace(10.0, 40.0, 61) + ZERO_CELSIUS_K
+MODELS = {"paper": "the paper's equations 30 and 31", "helical": "helical duct"}
+
+
+@dataclass(frozen=True, slots=True)
+class FilmChart:
+    """One film map with what the pump must do.
+
+    Attributes
+    ----------
+    model : str
+        A key of ``MODELS``.
+    held : str
+        "velocity" or "flow".
+    amount : float
+        What is held, m/s or m³/s.
+    chart : FilmMap
+    pressure_drop : (n_depths, n_temperatures) ndarray, [Pa]
+        From port to port without the ports.
+    pumping_power : (n_depths, n_temperatures) ndarray, [W]
+    best : (float, float), [m], [K]
+        Depth and temperature of the largest coefficient.
+    best_value : float, [W/(m²·K)]
+    paper_value : float, [W/(m²·K)]
+        At the paper's optimum, 19 mm and 31 °C.
+    """
+
+    model: str
+    held: str
+    amount: float
+    chart: FilmMap
+    pressure_drop: NDArray[np.float64]
+    pumping_power: NDArray[np.float64]
+    best: tuple[float, float]
+    best_value: float
+    paper_value: float
+
+
+def film_study(spec: MachineSpec) -> tuple[FilmChart, ...]:
+    """Film maps over depth and oil temperature, by two sets of equations, at constant velocity and flow.
+
+    Depth 5–30 mm, temperature 10–40 °C. The paper gives neither velocity nor flow. Held here is the velocity that
+    puts the paper's optimum on the paper's own laminar–turbulent line, where
+    its choice comes from, and the flow that the machine has.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+        With a channel.
+
+    Returns
+    -------
+    tuple of FilmChart
+        Empty for a machine without a channel.
+
+    Source: Wu & Tan (2016), Adv. Mech. Eng. 8(8), Figure 22 and its optimum.
+    """
+    if spec.channel is None:
+        return ()
+    channel, coolant = spec.channel, coolant_by_name(spec.coolant.fluid)
+    section = ChannelSection(
+        channel.inner_radius, channel.depth, channel.width, channel.pitch, channel.turns, channel.starts
+    )
+    viscosity = float(coolant.properties(PAPER_TEMPERATURE).kinematic_viscosity)
+    held = {"velocity": PAPER_CRITICAL_REYNOLDS * viscosity / PAPER_DEPTH, "flow": spec.coolant.flow}
+    charts = []
+    for hold, amount in held.items():
+        how = {"velocity": amount} if hold == "velocity" else {"volume_flow": amount}
+        for model in MODELS:
+            chart = film_map(model, section, coolant, DEPTHS, TEMPERATURES, **how)
+            at_paper = film_map(model, section, coolant, [PAPER_DEPTH], [PAPER_TEMPERATURE], **how)
+            row, column = np.unravel_index(int(np.argmax(chart.value)), chart.value.shape)
+            drop = _pressure_drops(section, coolant, chart)
+            charts.append(
+                FilmChart(
+                    model=model,
+                    held=hold,
+                    amount=float(amount),
+                    chart=chart,
+                    pressure_drop=drop,
+                    pumping_power=drop * chart.volume_flow[:, None],
+                    best=(float(DEPTHS[row]), float(TEMPERATURES[column])),
+                    best_value=float(chart.value[row, column]),
+                    paper_value=float(at_paper.value[0, 0]),
+                )
+            )
+    return tuple(charts)
+
+
+def _pressure_drops(section: ChannelSection, coolant: object, chart: FilmMap) -> NDArray[np.float64]:
+    properties = [coolant.properties(float(temperature)) for temperature in chart.temperature]
+    found = np.empty(chart.value.shape)
+    for row, (depth, flow) in enumerate(zip(chart.depth, chart.volume_flow, strict=True)):
+        one = ChannelSection(
+            section.inner_radius, float(depth), section.width, section.pitch, section.turns, section.starts
+        )
+        critical = float(critical_reynolds_schmidt(one.curvature_ratio))
+        found[row] = [channel_pressure_drop(one, float(flow), oil, critical).channel for oil in properties]
+    return found

@@ -1,0 +1,89 @@
+"""``sweep.json``: what a study found, as plain numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from spindle_fem.design.judge import Ranking, rank
+from spindle_fem.design.outputs import unit_of
+from spindle_fem.design.sensitivity import neighbours, sensitivities
+from spindle_fem.design.table import FAILED, IMPOSSIBLE, OK, Row
+from spindle_fem.results.summary import package_versions
+
+if TYPE_CHECKING:
+    from spindle_fem.design.sweep import PreparedStudy
+
+SWEEP_SCHEMA = "spindle-fem/sweep/1"
+# Neighbours told of the best design, for each parameter.
+NEIGHBOURS = 2
+
+
+def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> dict[str, Any]:
+    """Counts, the best designs, what they are compared with, and what matters."""
+    statuses = [row["status"] for row in rows]
+    ranking = rank(prepared.study, rows)
+    numbers = [
+        *dict.fromkeys((*(item.output for item in prepared.study.objective), *prepared.question.outputs))
+    ]
+    return {
+        "schema": SWEEP_SCHEMA,
+        "study": prepared.name,
+        "machine": prepared.spec.name,
+        "parameters": [{"path": axis.path, "unit": axis.unit} for axis in prepared.axes],
+        "outputs": [{"path": path, "unit": unit_of(path).text} for path in prepared.question.outputs],
+        "constraints": [
+            {"output": limit.output, "min": limit.low, "max": limit.high} for limit in prepared.limits
+        ],
+        "objectives": [{"output": i.output, "direction": i.direction} for i in prepared.study.objective],
+        "film_uncertainty": prepared.question.film_uncertainty,
+        "designs": len(rows),
+        "ok": statuses.count(OK),
+        "failed": statuses.count(FAILED),
+        "impossible": statuses.count(IMPOSSIBLE),
+        "feasible": sum(row["feasible"] == "yes" for row in rows),
+        "geometries": len({row["geometry"] for row in rows if row["geometry"]}),
+        "reused_rows": reused,
+        "optimum": None if ranking is None else _optimum(prepared, rows, ranking),
+        "references": {
+            name: _design(prepared, rows[number - 1]) for name, number in prepared.references.items()
+        },
+        "sensitivities": [
+            {
+                "output": item.output,
+                "method": item.method,
+                "predicted_share": item.prediction,
+                "parameters": [
+                    {"path": path, "first_order": first, "total": total, "change_over_range": slope}
+                    for path, first, total, slope in zip(
+                        item.paths, item.first, item.total, item.slope, strict=True
+                    )
+                ],
+            }
+            for item in sensitivities(prepared.axes, rows, numbers)
+        ],
+        "versions": package_versions(),
+    }
+
+
+def _optimum(prepared: PreparedStudy, rows: Sequence[Row], ranking: Ranking) -> dict[str, Any]:
+    best = ranking.rows[ranking.front[0]]
+    return {
+        "best": _design(prepared, best) if len(prepared.study.objective) == 1 else None,
+        "front": [ranking.rows[index]["design"] for index in ranking.front],
+        "not_certainly_worse": [ranking.rows[index]["design"] for index in ranking.contenders],
+        "neighbours": [
+            _design(prepared, row)
+            for row in neighbours(prepared.axes, rows, best, NEIGHBOURS * len(prepared.axes))
+        ],
+    }
+
+
+def _design(prepared: PreparedStudy, row: Row) -> Mapping[str, Any]:
+    return {
+        "design": row["design"],
+        "status": row["status"],
+        "feasible": row["feasible"],
+        "parameters": {axis.path: row[axis.path] for axis in prepared.axes},
+        "outputs": {path: row[path] for path in prepared.question.columns},
+    }

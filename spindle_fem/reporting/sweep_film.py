@@ -1,0 +1,97 @@
+"""The paper's Figure 22 by two sets of equations, at constant velocity and at constant flow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from spindle_fem.design.film_study import MODELS, PAPER_DEPTH, PAPER_TEMPERATURE, FilmChart
+from spindle_fem.reporting.figures import FILM_MAP, INK, new_figure, styled
+from spindle_fem.units import ZERO_CELSIUS_K
+
+
+def held_text(chart: FilmChart) -> str:
+    """What is held, with its amount."""
+    if chart.held == "velocity":
+        return f"velocity {chart.amount:.1f} m/s"
+    return f"flow {chart.amount * 6e4:.0f} L/min"
+
+
+@styled
+def film_maps(charts: Sequence[FilmChart]) -> Figure:
+    """Film coefficient over oil temperature and depth; white line: laminar to turbulent."""
+    figure = new_figure(1240.0)
+    panels = figure.subplots(2, 2)
+    figure.subplots_adjust(left=0.06, right=0.985, top=0.95, bottom=0.07, wspace=0.14, hspace=0.3)
+    for axes, item in zip(panels.ravel(), charts, strict=True):
+        chart = item.chart
+        x, y = chart.temperature - ZERO_CELSIUS_K, chart.depth * 1e3
+        filled = axes.contourf(x, y, chart.value, levels=16, cmap=FILM_MAP)
+        figure.colorbar(filled, ax=axes, pad=0.02).set_label("film coefficient / W/(m²·K)")
+        turbulent = np.array(chart.regime == "turbulent", dtype=float)
+        if 0.0 < turbulent.mean() < 1.0:
+            axes.contour(x, y, turbulent, levels=[0.5], colors="white", linewidths=2.2)
+        _mark(axes, item)
+        axes.set(
+            xlabel="oil temperature / °C",
+            ylabel="channel depth / mm",
+            title=f"{MODELS[item.model]}, {held_text(item)}",
+        )
+    panels[0, 0].legend(loc="upper left", frameon=True, framealpha=0.9)
+    return figure
+
+
+@styled
+def pump_maps(charts: Sequence[FilmChart]) -> Figure:
+    """Pressure drop and pumping power over the same plane, once for what is held."""
+    figure = new_figure(1240.0)
+    panels = figure.subplots(2, 2)
+    figure.subplots_adjust(left=0.06, right=0.985, top=0.95, bottom=0.07, wspace=0.14, hspace=0.3)
+    once = [item for item in charts if item.model == charts[0].model]
+    for line, item in zip(panels, once, strict=True):
+        _logarithmic(figure, line[0], item, item.pressure_drop * 1e-5, "pressure drop / bar")
+        _logarithmic(figure, line[1], item, item.pumping_power, "pumping power / W")
+    return figure
+
+
+def _logarithmic(
+    figure: Figure, axes: object, item: FilmChart, values: NDArray[np.float64], label: str
+) -> None:
+    low, high = np.log10(values.min()), np.log10(values.max())
+    levels = np.logspace(low, high, 15)
+    x, y = item.chart.temperature - ZERO_CELSIUS_K, item.chart.depth * 1e3
+    filled = axes.contourf(x, y, values, levels=levels, cmap=FILM_MAP, norm="log")
+    lines = axes.contour(x, y, values, levels=levels[::2], colors=INK, linewidths=0.5)
+    axes.clabel(lines, fmt="%.2g", fontsize=7.5)
+    bar = figure.colorbar(filled, ax=axes, pad=0.02)
+    bar.set_ticks(levels[::4], labels=[f"{level:.2g}" for level in levels[::4]])
+    bar.set_label(label)
+    _mark(axes, item, own=False)
+    axes.set(
+        xlabel="oil temperature / °C",
+        ylabel="channel depth / mm",
+        title=f"{label.split(' /')[0]}, {held_text(item)}",
+    )
+
+
+def _mark(axes: object, item: FilmChart, *, own: bool = True) -> None:
+    style = {"s": 150, "edgecolor": INK, "facecolor": "white", "zorder": 5, "clip_on": False}
+    axes.scatter(
+        PAPER_TEMPERATURE - ZERO_CELSIUS_K,
+        PAPER_DEPTH * 1e3,
+        marker="o",
+        label="the paper's optimum",
+        **style,
+    )
+    if own:
+        axes.scatter(
+            item.best[1] - ZERO_CELSIUS_K,
+            item.best[0] * 1e3,
+            marker="*",
+            label="largest on this map",
+            **style,
+        )
+    axes.grid(visible=False)
