@@ -54,7 +54,7 @@ def run_machine(
     from spindle_fem.coupling import prepare_machine
     from spindle_fem.reporting.output import output_folder
     from spindle_fem.reporting.report import read_summary, write_outputs
-    from spindle_fem.solve import estimate_refinement, solve_prepared
+    from spindle_fem.solve import estimate_refinement, solve_prepared, with_heat_study
 
     started = time.perf_counter()
     spec = _load_buildable(machine, overrides)
@@ -63,7 +63,8 @@ def run_machine(
         if estimate_mesh_error:
             tell("second mesh")
             result = estimate_refinement(result, spec)
-        write_outputs(result, place, started=started, notify=tell)
+        tell("heat over speed")
+        write_outputs(with_heat_study(result), place, started=started, notify=tell)
     require_checks(result.checks, spec.name)
     return read_summary(place / "summary.json")
 

@@ -48,6 +48,7 @@ class PreparedMachine:
     joint_conductance: Mapping[str, float]
     conductivity: Mapping[str, float]
     volumetric_capacity: Mapping[str, float]
+    geometry_notes: tuple[str, ...] = ()
     timings: Mapping[str, float] = field(default_factory=dict)
 
     def field_state(self, unknowns: NDArray[np.float64], lumped: Mapping[str, float]) -> FieldState:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,12 @@ THRUST_STEPS = 11
 
 
 def heat_study(
-    spec: MachineSpec, speeds: Sequence[float] = (), temperature: float = 313.15, *, coupled: bool = False
+    spec: MachineSpec,
+    speeds: Sequence[float] = (),
+    temperature: float = 313.15,
+    *,
+    coupled: bool = False,
+    temperatures: Mapping[str, BearingTemperatures] | None = None,
 ) -> dict[str, Any]:
     """Speed sweep of every bearing, beside every heat model, and a thrust sweep.
 
@@ -39,6 +44,9 @@ def heat_study(
     coupled : bool
         Solve the machine at every speed (on its mesh) and take the
         temperatures from there.
+    temperatures : mapping of bearing to BearingTemperatures, optional
+        Of a solved machine, kept for every speed; the isothermal films keep
+        ``temperature``.
 
     Returns
     -------
@@ -67,25 +75,25 @@ def heat_study(
     warnings: list[CodedWarning] = []
     for speed in chosen:
         at_speed = replace(point, speed=speed)
-        temperatures = by_speed.get(speed, uniform)
+        here = by_speed.get(speed, temperatures or uniform)
         try:
-            states = mechanics.states(at_speed, temperatures, expand=spec.heat.thermal_preload)
+            states = mechanics.states(at_speed, here, expand=spec.heat.thermal_preload)
             isothermal = mechanics.states(at_speed, uniform, expand=False)
         except NoEquilibriumError as error:
             warnings.append(CodedWarning("no_equilibrium", f"{speed / RPM:.0f} rpm: {error}"))
             continue
         for name in names:
-            rows[name].append(_row(states[name], speed, temperatures[name], isothermal[name]))
+            rows[name].append(_row(states[name], speed, here[name], isothermal[name]))
             warnings += states[name].warnings
-        models.append(_by_model(mechanics, at_speed, temperatures))
+        models.append(_by_model(mechanics, at_speed, here))
     return {
         "schema": HEAT_SCHEMA,
         "machine": spec.name,
         "model": spec.heat.model,
-        "temperature_degC": None if coupled else temperature - ZERO_CELSIUS_K,
+        "temperature_degC": None if coupled or temperatures else temperature - ZERO_CELSIUS_K,
         "bearings": rows,
         "models": models,
-        "thrust": _thrust_sweep(spec, mechanics, point, uniform),
+        "thrust": _thrust_sweep(spec, mechanics, point, dict(temperatures or uniform)),
         "warnings": [
             {"code": item.code, "text": item.text} for item in fold_warnings(warnings, tuple(names))
         ],
@@ -154,7 +162,7 @@ def _row(
 
 
 def _by_model(
-    mechanics: BearingMechanics, point: OperatingPoint, temperatures: dict[str, BearingTemperatures]
+    mechanics: BearingMechanics, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
 ) -> dict[str, Any]:
     """Heat of every bearing by every model, side by side."""
     heat: dict[str, dict[str, float]] = {}

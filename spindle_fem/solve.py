@@ -11,7 +11,8 @@ from spindle_fem import checks
 from spindle_fem.conduction.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.coupling import FIELD_TOLERANCE, Clock, CoupledState, PreparedMachine, Progress, prepare_machine, solve_coupled
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
-from spindle_fem.loads.bearing_heat import BearingMechanics
+from spindle_fem.heat_study import heat_study
+from spindle_fem.loads.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import BearingResult, Check, CoolantResult, EnergyBalance, ThermalResult
 from spindle_fem.spec.model import MachineSpec
@@ -71,7 +72,9 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     bearings = _bearings(machine, coupled, lumped)
     coolant = _coolant(machine, point, coupled)
     area_error, volume_error = operators.area_error(), operators.volume_error()
-    warnings = list(coupled.loads.warnings)
+    warnings = [CodedWarning("mesh_note", note) for note in machine.mesh.notes]
+    warnings += [CodedWarning("geometry_note", note) for note in machine.geometry_notes]
+    warnings += coupled.loads.warnings
     done = [
         checks.check_energy(energy),
         checks.check_measures("areas", area_error),
@@ -193,6 +196,7 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
         velocity=velocity,
         regime=max(regimes.tolist(), key=order.index),
         source=march.film.source,
+        in_range=bool(np.all(march.film.in_range)),
         pressure_drop=state.pressure.total,
         pumping_power=state.pressure.pumping_power,
         hydraulic_diameter=section.hydraulic_diameter,
@@ -238,29 +242,55 @@ def _probes(machine: PreparedMachine, coupled: CoupledState, coolant: CoolantRes
     }
 
 
-def estimate_refinement(result: ThermalResult, spec: MachineSpec, coarsening: float = 1.5) -> ThermalResult:
-    """Add what the probes and the hottest point change by on a coarser mesh.
+def with_heat_study(result: ThermalResult) -> ThermalResult:
+    """The same result with bearing loads, films and heat over speed, at its own temperatures.
+
+    Left as it is where the heat comes from a table.
+    """
+    spec = result.spec
+    if spec.heat.model == "table" or not result.bearings:
+        return result
+    temperatures = {
+        name: BearingTemperatures(
+            bearing.temperature_inner,
+            bearing.temperature_outer,
+            bearing.temperature_ball,
+            bearing.temperature_inner,
+            bearing.temperature_outer,
+        )
+        for name, bearing in result.bearings.items()
+    }
+    return replace(result, heat_study=heat_study(spec, temperatures=temperatures))
+
+
+def estimate_refinement(result: ThermalResult, spec: MachineSpec, ratio: float = 1.5) -> ThermalResult:
+    """Add what the probes and the hottest point change by on a second mesh.
 
     Parameters
     ----------
-    coarsening : float
-        Factor on every element size of the second mesh.
+    ratio : float
+        Between the element sizes of both meshes. The second one is coarser, or
+        finer where the preset is the coarsest already.
 
     Returns
     -------
     ThermalResult
-        With ``mesh_refinement`` in ``extra``: sizes, and the change of each
-        probe in K. A second-order field on this mesh errs by about
-        ``change / (coarsening³ − 1)``, which is given as ``estimate_K``.
+        With ``mesh_refinement`` in ``extra``: the nodes of both, the change of
+        each probe in K, and ``estimate_K``, the error of this result when
+        errors fall with the power ``order + 1`` of the element size.
     """
-    coarse = solve_prepared(prepare_machine(spec, size_factor=spec.mesh.size_factor * coarsening))
-    change = {name: value - coarse.probes[name] for name, value in result.probes.items()}
-    change["hottest"] = result.temperature_maximum - coarse.temperature_maximum
-    gain = coarsening ** (spec.mesh.order + 1) - 1.0
+    coarser = spec.mesh.preset != "coarse"
+    factor = spec.mesh.size_factor * (ratio if coarser else 1.0 / ratio)
+    second = solve_prepared(prepare_machine(spec, size_factor=factor))
+    change = {name: value - second.probes[name] for name, value in result.probes.items()}
+    change["hottest"] = result.temperature_maximum - second.temperature_maximum
+    power = ratio ** (spec.mesh.order + 1)
+    # A coarser mesh errs by `power` times as much as this one, a finer one by 1/power.
+    share = 1.0 / (power - 1.0) if coarser else power / (power - 1.0)
     refinement = {
-        "coarse_nodes": coarse.n_unknowns,
-        "fine_nodes": result.n_unknowns,
+        "nodes": result.n_unknowns,
+        "second_nodes": second.n_unknowns,
         "change_K": change,
-        "estimate_K": {name: abs(value) / gain for name, value in change.items()},
+        "estimate_K": {name: share * abs(value) for name, value in change.items()},
     }
     return replace(result, extra={**result.extra, "mesh_refinement": refinement})

@@ -30,16 +30,7 @@ def write_heat_charts(content: Mapping[str, Any], folder: Path) -> list[Path]:
     list of Path
     """
     folder.mkdir(parents=True, exist_ok=True)
-    charts = {
-        "film_thickness": film_thickness,
-        "thrust": loads_over_thrust,
-        "contacts": contacts_over_speed,
-        "ball_speeds": ball_speeds,
-        "film_ratio": film_ratio,
-        "heat_terms": heat_terms,
-        "heat_models": heat_models,
-    }
-    return [save_png(draw(content), folder / f"{name}.png") for name, draw in charts.items()]
+    return [save_png(draw(content), folder / f"{name}.png") for name, draw in CHARTS.items()]
 
 
 def _panels(number: int, height: float = 620.0) -> tuple[Figure, Sequence[Axes]]:
@@ -244,3 +235,15 @@ def heat_models(content: Mapping[str, Any]) -> Figure:
     axes[0].set_ylabel("friction heat / W")
     _legend(figure, axes[0])
     return figure
+
+
+CHARTS: Mapping[str, Callable[[Mapping[str, Any]], Figure]] = {
+    "film_thickness": film_thickness,
+    "thrust": loads_over_thrust,
+    "contacts": contacts_over_speed,
+    "ball_speeds": ball_speeds,
+    "film_ratio": film_ratio,
+    "heat_terms": heat_terms,
+    "heat_models": heat_models,
+}
+"""Every chart by its file name."""

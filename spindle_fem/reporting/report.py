@@ -29,7 +29,15 @@ FIGURE_FOLDER = "figures"
 
 _SHADED = ("meridian_temperature",)  # a palette would show as bands
 
+OVER_SPEED = "over_speed_"
 CAPTIONS = {
+    f"{OVER_SPEED}heat_terms": "Friction heat over speed, stacked by term.",
+    f"{OVER_SPEED}heat_models": "The same bearings by every heat model: the spread a designer should expect.",
+    f"{OVER_SPEED}film_thickness": "Central film: flooded and isothermal (dashed), and as it is at this run's temperatures.",
+    f"{OVER_SPEED}film_ratio": "Film thickness over composite roughness; from 3 on the film carries alone.",
+    f"{OVER_SPEED}thrust": "Axial load and displacement of the set that carries the thrust.",
+    f"{OVER_SPEED}contacts": "Deformation, contact angle and ellipse: inner contact solid, outer dashed.",
+    f"{OVER_SPEED}ball_speeds": "Orbit and spin of the balls, centrifugal force and gyroscopic moment.",
     "machine_definition": (
         "The machine as defined: parts by colour, contact lines of the bearings in red, oil in yellow, "
         "surfaces with a film as thick lines, probes as dots."
@@ -145,12 +153,17 @@ def _write_files(result: ThermalResult, folder: Path) -> dict[str, float]:
 def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | None]]:
     """Charts of a run by file name, drawn when called (the 3-D pictures are in ``pictures``)."""
     from spindle_fem.reporting import balance_charts, charts
+    from spindle_fem.reporting.heat_charts import CHARTS as HEAT_CHARTS
     from spindle_fem.reporting.machine_drawing import machine_drawing
     from spindle_fem.reporting.profiles import meridian_section, temperature_scale
 
     section = meridian_section(result.mesh, result.temperature)
     bar = temperature_scale(result)
-    return {
+    study = result.heat_study
+    over_speed = {} if study is None else {
+        f"{OVER_SPEED}{name}": (lambda draw=draw: draw(study)) for name, draw in HEAT_CHARTS.items()
+    }
+    return over_speed | {
         "machine_definition": lambda: machine_drawing(result.spec),
         "meridian_temperature": lambda: charts.meridian_temperature(result, section, bar),
         "radial_profiles": lambda: charts.radial_profiles(result, section),
@@ -256,6 +269,7 @@ def render_run_report(
         ("answers", "What this answers", True),
         ("temperature", "Temperature field", True),
         ("bearings", "Bearings", has_bearings),
+        ("over_speed", "Bearings over speed", any(figures.glob(f"{OVER_SPEED}*.png"))),
         ("coolant", "Coolant", coolant is not None),
         ("balance", "Energy balance", True),
         ("probes", "Probes, joints and surfaces", True),
@@ -275,6 +289,7 @@ def render_run_report(
         failed_checks=failed,
         imbalance=tables.significant(abs(summary["energy"]["imbalance_relative"]), 2),
         figures=embed_figures(figures, CAPTIONS),
+        over_speed_captions=tuple(name for name in CAPTIONS if name.startswith(OVER_SPEED)),
         view3d=view,
         bearings=tables.bearing_table(summary),
         terms=tables.term_table(summary),

@@ -197,13 +197,10 @@ def coolant_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
     if not coolant:
         return None
     film = coolant["film_coefficient_W_m2K"]
-    related = [
-        item
-        for item in summary["warnings"]
-        if item["code"].startswith(("coolant", "channel", "film", "nusselt"))
-    ]
     state = (
-        "outside the range of its source, see the warnings" if related else "within the range of its source"
+        "within the range of its source"
+        if coolant["in_range"]
+        else "outside the range of its source, see the warnings"
     )
     entries = (
         ("flow", significant(coolant["flow_m3_s"] * 6.0e4), "L/min"),

@@ -106,6 +106,7 @@ def _coolant(coolant: CoolantResult) -> dict[str, Any]:
         "velocity_m_s": coolant.velocity,
         "regime": coolant.regime,
         "source": coolant.source,
+        "in_range": coolant.in_range,
         "film_coefficient_W_m2K": {
             "value": coolant.mean_film_coefficient,
             "low": coolant.mean_film_low,

@@ -64,6 +64,7 @@ class CoolantResult:
     velocity: float
     regime: str
     source: str
+    in_range: bool
     pressure_drop: float
     pumping_power: float
     hydraulic_diameter: float
@@ -126,6 +127,10 @@ class ThermalResult:
     heat_flows : mapping of str to float, [W]
         Through each joint, from the first-named part to the second.
     timings : mapping of str to float, [s]
+    extra : mapping
+        More entries of the summary.
+    heat_study : mapping or None
+        Heat over speed at this run's temperatures, where it was asked for.
     """
 
     spec: MachineSpec
@@ -151,6 +156,7 @@ class ThermalResult:
     iterations: Mapping[str, int]
     timings: Mapping[str, float]
     extra: Mapping[str, Any] = field(default_factory=dict)
+    heat_study: Mapping[str, Any] | None = None
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
         """The same result with the seconds of each stage."""

@@ -1,7 +1,7 @@
 """Measured deviation of the bearing model from each published value, as a Markdown table.
 
 Run: ``python tests/published/bearing_deviations.py`` (prints the table of
-``bearing_deviations.md``). The tests beside it hold the tolerances.
+``docs/published_bearing_values.md``). The tests beside it hold the tolerances.
 """
 
 from __future__ import annotations

@@ -40,6 +40,8 @@ ABOVE = {
     "reduced",
     "simulate",
     "calibration",
+    "transients",
+    "transient_run",
 }
 ABOVE |= {"design", "recordings", "diagnosis", "reporting"}
 COMMAND_LINE = {"cli", "commands", "console", "__main__"}

@@ -79,6 +79,7 @@ def make_result(machine: str = "wu_tan_2016", **changes) -> ThermalResult:
                 "velocity": 2.8,
                 "regime": "laminar",
                 "source": "a source",
+                "in_range": False,
             },
             **{"pressure_drop": 4.2e5, "pumping_power": 140.0, "hydraulic_diameter": 0.0109, "length": 3.55},
             **{"wetted_area": 0.156, "position": along, "angle": along * 8.8},
