@@ -166,6 +166,8 @@ def _simulate_geometry(
     log_factors = np.zeros(len(predictor.priors)) if result is None else result.log_factors
     predicted, sensitivity = predictor.predict(log_factors)[0]
     notes = [*predictor.drives[0].notes]
+    if spec.coolant is not None and spec.coolant.properties_at == "bulk":
+        notes.append("the coolant's film and properties are taken at its inlet temperature, not along the channel")
     if outside:
         notes.append(f"coefficients outside the reduced model's range: {', '.join(outside)}")
     if len(recording.segments) > 1:

@@ -51,8 +51,10 @@ class CoefficientTable:
         values |= {f"joint.{name}": conductance[self.groups[f"joint.{name}"][1]] for name in self.contacts}
         for film in spec.film:
             fluid = point.ambient_temperature if film.temperature == "ambient" else film.temperature
-            wall = np.array([fluid + (NATURAL_DIFFERENCE if isinstance(film, NaturalFilm) else 0.0)])
-            value = float(film_coefficient(film, point, wall, fluid)[0][0])
+            if isinstance(film, NaturalFilm):
+                value = natural_reference(spec, film)
+            else:
+                value = float(film_coefficient(film, point, np.array([fluid]), fluid)[0][0])
             values |= {f"film.{surface}": value for surface in film.surface}
         for gap in spec.gap:
             values[f"gap.{gap.name}"] = gap_coefficient(gap, point, *self.gap_radii[gap.name])[0]
@@ -182,3 +184,10 @@ def gap_radii_of(machine: PreparedMachine) -> dict[str, tuple[float, float]]:
 def free_parameters(spec: MachineSpec) -> dict[str, float]:
     """1 σ of the logarithm of every uncertain parameter, by name."""
     return {item.name: item.sigma_log for item in uncertain_parameters(spec)}
+
+
+def natural_reference(spec: MachineSpec, film: NaturalFilm) -> float:
+    """What the operators hold of a natural film: its coefficient 10 K above the defined surroundings."""
+    point = OperatingPoint.of(spec)
+    fluid = point.ambient_temperature if film.temperature == "ambient" else film.temperature
+    return float(film_coefficient(film, point, np.array([fluid + NATURAL_DIFFERENCE]), fluid)[0][0])

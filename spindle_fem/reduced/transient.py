@@ -13,6 +13,7 @@ from spindle_fem.errors import SpecError
 from spindle_fem.reduced.assemble import RunOperators, run_operators
 from spindle_fem.reduced.drive import Drive, heat_of_table
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.natural import natural_film_terms
 from spindle_fem.reduced.nonlinear import DynamicTerms, Evaluation, solve_added
 from spindle_fem.reduced.stepping import (
     Propagator,
@@ -79,7 +80,7 @@ def simulate_fast(
     derivatives : sequence of str
         Parameters to differentiate by.
     terms : sequence of Term
-        Physics beside the machine's own.
+        Physics beside the machine's own; its natural films are always there.
 
     Returns
     -------
@@ -98,7 +99,8 @@ def simulate_fast(
             f'"{fast.spec.heat.model}" follows the temperatures of every bearing.',
             'The fast model takes heat.model = "table".',
         )
-    run = _Run(fast, drive, parameters or {}, tuple(derivatives), tuple(terms))
+    everything = (*natural_film_terms(fast.spec), *terms)
+    run = _Run(fast, drive, parameters or {}, tuple(derivatives), everything)
     return run.solve(initial_temperature)
 
 

@@ -1,5 +1,7 @@
 """The fast model on a spindle of one unknown per part, where everything can be checked by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,9 @@ from spindle_fem.reduced.model import ReducedModel
 from spindle_fem.reduced.terms import Term, TermParameter
 from spindle_fem.reduced.transient import simulate_fast
 from spindle_fem.spec.load import load_machine
+from spindle_fem.spec.model import NaturalFilm
 from spindle_fem.spec.parameters import with_parameters
+from spindle_fem.surroundings.air import outside_coefficient
 
 CELLS = 12
 RPM = np.pi / 30.0
@@ -196,6 +200,50 @@ def test_halving_the_steps_changes_little_and_less_each_time(fast):
         runs.append(simulate_fast(fast, drive, 293.15).temperature[-1])
     assert np.abs(runs[2] - runs[1]).max() < 0.5 * np.abs(runs[1] - runs[0]).max()
     assert np.abs(runs[2] - runs[1]).max() < 1e-3
+
+
+def test_a_natural_film_carries_what_its_correlation_says(fast, spec):
+    film = NaturalFilm(
+        name="outside",
+        kind="natural_convection_radiation",
+        surface=("housing.outside",),
+        orientation="horizontal_cylinder",
+        characteristic_length="0.3 m",
+        emissivity=0.9,
+    )
+    others = tuple(item for item in spec.film if item.name != "outside")
+    changed = spec.model_copy(update={"film": (film, *others), "factor": spec.factor[1:]})
+    keep = [i for i, name in enumerate(fast.model.coefficient_names) if name != "film.cover.outside"]
+    fluids = [i for i, name in enumerate(fast.model.fluid_names) if name != "film.cover.outside"]
+    natural = FastModel(
+        replace(
+            fast.model,
+            coefficient_names=tuple(fast.model.coefficient_names[i] for i in keep),
+            operators=fast.model.operators[keep],
+            fluid_names=tuple(fast.model.fluid_names[i] for i in fluids),
+            fluid_load=fast.model.fluid_load[fluids],
+        ),
+        changed,
+    )
+    # The lumped model has no surfaces of its own: the housing stands for its outside.
+    places = (*natural.model.place_names, "housing.outside")
+    rows = np.vstack((natural.model.places, natural.model.place("housing")))
+    natural = FastModel(replace(natural.model, place_names=places, places=rows), changed)
+    times = np.linspace(0.0, 3.0e6, 20000)
+    # Not at the definition's own ambient temperature.
+    drive = drive_of(times, 3000.0, ambient=296.15)
+    run = simulate_fast(natural, drive, 293.15)
+    wall = natural.model.place("housing") @ run.states[-1]
+    coefficient = outside_coefficient(np.array([wall]), 296.15, 0.3, 0.9, shape="cylinder")[0]
+    point = drive.points[0]
+    values = natural.coefficients(point, {}) | {"film.housing.outside": coefficient}
+    out = sum(
+        values[name] * (load @ (run.states[-1] - 296.15))
+        for name, load in zip(natural.model.fluid_names, natural.model.fluid_load, strict=True)
+    )
+    _, rate, _ = natural.channel_film(point, {})
+    taken = rate * (run.temperature[-1, natural.channels.index("COOLANT_OUT")] - 290.15)
+    assert out + taken == pytest.approx(2 * 155 + 140 + 2 * 85, rel=1e-6)
 
 
 class Feedback(Term):
