@@ -109,7 +109,9 @@ def study_causes(
     if spec.channel is not None:
         progress("axisymmetric elements, closed rings")
         rings = refined(channelling="rings")
-        chain.append(gather_axisymmetric(coarse, rings.network.machine, solve_axisymmetric(rings)))
+        closed = gather_axisymmetric(coarse, rings.network.machine, solve_axisymmetric(rings))
+        # lands that a closed ring takes away keep the smeared value: their whole step is the next one's
+        chain.append(np.where(np.isnan(closed), chain[-1], closed))
         names += ["smeared_helix", "closed_rings"]
         if spec.channel.ports is not None:
             progress("elements without ports")

@@ -17,13 +17,17 @@ def gather(coarse: MachineNetwork, fine: MachineNetwork, solid: Array, balls: Ar
     """Temperatures of a fine model at the nodes of a coarse network, (n_nodes,) [K].
 
     Solids by volume, gap air by length along z, coolant at the end of each
-    coarse cell.
+    coarse cell. NaN where the fine model has no metal: lands that a closed
+    ring takes away.
     """
     cells = fine.cells
     middle = np.column_stack([np.zeros(cells.n_cells), cells.r.mean(axis=1), cells.z.mean(axis=1)])
     node = coarse.partition.node_of_cell[cells_at(coarse.cells, cells.part_names, cells.part, middle)]
     n = coarse.n_solid
-    values = [np.bincount(node, cells.volume * solid, n) / np.bincount(node, cells.volume, n), balls]
+    volume = np.bincount(node, cells.volume, n)
+    mean = np.full(n, np.nan)
+    np.divide(np.bincount(node, cells.volume * solid, n), volume, out=mean, where=volume > 0.0)
+    values = [mean, balls]
     start = 0
     for name, bands in coarse.gaps.items():
         own = fine.gaps[name]

@@ -116,9 +116,18 @@ def _crosscheck(spec: MachineSpec, place: Path, tell: Progress) -> tuple[dict[st
         "schema": SCHEMA,
         "machine": spec.name,
         "versions": {"spindle_fem": __version__},
-        "operating_point": {"speed_rpm": point.speed / RPM, "thrust_N": point.thrust},
+        "operating_point": {
+            "speed_rpm": point.speed / RPM,
+            "thrust_N": point.thrust,
+            "ambient_degC": point.ambient_temperature - ZERO_CELSIUS_K,
+            "coolant_inlet_degC": point.coolant_inlet_temperature - ZERO_CELSIUS_K,
+        },
         "network": _network_json(network, state),
-        "fem": {"unknowns": int(prepared.operators.n_unknowns), "elements": int(prepared.mesh.n_elements)},
+        "fem": {
+            "unknowns": int(prepared.operators.n_unknowns),
+            "elements": int(prepared.mesh.n_elements),
+            "coolant_outlet_degC": _celsius(matched.matched.coolant_outlet),
+        },
         "nodes": _nodes_json(comparison, study, regions),
         "links": [
             {
@@ -135,6 +144,7 @@ def _crosscheck(spec: MachineSpec, place: Path, tell: Progress) -> tuple[dict[st
         "convergence": convergence,
         "matched": {
             "speeds": speeds,
+            "heat_W": {name: float(value) for name, value in matched.matched.heat.items()},
             "nodes": matched.n_nodes,
             "links": len(matched.factor),
             "factor_min": float(matched.factor.min()),

@@ -263,7 +263,9 @@ def _state(network: OperatingNetwork, temperature: Array, iterations: int) -> Ma
         outlet = float(temperature[network.streams[1][-1]])
         rises = both[network.streams[1]] - both[network.streams[0]]
         out["coolant"] = float(network.stream_rate * rises.sum())
-    scale = max(abs(heat_in), *(abs(value) for value in out.values()), 1.0e-12)
+    # at rest there is no flow to compare with: rounding is that of conductance times absolute temperature
+    rounding = 1.0e-6 * float(network.conductance.sum()) * float(both.max())
+    scale = max(abs(heat_in), *(abs(value) for value in out.values()), rounding)
     imbalance = abs(heat_in - sum(out.values())) / scale
     if imbalance > BALANCE_TOLERANCE:
         raise EnergyBalanceError(

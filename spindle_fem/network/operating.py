@@ -18,9 +18,12 @@ from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.network.laws import CoolantLaw, FrictionLaw, Law, WallFilmLaw, faces_by_cell
 from spindle_fem.network.machine import MachineNetwork
 from spindle_fem.network.model import ThermalNetwork
+from spindle_fem.spec.model import NaturalFilm
 
 Array = NDArray[np.float64]
-FILM_RANGE = 150.0
+# Wall less fluid, K; the points lie close because the coefficient has a cusp where both are equal.
+FILM_RANGE = (-60.0, 140.0)
+FILM_POINTS = 801
 HEAT_RANGE = (-15.0, 120.0)
 HEAT_POINTS = 19
 FEWEST_HEAT_POINTS = 4
@@ -300,8 +303,8 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
         fluid = boundaries[boundary]
         for surface in film.surface:
             patch = machine.surfaces[surface]
-            if film.kind == "natural":
-                wall = np.linspace(fluid - FILM_RANGE, fluid + FILM_RANGE, 16 * TABLE_POINTS + 1)
+            if isinstance(film, NaturalFilm):
+                wall = fluid + np.linspace(*FILM_RANGE, FILM_POINTS)
                 value, _ = film_coefficient(film, point, wall, fluid)
                 laws.append(WallFilmLaw.of(patch, wall, value * (wall - fluid), surface))
                 continue
