@@ -41,7 +41,7 @@ class TransientOptions:
     """
 
     error: float = 0.05
-    coupling_tolerance: float = 5.0e-6
+    coupling_tolerance: float = 3.0e-8
     coefficient_tolerance: float = 5.0e-4
     first_step: float = 0.1
     fixed_step: float | None = None
