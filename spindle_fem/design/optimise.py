@@ -65,7 +65,6 @@ def search_designs(
             seed=settings.seed,
             multivariate=True,
             constant_liar=True,
-            constraints_func=lambda trial: trial.user_attrs.get("excess", [0.0]),
         )
         directions = [item.direction for item in study.objective]
         finder = optuna.create_study(sampler=sampler, directions=directions)
@@ -81,7 +80,8 @@ def search_designs(
             designs = [_design(first + i, trial.params, axes) for i, trial in enumerate(trials)]
             for trial, row in zip(trials, solve(designs), strict=True):
                 if row["status"] == OK:
-                    trial.set_user_attr("excess", _excess(row, limits))
+                    for name, value in _excess(row, limits).items():
+                        trial.set_constraint(name, value)
                     finder.tell(trial, _values(study, row))
                 else:
                     finder.tell(trial, state=optuna.trial.TrialState.FAIL)
@@ -117,14 +117,12 @@ def _add_known(
     row: Row,
 ) -> None:
     values = {axis.path: _coordinate(axis, row[axis.path]) for axis in axes}
-    excess = _excess(row, limits)
     finder.add_trial(
         optuna.trial.create_trial(
             params=values,
             distributions=space,
             values=_values(study, row),
-            user_attrs={"excess": excess},
-            system_attrs={"constraints": excess},
+            constraints=_excess(row, limits),
         )
     )
 
@@ -142,14 +140,14 @@ def _values(study: Study, row: Row) -> list[float]:
     return [float(row[item.output]) for item in study.objective]
 
 
-def _excess(row: Row, limits: Sequence[Limit]) -> list[float]:
+def _excess(row: Row, limits: Sequence[Limit]) -> dict[str, float]:
     """How far each limit is broken, relative to it; at most 0 where it holds at every end of the film."""
-    found = [0.0]
-    for limit in limits:
+    found = {}
+    for number, limit in enumerate(limits):
         values = [row.get(limit.output + end) for end in ("", FILM_LOW, FILM_HIGH)]
         values = [value for value in values if value is not None]
         if limit.high is not None:
-            found.append((max(values) - limit.high) / max(abs(limit.high), 1e-12))
+            found[f"{number}.max"] = (max(values) - limit.high) / max(abs(limit.high), 1e-12)
         if limit.low is not None:
-            found.append((limit.low - min(values)) / max(abs(limit.low), 1e-12))
+            found[f"{number}.min"] = (limit.low - min(values)) / max(abs(limit.low), 1e-12)
     return found

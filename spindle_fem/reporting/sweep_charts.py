@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -79,7 +80,7 @@ def response_maps(
         for number, (name, row) in enumerate(marks.items()):
             axes.scatter(
                 across.of([row]), up.of([row]), s=150, marker="*os^"[number % 4], facecolor="white", edgecolor=INK,
-                zorder=5, label=name,
+                zorder=5, label=name, clip_on=False,
             )  # fmt: skip
         axes.set(xlabel=across.label, ylabel=up.label, title=output.label)
         axes.grid(visible=False)
@@ -116,7 +117,7 @@ def parallel_coordinates(
 ) -> Figure:
     """Every design as a line across its parameters and outputs; ``marked`` designs are drawn thick."""
     figure = new_figure(760.0)
-    axes = figure.add_axes((0.05, 0.2, 0.86, 0.66))
+    axes = figure.add_axes((0.05, 0.2, 0.83, 0.66))
     table = np.column_stack([column.of(rows) for column in columns])
     low, high = np.nanmin(table, axis=0), np.nanmax(table, axis=0)
     span = np.where(high > low, high - low, 1.0)
@@ -141,13 +142,13 @@ def parallel_coordinates(
         )
         axes.text(position, -0.03, ends[0], ha="center", va="top", fontsize=8.5)
         axes.text(position, 1.03, ends[1], ha="center", va="bottom", fontsize=8.5)
-        axes.text(
-            position, -0.1, column.label.replace(" / ", "\n"), ha="right", va="top", fontsize=8.5, rotation=18
-        )
+        name, _, unit = column.label.partition(" / ")
+        text = "\n".join([*textwrap.wrap(name, 15), unit])
+        axes.text(position, -0.09, text, ha="center", va="top", fontsize=8.5)
     axes.set(xlim=(-0.2, len(columns) - 0.8), ylim=(-0.02, 1.02))
     axes.axis("off")
     bar = figure.colorbar(
-        mpl.cm.ScalarMappable(norm, TEMPERATURE_MAP), cax=figure.add_axes((0.94, 0.2, 0.012, 0.66))
+        mpl.cm.ScalarMappable(norm, TEMPERATURE_MAP), cax=figure.add_axes((0.91, 0.2, 0.012, 0.66))
     )
     bar.set_label(colour_by.label)
     figure.text(

@@ -25,7 +25,7 @@ def film_maps(charts: Sequence[FilmChart]) -> Figure:
     """Film coefficient over oil temperature and depth; white line: laminar to turbulent."""
     figure = new_figure(1240.0)
     panels = figure.subplots(2, 2)
-    figure.subplots_adjust(left=0.06, right=0.985, top=0.95, bottom=0.07, wspace=0.14, hspace=0.3)
+    figure.subplots_adjust(left=0.06, right=0.96, top=0.95, bottom=0.07, wspace=0.14, hspace=0.3)
     for axes, item in zip(panels.ravel(), charts, strict=True):
         chart = item.chart
         x, y = chart.temperature - ZERO_CELSIUS_K, chart.depth * 1e3
@@ -49,7 +49,7 @@ def pump_maps(charts: Sequence[FilmChart]) -> Figure:
     """Pressure drop and pumping power over the same plane, once for what is held."""
     figure = new_figure(1240.0)
     panels = figure.subplots(2, 2)
-    figure.subplots_adjust(left=0.06, right=0.985, top=0.95, bottom=0.07, wspace=0.14, hspace=0.3)
+    figure.subplots_adjust(left=0.06, right=0.96, top=0.95, bottom=0.07, wspace=0.14, hspace=0.3)
     once = [item for item in charts if item.model == charts[0].model]
     for line, item in zip(panels, once, strict=True):
         _logarithmic(figure, line[0], item, item.pressure_drop * 1e-5, "pressure drop / bar")
@@ -65,9 +65,9 @@ def _logarithmic(
     x, y = item.chart.temperature - ZERO_CELSIUS_K, item.chart.depth * 1e3
     filled = axes.contourf(x, y, values, levels=levels, cmap=FILM_MAP, norm="log")
     lines = axes.contour(x, y, values, levels=levels[::2], colors=INK, linewidths=0.5)
-    axes.clabel(lines, fmt="%.2g", fontsize=7.5)
+    axes.clabel(lines, fmt=_short, fontsize=7.5)
     bar = figure.colorbar(filled, ax=axes, pad=0.02)
-    bar.set_ticks(levels[::4], labels=[f"{level:.2g}" for level in levels[::4]])
+    bar.set_ticks(levels[::4], labels=[_short(level) for level in levels[::4]])
     bar.set_label(label)
     _mark(axes, item, own=False)
     axes.set(
@@ -75,6 +75,10 @@ def _logarithmic(
         ylabel="channel depth / mm",
         title=f"{label.split(' /')[0]}, {held_text(item)}",
     )
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
 
 
 def _mark(axes: object, item: FilmChart, *, own: bool = True) -> None:

@@ -1,0 +1,146 @@
+"""Limits, dominance, certainty within the film's band, and sensitivities."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from spindle_fem.design.designs import Axis
+from spindle_fem.design.judge import Limit, certainly_beaten, dominated, judged, rank
+from spindle_fem.design.outputs import limit_of, output_fault, output_paths, unit_of, value_of
+from spindle_fem.design.sensitivity import neighbours, sensitivities
+from spindle_fem.design.study import Study
+from spindle_fem.errors import SpecError, UnitError
+from spindle_fem.spec.load import load_machine
+
+
+def row(number, **values):
+    return {"design": number, "status": "ok", "reason": "", "feasible": "yes", **values}
+
+
+def test_limits_hold_at_every_end_of_the_film():
+    limit = Limit("p_Pa", None, 5.0)
+    inside = row(1, p_Pa=4.0)
+    outside = row(2, p_Pa=4.0) | {"p_Pa@film_low": 6.0, "p_Pa@film_high": 3.0}
+    assert judged(inside, [limit]) == {"feasible": "yes", "reason": ""}
+    assert judged(outside, [limit]) == {"feasible": "no", "reason": "p_Pa is 6 Pa, allowed at most 5 Pa"}
+    assert judged({**inside, "status": "failed", "reason": "hot"}, [limit]) == {
+        "feasible": None,
+        "reason": "hot",
+    }
+
+
+POINTS = arrays(float, st.tuples(st.integers(1, 12), st.just(2)), elements=st.integers(-5, 5).map(float))
+
+
+@given(POINTS)
+def test_front_by_definition(values):
+    beaten = dominated(values)
+    for index, value in enumerate(values):
+        others = [other for other in values if np.all(other <= value) and np.any(other < value)]
+        assert beaten[index] == bool(others)
+    assert not beaten.all()
+
+
+@given(POINTS, st.floats(0.0, 3.0))
+def test_a_wider_band_never_makes_more_certain(values, width):
+    sure = certainly_beaten(values, values)
+    unsure = certainly_beaten(values - width, values + width)
+    assert np.all(sure | ~unsure)
+
+
+def study(film_uncertainty, **directions):
+    return Study.model_validate(
+        {
+            "schema": "spindle-fem/study/1",
+            "parameter": [{"path": "x", "values": [1]}],
+            "study": {"outputs": ["a_K"], "film_uncertainty": film_uncertainty},
+            "objective": [{"output": path, "direction": way} for path, way in directions.items()],
+        }
+    )
+
+
+def test_better_only_when_it_is_so_within_the_band():
+    band = {"a_K@film_low": 0.0, "a_K@film_high": 0.0}
+    rows = [
+        row(1, a_K=1.0) | band | {"a_K@film_low": 1.5, "a_K@film_high": 0.5},
+        row(2, a_K=1.2) | band | {"a_K@film_low": 1.9, "a_K@film_high": 0.9},
+        row(3, a_K=3.0) | band | {"a_K@film_low": 3.5, "a_K@film_high": 2.0},
+        row(4, a_K=0.0) | band | {"feasible": "no"},
+    ]
+    ranking = rank(study(True, a_K="minimize"), rows)
+    assert [ranking.rows[i]["design"] for i in ranking.front] == [1]
+    assert [ranking.rows[i]["design"] for i in ranking.contenders] == [1, 2]
+    without = rank(study(False, a_K="minimize"), rows)
+    assert [without.rows[i]["design"] for i in without.contenders] == [1]
+    upwards = rank(study(False, a_K="maximize"), rows)
+    assert [upwards.rows[i]["design"] for i in upwards.front] == [3]
+
+
+def test_no_ranking_without_objectives_or_feasible_designs():
+    assert rank(study(False), [row(1, a_K=1.0)]) is None
+    assert rank(study(False, a_K="minimize"), [row(1, a_K=1.0) | {"feasible": "no"}]) is None
+
+
+def axis(path, sampled=False):
+    return Axis(path, (), 0.0, 1.0, None, sampled)
+
+
+def test_whole_grid_is_decomposed_exactly():
+    """y = 3a + b + ab on {-1, 1}²: variances 9, 1 and 1 of 11."""
+    rows = [
+        row(i, a=a, b=b, y=3 * a + b + a * b) for i, (a, b) in enumerate([(-1, -1), (-1, 1), (1, -1), (1, 1)])
+    ]
+    (found,) = sensitivities([axis("a"), axis("b")], rows, ["y"])
+    assert found.first == pytest.approx((9 / 11, 1 / 11))
+    assert found.total == pytest.approx((10 / 11, 2 / 11))
+    assert found.slope == pytest.approx((6.0, 2.0))
+    assert found.method == "whole grid"
+
+
+def test_sample_gives_the_exact_shares_of_a_quadratic():
+    """y = x + z² on [-1, 1]²: variances 1/3 and 4/45."""
+    points = np.random.default_rng(3).uniform(-1.0, 1.0, (40, 2))
+    points[0], points[1] = (-1.0, -1.0), (1.0, 1.0)
+    rows = [
+        row(i, x=x, z=z, y=x + z**2, junk=v)
+        for i, ((x, z), v) in enumerate(zip(points, points[::-1, 0] ** 5, strict=True))
+    ]
+    (found,) = sensitivities(
+        [axis("x"), axis("z")], rows, ["y", "junk"]
+    )  # noise is not explained, and left out
+    share = (1 / 3) / (1 / 3 + 4 / 45)
+    assert found.first == pytest.approx((share, 1.0 - share), abs=0.02)
+    assert found.prediction == pytest.approx(1.0, abs=1e-9)
+
+
+def test_neighbours_by_scaled_distance():
+    rows = [
+        row(i, depth=0.001 * d, temperature=t)
+        for i, (d, t) in enumerate([(5, 10), (6, 10), (5, 40), (9, 11)])
+    ]
+    near = neighbours([axis("depth"), axis("temperature")], rows, rows[0], 2)
+    assert [item["design"] for item in near] == [1, 2]
+
+
+def test_outputs_of_a_machine_and_their_units():
+    spec = load_machine("small_two_start")
+    paths = output_paths(spec)
+    assert {"bearings.B1.ring_difference_K", "probes.B1_SEAT", "derived.cooler_heat_W"} <= set(paths)
+    assert output_fault("bearings.B1.terms_W.cage", spec, "here") is None
+    assert "ring_difference_K" in str(output_fault("bearings.B1.ring_diference_K", spec, "here"))
+    assert not any(path.startswith("coolant") for path in output_paths(load_machine("uncooled")))
+    assert unit_of("coolant.film_coefficient_W_m2K.low").text == "W/(m²·K)"
+    assert unit_of("bearings.B1.terms_W.cage").text == "W"
+
+
+def test_limits_take_their_unit():
+    assert limit_of("40 degC", "temperature.max_degC", "x") == 40.0
+    assert limit_of("3 K", "bearings.F1.ring_difference_K", "x") == 3.0
+    assert limit_of("12 L/min", "coolant.flow_m3_s", "x") == pytest.approx(2e-4)
+    assert limit_of("15 deg", "bearings.F1.contact_angle_inner_deg", "x") == pytest.approx(15.0)
+    with pytest.raises(UnitError, match="a unit is needed"):
+        limit_of(5, "coolant.pressure_drop_Pa", "constraint[1].max")
+    with pytest.raises(SpecError, match="is no output of this design"):
+        value_of({"bearings": {"F1": {"terms_W": {}}}}, "bearings.F1.terms_W.cage")
