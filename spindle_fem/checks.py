@@ -16,14 +16,20 @@ BELOW_COLDEST_LIMIT = 0.01
 def check_energy(energy: EnergyBalance) -> Check:
     """Heat in equals heat out."""
     return _within(
-        "energy balance", abs(energy.imbalance_relative), BALANCE_LIMIT, "", "Heat in less heat out, relative."
+        "energy balance",
+        abs(energy.imbalance_relative),
+        BALANCE_LIMIT,
+        "",
+        "Heat in less heat out, relative.",
     )
 
 
 def check_coolant(film_heat: float, enthalpy_rise: float, moved: float) -> Check:
     """What the walls give equals what the oil carries away."""
     value = abs(film_heat - enthalpy_rise) / max(moved, 1.0e-12)
-    return _within("coolant enthalpy", value, BALANCE_LIMIT, "", "Film heat less enthalpy rise of the oil, relative.")
+    return _within(
+        "coolant enthalpy", value, BALANCE_LIMIT, "", "Film heat less enthalpy rise of the oil, relative."
+    )
 
 
 def check_measures(kind: str, errors: dict[str, float]) -> Check:
@@ -83,4 +89,6 @@ def require_checks(checks: Iterable[Check], where: str) -> None:
             f"{check.name} {check.value:.4g} {check.unit} (limit {check.limit:.4g}). {check.explanation}"
             for check in failed
         )
-        raise CheckFailedError(where, f"a self-check failed: {listing}", "The results are written, do not rely on them.")
+        raise CheckFailedError(
+            where, f"a self-check failed: {listing}", "The results are written, do not rely on them."
+        )

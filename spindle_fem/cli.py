@@ -60,7 +60,8 @@ def run(
     set_: Overrides = None,
     as_json: AsJson = False,
     estimate_mesh_error: Annotated[
-        bool, typer.Option("--estimate-mesh-error", help="Solve on a second, coarser mesh and report the change.")
+        bool,
+        typer.Option("--estimate-mesh-error", help="Solve on a second, coarser mesh and report the change."),
     ] = False,
 ) -> None:
     """Geometry, mesh, heat, films, solve, pictures, report."""
@@ -102,7 +103,8 @@ def mesh(
 def heat(
     machine: Machine,
     speed: Annotated[
-        list[str] | None, typer.Option("--speed", help='Speeds, repeatable: "3000 rpm"; default 500 to 4500 rpm.')
+        list[str] | None,
+        typer.Option("--speed", help='Speeds, repeatable: "3000 rpm"; default 500 to 4500 rpm.'),
     ] = None,
     temperature: Annotated[str, typer.Option(help="Of rings, balls and grease.")] = "40 degC",
     coupled: Annotated[
@@ -161,7 +163,11 @@ def simulate(
     output: Folder,
     calibrate: Annotated[
         list[Path] | None,
-        typer.Option("--calibrate", metavar="FILE", help="Recording that may move the uncertain parameters; repeatable."),
+        typer.Option(
+            "--calibrate",
+            metavar="FILE",
+            help="Recording that may move the uncertain parameters; repeatable.",
+        ),
     ] = None,
     set_: Overrides = None,
     as_json: AsJson = False,

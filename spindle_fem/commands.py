@@ -91,12 +91,17 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
     return {
         "machine": spec.name,
         "parts": [
-            {"name": part.name, "detail": f"{'rotating, ' if part.rotating else ''}{len(part.segments)} segments"}
+            {
+                "name": part.name,
+                "detail": f"{'rotating, ' if part.rotating else ''}{len(part.segments)} segments",
+            }
             for part in assembly.parts
         ],
         "surfaces": [{"name": surface.name, "detail": surface.part} for surface in spec.all_surfaces],
         "contacts": [{"name": name, "detail": conductance(name)} for name in assembly.joint_names],
-        "probes": [{"name": probe.name, "detail": probe.part or "mixed coolant outlet"} for probe in spec.probe],
+        "probes": [
+            {"name": probe.name, "detail": probe.part or "mixed coolant outlet"} for probe in spec.probe
+        ],
         "warnings": [{"code": "geometry_note", "text": note} for note in assembly.notes],
     }
 
@@ -113,7 +118,9 @@ def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = 
 
     endings = (".msh", ".vtu", ".step")
     if file.suffix not in endings:
-        raise SpecError(str(file), f'"{file.suffix}" is no format of the mesh.', f"Allowed: {', '.join(endings)}.")
+        raise SpecError(
+            str(file), f'"{file.suffix}" is no format of the mesh.', f"Allowed: {', '.join(endings)}."
+        )
     spec = _load_buildable(machine, overrides)
     assembly = build_assembly(spec)
     if file.suffix == ".step":

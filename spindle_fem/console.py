@@ -17,7 +17,9 @@ def _console() -> Console:
 
 
 def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(
+        title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
     table.add_column(columns[0], no_wrap=True)
     for column in columns[1:]:
         table.add_column(column, justify="right")
@@ -31,7 +33,9 @@ def _number(value: Any, digits: int) -> str:
 def print_run(summary: dict[str, Any], folder: Path) -> None:
     """Headline of a run: temperatures, bearings, balance, checks and warnings."""
     console = _console()
-    table = _table("Bearings", "", "heat W", "inner °C", "outer °C", "balls °C", "difference K", "preload N", "lambda")
+    table = _table(
+        "Bearings", "", "heat W", "inner °C", "outer °C", "balls °C", "difference K", "preload N", "lambda"
+    )
     for name, bearing in summary["bearings"].items():
         table.add_row(
             name,
@@ -65,8 +69,10 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
     console.print(f"{summary['wall_time_s']:.1f} s ({split}), peak {summary['peak_rss_MB']:.0f} MB")
     for check in summary["checks"]:
         if not check["passed"]:
-            console.print(f"[bold red]FAILED[/] {check['name']}: {check['value']:.4g} {check['unit']}, "
-                          f"limit {check['limit']:.4g}. {check['explanation']}")
+            console.print(
+                f"[bold red]FAILED[/] {check['name']}: {check['value']:.4g} {check['unit']}, "
+                f"limit {check['limit']:.4g}. {check['explanation']}"
+            )
     for warning in summary["warnings"]:
         console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
     console.print(f"Report: {folder / 'report.html'}")
@@ -109,7 +115,9 @@ def print_heat(content: dict[str, Any]) -> None:
     """Heat term by term, one table a bearing, one column a speed."""
     console = _console()
     for name, rows in content["bearings"].items():
-        table = _table(f"{name}, model {content['model']}", "rpm", *(f"{row['speed_rpm']:.0f}" for row in rows))
+        table = _table(
+            f"{name}, model {content['model']}", "rpm", *(f"{row['speed_rpm']:.0f}" for row in rows)
+        )
         table.add_row("heat W", *(_number(row["heat_W"], 1) for row in rows), style="bold")
         for term in dict.fromkeys(term for row in rows for term in row["terms_W"]):
             values = [row["terms_W"].get(term) for row in rows]
@@ -130,7 +138,9 @@ def print_bearing(content: dict[str, Any]) -> None:
     console = _console()
     for index, bearing in enumerate(content.get("bearings", [content])):
         scalars = {key: value for key, value in bearing.items() if not isinstance(value, (list, dict))}
-        console.print(", ".join(f"{key} {value:.5g}" for key, value in scalars.items() if isinstance(value, float)))
+        console.print(
+            ", ".join(f"{key} {value:.5g}" for key, value in scalars.items() if isinstance(value, float))
+        )
         balls = bearing["balls"]
         keys = [key for key in balls[0] if any(ball[key] is not None for ball in balls)]
         table = _table(f"bearing {index + 1}", *keys)
@@ -151,7 +161,9 @@ def print_crosscheck(content: dict[str, Any], folder: Path) -> None:
             _number(node["difference_K"], 2),
         )
     console.print(table)
-    console.print(f"{len(content['nodes'])} nodes, {len(content['links'])} links; report: {folder / 'report.html'}")
+    console.print(
+        f"{len(content['nodes'])} nodes, {len(content['links'])} links; report: {folder / 'report.html'}"
+    )
 
 
 def print_simulation(content: dict[str, Any], folder: Path) -> None:

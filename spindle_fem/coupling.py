@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.conduction.operators import ThermalOperators, build_operators
+from spindle_fem.conduction.linear_solvers import RELATIVE_TOLERANCE
 from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.conduction.steady import ConductionSolution, solve_steady
 from spindle_fem.errors import ConvergenceError, NoEquilibriumError, NoSteadyStateError, OutOfValidityError
@@ -33,6 +34,9 @@ ANDERSON_DEPTH = 6
 # Greases and seals are gone long before; a field beyond this is running away.
 RUNAWAY_TEMPERATURE = 600.0
 MIXING_BELOW = 0.5
+# A linear residual this small against the last change of the field costs no extra iteration of the loop.
+LINEAR_PER_KELVIN = 1.0e-4
+LOOSEST_LINEAR_TOLERANCE = 1.0e-5
 
 Progress = Callable[[str], None]
 
@@ -59,7 +63,10 @@ class PreparedMachine:
         }
         sides = {
             joint: tuple(
-                float(self.operators.facet_integral(unknowns, rows).sum() / self.operators.facet_area[rows].sum())
+                float(
+                    self.operators.facet_integral(unknowns, rows).sum()
+                    / self.operators.facet_area[rows].sum()
+                )
                 for rows in self.operators.joint_rows[joint]
             )
             for joint in self.operators.joint_rows
@@ -70,10 +77,12 @@ class PreparedMachine:
     def problem(self, loads: Loads) -> ConductionProblem:
         """Conduction problem of given loads."""
         films = tuple(
-            Film(surface, film.coefficient, film.temperature, film.name) for surface, film in loads.films.items()
+            Film(surface, film.coefficient, film.temperature, film.name)
+            for surface, film in loads.films.items()
         )
         lumped = tuple(
-            LumpedNode(node.name, tuple(node.connections.items()), node.capacity, node.heat) for node in loads.lumped
+            LumpedNode(node.name, tuple(node.connections.items()), node.capacity, node.heat)
+            for node in loads.lumped
         )
         return ConductionProblem(
             self.operators,
@@ -192,16 +201,21 @@ def solve_coupled(
             machine.problem(loads),
             guess=solution,
             preconditioner=None if solution is None else solution.preconditioner,
+            relative_tolerance=_linear_tolerance(change),
         )
         hottest = float(solution.temperature.max())
         preload = {name: heat.preload for name, heat in loads.bearing_heat.items()}
         assembled = assembled or preload
         if not np.isfinite(hottest) or hottest > RUNAWAY_TEMPERATURE:
-            raise _no_steady_state(machine, point, f"{loads.total_heat:.0f} W would heat it over {hottest - 273.15:.0f} °C.")
+            raise _no_steady_state(
+                machine, point, f"{loads.total_heat:.0f} W would heat it over {hottest - 273.15:.0f} °C."
+            )
         if follows_preload and preload_runs_away(preload, assembled):
             worst = max(preload, key=lambda name: preload[name] / assembled[name])
             raise _no_steady_state(
-                machine, point, f"the preload of {worst} passes {preload[worst]:.0f} N, from {assembled[worst]:.0f} N cold."
+                machine,
+                point,
+                f"the preload of {worst} passes {preload[worst]:.0f} N, from {assembled[worst]:.0f} N cold.",
             )
         change = float(np.abs(solution.temperature - unknowns).max())
         heat = loads.total_heat
@@ -224,6 +238,11 @@ def solve_coupled(
         f"field and loads still change by {change:.2g} K after {MAXIMUM_ITERATIONS} iterations.",
         "Friction heat may rise with temperature faster than the machine can carry it away; lower speed or preload.",
     )
+
+
+def _linear_tolerance(change: float) -> float:
+    """Relative residual worth solving to when the loads last moved the field by ``change`` K."""
+    return float(np.clip(LINEAR_PER_KELVIN * change, RELATIVE_TOLERANCE, LOOSEST_LINEAR_TOLERANCE))
 
 
 def _no_steady_state(machine: PreparedMachine, point: OperatingPoint, reason: str) -> NoSteadyStateError:

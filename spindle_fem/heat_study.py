@@ -113,7 +113,11 @@ def _solved_temperatures(
         coupled = solve_coupled(machine, replace(point, speed=speed), start)
         start = coupled.solution.temperature
         lumped = dict(
-            zip(coupled.solution.problem.lumped_names, coupled.solution.lumped_temperature.tolist(), strict=True)
+            zip(
+                coupled.solution.problem.lumped_names,
+                coupled.solution.lumped_temperature.tolist(),
+                strict=True,
+            )
         )
         found[speed] = machine.builder.bearing_temperatures(machine.field_state(start, lumped))
     return found
@@ -123,7 +127,9 @@ def _row(
     state: BearingState, speed: float, temperatures: BearingTemperatures, isothermal: BearingState
 ) -> dict[str, Any]:
     balls = state.balls
-    first = {name: float(getattr(balls, name)[0]) for name in ("centrifugal_force", "orbital_speed", "spin_speed")}
+    first = {
+        name: float(getattr(balls, name)[0]) for name in ("centrifugal_force", "orbital_speed", "spin_speed")
+    }
     contact = {
         side: {
             "contact_angle_deg": float(np.degrees(balls.contact_angle[0, index])),
@@ -181,9 +187,7 @@ def _thrust_sweep(
 ) -> list[dict[str, Any]]:
     """Axial load and displacement of the set that carries the thrust, up to twice the operating thrust."""
     rows = []
-    carrying = {
-        bearing.name for group, bearing in spec.bearings if group.carries_thrust
-    }
+    carrying = {bearing.name for group, bearing in spec.bearings if group.carries_thrust}
     for thrust in np.linspace(0.0, 2.0 * point.thrust, THRUST_STEPS):
         states = mechanics.states(replace(point, thrust=float(thrust)), temperatures, expand=False)
         rows.append(

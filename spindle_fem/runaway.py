@@ -52,7 +52,10 @@ class HeatResponse:
             heat = dict.fromkeys(loads.surface_heat, 0.0)
             shares = machine.builder.shares(1.0)
             if active:
-                heat |= {f"{active}.inner_raceway": shares["inner"], f"{active}.outer_raceway": shares["outer"]}
+                heat |= {
+                    f"{active}.inner_raceway": shares["inner"],
+                    f"{active}.outer_raceway": shares["outer"],
+                }
             balls = machine.builder.ball_nodes(active) if active else ()
             lumped = tuple(
                 replace(node, heat=shares["balls"] / len(balls) if node.name in balls else 0.0)
@@ -71,7 +74,9 @@ class HeatResponse:
     def temperatures(self, heat: NDArray[np.float64]) -> dict[str, BearingTemperatures]:
         """Temperatures at given heats (n_bearings,) in W."""
         values = self.unheated + self.per_watt @ heat
-        return {name: BearingTemperatures(*row) for name, row in zip(self.names, values.tolist(), strict=True)}
+        return {
+            name: BearingTemperatures(*row) for name, row in zip(self.names, values.tolist(), strict=True)
+        }
 
     def settles(self, speed: float) -> bool:
         """Whether heat and temperature reach a fixed point when they start cold."""

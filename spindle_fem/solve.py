@@ -9,12 +9,26 @@ import numpy as np
 
 from spindle_fem import checks
 from spindle_fem.conduction.evaluate import probe_matrix, temperature_at_nodes
-from spindle_fem.coupling import FIELD_TOLERANCE, Clock, CoupledState, PreparedMachine, Progress, prepare_machine, solve_coupled
+from spindle_fem.coupling import (
+    FIELD_TOLERANCE,
+    Clock,
+    CoupledState,
+    PreparedMachine,
+    Progress,
+    prepare_machine,
+    solve_coupled,
+)
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.heat_study import heat_study
 from spindle_fem.loads.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.results.thermal_result import BearingResult, Check, CoolantResult, EnergyBalance, ThermalResult
+from spindle_fem.results.thermal_result import (
+    BearingResult,
+    Check,
+    CoolantResult,
+    EnergyBalance,
+    ThermalResult,
+)
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.validity import CodedWarning
 
@@ -123,7 +137,9 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     )
 
 
-def _bearings(machine: PreparedMachine, coupled: CoupledState, lumped: Mapping[str, float]) -> dict[str, BearingResult]:
+def _bearings(
+    machine: PreparedMachine, coupled: CoupledState, lumped: Mapping[str, float]
+) -> dict[str, BearingResult]:
     state = machine.field_state(coupled.solution.temperature, lumped)
     found = {}
     for name, temperatures in machine.builder.bearing_temperatures(state).items():
@@ -151,7 +167,9 @@ def _omitted_preload(
     spec = machine.spec
     if spec.heat.thermal_preload or spec.heat.model == "table" or not spec.bearing_set:
         return []
-    temperatures = machine.builder.bearing_temperatures(machine.field_state(coupled.solution.temperature, lumped))
+    temperatures = machine.builder.bearing_temperatures(
+        machine.field_state(coupled.solution.temperature, lumped)
+    )
     hint = "heat.thermal_preload = true follows it."
     try:
         states = BearingMechanics(spec).states(point, temperatures, expand=True)
@@ -226,7 +244,9 @@ def _coolant_checks(machine: PreparedMachine, coupled: CoupledState) -> list[Che
     return [checks.check_coolant(film_heat + pumping, march.enthalpy_rise, moved)]
 
 
-def _probes(machine: PreparedMachine, coupled: CoupledState, coolant: CoolantResult | None) -> dict[str, float]:
+def _probes(
+    machine: PreparedMachine, coupled: CoupledState, coolant: CoolantResult | None
+) -> dict[str, float]:
     points = [probe for probe in machine.spec.probe if probe.kind == "point"]
     readings: dict[str, float] = {}
     if points:

@@ -167,7 +167,9 @@ class BearingMechanics:
     @staticmethod
     def _expanded(around: list[BearingTemperatures]) -> mounting.SetTemperatures:
         return mounting.SetTemperatures(
-            bearings=tuple(mounting.BearingTemperatures(item.inner, item.outer, item.ball) for item in around),
+            bearings=tuple(
+                mounting.BearingTemperatures(item.inner, item.outer, item.ball) for item in around
+            ),
             shaft=float(np.mean([item.shaft for item in around])),
             housing=float(np.mean([item.housing for item in around])),
         )
@@ -249,7 +251,10 @@ def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
     return mounting.BearingSet(
         bearings=tuple(
             mounting.MountedBearing(
-                bearing.name, geometry, _ORIENTATION[bearing.takes_thrust], 0.5 * (bearing.z[0] + bearing.z[1])
+                bearing.name,
+                geometry,
+                _ORIENTATION[bearing.takes_thrust],
+                0.5 * (bearing.z[0] + bearing.z[1]),
             )
             for bearing in group.bearing
         ),
@@ -267,6 +272,10 @@ def _shaft_bore(spec: MachineSpec, group: BearingSet) -> float | None:
     middle = 0.5 * (group.bearing[0].z[0] + group.bearing[0].z[1])
     for part in spec.part:
         for segment in part.segment:
-            if part.rotating and segment.z[0] <= middle <= segment.z[1] and abs(segment.outer_diameter - bore) < 1e-6:
+            if (
+                part.rotating
+                and segment.z[0] <= middle <= segment.z[1]
+                and abs(segment.outer_diameter - bore) < 1e-6
+            ):
                 return segment.inner_diameter or None
     return None

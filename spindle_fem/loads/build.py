@@ -138,7 +138,9 @@ class LoadsBuilder:
             coolant = self.coolant_loop.at(point, self.wall_temperature(state))
             films |= self._channel_films(coolant)
             warnings += [*coolant.march.film.warnings, *coolant.pressure.warnings]
-        loads = Loads(surface_heat, films, tuple(lumped), heats, heat_to, fold_warnings(warnings, tuple(heats)))
+        loads = Loads(
+            surface_heat, films, tuple(lumped), heats, heat_to, fold_warnings(warnings, tuple(heats))
+        )
         return loads, coolant
 
     def shares(self, total: float) -> dict[str, float]:
@@ -148,7 +150,9 @@ class LoadsBuilder:
         inner = heat.inner_share.value
         return {"inner": inner * rings, "outer": (1.0 - inner) * rings, "balls": heat.ball_share * total}
 
-    def _ball_row(self, group: BearingSet, name: str, heat: BearingHeat, ball_heat: float) -> list[LumpedLoad]:
+    def _ball_row(
+        self, group: BearingSet, name: str, heat: BearingHeat, ball_heat: float
+    ) -> list[LumpedLoad]:
         spec = self.spec
         kind = spec.bearing_types[group.bearing_type]
         row = group.ball_row
@@ -163,7 +167,8 @@ class LoadsBuilder:
         raceways = (f"{name}.inner_raceway", f"{name}.outer_raceway")
         sectors = {
             surface: np.minimum(
-                (angle_of(self._centres[surface]) / (2.0 * np.pi) * self.n_sectors).astype(int), self.n_sectors - 1
+                (angle_of(self._centres[surface]) / (2.0 * np.pi) * self.n_sectors).astype(int),
+                self.n_sectors - 1,
             )
             for surface in raceways
         }
@@ -200,7 +205,8 @@ class LoadsBuilder:
             conductance = 2.0 * coefficient * bands.conductance_share
             on_rotating = (conductance / bands.rotating_area)[bands.rotating_cell]
             on_standing = {
-                name: (conductance / bands.standing_area)[cells] for name, cells in bands.standing_cells.items()
+                name: (conductance / bands.standing_area)[cells]
+                for name, cells in bands.standing_cells.items()
             }
             for cell in range(bands.n_cells):
                 connections = {gap.rotating: np.where(bands.rotating_cell == cell, on_rotating, 0.0)}
@@ -226,4 +232,3 @@ class LoadsBuilder:
             surface: FilmLoad(surface, coefficient[index], bulk[index])
             for surface, index in cells.facet_cell.items()
         }
-

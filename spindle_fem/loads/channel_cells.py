@@ -48,7 +48,9 @@ class ChannelCells:
         return self.cell_area.shape[0]
 
 
-def helix_coordinates(points: NDArray[np.float64], channel: Channel) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def helix_coordinates(
+    points: NDArray[np.float64], channel: Channel
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Start number and helix angle from its inlet, for points in the channel.
 
     The centre line of start ``k`` is ``z = z_start + pitch φ / 2π`` with the
@@ -94,7 +96,9 @@ def build_channel_cells(
     total = 2.0 * np.pi * channel.turns
     tolerance = 2.0 * np.pi / cells_per_turn
     if angle.min() < -tolerance or angle.max() > total + tolerance:
-        raise GeometryError(where, f"wall facets lie {np.degrees(angle.max() - total):.1f} degrees beyond the end.")
+        raise GeometryError(
+            where, f"wall facets lie {np.degrees(angle.max() - total):.1f} degrees beyond the end."
+        )
     n_cells = max(4, round(channel.turns * cells_per_turn))
     cell = np.clip((angle / total * n_cells).astype(np.int64), 0, n_cells - 1)
     with_ports = channel.ports is not None and channel.ports.wetted
@@ -110,7 +114,9 @@ def build_channel_cells(
     for name, cells in facet_cell.items():
         cell_area += np.bincount(cells, facet_areas[name], channel.starts * n_along)
     if (cell_area <= 0.0).any():
-        raise GeometryError(where, f"{int((cell_area <= 0.0).sum())} of its cells have no wall facet; refine the mesh.")
+        raise GeometryError(
+            where, f"{int((cell_area <= 0.0).sum())} of its cells have no wall facet; refine the mesh."
+        )
     radius = channel.inner_radius + 0.5 * channel.depth
     slope = float(np.hypot(radius, channel.pitch / (2.0 * np.pi)))
     centre_angle = (np.arange(n_cells) + 0.5) * total / n_cells

@@ -52,7 +52,9 @@ class CoolantLoop:
             starts=channel.starts,
         )
         self.port_diameter = channel.ports.diameter if cells.is_port.any() else None
-        port_area = cells.cell_area[:, cells.is_port].sum() / max(1, cells.n_starts * int(cells.is_port.sum()))
+        port_area = cells.cell_area[:, cells.is_port].sum() / max(
+            1, cells.n_starts * int(cells.is_port.sum())
+        )
         self.port_length = port_area / (np.pi * self.port_diameter) if self.port_diameter else 0.0
 
     def at(self, point: OperatingPoint, wall_temperature: NDArray[np.float64]) -> CoolantState:
@@ -104,7 +106,13 @@ class CoolantLoop:
         velocity = point.coolant_flow / self.section.starts / (0.25 * np.pi * self.port_diameter**2)
         reynolds = velocity * self.port_diameter / properties.kinematic_viscosity
         graetz = reynolds * properties.prandtl * self.port_diameter / self.port_length
-        port = nusselt_sieder_tate(graetz, extrapolate=True) * properties.thermal_conductivity / self.port_diameter
+        port = (
+            nusselt_sieder_tate(graetz, extrapolate=True)
+            * properties.thermal_conductivity
+            / self.port_diameter
+        )
         state = ChannelState(self.coolant, point.coolant_flow, inlet)
-        factor[self.cells.is_port] = float(port) / select_film(self.spec.coolant.film_model, self.section, state).value
+        factor[self.cells.is_port] = (
+            float(port) / select_film(self.spec.coolant.film_model, self.section, state).value
+        )
         return factor

@@ -17,7 +17,9 @@ _WEIGHTS = np.array([_WEIGHT_A] * 3 + [_WEIGHT_B] * 3)
 def _shapes(points: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
     x, y = points.T
     z = 1.0 - x - y
-    values = np.stack([z * (2 * z - 1), x * (2 * x - 1), y * (2 * y - 1), 4 * z * x, 4 * x * y, 4 * y * z], axis=1)
+    values = np.stack(
+        [z * (2 * z - 1), x * (2 * x - 1), y * (2 * y - 1), 4 * z * x, 4 * x * y, 4 * y * z], axis=1
+    )
     zero = np.zeros_like(x)
     along_x = np.stack([1 - 4 * z, 4 * x - 1, zero, 4 * (z - x), 4 * y, -4 * y], axis=1)
     along_y = np.stack([1 - 4 * z, zero, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y)], axis=1)
@@ -44,4 +46,3 @@ def facet_centres(points: NDArray[np.float64], facets: NDArray[np.int64]) -> NDA
     jacobian = 0.5 * np.linalg.norm(np.cross(tangent_x, tangent_y), axis=2) * _WEIGHTS
     places = np.einsum("qk,fkd->fqd", values, corners)
     return np.einsum("fq,fqd->fd", jacobian, places) / jacobian.sum(axis=1)[:, None]
-

@@ -103,9 +103,7 @@ def build_gap_bands(
     return GapBands(
         conductance_share=np.full(n_cells, turning_areas.sum() / n_cells),
         rotating_cell=cells_turning,
-        standing_cells={
-            name: cells_standing[starts[i] : starts[i + 1]] for i, name in enumerate(standing)
-        },
+        standing_cells={name: cells_standing[starts[i] : starts[i + 1]] for i, name in enumerate(standing)},
         rotating_area=rotating_area,
         standing_area=standing_area,
     )

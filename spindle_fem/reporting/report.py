@@ -160,9 +160,11 @@ def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | No
     section = meridian_section(result.mesh, result.temperature)
     bar = temperature_scale(result)
     study = result.heat_study
-    over_speed = {} if study is None else {
-        f"{OVER_SPEED}{name}": (lambda draw=draw: draw(study)) for name, draw in HEAT_CHARTS.items()
-    }
+    over_speed = (
+        {}
+        if study is None
+        else {f"{OVER_SPEED}{name}": (lambda draw=draw: draw(study)) for name, draw in HEAT_CHARTS.items()}
+    )
     return over_speed | {
         "machine_definition": lambda: machine_drawing(result.spec),
         "meridian_temperature": lambda: charts.meridian_temperature(result, section, bar),

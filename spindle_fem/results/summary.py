@@ -11,7 +11,18 @@ from spindle_fem.results.thermal_result import BearingResult, CoolantResult, The
 from spindle_fem.units import ZERO_CELSIUS_K
 
 SUMMARY_SCHEMA = "spindle-fem/summary/1"
-_PACKAGES = ("spindle-fem", "numpy", "scipy", "scikit-fem", "gmsh", "pygmsh", "pyamg", "pyvista", "vtk", "pydantic")
+_PACKAGES = (
+    "spindle-fem",
+    "numpy",
+    "scipy",
+    "scikit-fem",
+    "gmsh",
+    "pygmsh",
+    "pyamg",
+    "pyvista",
+    "vtk",
+    "pydantic",
+)
 
 
 def package_versions() -> dict[str, str]:

@@ -80,7 +80,9 @@ def test_heat_prints_terms_and_models(command):
 
 @pytest.mark.render
 def test_heat_writes_its_table_and_charts(command, tmp_path):
-    process = command("heat", "small_two_start", "--speed", "2000 rpm", "--speed", "4000 rpm", "-o", tmp_path / "heat")
+    process = command(
+        "heat", "small_two_start", "--speed", "2000 rpm", "--speed", "4000 rpm", "-o", tmp_path / "heat"
+    )
     assert process.returncode == 0, process.stderr
     assert (tmp_path / "heat" / "heat.csv").is_file()
     assert len(list((tmp_path / "heat" / "figures").glob("*.png"))) == 7

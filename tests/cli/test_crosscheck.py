@@ -30,7 +30,9 @@ def test_every_file_is_there_and_the_folder_complete(result):
         "reduced_network.toml", "state_space.npz", "state_space.json",
     } <= names  # fmt: skip
     assert "INCOMPLETE" not in names
-    assert json.loads((folder / "crosscheck.json").read_text(encoding="utf-8")) == json.loads(json.dumps(content))
+    assert json.loads((folder / "crosscheck.json").read_text(encoding="utf-8")) == json.loads(
+        json.dumps(content)
+    )
     assert {path.stem for path in (folder / "figures").glob("*.png")} == {
         "difference", "temperatures", "causes", "speeds", "convergence",
     }  # fmt: skip
@@ -55,7 +57,9 @@ def test_the_elements_flows_balance_at_the_balls(result):
     for name in ("B1", "B2"):
         into = [link["fem_W"] for link in content["links"] if link["link"].endswith(f"|{name}.balls")]
         shares = 0.5  # of the friction heat, given to the balls themselves
-        heat = next(case for case in content["claim"]["cases"] if case["model"] == "elements")["friction_heat_W"]
+        heat = next(case for case in content["claim"]["cases"] if case["model"] == "elements")[
+            "friction_heat_W"
+        ]
         assert -sum(into) < shares * heat
         assert len(into) == 2
 

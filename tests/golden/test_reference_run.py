@@ -32,7 +32,9 @@ def outputs(case):
         "probes": summary["probes"],
         "hottest": summary["temperature"]["max_degC"],
         "heat_W": {name: bearing["heat_W"] for name, bearing in summary["bearings"].items()},
-        "ring_difference_K": {name: bearing["ring_difference_K"] for name, bearing in summary["bearings"].items()},
+        "ring_difference_K": {
+            name: bearing["ring_difference_K"] for name, bearing in summary["bearings"].items()
+        },
         "coolant_W": summary["coolant"]["heat_W"],
         "film_W_m2K": summary["coolant"]["film_coefficient_W_m2K"]["value"],
     }

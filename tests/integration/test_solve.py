@@ -46,9 +46,13 @@ def test_temperatures_rise_in_proportion_to_heat(recorded):
     doubled = table.model_copy(
         update={"heat": {name: tuple(2.0 * value for value in row) for name, row in table.heat.items()}}
     )
-    point = dataclasses.replace(OperatingPoint.of(spec), coolant_inlet_temperature=290.75, ambient_temperature=290.75)
+    point = dataclasses.replace(
+        OperatingPoint.of(spec), coolant_inlet_temperature=290.75, ambient_temperature=290.75
+    )
     single = solve_prepared(recorded, point)
-    heated = prepare_machine(spec.model_copy(update={"heat": spec.heat.model_copy(update={"table": doubled})}))
+    heated = prepare_machine(
+        spec.model_copy(update={"heat": spec.heat.model_copy(update={"table": doubled})})
+    )
     twice = solve_prepared(heated, point)
     rise, doubled_rise = single.temperature - 290.75, twice.temperature - 290.75
     assert np.abs(doubled_rise - 2.0 * rise).max() < 1e-6 * rise.max()
@@ -89,7 +93,9 @@ def _first_harmonic(result, surface):
 
 def test_linear_and_quadratic_temperatures_agree(recorded, recorded_result):
     spec = recorded.spec
-    linear = solve_prepared(prepare_machine(spec.model_copy(update={"mesh": spec.mesh.model_copy(update={"order": 1})})))
+    linear = solve_prepared(
+        prepare_machine(spec.model_copy(update={"mesh": spec.mesh.model_copy(update={"order": 1})}))
+    )
     assert linear.n_unknowns < recorded_result.n_unknowns / 3
     for name, value in recorded_result.probes.items():
         # Straight temperatures on elements of 10-20 mm; the rings alone span 15 K.
@@ -119,7 +125,9 @@ def test_heat_enters_balls_and_rings_by_the_share(reference_result):
 
 def test_grease_beyond_its_limit_fails_the_run(recorded):
     spec = recorded.spec
-    cool_grease = spec.model_copy(update={"grease": spec.grease.model_copy(update={"temperature_limit": 310.0})})
+    cool_grease = spec.model_copy(
+        update={"grease": spec.grease.model_copy(update={"temperature_limit": 310.0})}
+    )
     result = solve_prepared(prepare_machine(cool_grease))
     with pytest.raises(CheckFailedError, match=r"grease temperature 50\..* degC \(limit 36\.85\)"):
         require_checks(result.checks, "recorded")
@@ -144,9 +152,7 @@ def test_rigid_preload_runs_away_and_says_up_to_which_speed_it_does_not():
     limit = highest_stable_speed(machine, OperatingPoint.of(spec))
     slower = dataclasses.replace(OperatingPoint.of(spec), speed=0.9 * limit)
     state = solve_coupled(machine, slower)
-    cold = solve_coupled(
-        prepare_machine(load_machine("wu_tan_2016", ["mesh.preset=coarse"])), slower
-    )
+    cold = solve_coupled(prepare_machine(load_machine("wu_tan_2016", ["mesh.preset=coarse"])), slower)
     assert state.loads.bearing_heat["F2"].preload > cold.loads.bearing_heat["F2"].preload
     assert HeatResponse(machine, slower).settles(slower.speed)
 
@@ -191,4 +197,6 @@ def test_contacts_need_one_group_each(recorded):
     text = str(error.value)
     assert '"X*|shaft" is no contact of this machine.' in text
     assert 'the contact "F2.inner_ring|shaft" has no conductance.' in text
-    assert 'the contact "F1.inner_ring|shaft" is claimed by inner_ring_seats and front_outer_ring_seats' in text
+    assert (
+        'the contact "F1.inner_ring|shaft" is claimed by inner_ring_seats and front_outer_ring_seats' in text
+    )
