@@ -60,6 +60,10 @@ class ReductionOptions:
     largest: int = 140
     highest_speed: float | None = None
 
+    def key(self, spec: MachineSpec) -> dict[str, float]:
+        """What of it a model's identity depends on."""
+        return {**asdict(self), "highest_speed": self.highest_speed_of(spec)}
+
     def highest_speed_of(self, spec: MachineSpec) -> float:
         """Highest speed that the range holds, rad/s."""
         if self.highest_speed is not None:
@@ -161,7 +165,7 @@ def reduced_model_of(
         Told each stage by name as it begins.
     """
     chosen = options or ReductionOptions()
-    digest = reduced_digest(spec, asdict(chosen))
+    digest = reduced_digest(spec, chosen.key(spec))
     found = ReducedModel.load(reduced_path(digest))
     if found is not None and found.digest == digest:
         return found
@@ -230,7 +234,7 @@ def build_reduced_model(
             contacts=tuple(machine.mesh.joints),
             gap_radii=radii,
             ranges=workshop.ranges(),
-            digest=reduced_digest(spec, asdict(chosen)),
+            digest=reduced_digest(spec, chosen.key(spec)),
         )
         errors = [
             _check(affine, model, basis, sample, found, spec)

@@ -1,0 +1,115 @@
+"""The basis of the reduced model, and the coefficients that it leaves free."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from spindle_fem.errors import SpecError
+from spindle_fem.geometry.assembly import build_assembly
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.reduced.affine import build_affine_system
+from spindle_fem.reduced.coefficients import build_coefficient_table
+from spindle_fem.reduced.model import reduced_digest
+from spindle_fem.reduced.snapshots import compress, helix_profiles, orthonormalise
+from spindle_fem.spec.load import load_machine
+from spindle_fem.surroundings.rotating import rotating_film
+
+RADII = {"air_gap": (0.065, 0.09), "labyrinth": (0.09, 0.091)}
+
+
+@pytest.fixture(scope="module")
+def energy():
+    rng = np.random.default_rng(0)
+    root = sparse.random_array((80, 80), density=0.1, rng=rng) + sparse.eye_array(80)
+    return (root.T @ root).tocsr()
+
+
+def test_the_basis_is_orthonormal_in_energy_and_holds_what_it_must(energy):
+    rng = np.random.default_rng(1)
+    keep = np.ones((80, 1))
+    snapshots = rng.normal(size=(80, 6)) @ rng.normal(size=(6, 30))
+    # Singular values come from a Gram matrix: below 1e-8 of the largest they are round-off.
+    basis = compress(snapshots, energy, 1e-6, 40, keep)
+    assert basis.shape[1] == 7
+    assert basis.T @ (energy @ basis) == pytest.approx(np.eye(7), abs=1e-12)
+    for vectors in (keep, snapshots):
+        rest = vectors - basis @ (basis.T @ (energy @ vectors))
+        assert np.abs(rest).max() < 1e-9
+
+
+def test_what_is_dropped_is_as_small_as_was_asked(energy):
+    rng = np.random.default_rng(2)
+    directions = orthonormalise(rng.normal(size=(80, 20)), energy)
+    sizes = 10.0 ** -np.arange(20)
+    basis = compress(directions * sizes, energy, 1e-5, 60, np.ones((80, 1)))
+    rest = directions * sizes
+    rest = rest - basis @ (basis.T @ (energy @ rest))
+    left = np.sqrt(np.sum(rest * (energy @ rest), axis=0))
+    assert left.max() <= 1.01e-5
+    assert basis.shape[1] <= 8
+    assert compress(directions, energy, 1e-12, 5, np.ones((80, 1))).shape[1] == 5
+
+
+def test_shapes_along_the_channel_are_polynomials_of_each_start_alone():
+    profiles = helix_profiles(2, 10, 2)
+    assert profiles.shape == (20, 6)
+    assert profiles[:10, 0].tolist() == [1.0] * 10
+    assert not profiles[10:, :3].any()
+    assert not profiles[:10, 3:].any()
+    assert profiles[:10, 1].sum() == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def table():
+    spec = load_machine("recorded_spindle")
+    return build_coefficient_table(spec, build_assembly(spec).joint_names, RADII)
+
+
+def test_coefficients_are_those_of_the_definition(table):
+    point = OperatingPoint(314.16, 1750.0, 293.15, 288.15, 3.3e-4)
+    base = table.base(point)
+    assert base["joint.F1.inner_ring|shaft"] == 10_000.0
+    assert base["joint.F1.outer_ring|shaft:face"] == 0.0
+    assert base["film.housing.flange_back"] == 200.0
+    assert base["balls.R1.inner"] == 3.0
+    # The reference page: 8 + 12 (n/3000)^0.75 and 0.133 Re^(2/3) 0.71^(1/3) 0.026/D.
+    assert base["gap.air_gap"] == pytest.approx(20.0, rel=1e-4)
+    assert base["film.shaft.nose_end"] == pytest.approx(
+        rotating_film("becker", 314.16, 0.18, minimum=10.0).value
+    )
+    reynolds = 314.16 * 0.18**2 / (2.0 * 1.55e-5)
+    assert base["film.shaft.nose_end"] == pytest.approx(
+        0.133 * reynolds ** (2 / 3) * 0.71 ** (1 / 3) * 0.026 / 0.18, rel=1e-3
+    )
+    assert table.capacities()["capacity.F1.balls"] == 170.0
+
+
+def test_a_parameter_scales_its_group_and_only_that(table):
+    factors = table.factors(
+        {"shaft_end_films": 1.5, "joint.inner_ring_seats": 2.0, "joint.F1.inner_ring|shaft": 3.0}
+    )
+    assert table.scale("film.shaft.nose_end", factors) == 1.5
+    assert table.scale("film.shaft.drive_end", factors) == 1.5
+    assert table.scale("film.housing.outside", factors) == 1.0
+    assert table.scale("joint.F2.inner_ring|shaft", factors) == 2.0
+    assert table.scale("joint.F1.inner_ring|shaft", factors) == 6.0
+
+
+def test_what_has_no_constant_coefficient_is_refused():
+    spec = load_machine("wu_tan_2016")
+    with pytest.raises(SpecError, match=r"bearing_set.front.ball_row.*no constant conductance"):
+        build_coefficient_table(spec, build_assembly(spec).joint_names, RADII)
+    machine = SimpleNamespace(spec=None, operators=None, joint_conductance={"A|B": np.inf, "B|C": 1.0})
+    with pytest.raises(SpecError, match="A|B is .perfect.*Give a large conductance"):
+        build_affine_system(machine)
+
+
+def test_the_identity_of_a_model_follows_coefficients_but_not_words_or_operation():
+    plain = load_machine("recorded_spindle")
+    same = load_machine("recorded_spindle", ["operation.thrust=900 N"]).model_copy(update={"title": "other"})
+    other = load_machine("recorded_spindle", ["channel.depth=11 mm"])
+    assert reduced_digest(plain, {}) == reduced_digest(same, {})
+    assert reduced_digest(plain, {}) != reduced_digest(other, {})
+    assert reduced_digest(plain, {}) != reduced_digest(plain, {"tolerance": 1.0})
