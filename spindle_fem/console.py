@@ -56,14 +56,16 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
         film = coolant["film_coefficient_W_m2K"]
         console.print(
             f"Coolant {coolant['inlet_degC']:.2f} → {coolant['outlet_degC']:.2f} °C, {coolant['regime']}, "
-            f"Re {coolant['reynolds']:.0f}, film {film['value']:.0f} ({film['low']:.0f}–{film['high']:.0f}) W/(m²·K), "
+            f"Re {coolant['reynolds']:.0f}, "
+            f"film {film['value']:.0f} ({film['low']:.0f}–{film['high']:.0f}) W/(m²·K), "
             f"pressure drop {coolant['pressure_drop_Pa'] / 1e5:.2f} bar"
         )
     temperature, energy, mesh = summary["temperature"], summary["energy"], summary["mesh"]
     console.print(f"Hottest {temperature['max_degC']:.2f} °C at {temperature['max_at_mm']} mm")
     console.print(
         f"Heat in {energy['heat_in_W']:.2f} W, imbalance {energy['imbalance_relative']:.1e}; "
-        f"{mesh['nodes']:,} temperatures, {mesh['elements']:,} elements, worst quality {mesh['min_quality']:.2f}"
+        f"{mesh['nodes']:,} temperatures, {mesh['elements']:,} elements, "
+        f"worst quality {mesh['min_quality']:.2f}"
     )
     split = ", ".join(f"{name} {seconds:.1f}" for name, seconds in summary["timings_s"].items())
     console.print(f"{summary['wall_time_s']:.1f} s ({split}), peak {summary['peak_rss_MB']:.0f} MB")

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.conduction.operators import ThermalOperators, build_operators
 from spindle_fem.conduction.linear_solvers import RELATIVE_TOLERANCE
+from spindle_fem.conduction.operators import ThermalOperators, build_operators
 from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.conduction.steady import ConductionSolution, solve_steady
 from spindle_fem.errors import ConvergenceError, NoEquilibriumError, NoSteadyStateError, OutOfValidityError
@@ -236,7 +236,7 @@ def solve_coupled(
     raise ConvergenceError(
         machine.spec.name,
         f"field and loads still change by {change:.2g} K after {MAXIMUM_ITERATIONS} iterations.",
-        "Friction heat may rise with temperature faster than the machine can carry it away; lower speed or preload.",
+        "Friction heat may rise with temperature faster than it is carried away; lower speed or preload.",
     )
 
 
@@ -284,11 +284,13 @@ class Clock:
         self._since = 0.0
 
     def begin(self, stage: str) -> None:
+        """End the stage before and start this one."""
         self.end()
         self._stage, self._since = stage, time.perf_counter()
         self.progress(stage)
 
     def end(self) -> None:
+        """End the stage that runs."""
         if self._stage:
             self.timings[self._stage] = time.perf_counter() - self._since
         self._stage = ""

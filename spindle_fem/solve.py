@@ -108,7 +108,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         )
         done.append(grease)
         if not grease.passed:
-            text = f"Grease reaches {grease.value:.1f} °C, its limit is {grease.limit:.1f} °C. {grease.explanation}"
+            text = f"Grease reaches {grease.value:.1f} °C, its limit is {grease.limit:.1f} °C."
             warnings.append(CodedWarning("grease_temperature", text))
     films = coupled.loads.films
     return ThermalResult(
@@ -174,7 +174,7 @@ def _omitted_preload(
     try:
         states = BearingMechanics(spec).states(point, temperatures, expand=True)
     except (NoEquilibriumError, OutOfValidityError) as error:
-        text = f"Thermal expansion is left out; at these temperatures there would be no equilibrium ({error}). {hint}"
+        text = f"Thermal expansion is left out; with it there would be no equilibrium here ({error}). {hint}"
         return [CodedWarning("thermal_preload_omitted", text)]
     cold = coupled.loads.bearing_heat
     name = max(states, key=lambda key: states[key].preload - cold[key].preload)

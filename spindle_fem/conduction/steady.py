@@ -123,7 +123,8 @@ def solve_steady(
     unknowns = close_balance(matrix, load, solution.unknowns)
     rise, lumped_rise = split_unknowns(unknowns, system.n_lumped, system.tie)
     # Row sums of a stiff matrix are rounded; the films alone say what is still missing.
-    missing = compute_balance(problem, system, rise, lumped_rise).imbalance / _surroundings_conductance(problem)
+    first = compute_balance(problem, system, rise, lumped_rise)
+    missing = first.imbalance / _surroundings_conductance(problem)
     rise, lumped_rise = rise + missing, lumped_rise + missing
     balance = compute_balance(problem, system, rise, lumped_rise)
     require_balance(balance, LINEAR_BALANCE_TOLERANCE if balance_tolerance is None else balance_tolerance)
@@ -201,7 +202,10 @@ def _surroundings_conductance(problem: ConductionProblem) -> float:
     """Heat to the surroundings of the whole machine warmed by one kelvin, W/K."""
     operators = problem.operators
     films = sum(
-        float(np.sum(operators.per_facet(film.surface, film.coefficient, film.label) * operators.facet_areas(film.surface)))
+        float(
+            operators.per_facet(film.surface, film.coefficient, film.label)
+            @ operators.facet_areas(film.surface)
+        )
         for film in problem.films
     )
     return films + sum(link.conductance for link in problem.lumped_links if link.other is None)

@@ -33,7 +33,9 @@ OVER_SPEED = "over_speed_"
 CAPTIONS = {
     f"{OVER_SPEED}heat_terms": "Friction heat over speed, stacked by term.",
     f"{OVER_SPEED}heat_models": "The same bearings by every heat model: the spread a designer should expect.",
-    f"{OVER_SPEED}film_thickness": "Central film: flooded and isothermal (dashed), and as it is at this run's temperatures.",
+    f"{OVER_SPEED}film_thickness": (
+        "Central film: flooded and isothermal (dashed), and as it is at this run's temperatures."
+    ),
     f"{OVER_SPEED}film_ratio": "Film thickness over composite roughness; from 3 on the film carries alone.",
     f"{OVER_SPEED}thrust": "Axial load and displacement of the set that carries the thrust.",
     f"{OVER_SPEED}contacts": "Deformation, contact angle and ellipse: inner contact solid, outer dashed.",

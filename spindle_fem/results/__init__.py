@@ -1,0 +1,1 @@
+"""What a solved machine knows, as objects, summary, dataset and fields."""

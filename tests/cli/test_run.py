@@ -38,7 +38,8 @@ def test_summary_has_the_keys_that_stay_put(small_run):
     for bearing in summary["bearings"].values():
         assert {
             "heat_W", "terms_W", "temperature_inner_degC", "temperature_outer_degC", "temperature_ball_degC",
-            "ring_difference_K", "contact_angle_inner_deg", "contact_angle_outer_deg", "preload_N", "film_um", "lambda",
+            "ring_difference_K", "contact_angle_inner_deg", "contact_angle_outer_deg", "preload_N", "film_um",
+            "lambda",
         } <= set(bearing)  # fmt: skip
     assert {"min_degC", "max_degC", "max_at_mm"} == set(summary["temperature"])
 
