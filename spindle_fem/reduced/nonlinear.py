@@ -50,23 +50,69 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """Which complex columns of a term's answer belong to which derivative."""
+    """Complex columns of a term: the value first, then one for each direction of a derivative.
+
+    Attributes
+    ----------
+    reads, states : slice
+        Rows of the sensed temperatures and of the states.
+    split, end : int
+        Columns of the states' and of the parameters' directions begin here.
+    targets : list of int
+        Derivative that each of the latter belongs to.
+    temperatures, state : ndarray
+        Perturbations, to which the values are added.
+    parameters : mapping of str to ndarray
+    """
 
     reads: slice
     states: slice
-    n_reads: int
-    n_states: int
+    split: int
+    end: int
     targets: list[int]
+    temperatures: NDArray[np.complex128]
+    state: NDArray[np.complex128]
+    parameters: Mapping[str, NDArray[np.complex128]]
 
-    def spread(self, answer: NDArray, rows: slice, scale: Array, slopes: tuple[Array, Array, Array]) -> None:
-        """Add one complex answer, times what it multiplies in each row, to the derivatives."""
+    @classmethod
+    def of(
+        cls, term: Term, values: Mapping[str, float], reads: slice, states: slice, own: Mapping[str, int]
+    ) -> _Layout:
+        """Layout of a term with parameter values; ``own`` maps its asked parameters to derivatives."""
+        n_reads, n_states = len(term.reads), term.n_states
+        split, end = 1 + n_reads, 1 + n_reads + n_states
+        width = end + len(own)
+        temperatures = np.zeros((n_reads, width), dtype=complex)
+        state = np.zeros((n_states, width), dtype=complex)
+        temperatures[np.arange(n_reads), 1 + np.arange(n_reads)] = 1j * COMPLEX_STEP
+        state[np.arange(n_states), split + np.arange(n_states)] = 1j * COMPLEX_STEP
+        parameters = {name: np.full(width, value, dtype=complex) for name, value in values.items()}
+        kinds = {item.name: item.logarithmic for item in term.parameters}
+        for i, name in enumerate(own):
+            parameters[name][end + i] += 1j * COMPLEX_STEP * (values[name] if kinds[name] else 1.0)
+        return cls(reads, states, split, end, list(own.values()), temperatures, state, parameters)
+
+    def context(self, time: float, inputs: Mapping[str, float], sensed: Array, states: Array) -> TermContext:
+        """What the term sees."""
+        return TermContext(
+            time,
+            inputs,
+            self.temperatures + sensed[self.reads, None],
+            self.state + states[self.states, None],
+            self.parameters,
+        )
+
+    def spread(
+        self, answers: NDArray, rows: slice, scale: Array | float, slopes: tuple[Array, Array, Array]
+    ) -> None:
+        """Add complex answers, times what they multiply in each row, to the derivatives."""
         by_sensed, by_state, by_parameter = slopes
-        found = np.imag(answer) / COMPLEX_STEP
-        split = 1 + self.n_reads
-        by_sensed[rows, self.reads] += np.outer(scale, found[1:split])
-        by_state[rows, self.states] += np.outer(scale, found[split : split + self.n_states])
+        found = scale * (answers.imag / COMPLEX_STEP)
+        by_sensed[rows, self.reads] += found[:, 1 : self.split]
+        if self.end > self.split:
+            by_state[rows, self.states] += found[:, self.split : self.end]
         for i, target in enumerate(self.targets):
-            by_parameter[rows, target] += scale * found[split + self.n_states + i]
+            by_parameter[rows, target] += found[:, self.end + i]
 
 
 class DynamicTerms:
@@ -136,10 +182,23 @@ class DynamicTerms:
         ends = np.cumsum([0, *sizes])
         self._states = [slice(ends[i], ends[i + 1]) for i in range(len(terms))]
         self.n_states = int(ends[-1])
-        self._own: list[dict[str, int]] = [
-            {term.names()[name].name: i for i, name in enumerate(self.derivatives) if name in term.names()}
-            for term in terms
-        ]
+        self._uniform = self.sense @ model.one
+        self._layouts = []
+        self._shifted: list[list[tuple[int, str]]] = []
+        for number, term in enumerate(terms):
+            names = term.names()
+            own = {names[name].name: i for i, name in enumerate(self.derivatives) if name in names}
+            self._layouts.append(
+                _Layout.of(term, self.values[number], self._reads[number], self._states[number], own)
+            )
+            films = [f"film.{place.removeprefix(FLUID_PREFIX)}" for place in term.heat_places]
+            self._shifted.append(
+                [
+                    (i, film)
+                    for i, (place, film) in enumerate(zip(term.heat_places, films, strict=True))
+                    if place.startswith(FLUID_PREFIX) and film in model.fluid_names
+                ]
+            )
 
     def _require_place(self, term: Term, place: str) -> None:
         model = self.fast.model
@@ -192,30 +251,6 @@ class DynamicTerms:
         parts = [term.initial_state(values) for term, values in zip(self.terms, self.values, strict=True)]
         return np.concatenate(parts) if parts else np.zeros(0)
 
-    def _context(
-        self, number: int, time: float, inputs: Mapping[str, float], sensed: Array, states: Array
-    ) -> tuple[TermContext, int, int, list[int]]:
-        """Context of a term with one column unperturbed and one for each direction."""
-        term = self.terms[number]
-        n_reads, n_states = len(term.reads), term.n_states
-        own = self._own[number]
-        width = 1 + n_reads + n_states + len(own)
-        temperatures = np.repeat(sensed[self._reads[number], None], width, axis=1).astype(complex)
-        state = np.repeat(states[self._states[number], None], width, axis=1).astype(complex)
-        for i in range(n_reads):
-            temperatures[i, 1 + i] += 1j * COMPLEX_STEP
-        for i in range(n_states):
-            state[i, 1 + n_reads + i] += 1j * COMPLEX_STEP
-        parameters, targets = {}, []
-        kinds = {item.name: item.logarithmic for item in term.parameters}
-        for name, value in self.values[number].items():
-            parameters[name] = np.full(width, value, dtype=complex)
-        for i, (name, target) in enumerate(own.items()):
-            scale = parameters[name][0].real if kinds[name] else 1.0
-            parameters[name][1 + n_reads + n_states + i] += 1j * COMPLEX_STEP * scale
-            targets.append(target)
-        return TermContext(time, inputs, temperatures, state, parameters), n_reads, n_states, targets
-
     def evaluate(
         self,
         time: float,
@@ -244,30 +279,30 @@ class DynamicTerms:
         by_state = np.zeros((self.n_added, self.n_states))
         by_parameter = np.zeros((self.n_added, n_derivatives))
         for number, term in enumerate(self.terms):
-            context, n_reads, n_states, targets = self._context(number, time, inputs, sensed, states)
-            layout = _Layout(self._reads[number], self._states[number], n_reads, n_states, targets)
+            layout = self._layouts[number]
+            context = layout.context(time, inputs, sensed, states)
             slopes = (by_sensed, by_state, by_parameter)
             if term.heat_places:
-                answers = term.heat(context)
-                for i, place in enumerate(term.heat_places):
-                    row = self._heat[number].start + i
-                    film = "film." + place.removeprefix(FLUID_PREFIX)
-                    shifts_film = place.startswith(FLUID_PREFIX) and film in coefficients
-                    scale = coefficients[film] if shifts_film else 1.0
-                    value[row] = scale * answers[i, 0].real
-                    layout.spread(answers[i], slice(row, row + 1), np.array([scale]), slopes)
-                    for target in touched.get(film, ()) if shifts_film else ():
-                        by_parameter[row, target] += value[row]
+                answers = np.asarray(term.heat(context), dtype=complex)
+                rows = self._heat[number]
+                scale = np.ones((len(answers), 1))
+                for i, film in self._shifted[number]:
+                    scale[i] = coefficients[film]
+                value[rows] = scale[:, 0] * answers[:, 0].real
+                layout.spread(answers, rows, scale, slopes)
+                for i, film in self._shifted[number]:
+                    for target in touched.get(film, ()):
+                        by_parameter[rows.start + i, target] += value[rows.start + i]
             if term.coefficients:
-                answers = term.factor(context)
+                answers = np.asarray(term.factor(context), dtype=complex)
                 for i, (coefficient, own_sensed, columns) in enumerate(self._moved[number]):
                     strength = coefficients[coefficient] * self._spectra[coefficient]
                     fluid = self._fluid_temperature(coefficient, inputs)
-                    difference = sensed[own_sensed] - fluid * (self.sense[own_sensed] @ self.fast.model.one)
+                    difference = sensed[own_sensed] - fluid * self._uniform[own_sensed]
                     excess = answers[i, 0].real - 1.0
                     value[columns] = -excess * strength * difference
-                    by_sensed[columns, own_sensed] -= np.diag(excess * strength)
-                    layout.spread(answers[i], columns, -strength * difference, slopes)
+                    by_sensed[columns, own_sensed].flat[:: len(strength) + 1] -= excess * strength
+                    layout.spread(answers[i : i + 1], columns, -(strength * difference)[:, None], slopes)
                     for target in touched.get(coefficient, ()):
                         by_parameter[columns, target] += value[columns]
         return Evaluation(value, by_sensed, by_state, by_parameter)
@@ -291,15 +326,12 @@ class DynamicTerms:
         for number, term in enumerate(self.terms):
             if not term.n_states:
                 continue
-            context, n_reads, n_states, targets = self._context(number, time, inputs, sensed, states)
-            answer = term.advance(context, step)
-            own = self._states[number]
-            after[own] = answer[:, 0].real
-            slopes = np.imag(answer) / COMPLEX_STEP
-            by_sensed[own, self._reads[number]] = slopes[:, 1 : 1 + n_reads]
-            by_state[own, own] = slopes[:, 1 + n_reads : 1 + n_reads + n_states]
-            for i, target in enumerate(targets):
-                by_parameter[own, target] = slopes[:, 1 + n_reads + n_states + i]
+            layout = self._layouts[number]
+            answer = np.asarray(
+                term.advance(layout.context(time, inputs, sensed, states), step), dtype=complex
+            )
+            after[layout.states] = answer[:, 0].real
+            layout.spread(answer, layout.states, 1.0, (by_sensed, by_state, by_parameter))
         return after, by_sensed, by_state, by_parameter
 
 
