@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementQuad2, FacetBasis, LinearForm, MeshQuad
 
 from spindle_fem.errors import ConvergenceError
-from spindle_fem.loads.films import gap_coefficient
+from spindle_fem.loads.films import film_coefficient, gap_coefficient
 from spindle_fem.loads.joints import group_of_contacts
 from spindle_fem.network.cells import Faces, MeridianCells
 from spindle_fem.network.laws import CoolantLaw
@@ -26,6 +26,8 @@ from spindle_fem.network.machine_steady import MachineNetworkState
 
 Array = NDArray[np.float64]
 FULL_TURN = 2.0 * np.pi
+# W; a machine without heat is measured by this.
+AT_REST = 1.0
 
 
 @BilinearForm
@@ -56,7 +58,7 @@ class AxisymmetricState:
     balls, air, coolant : (n,) ndarray, [K]
         In the order of the network's nodes; coolant at the end of each cell.
     residual_relative : float
-        Heat in less heat out over heat in.
+        Heat in less heat out over heat in (over 1 W where there is less).
     n_unknowns : int
     """
 
@@ -102,7 +104,9 @@ class _Assembly:
             z, r = middles[0, facets], middles[1, facets]
             for cell, facet in enumerate(facets):
                 radial = bool(np.isclose(z[cell], self.cells.z[cell].mean(), atol=1e-12))
-                low = (r[cell] < self.cells.r[cell].mean()) if radial else (z[cell] < self.cells.z[cell].mean())
+                low = (
+                    (r[cell] < self.cells.r[cell].mean()) if radial else (z[cell] < self.cells.z[cell].mean())
+                )
                 found[cell, radial, low] = int(facet)
         return found
 
@@ -188,7 +192,7 @@ def solve_axisymmetric(state: MachineNetworkState) -> AxisymmetricState:
     coolant = solution[machine.coolant_start - machine.n_solid + system.n_field :]
     if machine.coolant is not None:
         out += network.stream_rate * (float(coolant[-1]) - network.point.coolant_inlet_temperature)
-    residual = (heat - out) / max(heat, 1.0e-12)
+    residual = (heat - out) / max(heat, AT_REST)
     if abs(residual) > 1.0e-8:
         raise ConvergenceError("axisymmetric elements", f"heat in and out differ by {residual:.1e}.")
     weight = system.basis.dx * FULL_TURN * system.basis.global_coordinates()[1]
@@ -204,7 +208,8 @@ def _joints(system: _Assembly, machine: MachineNetwork) -> None:
     contact = system.cells.contact
     groups = group_of_contacts(machine.spec, machine.assembly.joint_names)
     value = {
-        name: np.inf if group.conductance == "perfect" else group.conductance.value for name, group in groups.items()
+        name: np.inf if group.conductance == "perfect" else group.conductance.value
+        for name, group in groups.items()
     }
     h = np.array([value[name] for name in contact.name], dtype=float)
     # a perfect contact is a very good one: 1e9 W/(m²K) leaves 1e-5 K at 10 kW/m²
@@ -232,7 +237,11 @@ def _balls(system: _Assembly, state: MachineNetworkState) -> float:
         lump = system.n_field + machine.ball_nodes[bearing.name] - machine.n_solid
         given = network.bearing_heat[bearing.name]
         row = group.ball_row
-        pair = (row.conductance.value,) * 2 if row.kind == "constant" else (given.conductance_inner, given.conductance_outer)
+        pair = (
+            (row.conductance.value,) * 2
+            if row.kind == "constant"
+            else (given.conductance_inner, given.conductance_outer)
+        )
         for side, conductance in zip(("inner", "outer"), pair, strict=True):
             surface = f"{bearing.name}.{side}_raceway"
             area = float(machine.surfaces[surface].area.sum())
@@ -251,8 +260,6 @@ def _coolant_heat(state: MachineNetworkState) -> Array:
 
 def _films(system: _Assembly, state: MachineNetworkState) -> list[tuple[Array, float]]:
     """Films at the coefficients that the network's wall temperatures give."""
-    from spindle_fem.loads.films import film_coefficient
-
     network = state.network
     lost = []
     for film in network.machine.spec.film:
@@ -325,5 +332,3 @@ def _coolant(system: _Assembly, state: MachineNetworkState) -> None:
             system.entry(start + c, start + c - 1, -rate)
         else:
             system.load[start] += rate * law.inlet
-
-

@@ -31,7 +31,8 @@ CAUSES = {
     "few_columns": "few nodes along z: a column is one temperature",
     "few_rows": "few nodes along r: a body is one temperature, heat reaches its middle",
     "smeared_helix": (
-        "helix smeared over its pitch: constriction of the heat between the turns and the drop along the lands"
+        "helix smeared over its pitch: constriction of the heat between the turns and the drop along "
+        "the lands"
     ),
     "closed_rings": "closed rings for a helix: ends of the channel, inclination, temperature around the axis",
     "port_region": "no ports: drillings with a film of their own, metal missing there",

@@ -161,18 +161,24 @@ def _explanation(spec: MachineSpec, network: dict[str, ClaimCase], verdict: dict
     drops = verdict["ring_difference_change_K"]
     hottest = max(base.ring_difference, key=lambda name: base.ring_difference[name])
     sentences = [
-        f"Claimed: maximum up by less than {CLAIMED_RISE:.0f} K, ring difference down by about {CLAIMED_FALL:.0f} K. "
+        f"Claimed: maximum up by less than {CLAIMED_RISE:.0f} K, ring difference down by about "
+        f"{CLAIMED_FALL:.0f} K. "
         f"Elements: maximum {verdict['max_rise_K']:+.1f} K, ring differences "
         + ", ".join(f"{name} {value:+.1f} K" for name, value in drops.items())
         + ".",
-        f"Oil 16 K warmer alone moves the maximum by {oil.maximum - base.maximum:+.1f} K and the ring difference of "
-        f"{hottest} by {oil.ring_difference[hottest] - base.ring_difference[hottest]:+.1f} K: all that sits on the "
-        "housing follows the oil, the shaft side only through balls and air, so the outer ring warms more than the "
+        f"Oil 16 K warmer alone moves the maximum by {oil.maximum - base.maximum:+.1f} K and the ring "
+        "difference of "
+        f"{hottest} by {oil.ring_difference[hottest] - base.ring_difference[hottest]:+.1f} K: all "
+        "that sits on the "
+        "housing follows the oil, the shaft side only through balls and air, so the outer ring warms "
+        "more than the "
         "inner one.",
-        f"The deeper channel alone moves the maximum by {deep.maximum - base.maximum:+.1f} K: the flow stays laminar, "
+        f"The deeper channel alone moves the maximum by {deep.maximum - base.maximum:+.1f} K: the "
+        "flow stays laminar, "
         f"the film coefficient goes from {base.film_coefficient:.0f} to {deep.film_coefficient:.0f} W/(m²·K) "
         "while the wetted area grows.",
-        f"Together the oil takes {both.coolant_heat:.0f} W instead of {base.coolant_heat:.0f} W, and friction makes "
+        f"Together the oil takes {both.coolant_heat:.0f} W instead of {base.coolant_heat:.0f} W, and "
+        "friction makes "
         f"{both.heat:.0f} W instead of {base.heat:.0f} W.",
     ]
     needed = base.ring_difference[hottest] - CLAIMED_FALL
@@ -182,10 +188,11 @@ def _explanation(spec: MachineSpec, network: dict[str, ClaimCase], verdict: dict
     )
     if not verdict["rise_below_3_K"]:
         sentences.append(
-            "A maximum that hardly rises under warmer oil needs a film coefficient that grows several times: the "
+            "A maximum that hardly rises under warmer oil needs a film coefficient that grows "
+            "several times: the "
             "paper's map steps to its turbulent branch at 19 mm and 31 °C. At the flow defined here "
-            f"({1e3 * 60.0 * spec.coolant.flow:.0f} L/min) the Reynolds number is far below the transition, so that "
+            f"({1e3 * 60.0 * spec.coolant.flow:.0f} L/min) the Reynolds number is far below the "
+            "transition, so that "
             "branch is not reached and the step is absent."
         )
     return sentences
-

@@ -100,7 +100,9 @@ def compare(
     told = {(item.first, item.second) for item in links if item.kind == "solid"}
     for (first, second, kind), (fem, surface) in flows.items():
         if kind == "solid" and (first, second) not in told:
-            links.append(LinkComparison(f"{names[first]}|{names[second]}", first, second, kind, 0.0, fem, surface))
+            links.append(
+                LinkComparison(f"{names[first]}|{names[second]}", first, second, kind, 0.0, fem, surface)
+            )
     links.sort(key=lambda item: (item.kind != "solid", item.first, item.second, item.kind))
     return Comparison(machine, state.temperature, node_temperatures(regions, prepared, coupled), tuple(links))
 
@@ -184,8 +186,14 @@ def _surface_flows(prepared, coupled, machine, add) -> None:
             for node, value in enumerate(np.bincount(nodes_of(surface), heat, machine.n_solid)):
                 if value:
                     add(node, surface, surface, float(value), surface)
-    lumped = dict(zip(coupled.solution.problem.lumped_names, coupled.solution.lumped_temperature, strict=True))
-    balls = {ball: machine.ball_nodes[name] for name in machine.ball_nodes for ball in prepared.builder.ball_nodes(name)}
+    lumped = dict(
+        zip(coupled.solution.problem.lumped_names, coupled.solution.lumped_temperature, strict=True)
+    )
+    balls = {
+        ball: machine.ball_nodes[name]
+        for name in machine.ball_nodes
+        for ball in prepared.builder.ball_nodes(name)
+    }
     for load in coupled.loads.lumped:
         for surface, coefficient in load.connections.items():
             rows = operators.surface_rows[surface]

@@ -13,7 +13,9 @@ from spindle_fem.network.machine_steady import MachineNetworkState
 Array = NDArray[np.float64]
 
 
-def gather(coarse: MachineNetwork, fine: MachineNetwork, solid: Array, balls: Array, air: Array, coolant: Array) -> Array:
+def gather(
+    coarse: MachineNetwork, fine: MachineNetwork, solid: Array, balls: Array, air: Array, coolant: Array
+) -> Array:
     """Temperatures of a fine model at the nodes of a coarse network, (n_nodes,) [K].
 
     Solids by volume, gap air by length along z, coolant at the end of each

@@ -24,7 +24,6 @@ from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.network.laws import CoolantLaw, WallFilmLaw
 from spindle_fem.network.machine import MachineNetwork
-
 from spindle_fem.network.model import ThermalNetwork
 from spindle_fem.network.operating import operate
 
@@ -127,7 +126,9 @@ class MatchedNetwork:
         # a link that only the elements have (through the lands) is the same at every speed
         return self.factor * np.where(np.isnan(value), self.base, value)
 
-    def steady(self, point: OperatingPoint, heat: Mapping[str, float], conductance: Array | None = None) -> Array:
+    def steady(
+        self, point: OperatingPoint, heat: Mapping[str, float], conductance: Array | None = None
+    ) -> Array:
         """Node temperatures for given friction heat [W], (n,) [K]."""
         matrix, to_boundary = self.matrices(self.factor * self.base if conductance is None else conductance)
         power = self.spread @ np.array([heat[name] for name in self.bearings])
@@ -188,7 +189,9 @@ def element_state(
 
 def _boundary_values(machine: MachineNetwork, names: Sequence[str], point: OperatingPoint) -> Array:
     known = {"ambient": point.ambient_temperature, "coolant_inlet": point.coolant_inlet_temperature}
-    known |= {f"{film.name}.fluid": film.temperature for film in machine.spec.film if film.temperature != "ambient"}
+    known |= {
+        f"{film.name}.fluid": film.temperature for film in machine.spec.film if film.temperature != "ambient"
+    }
     return np.array([known[name] for name in names])
 
 
@@ -227,9 +230,13 @@ def base_conductances(
             second = inlet
         found[first, second] = found.get((first, second), 0.0) + value
 
-    for a, b, g in zip(network.first.tolist(), network.second.tolist(), network.conductance.tolist(), strict=True):
+    for a, b, g in zip(
+        network.first.tolist(), network.second.tolist(), network.conductance.tolist(), strict=True
+    ):
         add(a, b, g)
-    full = np.concatenate([temperature, np.full(machine.n_nodes - len(temperature), point.coolant_inlet_temperature)])
+    full = np.concatenate(
+        [temperature, np.full(machine.n_nodes - len(temperature), point.coolant_inlet_temperature)]
+    )
     for law in network.laws:
         if isinstance(law, WallFilmLaw):
             fluid = _film_fluid(machine, law.name, point)
@@ -298,14 +305,18 @@ def match_fluxes(
     n, boundaries = machine.coolant_start, _boundary_names(machine)
     network = operate(machine, matched.point, heat_model, around=matched.around)
     spread = _heat_spread(machine, network)
-    base = [base_conductances(machine, s.point, heat_model, matched.around, matched.temperature) for s in states]
+    base = [
+        base_conductances(machine, s.point, heat_model, matched.around, matched.temperature) for s in states
+    ]
     flux = _element_fluxes(machine, matched)
     bases = [dict(item) for item in base]
     for pair in flux:
         if pair not in bases[0] and _conducts(pair, flux, matched, boundaries, machine):
             for item in bases:
                 item[pair] = _ratio(pair, flux, matched, boundaries, machine)
-    both = [np.concatenate([s.temperature[:n], _boundary_values(machine, boundaries, s.point)]) for s in states]
+    both = [
+        np.concatenate([s.temperature[:n], _boundary_values(machine, boundaries, s.point)]) for s in states
+    ]
     heats = [spread @ np.array([state.heat[name] for name in machine.ball_nodes]) for state in states]
     bypass = _bypass(machine, network, matched)
     for _ in range(RELIEF_ROUNDS):
@@ -361,7 +372,9 @@ def _fit(pairs, bases, temperatures, heats, prior: Array, n: int) -> tuple[Array
     return solved.x, heats[0] - matched @ solved.x
 
 
-def _second_neighbours(needy, residual: Array, base, temperature: Array, n: int) -> dict[tuple[int, int], float]:
+def _second_neighbours(
+    needy, residual: Array, base, temperature: Array, n: int
+) -> dict[tuple[int, int], float]:
     """Links past a neighbour for nodes that no positive conductances can balance.
 
     A volume mean may lie above (below) those of all neighbours although heat
@@ -413,7 +426,8 @@ def _heat_spread(machine: MachineNetwork, network) -> Array:
         spread[ball, column] += shares["balls"]
         for side, way in zip(("inner", "outer"), network.raceways[name], strict=True):
             area = np.bincount(
-                machine.surfaces[f"{name}.{side}_raceway"].node, machine.surfaces[f"{name}.{side}_raceway"].area
+                machine.surfaces[f"{name}.{side}_raceway"].node,
+                machine.surfaces[f"{name}.{side}_raceway"].area,
             )[way.nodes]
             spread[way.nodes, column] += shares[side] * area / area.sum() - way.bypass
             spread[ball, column] += float(way.bypass.sum())

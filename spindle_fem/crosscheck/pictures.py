@@ -24,17 +24,23 @@ _LARGEST = 24
 
 CAPTIONS = {
     "difference": (
-        "Network less elements at each node, on the upper half of the meridian section. White lines part the nodes; "
+        "Network less elements at each node, on the upper half of the meridian section. White lines "
+        "part the nodes; "
         "circles are balls, and diamonds gap air."
     ),
-    "temperatures": "The same section coloured by temperature: network above, elements averaged over its nodes below.",
-    "causes": "The nodes that differ most, and what makes them differ. The bars of a node add up to its mark.",
+    "temperatures": "The same section coloured by temperature: network above, elements averaged over "
+    "its nodes below.",
+    "causes": "The nodes that differ most, and what makes them differ. The bars of a node add up to "
+    "its mark.",
     "speeds": "Largest difference of any node against the elements over speed.",
-    "convergence": "Refined network against axisymmetric elements of the same machine with the helix smeared.",
+    "convergence": "Refined network against axisymmetric elements of the same machine with the helix "
+    "smeared.",
 }
 
 
-def _patches(axes: Any, machine: MachineNetwork, values: Array, colour_map: Any, norm: Any, mirror: bool = False) -> Any:
+def _patches(
+    axes: Any, machine: MachineNetwork, values: Array, colour_map: Any, norm: Any, mirror: bool = False
+) -> Any:
     cells, node = machine.cells, machine.partition.node_of_cell
     sign = -1.0 if mirror else 1.0
     boxes = [
@@ -111,7 +117,9 @@ def temperature_map(comparison: Comparison) -> Figure:
     figure = new_figure(1150.0)
     machine = comparison.machine
     axes = _section_axes(figure, machine, True)
-    network, fem = (values - 273.15 for values in (comparison.network_temperature, comparison.fem_temperature))
+    network, fem = (
+        values - 273.15 for values in (comparison.network_temperature, comparison.fem_temperature)
+    )
     solid = slice(0, machine.coolant_start)
     low, high = min(network[solid].min(), fem[solid].min()), max(network[solid].max(), fem[solid].max())
     from matplotlib.colors import Normalize

@@ -11,8 +11,8 @@ from scipy.spatial import KDTree
 
 from spindle_fem.conduction.elements import evaluate_shape
 from spindle_fem.conduction.evaluate import quadratic_shape
-from spindle_fem.errors import GeometryError
 from spindle_fem.coupling import CoupledState, PreparedMachine
+from spindle_fem.errors import GeometryError
 from spindle_fem.loads.channel_cells import helix_coordinates
 from spindle_fem.loads.facets import facet_centres
 from spindle_fem.network.cells import Faces, MeridianCells
@@ -92,7 +92,7 @@ def build_regions(prepared: PreparedMachine, machine: MachineNetwork) -> NodeReg
     cut into eight and each quadrature point goes to the node it lies in.
     """
     mesh, operators = prepared.mesh, prepared.operators
-    cells, node_of_cell = machine.cells, machine.partition.node_of_cell
+    cells, _node_of_cell = machine.cells, machine.partition.node_of_cell
     straddles = _crosses(cells, mesh.points[mesh.tetrahedra])
     n_shape = 4 if operators.order == 1 else 10
     blocks = []
@@ -101,7 +101,9 @@ def build_regions(prepared: PreparedMachine, machine: MachineNetwork) -> NodeReg
         (np.flatnonzero(straddles), _subdivided(_subdivided(_POINTS)), 1.0 / 24.0 / 64.0),
     ):
         for start in range(0, len(rows), _CHUNK):
-            blocks.append(_integrate(prepared, machine, rows[start : start + _CHUNK], points, weight, n_shape))
+            blocks.append(
+                _integrate(prepared, machine, rows[start : start + _CHUNK], points, weight, n_shape)
+            )
     row, column, value = (np.concatenate(items) for items in zip(*blocks, strict=True))
     n = len(machine.partition.node_names)
     integral = sparse.csr_array((value, (row, column)), shape=(n, operators.n_unknowns))
@@ -184,7 +186,9 @@ def node_temperatures(regions: NodeRegions, prepared: PreparedMachine, coupled: 
     the end of each node's stretch of channel.
     """
     machine = regions.machine
-    lumped = dict(zip(coupled.solution.problem.lumped_names, coupled.solution.lumped_temperature, strict=True))
+    lumped = dict(
+        zip(coupled.solution.problem.lumped_names, coupled.solution.lumped_temperature, strict=True)
+    )
     values = [regions.average @ coupled.solution.temperature]
     builder = prepared.builder
     for _, bearing in machine.spec.bearings:
@@ -220,7 +224,9 @@ def _coolant_ends(machine, prepared, coupled) -> Array:
     return np.interp(wanted, along, edge[first : first + n + 1])
 
 
-def facet_nodes(prepared: PreparedMachine, machine: MachineNetwork, facets: NDArray, part: str) -> NDArray[np.int64]:
+def facet_nodes(
+    prepared: PreparedMachine, machine: MachineNetwork, facets: NDArray, part: str
+) -> NDArray[np.int64]:
     """Network node behind each boundary facet of a part."""
     mesh = prepared.mesh
     corners = mesh.points[facets[:, :3]]
@@ -240,7 +246,9 @@ def in_channel(machine: MachineNetwork, points: Array) -> NDArray[np.bool_]:
         return inside
     r = np.hypot(points[:, 0], points[:, 1])
     _, angle = helix_coordinates(points, channel)
-    centre = channel.z_start + channel.pitch * np.clip(angle, 0.0, 2.0 * np.pi * channel.turns) / (2.0 * np.pi)
+    centre = channel.z_start + channel.pitch * np.clip(angle, 0.0, 2.0 * np.pi * channel.turns) / (
+        2.0 * np.pi
+    )
     beyond = np.maximum(np.maximum(-angle, angle - 2.0 * np.pi * channel.turns), 0.0) * r
     inside |= (
         (np.abs(points[:, 2] - centre) < 0.5 * channel.width + _MARGIN)
@@ -257,7 +265,9 @@ def in_channel(machine: MachineNetwork, points: Array) -> NDArray[np.bool_]:
     return inside
 
 
-def flux_through_cuts(prepared: PreparedMachine, machine: MachineNetwork, temperature: Array) -> dict[tuple[int, int], float]:
+def flux_through_cuts(
+    prepared: PreparedMachine, machine: MachineNetwork, temperature: Array
+) -> dict[tuple[int, int], float]:
     """Heat through every surface between two nodes that lies inside a part, W, from first to second node.
 
     The gradient of the field is integrated over the cut (48 angles by three
@@ -273,9 +283,7 @@ def flux_through_cuts(prepared: PreparedMachine, machine: MachineNetwork, temper
     radial = faces.radial[rows]
     position = np.broadcast_to(faces.position[rows][:, None], other.shape)
     z, r = np.where(radial[:, None], other, position), np.where(radial[:, None], position, other)
-    full = np.where(
-        radial, 2.0 * np.pi * faces.position[rows] * (high - low), np.pi * (high**2 - low**2)
-    )
+    full = np.where(radial, 2.0 * np.pi * faces.position[rows] * (high - low), np.pi * (high**2 - low**2))
     jacobian = np.where(radial[:, None], 1.0, r / np.maximum(0.5 * (low + high)[:, None], 1e-12))
     weight = (full[:, None] * jacobian * 0.5 * _GAUSS_WEIGHTS)[..., None] / _ANGLES * np.ones(_ANGLES)
     shape = (*other.shape, _ANGLES)

@@ -39,7 +39,9 @@ def write_report(folder: str | Path) -> Path:
         raise BadInputError(str(path), "there is no such file.", "Run spindle-fem crosscheck.")
     content = json.loads(path.read_text(encoding="utf-8"))
     if content.get("schema") != "spindle-fem/crosscheck/1":
-        raise BadInputError(str(path), f"schema {content.get('schema')!r} is not known.", "Run the command again.")
+        raise BadInputError(
+            str(path), f"schema {content.get('schema')!r} is not known.", "Run the command again."
+        )
     return replace_text(folder / "report.html", render(content, folder / "figures"))
 
 
@@ -84,19 +86,26 @@ def render(content: Mapping[str, Any], figures: Path) -> str:
 
 
 _LINKS = (
-    "Heat from the first to the second end of each link. Where two bodies touch or a film ends a link, the elements’ "
-    "heat is that of the same surface, as their balance has it. Where a link is cut through one body there is no "
-    "surface of the mesh: there the gradient of the field is integrated over the cut. Links through the channel’s "
+    "Heat from the first to the second end of each link. Where two bodies touch or a film ends a "
+    "link, the elements’ "
+    "heat is that of the same surface, as their balance has it. Where a link is cut through one body "
+    "there is no "
+    "surface of the mesh: there the gradient of the field is integrated over the cut. Links through "
+    "the channel’s "
     "depth along the axis exist in the elements only (the turns are joined by their lands)."
 )
 _CAUSES = (
-    "Between both models stand others, each different from its neighbour in one assumption: nodes refined along z, "
-    "then along r too (axisymmetric elements), then closed rings instead of the smeared helix, then the helix itself "
+    "Between both models stand others, each different from its neighbour in one assumption: nodes "
+    "refined along z, "
+    "then along r too (axisymmetric elements), then closed rings instead of the smeared helix, then "
+    "the helix itself "
     "without ports, then the machine as defined. The differences of neighbours add up to the whole."
 )
 _MATCHED = (
-    "Every conductance is multiplied by a constant so that the elements’ node temperatures balance exactly at the "
-    "matched state. Other speeds were not fitted: they test it. The state-space has matrices for every speed; the TOML "
+    "Every conductance is multiplied by a constant so that the elements’ node temperatures balance "
+    "exactly at the "
+    "matched state. Other speeds were not fitted: they test it. The state-space has matrices for "
+    "every speed; the TOML "
     "network holds the conductances of the matched one."
 )
 
@@ -105,7 +114,8 @@ def _sentence(content: Mapping[str, Any]) -> str:
     summary = content["summary"]
     title = CAUSES[summary["worst_node_cause"]]
     return (
-        f"The node that differs most is {summary['worst_node']}; {number(summary['worst_node_cause_K'], 2)} K of it come "
+        f"The node that differs most is {summary['worst_node']}; "
+        f"{number(summary['worst_node_cause_K'], 2)} K of it come "
         f"from this: {title}."
     )
 
@@ -161,8 +171,15 @@ def _cause_table(content: Mapping[str, Any]) -> Table:
          number(item["max_K"], 3), number(item["rms_K"], 3))
         for item in content["causes"]
     ]  # fmt: skip
-    columns = (column("assumption exchanged"), column("kind"), column("at most K", number=True), column("rms K", number=True))
-    return Table(columns, rows_of(rows), "Steps add up to the difference; the others change one assumption by itself.")
+    columns = (
+        column("assumption exchanged"),
+        column("kind"),
+        column("at most K", number=True),
+        column("rms K", number=True),
+    )
+    return Table(
+        columns, rows_of(rows), "Steps add up to the difference; the others change one assumption by itself."
+    )
 
 
 def _convergence_table(content: Mapping[str, Any]) -> Table:
@@ -170,8 +187,14 @@ def _convergence_table(content: Mapping[str, Any]) -> Table:
         (f"{item['refinement']}×", item["nodes"], number(item["max_difference_K"], 3))
         for item in content["convergence"]["rows"]
     ]
-    columns = (column("refinement"), column("nodes", number=True), column("largest difference K", number=True))
-    caption = f"Against axisymmetric elements with {content['convergence']['axisymmetric_unknowns']} unknowns."
+    columns = (
+        column("refinement"),
+        column("nodes", number=True),
+        column("largest difference K", number=True),
+    )
+    caption = (
+        f"Against axisymmetric elements with {content['convergence']['axisymmetric_unknowns']} unknowns."
+    )
     return Table(columns, rows_of(rows), caption)
 
 

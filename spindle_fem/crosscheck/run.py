@@ -237,14 +237,22 @@ def _convergence(
     """Networks of growing refinement against the axisymmetric elements on the finest one's cells."""
     states = {
         n: solve_machine_network(
-            build_machine_network(network.spec, refinement=n, assembly=network.assembly), point, heat_model=heat_model
+            build_machine_network(network.spec, refinement=n, assembly=network.assembly),
+            point,
+            heat_model=heat_model,
         )
         for n in REFINEMENTS
     }
     finest = states[REFINEMENTS[-1]]
     elements = solve_axisymmetric(finest)
     reference = gather_axisymmetric(network, finest.network.machine, elements)
-    rows = [{"refinement": 1, "nodes": network.n_nodes, "max_difference_K": _largest(state.temperature, reference)}]
+    rows = [
+        {
+            "refinement": 1,
+            "nodes": network.n_nodes,
+            "max_difference_K": _largest(state.temperature, reference),
+        }
+    ]
     for n, refined in states.items():
         rows.append(
             {
@@ -278,7 +286,9 @@ def _speeds(
         else:
             tell(f"elements at {speed:.0f} rpm")
             at = replace(point, speed=speed * RPM)
-            own = element_state(prepared, solve_coupled(prepared, at, coupled.solution.temperature), at, regions)
+            own = element_state(
+                prepared, solve_coupled(prepared, at, coupled.solution.temperature), at, regions
+            )
             plain = solve_machine_network(state.network.machine, at, heat_model=heat_model)
         moving = matched.steady(own.point, own.heat, matched.conductance(own.point, heat_model))
         rows.append(

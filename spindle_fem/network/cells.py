@@ -8,6 +8,7 @@ rings; both keep its wetted area and its volume.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -177,7 +178,7 @@ def _refined(lines: NDArray[np.int64], spacing: float) -> Array:
     """Lines in m with intervals cut into even pieces not longer than ``spacing``."""
     exact = lines * NANOMETRE
     pieces = [exact[:1]]
-    for low, high in zip(exact[:-1], exact[1:], strict=True):
+    for low, high in itertools.pairwise(exact):
         number = max(1, int(np.ceil((high - low) / spacing - 1.0e-6)))
         pieces.append(np.linspace(low, high, number + 1)[1:])
     return np.concatenate(pieces)
@@ -212,7 +213,9 @@ def build_cells(
         raise SpecError("channelling", f'"{channelling}".', 'Allowed: "smeared", "rings".')
     channel = None if assembly.channel is None else assembly.channel.definition
     z_values = [value for part in assembly.parts for s in part.segments for value in (s.z_start, s.z_end)]
-    r_values = [value for part in assembly.parts for s in part.segments for value in (s.inner_radius, s.outer_radius)]
+    r_values = [
+        value for part in assembly.parts for s in part.segments for value in (s.inner_radius, s.outer_radius)
+    ]
     z_values += [value for edge in assembly.edges for value in edge.z] + list(extra_z)
     r_values += [value for edge in assembly.edges for value in edge.r if value > 0.0] + list(extra_r)
     rings: list[tuple[float, float, float]] = []
@@ -319,7 +322,9 @@ def _assemble(assembly, channel, z_lines, r_lines, owner, void, smeared, channel
         contact=select(touch, one, cell_a, cell_b, labels),
         exposed=select(outer & (labels != ""), one, cell_a, cell_b, labels),
         wall=wall,
-        blocked=select(same & ~conducts & (cell_a != OUTSIDE) & (cell_b != OUTSIDE), one, cell_a, cell_b, names),
+        blocked=select(
+            same & ~conducts & (cell_a != OUTSIDE) & (cell_b != OUTSIDE), one, cell_a, cell_b, names
+        ),
         side_area=side_area,
         grid_index=np.column_stack([i, j]),
         channelling=None if channel is None else channelling,
@@ -358,5 +363,7 @@ def _edge_names(assembly: AssemblyGeometry, faces: Mapping[str, NDArray]) -> NDA
             continue
         own, across = (edge.r, edge.z) if edge.is_cylinder else (edge.z, edge.r)
         on_line = np.abs(faces["position"] - own[0]) < NANOMETRE
-        names[(faces["radial"] == edge.is_cylinder) & on_line & (other > across[0]) & (other < across[1])] = edge.name
+        names[(faces["radial"] == edge.is_cylinder) & on_line & (other > across[0]) & (other < across[1])] = (
+            edge.name
+        )
     return names

@@ -7,6 +7,7 @@ splines over temperature, so value and derivative belong to one function.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -229,7 +230,7 @@ def faces_by_cell(cell: NDArray[np.int64]) -> NDArray[np.int64]:
     order = np.argsort(cell, kind="stable")
     counts = np.bincount(cell)
     starts = np.concatenate([[0], np.cumsum(counts)])
-    groups = [order[low:high] for low, high in zip(starts[:-1], starts[1:], strict=True)]
+    groups = [order[low:high] for low, high in itertools.pairwise(starts)]
     one = np.concatenate([np.repeat(group, len(group)) for group in groups])
     other = np.concatenate([np.tile(group, len(group)) for group in groups])
     return np.stack([one, other])
@@ -264,7 +265,9 @@ class FrictionLaw:
     coefficients: Array
 
     @classmethod
-    def of(cls, tables: dict[str, PchipInterpolator], weights: Array, feedback: Array, spread: Array) -> FrictionLaw:
+    def of(
+        cls, tables: dict[str, PchipInterpolator], weights: Array, feedback: Array, spread: Array
+    ) -> FrictionLaw:
         """Law of tables of heat over film temperature."""
         pieces = []
         for table, gain in zip(tables.values(), feedback, strict=True):
@@ -314,7 +317,9 @@ class FrictionLaw:
             feels = np.flatnonzero(self.weights[bearing])
             rows.append(np.repeat(into, len(feels)))
             columns.append(np.tile(feels, len(into)))
-            values.append(slope[bearing] * np.outer(self.spread[into, bearing], self.weights[bearing, feels]).ravel())
+            values.append(
+                slope[bearing] * np.outer(self.spread[into, bearing], self.weights[bearing, feels]).ravel()
+            )
         return self.spread @ heat, (np.concatenate(rows), np.concatenate(columns), np.concatenate(values))
 
 

@@ -109,7 +109,9 @@ def half_resistance(
     """
     node = partition.node_of_cell[side]
     with np.errstate(divide="ignore"):
-        along_r = faces.position * np.abs(np.log(np.maximum(faces.position, 1.0e-12)) - centres.log_radius[node])
+        along_r = faces.position * np.abs(
+            np.log(np.maximum(faces.position, 1.0e-12)) - centres.log_radius[node]
+        )
     along_z = np.abs(faces.position - centres.z[node])
     return np.where(faces.radial, along_r, along_z) / (conductivity[cells.part[side]] * faces.area)
 
@@ -131,13 +133,16 @@ def solid_links(
     pieces = []
     for faces in (cells.conduction, cells.contact):
         resistance = half_resistance(faces, faces.first, cells, partition, centres, conductivity)
-        resistance = resistance + half_resistance(faces, faces.second, cells, partition, centres, conductivity)
+        resistance = resistance + half_resistance(
+            faces, faces.second, cells, partition, centres, conductivity
+        )
         if faces is cells.contact:
             joint = np.array([joint_conductance[name] for name in faces.name], dtype=float)
             with np.errstate(divide="ignore"):
                 resistance = resistance + 1.0 / (joint * faces.area)
         ends = np.sort(
-            np.column_stack([partition.node_of_cell[faces.first], partition.node_of_cell[faces.second]]), axis=1
+            np.column_stack([partition.node_of_cell[faces.first], partition.node_of_cell[faces.second]]),
+            axis=1,
         )
         # inside a node a face may pass through the very centre; it joins nothing
         apart = (ends[:, 0] != ends[:, 1]) & np.isfinite(resistance)
@@ -183,4 +188,3 @@ def exposed_surfaces(cells: MeridianCells) -> dict[str, Faces]:
     """Exposed faces by surface name."""
     names = cells.exposed.name
     return {str(name): cells.exposed.pick(names == name) for name in dict.fromkeys(names)}
-

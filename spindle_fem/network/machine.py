@@ -29,7 +29,14 @@ from spindle_fem.network.links import (
     solid_links,
     surface_patch,
 )
-from spindle_fem.network.partition import Partition, build_columns, coarse_partition, fine_partition, plan_nodes, sliced_partition
+from spindle_fem.network.partition import (
+    Partition,
+    build_columns,
+    coarse_partition,
+    fine_partition,
+    plan_nodes,
+    sliced_partition,
+)
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
@@ -182,7 +189,9 @@ def build_machine_network(
     cuts = plan_nodes(spec, assembly, build_cells(assembly, extra_z=lines), spans)[2]
     if refinement == 1:
         if channelling != "smeared":
-            raise SpecError("channelling", f'"{channelling}" needs refinement above 1.', 'Allowed: "smeared".')
+            raise SpecError(
+                "channelling", f'"{channelling}" needs refinement above 1.', 'Allowed: "smeared".'
+            )
         cells = build_cells(assembly, extra_z=lines, extra_r=cuts)
         partition = coarse_partition(spec, assembly, cells, spans)
     else:
@@ -203,7 +212,8 @@ def build_machine_network(
     centres = node_centres(cells, partition, spec.heat_capacity_factor.value * volumetric)
     groups = group_of_contacts(spec, assembly.joint_names)
     joints = {
-        name: np.inf if group.conductance == "perfect" else group.conductance.value for name, group in groups.items()
+        name: np.inf if group.conductance == "perfect" else group.conductance.value
+        for name, group in groups.items()
     }
     links = solid_links(cells, partition, centres, conductivity, joints)
     surfaces = {
@@ -257,11 +267,15 @@ def _air_bands(spec, gap, surfaces, cells, partition, span) -> AirBands:
         n = len(edges) - 1
         of_rotating = np.clip(np.searchsorted(edges, rotating.z) - 1, 0, n - 1)
         of_standing = np.clip(np.searchsorted(edges, standing.z) - 1, 0, n - 1)
-        faced = (np.bincount(of_rotating, rotating.area, n) > 0.0) & (np.bincount(of_standing, standing.area, n) > 0.0)
+        faced = (np.bincount(of_rotating, rotating.area, n) > 0.0) & (
+            np.bincount(of_standing, standing.area, n) > 0.0
+        )
         if faced.all():
             break
         if n == 1:
-            raise GeometryError(f"gap {gap.name}", "one side has no surface.", "Allowed: surfaces that face along z.")
+            raise GeometryError(
+                f"gap {gap.name}", "one side has no surface.", "Allowed: surfaces that face along z."
+            )
         # a band that only one side bounds joins its neighbour
         empty = int(np.argmin(faced))
         edges = np.delete(edges, empty if empty > 0 else 1)

@@ -60,7 +60,13 @@ class MachineNetworkState:
         both = np.concatenate([self.temperature, network.boundary_temperature])
         flow = network.conductance * (both[network.first] - both[network.second])
         found = list(
-            zip(network.first.tolist(), network.second.tolist(), network.kind.tolist(), flow.tolist(), strict=True)
+            zip(
+                network.first.tolist(),
+                network.second.tolist(),
+                network.kind.tolist(),
+                flow.tolist(),
+                strict=True,
+            )
         )
         ambient = self.temperature.size
         for law in network.laws:
@@ -71,10 +77,13 @@ class MachineNetworkState:
                 h = law.coefficients(self.temperature)[0]
                 coolant = law.nodes[law.cell]
                 heat = law.conductances(h)[0] * (self.temperature[law.patch.node] - self.temperature[coolant])
-                pairs, inverse = np.unique(np.column_stack([law.patch.node, coolant]), axis=0, return_inverse=True)
+                pairs, inverse = np.unique(
+                    np.column_stack([law.patch.node, coolant]), axis=0, return_inverse=True
+                )
                 summed = np.bincount(inverse.ravel(), heat, len(pairs))
                 found += [
-                    (int(a), int(b), "coolant", float(value)) for (a, b), value in zip(pairs, summed, strict=True)
+                    (int(a), int(b), "coolant", float(value))
+                    for (a, b), value in zip(pairs, summed, strict=True)
                 ]
         return found
 
@@ -211,7 +220,9 @@ def _is_settled(machine: MachineNetwork, change: float) -> bool:
     return not coupled or change < CONTACT_TOLERANCE
 
 
-def _change(before: Mapping[str, BearingTemperatures] | None, after: Mapping[str, BearingTemperatures]) -> float:
+def _change(
+    before: Mapping[str, BearingTemperatures] | None, after: Mapping[str, BearingTemperatures]
+) -> float:
     if before is None:
         return np.inf
     fields = BearingTemperatures.__slots__
@@ -264,7 +275,7 @@ def _state(network: OperatingNetwork, temperature: Array, iterations: int) -> Ma
         rises = both[network.streams[1]] - both[network.streams[0]]
         out["coolant"] = float(network.stream_rate * rises.sum())
     # at rest there is no flow to compare with: rounding is that of conductance times absolute temperature
-    rounding = 1.0e-6 * float(network.conductance.sum()) * float(both.max())
+    rounding = 1.0e-7 * float(network.conductance.sum()) * float(both.max())
     scale = max(abs(heat_in), *(abs(value) for value in out.values()), rounding)
     imbalance = abs(heat_in - sum(out.values())) / scale
     if imbalance > BALANCE_TOLERANCE:

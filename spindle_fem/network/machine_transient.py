@@ -108,9 +108,13 @@ def simulate_machine_network(
     if instants.size < 2 or np.any(np.diff(instants) <= 0.0):
         raise SpecError("times", "they do not increase.", "Allowed: two or more increasing times in s.")
     if not len(starts) or starts[0] > instants[0] or np.any(np.diff(starts) <= 0.0):
-        raise SpecError("schedule", "it does not cover the times.", "Allowed: increasing starts, the first in time.")
+        raise SpecError(
+            "schedule", "it does not cover the times.", "Allowed: increasing starts, the first in time."
+        )
     if not np.isin(starts[1:], instants).all():
-        raise SpecError("schedule", "a change falls between two times.", "Allowed: changes at one of the times.")
+        raise SpecError(
+            "schedule", "a change falls between two times.", "Allowed: changes at one of the times."
+        )
     heat_model = heat_model_of(machine.spec) if heat_model is None else heat_model
     ambient = schedule[0][1].ambient_temperature
     state = np.full(machine.n_nodes, ambient) if initial is None else np.array(initial, dtype=float)
@@ -137,7 +141,9 @@ def simulate_machine_network(
         if k % CHECK_EVERY == 0 or k == instants.size - 2:
             for law in stepper.network.laws:
                 law.require_valid(state)
-    return MachineTransient(instants, temperature, machine.node_names, linearisations + stepper.linearisations)
+    return MachineTransient(
+        instants, temperature, machine.node_names, linearisations + stepper.linearisations
+    )
 
 
 class _Stepper:

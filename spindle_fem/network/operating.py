@@ -206,7 +206,9 @@ def operate(
         heat[law.nodes] += _pumping(machine, point)
     order = {name: machine.n_nodes + i for i, name in enumerate(boundaries)}
     first = [item[0] for item in links]
-    second = [item[1] if not isinstance(item[1], str) else np.full(len(item[0]), order[item[1]]) for item in links]
+    second = [
+        item[1] if not isinstance(item[1], str) else np.full(len(item[0]), order[item[1]]) for item in links
+    ]
     conductance = np.concatenate([item[2] for item in links])
     kind = np.concatenate([np.full(len(item[0]), item[3], dtype=object) for item in links])
     ends, conductance, kind = _merged(np.concatenate(first), np.concatenate(second), conductance, kind)
@@ -244,7 +246,11 @@ def _bearing(machine, group, name, heat: BearingHeat, links):
     settings = machine.spec.heat
     rings = 1.0 - settings.ball_share
     inner_share = settings.inner_share.value
-    shares = {"inner": inner_share * rings, "outer": (1.0 - inner_share) * rings, "balls": settings.ball_share}
+    shares = {
+        "inner": inner_share * rings,
+        "outer": (1.0 - inner_share) * rings,
+        "balls": settings.ball_share,
+    }
     row = group.ball_row
     conductances = (
         (row.conductance.value,) * 2
@@ -290,7 +296,6 @@ def _friction_law(machine, friction, raceways, spreads) -> FrictionLaw:
     return FrictionLaw.of(friction, weights, feedback, np.column_stack([spreads[name] for name in friction]))
 
 
-
 def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws) -> None:
     """Films to the surroundings and the bands of mixed air."""
     spec = machine.spec
@@ -310,7 +315,12 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
                 continue
             value, _ = film_coefficient(film, point, np.array([fluid]), fluid)
             links.append(
-                (patch.node, boundary, 1.0 / (patch.resistance + 1.0 / (float(value[0]) * patch.area)), surface)
+                (
+                    patch.node,
+                    boundary,
+                    1.0 / (patch.resistance + 1.0 / (float(value[0]) * patch.area)),
+                    surface,
+                )
             )
     start = machine.air_start
     for gap in spec.gap:
@@ -321,7 +331,12 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
         for patch, band in ((bands.rotating, bands.rotating_band), (bands.standing, bands.standing_band)):
             share = patch.area / np.bincount(band, patch.area, bands.n_bands)[band]
             links.append(
-                (patch.node, start + band, 1.0 / (patch.resistance + 1.0 / (whole[band] * share)), f"gap.{gap.name}")
+                (
+                    patch.node,
+                    start + band,
+                    1.0 / (patch.resistance + 1.0 / (whole[band] * share)),
+                    f"gap.{gap.name}",
+                )
             )
         start += bands.n_bands
 
@@ -331,7 +346,9 @@ def _pumping(machine: MachineNetwork, point: OperatingPoint) -> Array:
     coolant = machine.coolant
     if not machine.spec.coolant.pumping_heat:
         return np.zeros(len(coolant.area))
-    state = coolant.loop.at(point, np.full(coolant.loop.cells.cell_area.shape, point.coolant_inlet_temperature))
+    state = coolant.loop.at(
+        point, np.full(coolant.loop.cells.cell_area.shape, point.coolant_inlet_temperature)
+    )
     return state.pressure.pumping_power * coolant.area / coolant.area.sum()
 
 

@@ -114,7 +114,9 @@ def part_roles(spec: MachineSpec, assembly: AssemblyGeometry) -> dict[str, str]:
         for ring, place in rings.items():
             low, high = extent[ring]
             own = extent[part.name]
-            beside = {part.name, ring} in joined and min(high, own[1]) - max(low, own[0]) > 0.5 * (own[1] - own[0])
+            beside = {part.name, ring} in joined and min(high, own[1]) - max(low, own[0]) > 0.5 * (
+                own[1] - own[0]
+            )
             if beside and part.rotating == (place == INNER):
                 role = place
         roles[part.name] = role
@@ -146,9 +148,7 @@ class _Body:
         return even
 
 
-def _bodies(
-    spec: MachineSpec, cells: MeridianCells, roles: Mapping[str, str], column: Column
-) -> list[_Body]:
+def _bodies(spec: MachineSpec, cells: MeridianCells, roles: Mapping[str, str], column: Column) -> list[_Body]:
     middle = cells.z.mean(axis=1)
     inside = np.flatnonzero((middle > column.z[0]) & (middle < column.z[1]))
     groups: dict[str, list[int]] = {}
@@ -177,13 +177,18 @@ def _bodies(
         rows = np.array(members)
         steps = tuple(np.unique(np.round(_outer_steps(cells, rows), 9)).tolist())
         bodies.append(_Body(key, rows, (float(cells.r[rows, 0].min()), float(cells.r[rows, 1].max())), steps))
-    return sorted(bodies, key=lambda body: float(np.average(r_mid[body.cells], weights=cells.volume[body.cells])))
+    return sorted(
+        bodies, key=lambda body: float(np.average(r_mid[body.cells], weights=cells.volume[body.cells]))
+    )
 
 
 def _outer_steps(cells: MeridianCells, rows: NDArray[np.int64]) -> NDArray[np.float64]:
     """Inner and outer radius of a body in each interval along z."""
     interval = cells.grid_index[rows, 0]
-    ends = [(cells.r[rows[interval == i], 0].min(), cells.r[rows[interval == i], 1].max()) for i in np.unique(interval)]
+    ends = [
+        (cells.r[rows[interval == i], 0].min(), cells.r[rows[interval == i], 1].max())
+        for i in np.unique(interval)
+    ]
     return np.array(ends).ravel()
 
 
@@ -253,7 +258,8 @@ def fine_partition(spec: MachineSpec, assembly: AssemblyGeometry, cells: Meridia
     edges = np.array([column.z[1] for column in columns])
     column = np.minimum(np.searchsorted(edges, middle), len(columns) - 1)
     names = tuple(
-        f"{cells.part_names[part]}[{i},{j}]" for part, (i, j) in zip(cells.part, cells.grid_index, strict=True)
+        f"{cells.part_names[part]}[{i},{j}]"
+        for part, (i, j) in zip(cells.part, cells.grid_index, strict=True)
     )
     return Partition(names, np.arange(cells.n_cells), column, columns, np.asarray(cells.z_lines))
 
@@ -271,5 +277,9 @@ def sliced_partition(
     unique, node = np.unique(key, return_inverse=True)
     names = tuple(f"{lumps.node_names[k // intervals]}[{k % intervals}]" for k in unique)
     return Partition(
-        names, node.ravel(), lumps.column_of_node[unique // intervals], lumps.columns, np.asarray(cells.z_lines)
+        names,
+        node.ravel(),
+        lumps.column_of_node[unique // intervals],
+        lumps.columns,
+        np.asarray(cells.z_lines),
     )

@@ -26,12 +26,18 @@ from spindle_fem.tribology.contact_heat import ball_resistance, constriction_res
 K = 42.0
 
 
-def ring_nodes(*rings: tuple[str, float, float], height: float = 0.024, spacing: float = 1.0, joint: float = np.inf):
+def ring_nodes(
+    *rings: tuple[str, float, float], height: float = 0.024, spacing: float = 1.0, joint: float = np.inf
+):
     """Links of rings around each other, each cell a node; also their centres and cells."""
     parts = [PartGeometry(name, (AnnularSegment(0.0, height, low, high),)) for name, low, high in rings]
     cells = build_cells(assemble(parts), spacing=spacing)
     each = Partition(
-        tuple(str(i) for i in range(cells.n_cells)), np.arange(cells.n_cells), np.zeros(cells.n_cells, int), (), cells.z_lines
+        tuple(str(i) for i in range(cells.n_cells)),
+        np.arange(cells.n_cells),
+        np.zeros(cells.n_cells, int),
+        (),
+        cells.z_lines,
     )
     k = np.full(len(rings), K)
     centres = node_centres(cells, each, np.ones(len(rings)))
@@ -128,7 +134,9 @@ def pohlhausen(prandtl: float) -> float:
     """Exact Nu_x / Re_x^(1/2) of a laminar boundary layer at uniform wall temperature."""
 
     def end_slope(curvature: float) -> float:
-        flow = solve_ivp(lambda _, y: (y[1], y[2], -0.5 * y[0] * y[2]), (0.0, 10.0), (0.0, 0.0, curvature), rtol=1e-9)
+        flow = solve_ivp(
+            lambda _, y: (y[1], y[2], -0.5 * y[0] * y[2]), (0.0, 10.0), (0.0, 0.0, curvature), rtol=1e-9
+        )
         return flow.y[1, -1] - 1.0
 
     curvature = brentq(end_slope, 0.3, 0.36, xtol=1e-10)
@@ -152,7 +160,8 @@ def test_ring_and_clearance_in_series_against_the_tube():
     k_ring, k_air, inner, thickness, gap, width = 46.0, 0.026, 0.086, 9.0e-3, 5.0e-6, 0.024
     outer = inner + thickness
     exact = float(
-        cylinder_resistance(inner, outer, k_ring, width) + cylinder_resistance(outer, outer + gap, k_air, width)
+        cylinder_resistance(inner, outer, k_ring, width)
+        + cylinder_resistance(outer, outer + gap, k_air, width)
     )
     plane = ring_housing_resistance(thickness, k_ring, gap, k_air, 2.0 * np.pi * outer * width)
     # on the outer radius the plane formula is low by what the ring's curvature adds: 4.9 % of the ring
@@ -164,7 +173,9 @@ def test_a_film_is_one_over_coefficient_and_area():
     # a wall of 10 mm between 300 K and a film to 290 K: the flux of the exact linear profile
     h, area, k, thickness = 250.0, 0.04, 50.0, 0.01
     flux = (300.0 - 290.0) / (thickness / k + 1.0 / h)
-    assert 10.0 / (thickness / (k * area) + float(film_resistance(h, area))) == pytest.approx(flux * area, rel=1e-14)
+    assert 10.0 / (thickness / (k * area) + float(film_resistance(h, area))) == pytest.approx(
+        flux * area, rel=1e-14
+    )
 
 
 def graetz_leveque() -> float:
@@ -177,7 +188,9 @@ def graetz_leveque() -> float:
 def test_laminar_oil_film_against_the_entrance_solution():
     """Sieder and Tate's 1.86 is 15 % above Lévêque's exact 1.615, by measurement."""
     assert graetz_leveque() == pytest.approx(1.615, rel=1e-3)
-    assert float(nusselt_sieder_tate(1000.0)) / 1000.0 ** (1.0 / 3.0) == pytest.approx(graetz_leveque(), rel=0.16)
+    assert float(nusselt_sieder_tate(1000.0)) / 1000.0 ** (1.0 / 3.0) == pytest.approx(
+        graetz_leveque(), rel=0.16
+    )
 
 
 @pytest.mark.parametrize("reynolds", [2.0e4, 5.0e4])
@@ -185,7 +198,9 @@ def test_turbulent_oil_film_is_low_against_a_friction_based_correlation(reynolds
     """0.0225 Re^0.8 Pr^0.3 is a fifth to a quarter below Gnielinski (1976) at Pr 6; it must not be more."""
     prandtl = 6.0
     friction = (0.79 * np.log(reynolds) - 1.64) ** -2 / 8.0
-    gnielinski = friction * (reynolds - 1e3) * prandtl / (1.0 + 12.7 * np.sqrt(friction) * (prandtl ** (2 / 3) - 1.0))
+    gnielinski = (
+        friction * (reynolds - 1e3) * prandtl / (1.0 + 12.7 * np.sqrt(friction) * (prandtl ** (2 / 3) - 1.0))
+    )
     assert 0.7 < float(nusselt_paper_turbulent(reynolds, prandtl)) / gnielinski < 0.9
 
 

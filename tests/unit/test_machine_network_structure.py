@@ -48,7 +48,12 @@ def test_nodes_are_named_by_part(network):
 
 def test_more_bearings_make_more_columns():
     network = build_machine_network(load_machine("uncooled"))
-    assert [column.bearing for column in network.partition.columns if column.bearing] == ["F1", "F2", "R1", "R2"]
+    assert [column.bearing for column in network.partition.columns if column.bearing] == [
+        "F1",
+        "F2",
+        "R1",
+        "R2",
+    ]
     assert network.n_nodes % len(network.partition.columns) == 0
 
 
@@ -112,7 +117,9 @@ def test_jacobian_is_the_derivative_of_the_balance(machine):
     analytic = balance(temperature)[1].toarray()
     step = 1e-4
     moved = step * np.eye(network.n_nodes)
-    numeric = np.array([(balance.net_heat(temperature + e) - balance.net_heat(temperature - e)) / (2 * step) for e in moved]).T
+    numeric = np.array(
+        [(balance.net_heat(temperature + e) - balance.net_heat(temperature - e)) / (2 * step) for e in moved]
+    ).T
     assert np.abs(analytic - numeric).max() < 1e-6 * np.abs(analytic).max()
     assert balance.net_heat(temperature) == pytest.approx(balance(temperature)[0], abs=1e-9)
 
@@ -156,7 +163,10 @@ def test_a_long_transient_ends_in_the_steady_state(network):
 def test_transient_does_not_depend_on_the_step():
     network = build_machine_network(load_machine("small_two_start"))
     point = OperatingPoint.of(network.spec)
-    runs = [simulate_machine_network(network, np.arange(0.0, 3600.1, step), [(0.0, point)]) for step in (20.0, 5.0)]
+    runs = [
+        simulate_machine_network(network, np.arange(0.0, 3600.1, step), [(0.0, point)])
+        for step in (20.0, 5.0)
+    ]
     assert runs[0].temperature == pytest.approx(runs[1].temperature[::4], abs=5e-3)
 
 
@@ -219,6 +229,8 @@ def test_a_machine_that_loses_no_heat_has_no_steady_state(spindle):
     from dataclasses import replace
 
     outward = net.second >= network.n_nodes
-    sealed = replace(net, conductance=np.where(outward, 0.0, net.conductance), streams=(np.empty(0, int),) * 2)
+    sealed = replace(
+        net, conductance=np.where(outward, 0.0, net.conductance), streams=(np.empty(0, int),) * 2
+    )
     with pytest.raises(NoSteadyStateError):
         newton(sealed, np.full(network.n_nodes, 300.0))

@@ -73,7 +73,9 @@ def test_both_are_at_rest_when_everything_around_is(spindle):
     )
     state = refined(still, 2)
     assert state.temperature == pytest.approx(np.full(state.temperature.size, 295.0), abs=1e-9)
-    assert solve_axisymmetric(state).mean == pytest.approx(np.full(state.network.machine.n_solid, 295.0), abs=1e-9)
+    assert solve_axisymmetric(state).mean == pytest.approx(
+        np.full(state.network.machine.n_solid, 295.0), abs=1e-9
+    )
 
 
 def test_nothing_is_colder_than_its_surroundings(networks):
