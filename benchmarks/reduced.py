@@ -17,6 +17,7 @@ import numpy as np
 
 from spindle_fem.coupling import prepare_machine
 from spindle_fem.network.history import InputHistory
+from spindle_fem.reduced.adjoint import fast_gradient
 from spindle_fem.reduced.build import build_reduced_model
 from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import STANDARD, make_drive
@@ -99,9 +100,8 @@ def main() -> None:
     model = build_reduced_model(machine)
     built = time.process_time() - begin
     fast = FastModel(model, spec)
-    print(
-        f"{model.n_full} unknowns -> {model.size}, built in {built:.1f} s, checked {model.errors['probes']:.2g} K"
-    )
+    checked = model.errors["probes"]
+    print(f"{model.n_full} unknowns -> {model.size}, built in {built:.1f} s, checked {checked:.2g} K")
 
     times = np.arange(0.0, 10 * 2400.0 + 1.0, 10.0)
     values = inputs(times, np.minimum(np.floor(times / 2400.0), 9) * 500.0 * RPM, spec)
@@ -120,9 +120,8 @@ def main() -> None:
     for probe in full.probes:
         error = np.abs(run.temperature[::6, fast.channels.index(probe)] - full.reading(probe)).max()
         print(f"  step test 0-4500 rpm, {probe}: {error:.2g} K")
-    print(
-        f"  full model {full_time:.1f} s; fast model {median_time(lambda: simulate_fast(fast, drive, start)):.3f} s"
-    )
+    fast_time = median_time(lambda: simulate_fast(fast, drive, start))
+    print(f"  full model {full_time:.1f} s; fast model {fast_time:.3f} s")
 
     times = np.arange(0.0, 4 * 3600.0 + 1.0, 10.0)
     speeds = np.array([0.0, 3000.0, 1500.0, 4000.0])[np.minimum(times // 3600.0, 3).astype(int)]
@@ -130,7 +129,7 @@ def main() -> None:
     shared = list(free_parameters(spec))
     single = [f"joint.{name}" for name in model.contacts] + [f"heat.{name}" for name in fast.bearings]
     names = tuple((shared + single)[: options.parameters])
-    factors = {name: 1.01 for name in names}
+    factors = dict.fromkeys(names, 1.01)
     terms = (ThermalPreload(), GapClosure())
     plain = median_time(lambda: simulate_fast(fast, drive, start, parameters=factors))
     derived = median_time(lambda: simulate_fast(fast, drive, start, parameters=factors, derivatives=names))
@@ -140,9 +139,11 @@ def main() -> None:
     )
     print(f"4 h at 10 s, {len(names)} live parameters: {plain:.3f} s, {1e6 * plain / 1440:.0f} us a step")
     print(f"  with all derivatives {derived:.3f} s, {derived / plain:.1f} times")
-    print(
-        f"  with two nonlinear terms {nonlinear:.3f} s; derivatives {both:.3f} s, {both / nonlinear:.1f} times"
-    )
+    ones = np.ones((times.size, len(fast.channels)))
+    adjoint = median_time(lambda: fast_gradient(fast, drive, start, ones, names, parameters=factors))
+    print(f"  gradient of a misfit (adjoint) {adjoint:.3f} s, {adjoint / plain:.1f} times")
+    print(f"  with two nonlinear terms {nonlinear:.3f} s")
+    print(f"  and all derivatives {both:.3f} s, {both / nonlinear:.1f} times")
 
 
 if __name__ == "__main__":

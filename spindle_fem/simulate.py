@@ -167,7 +167,7 @@ def _simulate_geometry(
     predicted, sensitivity = predictor.predict(log_factors)[0]
     notes = [*predictor.drives[0].notes]
     if spec.coolant is not None and spec.coolant.properties_at == "bulk":
-        notes.append("the coolant's film and properties are taken at its inlet temperature, not along the channel")
+        notes.append("the coolant's film is taken at its inlet temperature, not along the channel")
     if outside:
         notes.append(f"coefficients outside the reduced model's range: {', '.join(outside)}")
     if len(recording.segments) > 1:

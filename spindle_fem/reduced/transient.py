@@ -100,11 +100,11 @@ def simulate_fast(
             'The fast model takes heat.model = "table".',
         )
     everything = (*natural_film_terms(fast.spec), *terms)
-    run = _Run(fast, drive, parameters or {}, tuple(derivatives), everything)
+    run = TransientRun(fast, drive, parameters or {}, tuple(derivatives), everything)
     return run.solve(initial_temperature)
 
 
-class _Run:
+class TransientRun:
     """One drive with one set of parameters."""
 
     def __init__(
@@ -146,6 +146,13 @@ class _Run:
         return found, by
 
     def solve(self, initial_temperature: float) -> FastTransient:
+        """States, then sensitivities, then outputs."""
+        states, tracks = self.march(initial_temperature)
+        sensitivities = self._march_sensitivities(states, tracks) if self.derivatives else None
+        return self._outputs(states, sensitivities, tracks)
+
+    def march(self, initial_temperature: float) -> tuple[Array, _Tracks | None]:
+        """States at the ends of all steps, (G + 1, r), and what the terms did."""
         size, steps = self.fast.model.size, len(self.drive.steps)
         response = np.empty((steps, size))
         for key, rows in self.groups.items():
@@ -161,8 +168,7 @@ class _Run:
                 states[step + 1] += response[step]
         else:
             tracks = self._march_terms(states, response)
-        sensitivities = self._march_sensitivities(states, tracks) if self.derivatives else None
-        return self._outputs(states, sensitivities, tracks)
+        return states, tracks
 
     # ------------------------------------------------------------------ terms
     def _term_inputs(self, values: Array) -> dict[str, float]:
@@ -381,7 +387,12 @@ class _Tracks:
 
 def _at(times: Array, grid: Array, values: Array) -> Array:
     """Values at times by straight lines between the grid's; exact where a time is on the grid."""
-    right = np.clip(np.searchsorted(grid, times - 1e-7), 1, grid.size - 1)
-    part = np.clip((times - grid[right - 1]) / (grid[right] - grid[right - 1]), 0.0, 1.0)
+    right, part = grid_weights(times, grid)
     part = part.reshape(-1, *([1] * (values.ndim - 1)))
     return values[right - 1] + part * (values[right] - values[right - 1])
+
+
+def grid_weights(times: Array, grid: Array) -> tuple[NDArray[np.int64], Array]:
+    """Grid point after each time, and the share of the step before it that has passed."""
+    right = np.clip(np.searchsorted(grid, times - 1e-7), 1, grid.size - 1)
+    return right, np.clip((times - grid[right - 1]) / (grid[right] - grid[right - 1]), 0.0, 1.0)

@@ -130,7 +130,7 @@ def test_overrides_reach_the_network(files, tmp_path):
 
 
 def test_a_bad_recording_leaves_no_folder(files, tmp_path):
-    machine, first, _ = files
+    machine, _, _ = files
     broken = tmp_path / "broken"
     broken.mkdir()
     (broken / "recording.toml").write_text(MANIFEST)

@@ -102,7 +102,7 @@ def test_what_has_no_constant_coefficient_is_refused():
     with pytest.raises(SpecError, match=r"bearing_set.front.ball_row.*no constant conductance"):
         build_coefficient_table(spec, build_assembly(spec).joint_names, RADII)
     machine = SimpleNamespace(spec=None, operators=None, joint_conductance={"A|B": np.inf, "B|C": 1.0})
-    with pytest.raises(SpecError, match="A|B is .perfect.*Give a large conductance"):
+    with pytest.raises(SpecError, match=r"A\|B is .perfect.*Give a large conductance"):
         build_affine_system(machine)
 
 

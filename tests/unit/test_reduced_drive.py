@@ -69,7 +69,7 @@ def test_jittering_stamps_get_equal_steps_between_changes_of_held_inputs():
 
 def test_standard_inputs_are_required():
     times = np.array([0.0, 1.0])
-    with pytest.raises(RecordingError, match="Allowed: .*speed"):
+    with pytest.raises(RecordingError, match=r"Allowed: .*speed"):
         make_drive(times, ("speed",), np.zeros((2, 1)), np.array([True]))
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.geometry.assembly import build_assembly
+from spindle_fem.reduced.adjoint import fast_gradient
 from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import STANDARD, make_drive
 from spindle_fem.reduced.fast_model import FastModel
@@ -183,6 +184,17 @@ def test_every_derivative_is_that_of_differences(fast, spec, steps):
         ]
         difference = (ends[0] - ends[1]) / 2e-5
         assert run.sensitivity[:, :, column] == pytest.approx(difference, abs=1e-6), name
+
+
+def test_the_adjoint_is_the_contracted_sensitivity(fast, spec, steps):
+    names = (*free_parameters(spec), "heat.F2", "steady.bypass", "steady.mass", "steady.path")
+    run = simulate_fast(fast, steps, 293.15, derivatives=names, terms=(Steady(),))
+    weights = np.random.default_rng(4).normal(size=run.temperature.shape)
+    gradient = fast_gradient(fast, steps, 293.15, weights, names, terms=(Steady(),))
+    expected = np.einsum("nc,ncp->p", weights, run.sensitivity)
+    assert gradient == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
+    with pytest.raises(SpecError, match=r"depends on temperature or time"):
+        fast_gradient(fast, steps, 293.15, weights, names[:3], terms=(Feedback(),))
 
 
 def test_halving_the_steps_changes_little_and_less_each_time(fast):
@@ -401,7 +413,7 @@ def test_a_term_that_runs_away_is_refused_with_its_time(fast):
             return np.exp(context.temperatures - 293.0)
 
     drive = drive_of(np.arange(0.0, 3600.0, 20.0), 3000.0)
-    with pytest.raises(ConvergenceError, match="t = .* terms of the fast model"):
+    with pytest.raises(ConvergenceError, match=r"t = .* terms of the fast model"):
         simulate_fast(fast, drive, 293.15, terms=(Runaway(),))
 
 
@@ -425,12 +437,12 @@ def test_terms_that_name_what_is_not_there_are_refused(fast, steps, term, messag
 
 
 def test_unknown_parameters_and_other_heat_models_are_refused(fast, spec, steps):
-    with pytest.raises(SpecError, match='Did you mean "heat.front"'):
+    with pytest.raises(SpecError, match=r'Did you mean "heat.front"'):
         simulate_fast(fast, steps, 293.15, parameters={"heat.frnt": 1.0})
-    with pytest.raises(SpecError, match="the share becomes 1.5"):
+    with pytest.raises(SpecError, match=r"the share becomes 1.5"):
         simulate_fast(fast, steps, 293.15, parameters={"heat.inner_share": 3.0})
     other = FastModel(fast.model, load_machine("recorded_spindle", ["heat.model=palmgren"]))
-    with pytest.raises(SpecError, match="takes heat.model"):
+    with pytest.raises(SpecError, match=r"takes heat.model"):
         simulate_fast(other, steps, 293.15)
 
 
