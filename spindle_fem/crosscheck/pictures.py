@@ -68,7 +68,8 @@ def _patches(
     ):
         kind = machine.spec.bearing_types[group.bearing_type]
         axes.scatter(
-            [_MM * np.mean(bearing.z)], [sign * 0.5 * _MM * kind.pitch], c=[value], cmap=colour_map, norm=norm, s=70,
+            [_MM * np.mean(bearing.z)], [sign * 0.5 * _MM * kind.pitch], c=[value], cmap=colour_map,
+            norm=norm, s=70,
             edgecolors=INK, linewidths=0.6, zorder=3,
         )  # fmt: skip
     start = machine.air_start

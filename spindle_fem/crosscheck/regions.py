@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 _A, _B = 0.5854101966249685, 0.1381966011250105
 _POINTS = np.array([[_B, _B, _B], [_A, _B, _B], [_B, _A, _B], [_B, _B, _A]])
 _CHUNK = 2_000
+# Larger elements across a border are cut into 64 pieces, smaller ones into eight.
+_LARGE_ELEMENT = 9.0e-3
 _NEAR_ELEMENTS = 24
 # In reference coordinates: curved walls lie a little outside their straight elements.
 _OUTSIDE_LIMIT = -0.25
@@ -89,16 +91,20 @@ def build_regions(prepared: PreparedMachine, machine: MachineNetwork) -> NodeReg
     """Averaging rows of every solid node of a network on a mesh.
 
     Elements inside one node are integrated whole; those across a border are
-    cut into eight and each quadrature point goes to the node it lies in.
+    cut into eight or 64 and each quadrature point goes to the node it lies in.
     """
     mesh, operators = prepared.mesh, prepared.operators
     cells, _node_of_cell = machine.cells, machine.partition.node_of_cell
     straddles = _crosses(cells, mesh.points[mesh.tetrahedra])
     n_shape = 4 if operators.order == 1 else 10
+    corners = mesh.points[mesh.tetrahedra[:, :4]]
+    large = np.ptp(corners, axis=1).max(axis=1) > _LARGE_ELEMENT
+    eight, sixty_four = _subdivided(_POINTS), _subdivided(_subdivided(_POINTS))
     blocks = []
     for rows, points, weight in (
         (np.flatnonzero(~straddles), _POINTS, 1.0 / 24.0),
-        (np.flatnonzero(straddles), _subdivided(_subdivided(_POINTS)), 1.0 / 24.0 / 64.0),
+        (np.flatnonzero(straddles & ~large), eight, 1.0 / 24.0 / 8.0),
+        (np.flatnonzero(straddles & large), sixty_four, 1.0 / 24.0 / 64.0),
     ):
         for start in range(0, len(rows), _CHUNK):
             blocks.append(

@@ -58,11 +58,14 @@ def render(content: Mapping[str, Any], figures: Path) -> str:
     finest = content["convergence"]["rows"][-1]
     headline = Cards(
         [
-            {"name": "largest difference, network − elements", "value": f"{number(summary['max_difference_K'], 2)} K"},
-            {"name": "root mean square over the nodes", "value": f"{number(summary['rms_difference_K'], 2)} K"},
+            {"name": "largest difference, network − elements",
+             "value": f"{number(summary['max_difference_K'], 2)} K"},
+            {"name": "root mean square over the nodes",
+             "value": f"{number(summary['rms_difference_K'], 2)} K"},
             {"name": f"refined {finest['refinement']}×, to axisymmetric elements",
              "value": f"{number(finest['max_difference_K'], 3)} K"},
-            {"name": "after flux matching, matched state", "value": f"{significant(at_match['matched_max_K'], 2)} K"},
+            {"name": "after flux matching, matched state",
+             "value": f"{significant(at_match['matched_max_K'], 2)} K"},
             {"name": "after flux matching, other speeds", "value": f"{number(worst['matched_max_K'], 2)} K"},
             {"name": "network’s energy balance", "value": significant(network["imbalance_relative"], 2)},
         ]
@@ -232,6 +235,7 @@ def _claim_blocks(claim: Mapping[str, Any]) -> list[Any]:
     ]
     columns = (
         column("model"), column("design"), column("maximum °C", number=True), column("inner − outer K"),
-        column("film W/(m²·K)", number=True), column("to the oil W", number=True), column("friction W", number=True),
+        column("film W/(m²·K)", number=True), column("to the oil W", number=True),
+        column("friction W", number=True),
     )  # fmt: skip
     return [Table(columns, rows_of(rows), claim["source"]), Bullets(claim["explanation"])]

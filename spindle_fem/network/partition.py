@@ -138,7 +138,7 @@ class _Body:
         return float(np.log(self.r[1] / max(self.r[0], 1.0e-2 * self.r[1]))) / self.pieces
 
     def bounds(self) -> NDArray[np.float64]:
-        """Radii between the pieces: even, moved to a step of the body that is near, so that no sliver is left."""
+        """Radii between the pieces: even, or at a near step of the body, so that no sliver is left."""
         even = np.linspace(self.r[0], self.r[1], self.pieces + 1)
         reach = SNAP * (even[1] - even[0])
         for step in self.steps:

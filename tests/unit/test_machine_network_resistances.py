@@ -78,7 +78,7 @@ def test_a_joint_of_no_conductance_is_no_link_and_a_perfect_one_no_resistance():
 
 @pytest.mark.parametrize("slenderness", [1.0, 2.0, 8.0])
 def test_an_elliptic_contact_constricts_as_the_potential_of_an_isothermal_ellipse(slenderness):
-    """Potential at two points of the ellipse, by quadrature of the exact flux q ~ (1 - x²/a² - y²/b²)^(-1/2)."""
+    """Potential at two points of the ellipse, by quadrature of the flux ~ (1 - x²/a² - y²/b²)^(-1/2)."""
     a, b = 1.0e-3, 1.0e-3 / slenderness
 
     def potential(x0: float) -> float:

@@ -1,4 +1,4 @@
-"""A refined network converges to the axisymmetric conduction problem, and the elements beside it to exact solutions."""
+"""A refined network converges to axisymmetric elements of the same machine without helix."""
 
 from __future__ import annotations
 
