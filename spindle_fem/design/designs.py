@@ -250,7 +250,7 @@ def annotation_rule(content: Mapping[str, Any], path: str) -> QuantityRule | Non
 
 
 def annotation_at(content: Mapping[str, Any], path: str) -> Any:
-    """Annotation of the value at a path that overrides accept; None where it is a table or a list of tables."""
+    """Annotation of the value at a path that overrides accept; None where it is a table or a list of them."""
     shape, node, rest = Shape("table", (MachineSpec,)), content, path
     while rest:
         if shape.kind == "table":

@@ -60,9 +60,10 @@ class FilmChart:
 def film_study(spec: MachineSpec) -> tuple[FilmChart, ...]:
     """Film maps over depth and oil temperature, by two sets of equations, at constant velocity and flow.
 
-    Depth 5–30 mm, temperature 10–40 °C. The paper gives neither velocity nor flow. Held here is the velocity that
-    puts the paper's optimum on the paper's own laminar–turbulent line, where
-    its choice comes from, and the flow that the machine has.
+    Depth 5–30 mm, temperature 10–40 °C. The paper gives neither velocity nor
+    flow. Held here is the velocity that puts the paper's optimum on the paper's
+    own laminar–turbulent line, where its choice comes from, and the flow that
+    the machine has.
 
     Parameters
     ----------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from spindle_fem.design.files import SWEEP_SCHEMA
 from spindle_fem.design.judge import Ranking, rank
 from spindle_fem.design.outputs import unit_of
 from spindle_fem.design.sensitivity import neighbours, sensitivities
@@ -14,7 +15,6 @@ from spindle_fem.results.summary import package_versions
 if TYPE_CHECKING:
     from spindle_fem.design.sweep import PreparedStudy
 
-SWEEP_SCHEMA = "spindle-fem/sweep/1"
 # Neighbours told of the best design, for each parameter.
 NEIGHBOURS = 2
 

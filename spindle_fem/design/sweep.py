@@ -12,6 +12,7 @@ from typing import Any
 
 from spindle_fem.design.designs import Axis, Design, build_axes, plan_designs, reference_designs
 from spindle_fem.design.evaluate import DesignTask, Question, TaskBuilder
+from spindle_fem.design.files import MACHINE_FILE, STUDY_FILE, SUMMARY_FILE
 from spindle_fem.design.judge import Limit, judged, limits_of
 from spindle_fem.design.optimise import search_designs
 from spindle_fem.design.outputs import WORDS, output_fault
@@ -25,7 +26,6 @@ from spindle_fem.reporting.sweep_report import write_sweep_report
 from spindle_fem.spec.load import apply_overrides, find_machine, load_machine, read_definition, write_machine
 from spindle_fem.spec.model import MachineSpec
 
-SUMMARY_FILE, STUDY_FILE, MACHINE_FILE = "sweep.json", "study.toml", "machine.toml"
 # Rows that stand in the table for designs of a study, besides parameters and outputs.
 _HEAD, _TAIL = ("design",), ("status", "reason", "feasible", "geometry", "key")
 

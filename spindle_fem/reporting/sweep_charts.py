@@ -75,11 +75,14 @@ def response_maps(
         else:
             shown = axes.scatter(x, y, c=values, cmap=colours, s=60, edgecolor=INK, linewidth=0.5)
         figure.colorbar(shown, ax=axes, pad=0.02)
-        axes.scatter(x[feasible], y[feasible], s=9, color=INK, zorder=3)
-        axes.scatter(x[~feasible], y[~feasible], s=22, color=INK, marker="x", linewidth=0.9, zorder=3)
+        axes.scatter(x[feasible], y[feasible], s=9, color=INK, zorder=3, clip_on=False)
+        axes.scatter(
+            x[~feasible], y[~feasible], s=22, color=INK, marker="x", linewidth=0.9, zorder=3, clip_on=False
+        )
         for number, (name, row) in enumerate(marks.items()):
             axes.scatter(
-                across.of([row]), up.of([row]), s=150, marker="*os^"[number % 4], facecolor="white", edgecolor=INK,
+                across.of([row]), up.of([row]), s=150, marker="*os^"[number % 4],
+                facecolor="white", edgecolor=INK,
                 zorder=5, label=name, clip_on=False,
             )  # fmt: skip
         axes.set(xlabel=across.label, ylabel=up.label, title=output.label)

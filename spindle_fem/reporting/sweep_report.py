@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
+from spindle_fem.design.files import MACHINE_FILE, SUMMARY_FILE, SWEEP_SCHEMA
 from spindle_fem.design.film_study import MODELS, FilmChart, film_study
+from spindle_fem.design.table import read_results
+from spindle_fem.errors import BadInputError
 from spindle_fem.reporting import sweep_charts, sweep_film
 from spindle_fem.reporting.document import (
     Bullets,
@@ -22,10 +26,11 @@ from spindle_fem.reporting.document import (
     illustration_of,
 )
 from spindle_fem.reporting.figures import save_png
-from spindle_fem.reporting.output import replace_text
+from spindle_fem.reporting.output import replace_text, require_complete
 from spindle_fem.reporting.page import render_page
 from spindle_fem.reporting.sweep_scales import Scale, scale_of_column
 from spindle_fem.reporting.tables import column, number, rows_of, significant
+from spindle_fem.spec.load import validate
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -35,12 +40,13 @@ FIGURE_FOLDER = "figures"
 MOST_PANELS = 6
 
 _CAPTIONS = {
-    "responses": "Outputs over the parameters that move them most. Dots are solved designs, crosses break a limit.",
+    "responses": "Outputs over the parameters that move them most. Dots are solved designs, crosses break "
+    "a limit.",
     "parallel_coordinates": "Each line is a design; dotted ones break a limit, thick ones are the best.",
     "pareto_front": "Designs of the front are not beaten in every objective by any other.",
     "sensitivities": "Which parameter each output depends on, over the whole space of the study.",
-    "film_maps": "The paper's Figure 22 and the same by correlations of a helical duct. White line: laminar to "
-    "turbulent. The paper names neither velocity nor flow; what it would choose depends on it.",
+    "film_maps": "The paper's Figure 22 and the same by correlations of a helical duct. White line: "
+    "laminar to turbulent. The paper names neither velocity nor flow; what it would choose depends on it.",
     "pump_maps": "What the pump must do for it, through the channel alone.",
 }
 
@@ -83,6 +89,26 @@ def write_sweep_report(
         explorer=_explorer(summary, solved, parameters, outputs),
     )
     return replace_text(folder / "report.html", html)
+
+
+def rebuild_sweep_report(folder: str | Path) -> Path:
+    """Draw and write the report of a finished study again, from its files.
+
+    Raises
+    ------
+    BadInputError
+        The folder is missing or incomplete, or a file is missing or unknown.
+    """
+    folder = require_complete(folder)
+    path = folder / SUMMARY_FILE
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+        machine = tomllib.loads((folder / MACHINE_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BadInputError(str(path), f"cannot be read ({error}).", "Give the folder of a sweep.") from error
+    if not isinstance(summary, dict) or summary.get("schema") != SWEEP_SCHEMA:
+        raise BadInputError(str(path), "is not of a known schema.", f'Known: "{SWEEP_SCHEMA}".')
+    return write_sweep_report(folder, summary, read_results(folder), validate(machine, MACHINE_FILE))
 
 
 def draw_figures(
@@ -198,7 +224,11 @@ def _limits(summary: Mapping[str, Any], outputs: Sequence[Scale]) -> list[Any]:
     lines = []
     for item in summary["constraints"]:
         scale = scales[item["output"]]
-        bounds = [f"{word} {scale.text(item[key])} {scale.unit}" for key, word in (("min", "at least"), ("max", "at most")) if item[key] is not None]  # fmt: skip
+        bounds = [
+            f"{word} {scale.text(item[key])} {scale.unit}"
+            for key, word in (("min", "at least"), ("max", "at most"))
+            if item[key] is not None
+        ]
         lines.append(f"Limit: {scale.label.split(' / ')[0]} {' and '.join(bounds)}".rstrip() + ".")
     lines += [
         f"Objective: {item['direction']} {scales[item['output']].label.split(' / ')[0]}."
@@ -227,7 +257,7 @@ def _optimum(
             f"{len(optimum['front'])} designs make the front: none of the others beats one in every objective"
         )
     if summary["film_uncertainty"] and open_ones:
-        text += f"; but within the uncertainty of the film coefficient {len(open_ones)} more cannot be told from it."
+        text += f"; but within the band of the film coefficient {len(open_ones)} more may be as good."
         blocks.append(Notice(text))
     else:
         sure = (
@@ -256,15 +286,17 @@ def _film_words(films: Sequence[FilmChart]) -> list[Any]:
     cells = [
         [
             MODELS[item.model], sweep_film.held_text(item), number(item.best[0] * 1e3, 1),
-            number(item.best[1] - ZERO_CELSIUS_K, 1), significant(item.best_value), significant(item.paper_value),
+            number(item.best[1] - ZERO_CELSIUS_K, 1), significant(item.best_value),
+            significant(item.paper_value),
             f"{item.paper_value / item.best_value:.0%}",
         ]
         for item in films
     ]  # fmt: skip
     text = (
-        "The paper chose 19 mm and 31 °C from its map of the film coefficient. The velocity held here is the one at "
-        "which that point lies on the paper's laminar–turbulent line; the flow is the machine's own. A film map says "
-        "nothing of the bearings: hotter oil also lifts the whole machine, which only the solved designs show."
+        "The paper chose 19 mm and 31 °C from its map of the film coefficient. The velocity held here is the "
+        "one at which that point lies on the paper's laminar–turbulent line; the flow is the machine's own. "
+        "A film map says nothing of the bearings: hotter oil also lifts the whole machine, which only the "
+        "solved designs show."
     )
     return [Text(text), Table(heads, rows_of(cells))]
 

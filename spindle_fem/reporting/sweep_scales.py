@@ -83,6 +83,7 @@ def name_of(path: str) -> str:
     ('F2 ring difference', 'temperature max')
     """
     text = path.removeprefix("bearings.").removeprefix("derived.").removesuffix(".value")
+    text = text.replace("terms_W.", "heat, ")
     for ending in (
         "_W_m2K",
         "_K_per_m",

@@ -16,6 +16,7 @@ from spindle_fem.design.sweep import sweep_machine
 from spindle_fem.design.table import RESULTS, read_results
 from spindle_fem.errors import BadInputError, FaultsError
 from spindle_fem.reporting.output import MARKER, is_complete
+from spindle_fem.reporting.sweep_report import rebuild_sweep_report
 from spindle_fem.results.summary import build_summary
 from spindle_fem.solve import solve_prepared
 from spindle_fem.spec.load import load_machine
@@ -124,6 +125,7 @@ def test_the_folder_is_complete_and_the_report_stands_alone(grid):
     html = (folder / "report.html").read_text()
     assert "breaks through" in html
     assert "http" not in html.replace("http://www.w3.org/2000/svg", "")
+    assert rebuild_sweep_report(folder).read_text() == html
     assert {path.stem for path in (folder / "figures").glob("*.png")} >= {
         "responses",
         "film_maps",

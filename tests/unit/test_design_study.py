@@ -78,7 +78,8 @@ def test_sample_fills_the_range_evenly(write, content, kind):
 
 def test_a_sampled_range_crosses_the_grid_of_the_others(write, content):
     text = DEPTHS + (
-        '[[parameter]]\npath = "coolant.flow"\nlow = "5 L/min"\nhigh = "10 L/min"\nsample = "sobol"\nnumber = 4\n'
+        '[[parameter]]\npath = "coolant.flow"\nlow = "5 L/min"\nhigh = "10 L/min"\n'
+        'sample = "sobol"\nnumber = 4\n'
     )
     designs = designs_of(write(text + OUTPUTS), content)
     assert len(designs) == 8
@@ -155,7 +156,7 @@ def test_faults_against_the_machine_are_told_together(write):
 
 def test_limit_of_another_dimension_is_refused(write):
     text = DEPTHS + OUTPUTS + '[[constraint]]\noutput = "coolant.pressure_drop_Pa"\nmax = "5 K"\n'
-    with pytest.raises(SpecError, match="constraint\\[1\\].max"):
+    with pytest.raises(SpecError, match=r"constraint\[1\]\.max"):
         prepare_study("small_two_start", write(text))
 
 
