@@ -11,6 +11,7 @@ from spindle_fem.units import ZERO_CELSIUS_K
 BALANCE_LIMIT = 1.0e-8
 MEASURE_LIMIT = 1.0e-3
 BELOW_COLDEST_LIMIT = 0.01
+CLOSING_SHIFT_LIMIT = 1.0e-6
 
 
 def check_energy(energy: EnergyBalance) -> Check:
@@ -64,6 +65,17 @@ def check_grease(temperatures: dict[str, float], limit: float) -> Check:
 def check_residual(residual: float, limit: float) -> Check:
     """Relative residual of the linear equations."""
     return _within("linear residual", residual, limit, "", "Norm of residual over norm of load.")
+
+
+def check_closing_shift(shift: float) -> Check:
+    """The balance was not closed by force: the shift that closed it is far below any temperature of interest."""
+    return _within(
+        "balance closing shift",
+        abs(shift),
+        CLOSING_SHIFT_LIMIT,
+        "K",
+        "Uniform shift that brought the balance from the linear solver's tolerance to round-off.",
+    )
 
 
 def check_fixed_point(change: float, limit: float, iterations: int) -> Check:

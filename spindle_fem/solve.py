@@ -95,6 +95,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         checks.check_measures("volumes", volume_error),
         checks.check_coldest(float(nodes.min()), point.coldest),
         checks.check_residual(solution.residual, LINEAR_RESIDUAL_LIMIT),
+        checks.check_closing_shift(solution.closing_shift),
         checks.check_fixed_point(
             coupled.change, FIELD_TOLERANCE * max(1.0, float(nodes.max()) - point.coldest), coupled.iterations
         ),

@@ -55,6 +55,9 @@ class ConductionSolution:
         To pass on to the next similar problem.
     nonlinear_iterations : int
         0 for a linear problem.
+    closing_shift : float, [K]
+        Uniform shift that closed the heat balance to round-off: what the
+        linear solver left undone, as a temperature.
     """
 
     problem: ConductionProblem
@@ -65,6 +68,7 @@ class ConductionSolution:
     residual: float
     preconditioner: Preconditioner
     nonlinear_iterations: int = 0
+    closing_shift: float = 0.0
 
     def lumped(self, name: str) -> float:
         """Temperature of one lumped node, [K]."""
@@ -126,6 +130,7 @@ def solve_steady(
     first = compute_balance(problem, system, rise, lumped_rise)
     missing = first.imbalance / _surroundings_conductance(problem)
     rise, lumped_rise = rise + missing, lumped_rise + missing
+    closing_shift = float(unknowns[0] - solution.unknowns[0] + missing)
     balance = compute_balance(problem, system, rise, lumped_rise)
     require_balance(balance, LINEAR_BALANCE_TOLERANCE if balance_tolerance is None else balance_tolerance)
     return ConductionSolution(
@@ -136,6 +141,7 @@ def solve_steady(
         solution.iterations,
         solution.residual,
         preconditioner,
+        closing_shift=closing_shift,
     )
 
 
