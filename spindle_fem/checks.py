@@ -68,7 +68,7 @@ def check_residual(residual: float, limit: float) -> Check:
 
 
 def check_closing_shift(shift: float) -> Check:
-    """The balance was not closed by force: the shift that closed it is far below any temperature of interest."""
+    """The balance was not closed by force: the shift that closed it is next to nothing."""
     return _within(
         "balance closing shift",
         abs(shift),

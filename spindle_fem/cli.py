@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -198,6 +199,9 @@ def main() -> None:
     """Entry point: exit status 0 done, 2 bad input, 1 anything else."""
     from spindle_fem.errors import SpindleFemError
 
+    # The solver is bound by memory: more threads only wait for one another, spinning.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
         app(standalone_mode=True)
     except SpindleFemError as error:
