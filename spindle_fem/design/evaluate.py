@@ -186,6 +186,12 @@ def evaluate(task: DesignTask, question: Question) -> Row:
     return {**head, **empty, **answers, "status": OK, "reason": ""}
 
 
+def solve_task(task: DesignTask) -> ThermalResult:
+    """The whole result of a possible design, as its row was made from; for pictures."""
+    with threadpool_limits(1):
+        return _solved(task.spec, *shared_operators(task.spec, task.geometry))
+
+
 def _answers(task: DesignTask, question: Question) -> dict[str, Any]:
     spec = task.spec
     mesh, operators = shared_operators(spec, task.geometry)

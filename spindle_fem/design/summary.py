@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Neighbours told of the best design, for each parameter.
 NEIGHBOURS = 2
+# Machines shown cut open.
+PICTURES = 4
 
 
 def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> dict[str, Any]:
@@ -45,6 +47,7 @@ def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> d
         "geometries": len({row["geometry"] for row in rows if row["geometry"]}),
         "reused_rows": reused,
         "optimum": None if ranking is None else _optimum(prepared, rows, ranking),
+        "pictured": pictured_designs(prepared, rows, ranking),
         "references": {
             name: _design(prepared, rows[number - 1]) for name, number in prepared.references.items()
         },
@@ -64,6 +67,17 @@ def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> d
         ],
         "versions": package_versions(),
     }
+
+
+def pictured_designs(prepared: PreparedStudy, rows: Sequence[Row], ranking: Ranking | None) -> list[int]:
+    """Designs worth a picture: the best, spread over the front, and those to compare with."""
+    if ranking is None:
+        return []
+    front = [ranking.rows[index]["design"] for index in ranking.front]
+    compared = [n for n in prepared.references.values() if rows[n - 1]["status"] == OK][: PICTURES - 1]
+    room = min(PICTURES - len(compared), len(front))
+    spread = [front[round(step * (len(front) - 1) / max(room - 1, 1))] for step in range(room)]
+    return list(dict.fromkeys([*spread, *compared]))
 
 
 def _optimum(prepared: PreparedStudy, rows: Sequence[Row], ranking: Ranking) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from spindle_fem.design.designs import Axis, Design, build_axes, plan_designs, reference_designs
-from spindle_fem.design.evaluate import DesignTask, Question, TaskBuilder
+from spindle_fem.design.evaluate import DesignTask, Question, TaskBuilder, solve_task
 from spindle_fem.design.files import MACHINE_FILE, STUDY_FILE, SUMMARY_FILE
 from spindle_fem.design.judge import Limit, judged, limits_of
 from spindle_fem.design.optimise import search_designs
@@ -22,7 +22,8 @@ from spindle_fem.design.summary import summarise
 from spindle_fem.design.table import RESULTS, ResultTable, Row
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
 from spindle_fem.reporting.output import output_folder, replace_text
-from spindle_fem.reporting.sweep_report import write_sweep_report
+from spindle_fem.reporting.sweep_report import BEST_PICTURE, FIGURE_FOLDER, write_sweep_report
+from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.spec.load import apply_overrides, find_machine, load_machine, read_definition, write_machine
 from spindle_fem.spec.model import MachineSpec
 
@@ -146,11 +147,12 @@ def sweep_machine(
         rows = table.finish(_heads(table, tasks, prepared))
         reused = len({task.key for task in tasks} & before)
         summary = summarise(prepared, rows, reused=reused)
+        results = _pictured(place, summary, tasks, solved_now=len(table.rows) > len(before))
         summary["wall_time_s"] = time.perf_counter() - started
         replace_text(
             place / SUMMARY_FILE, json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
         )
-        write_sweep_report(place, summary, rows, prepared.spec)
+        write_sweep_report(place, summary, rows, prepared.spec, results)
     return summary
 
 
@@ -256,6 +258,19 @@ def _solve_missing(
         tell(1)
 
     run_tasks(list(missing.values()), prepared.question, land, jobs=jobs, scheduler=scheduler)
+
+
+def _pictured(
+    place: Path, summary: Mapping[str, Any], tasks: Sequence[DesignTask], *, solved_now: bool
+) -> dict[int, ThermalResult]:
+    """Fields of the designs to picture; none where the folder has their picture already."""
+    picture = place / FIGURE_FOLDER / BEST_PICTURE
+    old = place / SUMMARY_FILE
+    if not solved_now and picture.is_file() and old.is_file():
+        with contextlib.suppress(ValueError):
+            if json.loads(old.read_text(encoding="utf-8")).get("pictured") == summary["pictured"]:
+                return {}
+    return {number: solve_task(tasks[number - 1]) for number in summary["pictured"]}
 
 
 def _heads(table: ResultTable, tasks: Sequence[DesignTask], prepared: PreparedStudy) -> list[Row]:

@@ -28,8 +28,10 @@ from spindle_fem.reporting.document import (
 from spindle_fem.reporting.figures import save_png
 from spindle_fem.reporting.output import replace_text, require_complete
 from spindle_fem.reporting.page import render_page
+from spindle_fem.reporting.sweep_best import best_designs
 from spindle_fem.reporting.sweep_scales import Scale, scale_of_column
 from spindle_fem.reporting.tables import column, number, rows_of, significant
+from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.spec.load import validate
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -38,10 +40,12 @@ Row = Mapping[str, Any]
 FIGURE_FOLDER = "figures"
 # Outputs drawn as maps and as columns; the table has all of them.
 MOST_PANELS = 6
+BEST_PICTURE = "best_designs.png"
 
 _CAPTIONS = {
     "responses": "Outputs over the parameters that move them most. Dots are solved designs, crosses break "
     "a limit.",
+    "best_designs": "Temperature in the vertical plane through the axis, on one scale.",
     "parallel_coordinates": "Each line is a design; dotted ones break a limit, thick ones are the best.",
     "pareto_front": "Designs of the front are not beaten in every objective by any other.",
     "sensitivities": "Which parameter each output depends on, over the whole space of the study.",
@@ -52,7 +56,11 @@ _CAPTIONS = {
 
 
 def write_sweep_report(
-    folder: Path, summary: Mapping[str, Any], rows: Sequence[Row], spec: MachineSpec
+    folder: Path,
+    summary: Mapping[str, Any],
+    rows: Sequence[Row],
+    spec: MachineSpec,
+    results: Mapping[int, ThermalResult] | None = None,
 ) -> Path:
     """Draw the figures of a study and write its report.
 
@@ -66,6 +74,8 @@ def write_sweep_report(
         Of the table.
     spec : MachineSpec
         The machine before any design, for the film maps.
+    results : mapping of design to ThermalResult, optional
+        Fields of the best designs; without them their picture stays as it is.
     """
     solved = [row for row in rows if row["status"] == "ok"]
     parameters = [scale_of_column(item["path"], item["unit"], rows) for item in summary["parameters"]]
@@ -74,9 +84,15 @@ def write_sweep_report(
     figures = draw_figures(summary, solved, parameters, outputs, films)
     place = folder / FIGURE_FOLDER
     place.mkdir(exist_ok=True)
+    if results:
+        figures["best_designs"] = best_designs(_titled(results, summary, rows, parameters))
+    kept = BEST_PICTURE if not results and summary["pictured"] else ""
     for old in place.glob("*.png"):
-        old.unlink()
+        if old.name != kept:
+            old.unlink()
     pictures: dict[str, Illustration] = {}
+    if kept and (place / kept).is_file():
+        pictures["best_designs"] = illustration_of(place / kept, _CAPTIONS["best_designs"])
     for name, figure in figures.items():
         pictures[name] = illustration_of(save_png(figure, place / f"{name}.png"), _CAPTIONS[name])
     sections = _sections(summary, rows, parameters, outputs, films, pictures)
@@ -157,6 +173,22 @@ def draw_figures(
     return figures
 
 
+def _titled(
+    results: Mapping[int, ThermalResult],
+    summary: Mapping[str, Any],
+    rows: Sequence[Row],
+    parameters: Sequence[Scale],
+) -> dict[str, ThermalResult]:
+    """Results by a title that tells name and parameters of the design."""
+    names = {item["design"]: name for name, item in summary["references"].items()}
+    titled = {}
+    for design, result in results.items():
+        row = solved_row(rows, design)
+        values = ", ".join(f"{item.text(row[item.path])} {item.unit}".rstrip() for item in parameters)
+        titled[f"{names.get(design, f'design {design}')}: {values}"] = result
+    return titled
+
+
 def solved_row(rows: Sequence[Row], design: int) -> Row | None:
     """Row of a design, None where it was not solved."""
     return next((row for row in rows if row["design"] == design), None)
@@ -192,6 +224,8 @@ def _sections(
     elif summary["objectives"]:
         text = "No design keeps every limit; the table tells which one each of them breaks."
         sections.append(Section("optimum", "Best designs", [Notice(text, "bad")]))
+    if "best_designs" in pictures:
+        sections.append(Section("machines", "The best designs, cut open", [pictures["best_designs"]]))
     maps = [
         pictures[name] for name in ("responses", "parallel_coordinates", "pareto_front") if name in pictures
     ]
