@@ -10,8 +10,9 @@ temperatures are always those of the temperatures themselves.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,46 @@ from spindle_fem.conduction.transient import ThermalState
 from spindle_fem.coolant.marching import march_enthalpy
 from spindle_fem.coupling import PreparedMachine
 from spindle_fem.errors import NoEquilibriumError, NoSteadyStateError, OutOfValidityError
+from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.loads.coolant_loop import CoolantState
-from spindle_fem.loads.model import FilmLoad, Loads
+from spindle_fem.loads.model import BearingHeat, FilmLoad, Loads
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.transients.history import OperatingHistory
 
 Array = NDArray[np.float64]
+
+# Bearings this close to their last temperatures make the same heat: some microwatts.
+SAME_TEMPERATURE_K = 1.0e-6
+
+
+class HeatInMemory:
+    """A heat model that answers the same question only once.
+
+    Parameters
+    ----------
+    model : HeatModel
+    tolerance : float, [K]
+        Temperatures closer than this are the same.
+    """
+
+    def __init__(self, model: HeatModel, tolerance: float = SAME_TEMPERATURE_K) -> None:
+        self.model, self.tolerance = model, tolerance
+        self.calls = 0
+        self._last: tuple | None = None
+
+    def __call__(
+        self, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+    ) -> tuple[Mapping[str, BearingHeat], tuple]:
+        """Heat of every bearing; see :mod:`spindle_fem.loads.bearing_heat`."""
+        values = np.array([astuple(item) for item in temperatures.values()])
+        if self._last is not None:
+            last_point, last_values, answer = self._last
+            if point == last_point and np.abs(values - last_values).max(initial=0.0) <= self.tolerance:
+                return answer
+        answer = self.model(point, temperatures)
+        self.calls += 1
+        self._last = (point, values, answer)
+        return answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +90,9 @@ class CoupledInputs:
     def __init__(
         self, machine: PreparedMachine, history: OperatingHistory, coefficient_tolerance: float
     ) -> None:
-        self.machine = machine
+        builder = copy.copy(machine.builder)
+        builder.heat_model = HeatInMemory(machine.builder.heat_model)
+        self.machine = replace(machine, builder=builder)
         self.history = history
         self.coefficient_tolerance = coefficient_tolerance
         self._kept: dict[tuple[str, ...], Array] = {}

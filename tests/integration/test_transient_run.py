@@ -1,0 +1,392 @@
+"""Coupled transients of the reference spindle on a small mesh (linear temperatures)."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spindle_fem.conduction.transient import ThermalState
+from spindle_fem.coupling import prepare_machine, solve_coupled
+from spindle_fem.errors import (
+    BadInputError,
+    EnergyBalanceError,
+    FaultsError,
+    NoSteadyStateError,
+    RecordingError,
+    SpecError,
+)
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.history import InputHistory
+from spindle_fem.solve import solve_prepared
+from spindle_fem.spec.load import load_machine
+from spindle_fem.transient_run import run_transient_study
+from spindle_fem.transients.history import OperatingHistory
+from spindle_fem.transients.run import MachineEnergy, TransientOptions, simulate_full, start_from
+from spindle_fem.transients.study import load_study, run_study, study_of, time_to_stay_within
+
+SMALL = ["mesh.preset=coarse", "mesh.order=1"]
+RPM = np.pi / 30.0
+
+
+def held(times, **inputs):
+    names = tuple(inputs)
+    values = np.column_stack([np.broadcast_to(np.asarray(inputs[name], float), len(times)) for name in names])
+    return InputHistory(np.asarray(times, float), names, values, np.ones(len(names), dtype=bool))
+
+
+def lines(times, **inputs):
+    history = held(times, **inputs)
+    return replace(history, held=np.zeros(len(history.names), dtype=bool))
+
+
+@pytest.fixture(scope="module")
+def machine():
+    """The reference spindle with catalogue friction: heat, films and coolant follow the temperatures."""
+    return prepare_machine(load_machine("wu_tan_2016", [*SMALL, "heat.model=palmgren"]))
+
+
+@pytest.fixture(scope="module")
+def paper_machine():
+    """The reference spindle as it ships, with its full friction model."""
+    return prepare_machine(load_machine("wu_tan_2016", SMALL))
+
+
+@pytest.fixture(scope="module")
+def heat_up(paper_machine):
+    return simulate_full(
+        paper_machine,
+        held([0.0, 14400.0], speed=3000 * RPM, thrust=1750.0),
+        sample_times=np.arange(0.0, 14401.0, 60.0),
+    )
+
+
+@pytest.fixture(scope="module")
+def steady(paper_machine):
+    return solve_prepared(paper_machine)
+
+
+# ------------------------------------------------------------------- balance
+def test_heat_in_less_out_is_stored(heat_up):
+    energy = heat_up.energy
+    assert energy.imbalance_relative < 1e-8
+    assert energy.heat_out["coolant"] > 0.3 * energy.heat_in
+    assert energy.stored > 0.05 * energy.heat_in
+
+
+def test_coolant_is_booked_by_its_own_enthalpy(machine, monkeypatch):
+    """An enthalpy that is wrong by one part in a million is found."""
+    import spindle_fem.transients.run as run
+
+    true = run.coolant_heat
+    monkeypatch.setattr(
+        run, "coolant_heat", lambda stages, step: tuple(1.000001 * h for h in true(stages, step))
+    )
+    with pytest.raises(EnergyBalanceError, match="coolant included"):
+        simulate_full(machine, held([0.0, 600.0], speed=3000 * RPM))
+
+
+def test_energies_add_up():
+    one = MachineEnergy(10.0, {"air": 4.0}, 6.0)
+    both = one + MachineEnergy(5.0, {"coolant": 5.0}, 0.0)
+    assert both == MachineEnergy(15.0, {"air": 4.0, "coolant": 5.0}, 6.0)
+    assert both.imbalance_relative == 0.0
+    assert MachineEnergy(10.0, {}, 6.0).imbalance_relative == pytest.approx(0.5)
+
+
+# ------------------------------------------------------------- steady state
+def test_steady_state_stays(paper_machine, steady):
+    """Started from the coupled steady state nothing moves."""
+    start = start_from(solve_coupled(paper_machine, OperatingPoint.of(paper_machine.spec)))
+    run = simulate_full(paper_machine, held([0.0, 7200.0], speed=3000 * RPM, thrust=1750.0), start=start)
+    expected = [steady.probes[name] for name in run.probes]
+    assert np.abs(run.readings - expected).max() < 1e-5
+    assert run.steps.bearing_heat[-1].sum() == pytest.approx(steady.energy.heat_in, rel=1e-6)
+
+
+def test_heat_up_ends_at_the_steady_state(paper_machine, heat_up, steady):
+    """From four hours on to thirty: the end is the state that the steady solver finds."""
+    run = simulate_full(
+        paper_machine, held([14400.0, 108000.0], speed=3000 * RPM, thrust=1750.0), start=heat_up.state
+    )
+    expected = np.array([steady.probes[name] for name in run.probes])
+    assert np.abs(run.readings[-1] - expected).max() < 2e-3
+    hottest = steady.temperature_maximum
+    assert run.steps.hottest[-1] == pytest.approx(hottest, abs=5e-3)
+    assert run.energy.imbalance_relative < 1e-8
+
+
+def test_time_to_equilibrium_is_the_papers(heat_up, steady):
+    """The slowest probe (rear seat) comes within half a kelvin after three to four hours."""
+    final = np.array([steady.probes[name] for name in heat_up.probes])
+    hours = time_to_stay_within(heat_up.times, heat_up.readings, final, 0.5) / 3600.0
+    assert 3.0 < hours < 4.0
+
+
+def test_nothing_gets_colder_than_the_coolant(heat_up):
+    assert heat_up.steps.coldest.min() > 288.15 - 1e-6
+    assert np.all(np.diff(heat_up.steps.hottest) > 0.0)
+
+
+def test_friction_falls_as_the_grease_warms(heat_up):
+    heat, warm = heat_up.steps.bearing_heat.sum(axis=1), heat_up.steps.times > 600.0
+    assert heat.max() > 1.1 * heat[-1]
+    assert np.all(np.diff(heat[warm]) < 0.0)
+
+
+# --------------------------------------------------------------------- steps
+def test_second_order_in_time(machine):
+    """Speed and inlet on straight lines, heat, films and coolant following: error falls as the square."""
+    times = [0.0, 1200.0]
+    inputs = lines(times, speed=[500 * RPM, 2000 * RPM], coolant_inlet=[288.15, 293.15], thrust=1750.0)
+    start = simulate_full(machine, held([-3600.0, 0.0], speed=500 * RPM, coolant_inlet=288.15)).state
+    start = ThermalState(0.0, start.temperature, start.lumped_temperature)
+    ends = [
+        simulate_full(
+            machine,
+            inputs,
+            start=start,
+            options=TransientOptions(fixed_step=step, coefficient_tolerance=0.0),
+        ).state.temperature
+        for step in (400.0, 200.0, 100.0, 50.0)
+    ]
+    change = [np.sqrt(np.mean((one - two) ** 2)) for one, two in itertools.pairwise(ends)]
+    order = np.log2(change[0] / change[1]), np.log2(change[1] / change[2])
+    assert order[1] == pytest.approx(2.0, abs=0.15)
+
+
+def test_error_asked_for_is_kept(machine):
+    """A run at a tenth of the tolerance differs by less than the tolerance at every reading."""
+    inputs, samples = held([0.0, 1800.0], speed=1500 * RPM, thrust=1750.0), np.arange(0.0, 1801.0, 60.0)
+    asked = simulate_full(machine, inputs, sample_times=samples)
+    fine = simulate_full(machine, inputs, sample_times=samples, options=TransientOptions(error=5e-3))
+    assert np.abs(fine.readings - asked.readings).max() < 0.05
+    assert np.abs(fine.inner - asked.inner).max() < 0.05
+    assert len(fine.steps.times) > 1.3 * len(asked.steps.times)
+
+
+def test_kept_coefficients_cost_little(machine):
+    """Matrices that are not renewed at every stage: far below the step error, far fewer of them."""
+    inputs = held([0.0, 1800.0], speed=1500 * RPM, thrust=1750.0)
+    kept = simulate_full(machine, inputs)
+    renewed = simulate_full(machine, inputs, options=TransientOptions(coefficient_tolerance=0.0))
+    assert np.abs(kept.readings - renewed.readings).max() < 2e-3
+    assert kept.counts["matrix_builds"] < 0.5 * renewed.counts["matrix_builds"]
+
+
+# ------------------------------------------------------------------- restart
+def test_restart_from_a_saved_state(machine, tmp_path):
+    """Saved, read back and gone on: the same end as without the break."""
+    names = {"speed": 1500 * RPM, "thrust": 1750.0}
+    whole = simulate_full(machine, held([0.0, 1800.0], **names), breakpoints=[900.0])
+    first = simulate_full(machine, held([0.0, 900.0], **names))
+    first.state.save(tmp_path / "state.npz")
+    second = simulate_full(
+        machine, held([900.0, 1800.0], **names), start=ThermalState.load(tmp_path / "state.npz")
+    )
+    assert np.abs(second.state.temperature - whole.state.temperature).max() < 5e-3
+    total = first.energy + second.energy
+    assert total.heat_in == pytest.approx(whole.energy.heat_in, rel=1e-5)
+    assert total.stored == pytest.approx(whole.energy.stored, rel=1e-4)
+
+
+def test_state_of_another_mesh_is_refused(machine):
+    small = ThermalState(0.0, np.full(10, 290.0), np.full(3, 290.0))
+    with pytest.raises(SpecError, match="another mesh"):
+        simulate_full(machine, held([0.0, 60.0], speed=0.0), start=small)
+
+
+# -------------------------------------------------------------------- inputs
+def test_jump_is_right_continuous(machine):
+    """Heat before a jump of the speed is the old one's, after it the new one's."""
+    times = [0.0, 600.0, 1200.0]
+    run = simulate_full(machine, held(times, speed=np.array([0.0, 3000.0, 3000.0]) * RPM))
+    before = run.steps.times <= 600.0
+    assert 600.0 in run.steps.times
+    assert np.all(run.steps.bearing_heat[before] == 0.0)
+    assert np.all(run.steps.bearing_heat[~before].sum(axis=1) > 300.0)
+    sizes = run.steps.sizes[~before]
+    assert sizes[0] < 1.0 < sizes[-1]
+
+
+def test_held_and_linear_inputs():
+    spec = load_machine("wu_tan_2016", SMALL)
+    history = InputHistory(
+        np.array([0.0, 10.0, 20.0]),
+        ("speed", "ambient"),
+        np.array([[100.0, 290.0], [-200.0, 300.0], [0.0, 300.0]]),
+        np.array([True, False]),
+    )
+    operating = OperatingHistory.of(spec, history)
+    assert operating.at(9.999).speed == 100.0
+    assert operating.at(10.0).speed == 200.0
+    assert operating.at(5.0).ambient_temperature == pytest.approx(295.0)
+    assert operating.at(-5.0).ambient_temperature == 290.0
+    assert operating.at(99.0).thrust == spec.operation.thrust
+    assert operating.breakpoints().tolist() == [10.0, 20.0]
+    assert operating.restarts().tolist() == [10.0, 20.0]
+
+
+def test_noise_makes_no_breakpoints():
+    spec = load_machine("wu_tan_2016", SMALL)
+    rng = np.random.default_rng(1)
+    times = np.arange(0.0, 3600.0, 10.0)
+    history = OperatingHistory.of(
+        spec,
+        InputHistory(
+            times,
+            ("speed", "ambient"),
+            np.column_stack(
+                (300.0 + rng.uniform(-0.1, 0.1, times.size), 290.0 + rng.uniform(-0.02, 0.02, times.size))
+            ),
+            np.array([True, False]),
+        ),
+    )
+    assert history.breakpoints().size == 0
+    assert history.restarts().size == 0
+
+
+def test_unknown_input_is_refused(machine):
+    with pytest.raises(RecordingError, match=r'"sped" drives nothing.*Did you mean "speed"'):
+        simulate_full(machine, held([0.0, 60.0], sped=1.0))
+
+
+@pytest.mark.parametrize(
+    "bad", [{"error": 0.0}, {"coupling_tolerance": -1.0}, {"coefficient_tolerance": -1.0}]
+)
+def test_impossible_options_are_refused(bad):
+    with pytest.raises(SpecError, match=next(iter(bad))):
+        TransientOptions(**bad)
+
+
+def test_preload_follows_the_temperatures():
+    """Rigid preload in a machine whose parts grow: it rises, at high speed until no equilibrium is left."""
+    machine = prepare_machine(load_machine("wu_tan_2016", [*SMALL, "heat.thermal_preload=true"]))
+    calm = simulate_full(machine, held([0.0, 1800.0], speed=300 * RPM))
+    preload = calm.steps.preload[:, calm.bearings.index("R1")]
+    assert np.isfinite(preload).all()
+    assert np.ptp(preload) > 10.0
+    assert calm.energy.imbalance_relative < 1e-8
+    with pytest.raises(NoSteadyStateError, match=r"after \d"):
+        simulate_full(machine, held([0.0, 14400.0], speed=4500 * RPM))
+
+
+# --------------------------------------------------------------------- cases
+def test_step_test_goes_on_when_settled(machine):
+    """Each speed ends at the first look at which no probe has moved by the threshold."""
+    study = study_of(
+        {
+            "schema": "spindle-fem/transient/1",
+            "name": "short",
+            "until": {"change": "2 K", "within": "10 min", "look_every": "5 min", "at_most": "2 h"},
+            "phase": [{"name": "1000", "speed": "1000 rpm"}, {"name": "2000", "speed": "2000 rpm"}],
+        }
+    )
+    result = run_study(machine, study)
+    first, second = result.phases
+    assert first.settled
+    assert second.settled
+    assert second.start == first.end
+    assert first.end % 300.0 == 0.0
+    times, readings = result.joined("times"), result.joined("readings")
+    assert np.all(np.diff(times) > 0.0)
+    for phase in result.phases:
+        at = [readings[np.flatnonzero(times == phase.end - back)[0]] for back in (0.0, 600.0)]
+        if phase is second:
+            assert np.abs(at[0] - at[1]).max() < 2.0
+        assert phase.transient.energy.imbalance_relative < 1e-8
+    earlier = [readings[np.flatnonzero(times == second.end - back)[0]] for back in (300.0, 900.0)]
+    assert second.end - second.start == 600.0 or np.abs(earlier[0] - earlier[1]).max() >= 2.0
+
+
+def test_cool_down_after_switch_off(paper_machine, steady):
+    study = study_of(
+        {
+            "schema": "spindle-fem/transient/1",
+            "name": "off",
+            "start": "steady",
+            "phase": [{"name": "standstill", "speed": "0 rpm", "thrust": "0 N", "duration": "1 h"}],
+        }
+    )
+    run = run_study(paper_machine, study).phases[0].transient
+    assert run.readings[0, 0] == pytest.approx(steady.probes["SP01"], abs=1e-6)
+    assert np.all(run.steps.bearing_heat == 0.0)
+    assert np.all(np.diff(run.steps.hottest) < 0.0)
+    assert run.energy.stored < 0.0
+    assert run.energy.imbalance_relative < 1e-8
+
+
+@pytest.mark.parametrize("name", ["heat_up_3000rpm", "step_test", "cool_down"])
+def test_shipped_cases_are_sound(name, pytestconfig):
+    study = load_study(pytestconfig.rootpath / "studies" / f"{name}.toml")
+    assert study.machine == "wu_tan_2016"
+    assert study.error == 0.05
+    if name == "step_test":
+        assert [round(phase.speed / RPM) for phase in study.phase] == list(range(0, 4501, 500))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"schema": "spindle-fem/transient/9"}, "schema: 'spindle-fem/transient/9' is not known"),
+        ({"phase": [{"name": "x", "speed": "3000 rpm"}]}, "phase.x: has no end"),
+        (
+            {"phase": [{"name": "x", "sped": "3000 rpm", "duration": "1 h"}]},
+            'unknown key.*Did you mean "speed"',
+        ),
+        ({"phase": [{"name": "x", "speed": "3000", "duration": "1 h"}]}, "phase.x.speed: .*unit"),
+        ({"phase": [{"name": "x", "duration": "-1 h"}]}, "phase.x.duration: .*above 0 s"),
+        (
+            {"until": {"change": "1 K", "within": "10 min", "look_every": "3 min", "at_most": "1 h"}},
+            "until.look_every: 180 s does not divide 600 s",
+        ),
+    ],
+)
+def test_bad_studies_are_refused(change, said):
+    good = {
+        "schema": "spindle-fem/transient/1",
+        "name": "x",
+        "phase": [{"name": "x", "speed": "3000 rpm", "duration": "1 h"}],
+    }
+    with pytest.raises(FaultsError, match=said):
+        study_of({**good, **change})
+
+
+def test_a_study_leaves_a_complete_folder(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'schema = "spindle-fem/transient/1"\nname = "short"\nsample_every = "5 min"\n'
+        '[[phase]]\nname = "on"\nspeed = "3000 rpm"\nduration = "10 min"\n'
+        '[[phase]]\nname = "off"\nspeed = "0 rpm"\nduration = "10 min"\n',
+        encoding="utf-8",
+    )
+    folder = tmp_path / "out"
+    summary = run_transient_study(path, folder, overrides=SMALL)
+    assert json.loads((folder / "transient.json").read_text(encoding="utf-8")) == summary
+    assert not (folder / "INCOMPLETE").exists()
+    with (folder / "transient.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["time_s"]) for row in rows] == [0.0, 300.0, 600.0, 900.0, 1200.0]
+    assert float(rows[2]["SP01_degC"]) > float(rows[0]["SP01_degC"])
+    assert [phase["heat_W"] > 0.0 for phase in summary["phases"]] == [True, False]
+    assert summary["equilibrium"]["exists"]
+    report = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Time" in report or "time" in report
+    for name in ("probes", "bearings", "heat", "steps"):
+        assert (folder / "figures" / f"{name}.png").stat().st_size > 10_000
+    again = run_transient_study(path, tmp_path / "again", overrides=SMALL, restart=folder / "state.npz")
+    assert again["phases"][0]["start_s"] == 1200.0
+
+
+def test_no_state_file(tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(
+        'schema = "spindle-fem/transient/1"\nname = "x"\n[[phase]]\nname = "x"\nduration = "1 h"\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(BadInputError, match="no saved thermal state"):
+        run_transient_study(study, tmp_path / "out", restart=tmp_path / "none.npz")
