@@ -158,6 +158,55 @@ def crosscheck(machine: Machine, output: Folder, set_: Overrides = None, as_json
 
 
 @app.command()
+def sweep(
+    machine: Machine,
+    study: Annotated[Path, typer.Argument(help="TOML with parameters, design and outputs.")],
+    output: Folder,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", help="Worker processes; 0 for one a core.")] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler instead.")
+    ] = None,
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Channel design iterations: every design a solved machine; stopped studies go on."""
+    from spindle_fem.console import print_sweep
+    from spindle_fem.design.sweep import sweep_machine
+
+    content = sweep_machine(
+        machine,
+        study,
+        output,
+        overrides=set_ or (),
+        jobs=jobs,
+        scheduler=scheduler,
+        progress=not as_json,
+    )
+    _print_json(content) if as_json else print_sweep(content, output)
+
+
+@app.command()
+def transient(
+    study: Annotated[Path, typer.Argument(help="TOML with phases, such as studies/heat_up_3000rpm.toml.")],
+    output: Folder,
+    machine: Annotated[str | None, typer.Option("--machine", help="In place of the study's own.")] = None,
+    restart: Annotated[Path | None, typer.Option("--restart", help="state.npz of an earlier run.")] = None,
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Heat-up, step test or cool-down by the full finite-element model."""
+    from spindle_fem.commands import stages
+    from spindle_fem.console import print_transient
+    from spindle_fem.transient_run import run_transient_study
+
+    with stages(not as_json) as tell:
+        content = run_transient_study(
+            study, output, machine=machine, overrides=set_ or (), restart=restart, progress=tell
+        )
+    _print_json(content) if as_json else print_transient(content, output)
+
+
+@app.command()
 def simulate(
     machine: Machine,
     recording: Annotated[Path, typer.Argument(help="Folder or .toml file of a recording.")],

@@ -176,3 +176,21 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
         table.add_row(channel["channel"], _number(channel["rmse_K"], 3), _number(channel["noise_K"], 3))
     console.print(table)
     console.print(f"Files: {folder}")
+
+
+def print_sweep(content: dict[str, Any], folder: Path) -> None:
+    """How many designs were solved, and where the table is."""
+    console = _console()
+    for key, value in content.items():
+        if isinstance(value, (str, int, float)) and key != "schema":
+            console.print(f"{key.replace('_', ' ')}: {value}")
+    console.print(f"Table: {folder / 'results.csv'}; report: {folder / 'report.html'}")
+
+
+def print_transient(content: dict[str, Any], folder: Path) -> None:
+    """Headline of a transient study."""
+    console = _console()
+    for key, value in content.items():
+        if isinstance(value, (str, int, float)) and key != "schema":
+            console.print(f"{key.replace('_', ' ')}: {value}")
+    console.print(f"Report: {folder / 'report.html'}")

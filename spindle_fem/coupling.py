@@ -29,6 +29,7 @@ from spindle_fem.spec.model import MachineSpec
 # The coolant's energy closes to 1e-8 only when the wall is known to about 1e-7 K.
 FIELD_TOLERANCE = 1.0e-8
 HEAT_TOLERANCE = 1.0e-7
+COOLANT_TOLERANCE = 2.0e-9
 MAXIMUM_ITERATIONS = 100
 ANDERSON_DEPTH = 6
 # Greases and seals are gone long before; a field beyond this is running away.
@@ -220,6 +221,7 @@ def solve_coupled(
         change = float(np.abs(solution.temperature - unknowns).max())
         heat = loads.total_heat
         settled = abs(heat - heat_before) <= HEAT_TOLERANCE * max(abs(heat), 1.0e-12)
+        settled = settled and coolant_mismatch(machine, solution, coolant) <= COOLANT_TOLERANCE
         if settled and change < FIELD_TOLERANCE * max(1.0, hottest - point.coldest):
             return CoupledState(solution, loads, coolant, iteration, change)
         heat_before = heat
@@ -238,6 +240,19 @@ def solve_coupled(
         f"field and loads still change by {change:.2g} K after {MAXIMUM_ITERATIONS} iterations.",
         "Friction heat may rise with temperature faster than it is carried away; lower speed or preload.",
     )
+
+
+def coolant_mismatch(
+    machine: PreparedMachine, solution: ConductionSolution, coolant: CoolantState | None
+) -> float:
+    """Heat that the walls give less the oil's enthalpy rise, relative to all heat moved; 0 without a channel."""
+    if coolant is None:
+        return 0.0
+    march = coolant.march.march
+    given = sum(solution.balance.films[surface] for surface in machine.builder.cells.surfaces)
+    taken = march.enthalpy_rise - float(march.pumping_heat.sum())
+    moved = float(np.abs(march.heat).sum() + np.abs(march.pumping_heat).sum())
+    return abs(given - taken) / max(moved, 1.0e-12)
 
 
 def _linear_tolerance(change: float) -> float:

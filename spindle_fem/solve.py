@@ -15,6 +15,7 @@ from spindle_fem.coupling import (
     CoupledState,
     PreparedMachine,
     Progress,
+    coolant_mismatch,
     prepare_machine,
     solve_coupled,
 )
@@ -24,7 +25,6 @@ from spindle_fem.loads.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import (
     BearingResult,
-    Check,
     CoolantResult,
     EnergyBalance,
     ThermalResult,
@@ -100,7 +100,8 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
             coupled.change, FIELD_TOLERANCE * max(1.0, float(nodes.max()) - point.coldest), coupled.iterations
         ),
     ]
-    done += _coolant_checks(machine, coupled)
+    if coupled.coolant is not None:
+        done.append(checks.check_coolant(coolant_mismatch(machine, solution, coupled.coolant)))
     warnings += _omitted_preload(machine, point, coupled, lumped)
     if spec.grease is not None and bearings:
         grease = checks.check_grease(
@@ -232,17 +233,6 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
         mean_film_low=mean(state.film_low),
         mean_film_high=mean(state.film_high),
     )
-
-
-def _coolant_checks(machine: PreparedMachine, coupled: CoupledState) -> list[Check]:
-    if coupled.coolant is None:
-        return []
-    films = coupled.solution.balance.films
-    film_heat = sum(films[surface] for surface in machine.builder.cells.surfaces)
-    march = coupled.coolant.march.march
-    pumping = float(march.pumping_heat.sum())
-    moved = float(np.abs(march.heat).sum() + np.abs(march.pumping_heat).sum())
-    return [checks.check_coolant(film_heat + pumping, march.enthalpy_rise, moved)]
 
 
 def _probes(
