@@ -177,16 +177,27 @@ def heat_table(
 
 
 def rebuild(folder: Path) -> Path:
-    """Rebuild the report of an output folder from its files.
+    """Rebuild the report of an output folder, of whichever command, from its files.
 
     Raises
     ------
-    SpecError
+    BadInputError
         The folder holds no results, or is marked incomplete.
     """
+    from spindle_fem.reporting.output import require_complete
+
+    place = require_complete(folder)
+    if (place / "crosscheck.json").is_file():
+        from spindle_fem.crosscheck.report import write_report
+
+        return write_report(place)
+    if (place / "sweep.json").is_file():
+        from spindle_fem.reporting.sweep_report import rebuild_sweep_report
+
+        return rebuild_sweep_report(place)
     from spindle_fem.reporting.report import rebuild_report
 
-    return rebuild_report(folder)
+    return rebuild_report(place)
 
 
 def _load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:

@@ -245,7 +245,7 @@ def solve_coupled(
 def coolant_mismatch(
     machine: PreparedMachine, solution: ConductionSolution, coolant: CoolantState | None
 ) -> float:
-    """Heat that the walls give less the oil's enthalpy rise, relative to all heat moved; 0 without a channel."""
+    """Heat that the walls give less the oil's enthalpy rise, relative to all heat moved."""
     if coolant is None:
         return 0.0
     march = coolant.march.march

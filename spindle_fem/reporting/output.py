@@ -29,6 +29,12 @@ _OWN = frozenset(
         "improved_machine.toml",
         "states.csv",
         "heat.json",
+        "heat.csv",
+        "sweep.json",
+        "transient.json",
+        "reduced_network.toml",
+        "state_space.npz",
+        "state_space.json",
     }
 )
 
