@@ -1,4 +1,4 @@
-"""The paper's choice of depth and oil temperature (Wu & Tan 2016, Figure 22) against both sets of equations."""
+"""The paper's choice of depth and oil temperature (Wu & Tan 2016, Figure 22) by both sets of equations."""
 
 import numpy as np
 import pytest
@@ -12,16 +12,17 @@ def charts():
     return {(item.model, item.held): item for item in film_study(load_machine("wu_tan_2016"))}
 
 
+def at_optimum(chart):
+    return np.argmin(np.abs(chart.depth - 0.019)), np.argmin(np.abs(chart.temperature - 304.15))
+
+
 def test_velocity_puts_the_optimum_on_the_papers_own_line(charts):
     """Re on the depth is 2300 at 19 mm and 31 °C (ν 46.5 mm²/s) for 5.6 m/s, 77 L/min in this channel."""
     item = charts["paper", "velocity"]
     assert item.amount == pytest.approx(5.6, abs=0.05)
     flow = item.amount * PAPER_DEPTH * 0.012
     assert flow * 6e4 == pytest.approx(77.0, abs=1.0)
-    row, column = (
-        np.argmin(np.abs(item.chart.depth - 0.019)),
-        np.argmin(np.abs(item.chart.temperature - 304.15)),
-    )
+    row, column = at_optimum(item.chart)
     assert item.chart.regime[row, column + 2] == "turbulent"
     assert item.chart.regime[row, column - 2] == "laminar"
 
@@ -43,10 +44,7 @@ def test_value_at_the_papers_optimum(charts):
 def test_pump(charts):
     """Straight duct: f Re = 14.85 gives 1.1 bar and 150 W; White's curvature factor at De 445 is 2.63."""
     item = charts["helical", "velocity"]
-    row, column = (
-        np.argmin(np.abs(item.chart.depth - 0.019)),
-        np.argmin(np.abs(item.chart.temperature - 304.15)),
-    )
+    row, column = at_optimum(item.chart)
     hydraulic_diameter, length = 4 * 19e-3 * 12e-3 / (2 * 31e-3), 3.69
     fanning = 14.85 / (item.amount * hydraulic_diameter / 46.46e-6)
     density = 869.1 * (1 - 7.9744e-4 * 10.0)

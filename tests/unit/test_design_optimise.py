@@ -10,12 +10,11 @@ from spindle_fem.spec.fields import QuantityRule
 
 pytest.importorskip("optuna")
 
+HANDS = (Choice("hand=right", "right"), Choice("hand=left", "left"))
 AXES = (
     Axis("depth", (), 0.005, 0.030, QuantityRule("m"), sampled=True),
     Axis("inlet", (), 283.15, 313.15, QuantityRule("K", "temperature"), sampled=True),
-    Axis(
-        "hand", (Choice("hand=right", "right"), Choice("hand=left", "left")), None, None, None, sampled=True
-    ),
+    Axis("hand", HANDS, None, None, None, sampled=True),
 )
 LIMITS = (Limit("drop_Pa", None, 1.0),)
 
