@@ -46,7 +46,7 @@ class ReductionOptions:
     error : float, [K]
         Largest error at any probe in the checks, for loads as large as they occur.
     largest : int
-        Basis vectors at most.
+        Basis vectors at most; 30 more each time that a check fails.
     highest_speed : float or None, [rad/s]
         Of the sampled range; the heat table's last, or the definition's speed
         where that is higher, when None.
@@ -77,6 +77,8 @@ SHIFTS = (0.0, 3.0e-4, 3.0e-3)
 FAST_SHIFT = 3.0e-2
 FRICTION_HEAT = 80.0
 PLACE_HEAT = 50.0
+GUESS_TOLERANCE = 1e-4
+GUESS_SIZE = 80
 FLUID_RISE = 10.0
 # Of the highest speed; the second is the nominal one.
 SPEED_SHARES = (0.0, 2.0 / 3.0, 0.25, 1.0, 0.45)
@@ -204,27 +206,28 @@ def build_reduced_model(
     workshop = _Workshop(machine, affine, table, free_parameters(spec), chosen)
     nominal = workshop.sample({}, SPEED_SHARES[1] * chosen.highest_speed_of(spec))
     progress("reduced model: snapshots")
-    snapshots = [_nominal_snapshots(affine, nominal, spec)]
-    samples = workshop.random_samples(chosen.samples, 1, chosen.sigmas)
-    for sample in samples:
-        for shift in SHIFTS:
-            snapshots.append(solve_shifted(affine, sample, shift, physical_loads(affine, sample, spec)))
     energy = (
         affine.conduction(nominal.coefficients, nominal.channel_film)
         + 1e-4 * affine.capacity(nominal.capacities)
     ).tocsr()
     uniform = np.ones((affine.size, 1))
+    snapshots = [_nominal_snapshots(affine, nominal, spec)]
+    # Fields at other coefficients begin as the best combination of those at the nominal ones.
+    known = compress(snapshots[0], energy, GUESS_TOLERANCE, GUESS_SIZE, uniform)
+
+    def exact_at(sample: Sample) -> list[tuple[float, Array]]:
+        loads = physical_loads(affine, sample, spec)
+        return [(shift, solve_shifted(affine, sample, shift, loads, known)) for shift in SHIFTS]
+
+    for sample in workshop.random_samples(chosen.samples, 1, chosen.sigmas):
+        snapshots += [solution for _, solution in exact_at(sample)]
     checks = workshop.random_samples(chosen.checks, 2, 0.9 * chosen.sigmas)
-    exact = [
-        [
-            (shift, solve_shifted(affine, sample, shift, physical_loads(affine, sample, spec)))
-            for shift in SHIFTS
-        ]
-        for sample in checks
-    ]
-    for _ in range(3):
+    exact = [exact_at(sample) for sample in checks]
+    for attempt in range(3):
         progress("reduced model: basis")
-        basis = compress(np.hstack(snapshots), energy, chosen.tolerance, chosen.largest, uniform)
+        basis = compress(
+            np.hstack(snapshots), energy, chosen.tolerance, chosen.largest + 30 * attempt, uniform
+        )
         one = basis.T @ (energy @ uniform[:, 0])
         model = project(
             affine,
@@ -249,10 +252,7 @@ def build_reduced_model(
                 snapshots += [solution for _, solution in exact[number]]
         # Solutions that have joined can no longer judge: draw others.
         checks = workshop.random_samples(chosen.checks, 100 + len(snapshots), 0.9 * chosen.sigmas)
-        exact = [
-            [(s, solve_shifted(affine, sample, s, physical_loads(affine, sample, spec))) for s in SHIFTS]
-            for sample in checks
-        ]
+        exact = [exact_at(sample) for sample in checks]
     raise ConvergenceError(
         "reduced model",
         f"its probes still err by {worst['probes']:.3g} K with {model.size} basis vectors.",
