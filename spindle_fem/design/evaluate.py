@@ -123,7 +123,9 @@ class TaskBuilder:
         return DesignTask(design, key, spec, found.geometry)
 
     def _impossible(self, design: Design, error: SpindleFemError) -> DesignTask:
-        return DesignTask(design, self._key(list(design.overrides)), None, "", reason_of(error))
+        # Without a machine to hash, the key is that of the definition and what the design changes.
+        key = self._key([self._content, list(design.overrides)])
+        return DesignTask(design, key, None, "", reason_of(error))
 
     def _key(self, machine: Any) -> str:
         asked = [self._question.outputs, self._question.film_uncertainty]
@@ -142,7 +144,9 @@ def _examine_geometry(spec: MachineSpec) -> _Shape:
 
 
 def _digest(content: Any) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    return hashlib.sha256(
+        json.dumps(content, sort_keys=True, separators=(",", ":"), default=str).encode()
+    ).hexdigest()
 
 
 def _without_marks(value: Any) -> Any:

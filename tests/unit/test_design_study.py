@@ -180,6 +180,14 @@ def test_tasks_share_a_geometry_and_tell_impossible_designs(write):
     assert "channel.depth" in tasks[2].reason
 
 
+def test_an_impossible_design_is_so_on_its_own_machine_only(write):
+    """A width that its pitch forbids: the verdict must not be taken over for another machine."""
+    path = write('[[parameter]]\npath = "channel.width"\nvalues = ["8 mm", "30 mm"]\n' + OUTPUTS)
+    tasks = [prepare_study("small_two_start", path, given).tasks for given in ((), ("channel.depth=7mm",))]
+    assert tasks[0][1].spec is None
+    assert tasks[0][1].key != tasks[1][1].key
+
+
 def test_the_same_machine_written_otherwise_has_the_same_key(write):
     one = '[[parameter]]\npath = "channel.depth"\nvalues = ["{}", "6 mm"]\n' + OUTPUTS
     keys = [
