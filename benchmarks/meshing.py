@@ -24,9 +24,8 @@ def timed(label: str, function: Callable[[], Any]) -> Any:
     """Result of a call whose times are printed."""
     wall, processor = time.perf_counter(), time.process_time()
     result = function()
-    print(
-        f"{label:32s} {time.perf_counter() - wall:6.2f} s wall {time.process_time() - processor:6.2f} s processor"
-    )
+    wall, processor = time.perf_counter() - wall, time.process_time() - processor
+    print(f"{label:32s} {wall:6.2f} s wall {processor:6.2f} s processor")
     return result
 
 
