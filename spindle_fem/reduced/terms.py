@@ -149,3 +149,21 @@ class Term:
     def is_dynamic(self) -> bool:
         """Whether anything depends on temperatures, time or state."""
         return bool(self.heat_places or self.coefficients)
+
+
+class RecordedHeat(Term):
+    """Heat that a recording gives for a place: an input ``heat.<place>`` in W.
+
+    Parameters
+    ----------
+    source : str
+        Name of the input.
+    """
+
+    def __init__(self, source: str) -> None:
+        self.name = source
+        self.heat_places = (source.removeprefix("heat."),)
+
+    def heat(self, context: TermContext) -> NDArray[np.complex128]:
+        """The input itself, (1, k) W."""
+        return np.full((1, context.temperatures.shape[-1]), context.inputs[self.name], dtype=complex)

@@ -23,7 +23,7 @@ from spindle_fem.reduced.stepping import (
     sensitivity_forcing,
     stage_values,
 )
-from spindle_fem.reduced.terms import Term
+from spindle_fem.reduced.terms import RecordedHeat, Term
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,8 @@ def simulate_fast(
     derivatives : sequence of str
         Parameters to differentiate by.
     terms : sequence of Term
-        Physics beside the machine's own; its natural films are always there.
+        Physics beside the machine's own; its natural films, and heat that the
+        drive gives (``heat.<place>``), are always there.
 
     Returns
     -------
@@ -99,7 +100,8 @@ def simulate_fast(
             f'"{fast.spec.heat.model}" follows the temperatures of every bearing.',
             'The fast model takes heat.model = "table".',
         )
-    everything = (*natural_film_terms(fast.spec), *terms)
+    recorded = tuple(RecordedHeat(name) for name in drive.names if name.startswith("heat."))
+    everything = (*natural_film_terms(fast.spec), *recorded, *terms)
     run = TransientRun(fast, drive, parameters or {}, tuple(derivatives), everything)
     return run.solve(initial_temperature)
 

@@ -403,6 +403,28 @@ def test_constant_heat_as_a_term_is_heat_of_the_table(fast):
     assert simulate_fast(fast, drive, 293.15, terms=(Heat(),)).temperature == pytest.approx(doubled, abs=1e-8)
 
 
+def test_heat_that_a_recording_gives_enters_where_its_name_says(fast):
+    times = np.arange(0.0, 3600.0, 20.0)
+    plain = drive_of(times, 3000.0)
+    values = np.column_stack([np.repeat(plain.start[:1], times.size, axis=0), np.full(times.size, 155.0)])
+    held = np.ones(6, dtype=bool)
+    drive = make_drive(times, (*STANDARD, "heat.F1.inner_raceway"), values, held)
+    more = simulate_fast(fast, drive, 293.15).temperature
+
+    class Same(Term):
+        name = "same"
+        heat_places = ("F1.inner_raceway",)
+
+        def heat(self, context):
+            return np.full((1, context.temperatures.shape[-1]), 155.0, dtype=complex)
+
+    assert more == pytest.approx(simulate_fast(fast, plain, 293.15, terms=(Same(),)).temperature, abs=1e-9)
+    assert more[-1, 0] > simulate_fast(fast, plain, 293.15).temperature[-1, 0] + 0.5
+    lost = make_drive(times, (*STANDARD, "heat.oven"), values, held)
+    with pytest.raises(SpecError, match='puts heat into "oven"'):
+        simulate_fast(fast, lost, 293.15)
+
+
 def test_a_term_that_runs_away_is_refused_with_its_time(fast):
     class Runaway(Term):
         name = "runaway"
