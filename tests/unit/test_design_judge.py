@@ -140,6 +140,7 @@ def test_limits_take_their_unit():
     assert limit_of("3 K", "bearings.F1.ring_difference_K", "x") == 3.0
     assert limit_of("12 L/min", "coolant.flow_m3_s", "x") == pytest.approx(2e-4)
     assert limit_of("15 deg", "bearings.F1.contact_angle_inner_deg", "x") == pytest.approx(15.0)
+    assert limit_of("0.5 um", "bearings.F1.film_um", "x") == pytest.approx(0.5)
     with pytest.raises(UnitError, match="a unit is needed"):
         limit_of(5, "coolant.pressure_drop_Pa", "constraint[1].max")
     with pytest.raises(SpecError, match="is no output of this design"):

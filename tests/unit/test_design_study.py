@@ -194,3 +194,8 @@ def test_the_same_machine_written_otherwise_has_the_same_key(write):
         prepare_study("small_two_start", write(one.format(text))).tasks[0].key for text in ("5 mm", "0.5 cm")
     ]
     assert keys[0] == keys[1]
+    renamed = prepare_study("small_two_start", write(one.format("5 mm")), ["name=another", "title=Another"])
+    assert renamed.tasks[0].key == keys[0]
+    slower = prepare_study("small_two_start", write(one.format("5 mm")), ["operation.speed=7000 rpm"])
+    assert slower.tasks[0].key != keys[0]
+    assert slower.tasks[0].geometry == renamed.tasks[0].geometry
