@@ -51,6 +51,12 @@ def machine():
 
 
 @pytest.fixture(scope="module")
+def quick():
+    """The recorded spindle, its heat by table; the channel film follows the coolant's temperature."""
+    return prepare_machine(load_machine("recorded_spindle", [*SMALL, "coolant.properties_at=bulk"]))
+
+
+@pytest.fixture(scope="module")
 def paper_machine():
     """The reference spindle as it ships, with its full friction model."""
     return prepare_machine(load_machine("wu_tan_2016", SMALL))
@@ -78,7 +84,7 @@ def test_heat_in_less_out_is_stored(heat_up):
     assert energy.stored > 0.05 * energy.heat_in
 
 
-def test_coolant_is_booked_by_its_own_enthalpy(machine, monkeypatch):
+def test_coolant_is_booked_by_its_own_enthalpy(quick, monkeypatch):
     """An enthalpy that is wrong by one part in a million is found."""
     import spindle_fem.transients.run as run
 
@@ -87,7 +93,7 @@ def test_coolant_is_booked_by_its_own_enthalpy(machine, monkeypatch):
         run, "coolant_heat", lambda stages, step: tuple(1.000001 * h for h in true(stages, step))
     )
     with pytest.raises(EnergyBalanceError, match="coolant included"):
-        simulate_full(machine, held([0.0, 600.0], speed=3000 * RPM))
+        simulate_full(quick, held([0.0, 600.0], speed=3000 * RPM))
 
 
 def test_energies_add_up():
@@ -159,34 +165,34 @@ def test_second_order_in_time(machine):
     assert order[1] == pytest.approx(2.0, abs=0.15)
 
 
-def test_error_asked_for_is_kept(machine):
+def test_error_asked_for_is_kept(quick):
     """A run at a tenth of the tolerance differs by less than the tolerance at every reading."""
     inputs, samples = held([0.0, 1800.0], speed=1500 * RPM, thrust=1750.0), np.arange(0.0, 1801.0, 60.0)
-    asked = simulate_full(machine, inputs, sample_times=samples)
-    fine = simulate_full(machine, inputs, sample_times=samples, options=TransientOptions(error=5e-3))
+    asked = simulate_full(quick, inputs, sample_times=samples)
+    fine = simulate_full(quick, inputs, sample_times=samples, options=TransientOptions(error=5e-3))
     assert np.abs(fine.readings - asked.readings).max() < 0.05
     assert np.abs(fine.inner - asked.inner).max() < 0.05
     assert len(fine.steps.times) > 1.3 * len(asked.steps.times)
 
 
-def test_kept_coefficients_cost_little(machine):
+def test_kept_coefficients_cost_little(quick):
     """Matrices that are not renewed at every stage: far below the step error, far fewer of them."""
     inputs = held([0.0, 1800.0], speed=1500 * RPM, thrust=1750.0)
-    kept = simulate_full(machine, inputs)
-    renewed = simulate_full(machine, inputs, options=TransientOptions(coefficient_tolerance=0.0))
+    kept = simulate_full(quick, inputs)
+    renewed = simulate_full(quick, inputs, options=TransientOptions(coefficient_tolerance=0.0))
     assert np.abs(kept.readings - renewed.readings).max() < 2e-3
     assert kept.counts["matrix_builds"] < 0.5 * renewed.counts["matrix_builds"]
 
 
 # ------------------------------------------------------------------- restart
-def test_restart_from_a_saved_state(machine, tmp_path):
+def test_restart_from_a_saved_state(quick, tmp_path):
     """Saved, read back and gone on: the same end as without the break."""
     names = {"speed": 1500 * RPM, "thrust": 1750.0}
-    whole = simulate_full(machine, held([0.0, 1800.0], **names), breakpoints=[900.0])
-    first = simulate_full(machine, held([0.0, 900.0], **names))
+    whole = simulate_full(quick, held([0.0, 1800.0], **names), breakpoints=[900.0])
+    first = simulate_full(quick, held([0.0, 900.0], **names))
     first.state.save(tmp_path / "state.npz")
     second = simulate_full(
-        machine, held([900.0, 1800.0], **names), start=ThermalState.load(tmp_path / "state.npz")
+        quick, held([900.0, 1800.0], **names), start=ThermalState.load(tmp_path / "state.npz")
     )
     assert np.abs(second.state.temperature - whole.state.temperature).max() < 5e-3
     total = first.energy + second.energy
@@ -194,21 +200,21 @@ def test_restart_from_a_saved_state(machine, tmp_path):
     assert total.stored == pytest.approx(whole.energy.stored, rel=1e-4)
 
 
-def test_state_of_another_mesh_is_refused(machine):
+def test_state_of_another_mesh_is_refused(quick):
     small = ThermalState(0.0, np.full(10, 290.0), np.full(3, 290.0))
     with pytest.raises(SpecError, match="another mesh"):
-        simulate_full(machine, held([0.0, 60.0], speed=0.0), start=small)
+        simulate_full(quick, held([0.0, 60.0], speed=0.0), start=small)
 
 
 # -------------------------------------------------------------------- inputs
-def test_jump_is_right_continuous(machine):
+def test_jump_is_right_continuous(quick):
     """Heat before a jump of the speed is the old one's, after it the new one's."""
     times = [0.0, 600.0, 1200.0]
-    run = simulate_full(machine, held(times, speed=np.array([0.0, 3000.0, 3000.0]) * RPM))
+    run = simulate_full(quick, held(times, speed=np.array([0.0, 3000.0, 3000.0]) * RPM))
     before = run.steps.times <= 600.0
     assert 600.0 in run.steps.times
     assert np.all(run.steps.bearing_heat[before] == 0.0)
-    assert np.all(run.steps.bearing_heat[~before].sum(axis=1) > 300.0)
+    assert np.allclose(run.steps.bearing_heat[~before].sum(axis=1), 620.0)
     sizes = run.steps.sizes[~before]
     assert sizes[0] < 1.0 < sizes[-1]
 
@@ -250,9 +256,9 @@ def test_noise_makes_no_breakpoints():
     assert history.restarts().size == 0
 
 
-def test_unknown_input_is_refused(machine):
+def test_unknown_input_is_refused(quick):
     with pytest.raises(RecordingError, match=r'"sped" drives nothing.*Did you mean "speed"'):
-        simulate_full(machine, held([0.0, 60.0], sped=1.0))
+        simulate_full(quick, held([0.0, 60.0], sped=1.0))
 
 
 @pytest.mark.parametrize(
@@ -276,7 +282,7 @@ def test_preload_follows_the_temperatures():
 
 
 # --------------------------------------------------------------------- cases
-def test_step_test_goes_on_when_settled(machine):
+def test_step_test_goes_on_when_settled(quick):
     """Each speed ends at the first look at which no probe has moved by the threshold."""
     study = study_of(
         {
@@ -286,7 +292,7 @@ def test_step_test_goes_on_when_settled(machine):
             "phase": [{"name": "1000", "speed": "1000 rpm"}, {"name": "2000", "speed": "2000 rpm"}],
         }
     )
-    result = run_study(machine, study)
+    result = run_study(quick, study)
     first, second = result.phases
     assert first.settled
     assert second.settled
