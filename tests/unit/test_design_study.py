@@ -1,5 +1,7 @@
 """Study files: what they may hold, every fault at once, and the designs they make."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -199,3 +201,15 @@ def test_the_same_machine_written_otherwise_has_the_same_key(write):
     slower = prepare_study("small_two_start", write(one.format("5 mm")), ["operation.speed=7000 rpm"])
     assert slower.tasks[0].key != keys[0]
     assert slower.tasks[0].geometry == renamed.tasks[0].geometry
+
+
+def test_the_study_that_ships_is_valid():
+    """The paper's question on the reference machine: every design is possible, its optimum among them."""
+    prepared = prepare_study(
+        "wu_tan_2016", Path(__file__).parents[2] / "studies" / "channel_depth_and_oil.toml"
+    )
+    assert [task.reason for task in prepared.tasks] == [""] * 36
+    assert len({task.geometry for task in prepared.tasks}) == 5
+    optimum = prepared.tasks[prepared.references["the paper's optimum"] - 1].spec
+    assert optimum.channel.depth == pytest.approx(0.019)
+    assert optimum.coolant.inlet_temperature == pytest.approx(304.15)
