@@ -12,6 +12,7 @@ import pytest
 from spindle_fem.coupling import prepare_machine
 from spindle_fem.design import run as runner
 from spindle_fem.design.evaluate import FILM_HIGH, FILM_LOW
+from spindle_fem.design.outputs import derived_values, output_paths, value_of
 from spindle_fem.design.sweep import sweep_machine
 from spindle_fem.design.table import RESULTS, read_results
 from spindle_fem.errors import BadInputError, FaultsError
@@ -104,6 +105,9 @@ def test_a_row_is_what_a_run_of_that_machine_gives(grid):
         run["bearings"]["B1"]["ring_difference_K"], abs=1e-6
     )
     assert row["coolant.regime"] == run["coolant"]["regime"]
+    run["derived"] = derived_values(run, spec)
+    for path in output_paths(spec):  # all that a study may name is there
+        assert value_of(run, path) is not None
 
 
 def test_limits_and_optimum(grid):
@@ -166,7 +170,8 @@ def test_killed_in_the_middle_and_run_again(grid, tmp_path):
     path, folder, _ = grid
     place = tmp_path / "out"
     code = (
-        "import sys; from spindle_fem.design.sweep import sweep_machine; "
+        "import sys; from spindle_fem.design.outputs import derived_values, output_paths, value_of
+from spindle_fem.design.sweep import sweep_machine; "
         "sweep_machine(sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4:])"
     )
     process = subprocess.Popen(
