@@ -170,8 +170,7 @@ def test_killed_in_the_middle_and_run_again(grid, tmp_path):
     path, folder, _ = grid
     place = tmp_path / "out"
     code = (
-        "import sys; from spindle_fem.design.outputs import derived_values, output_paths, value_of
-from spindle_fem.design.sweep import sweep_machine; "
+        "import sys; from spindle_fem.design.sweep import sweep_machine; "
         "sweep_machine(sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4:])"
     )
     process = subprocess.Popen(
