@@ -31,7 +31,7 @@ fi
 "$python" -c 'import ensurepip, venv' 2>/dev/null || install_packages python3-venv
 
 [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,speed]'
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,cluster,optimise]'
 
 works() { "$venv/bin/python" -c 'import gmsh, vtk, pyvista as pv
 p = pv.Plotter(off_screen=True, window_size=(64, 64)); p.add_mesh(pv.Sphere()); p.screenshot(None)' >/dev/null 2>&1; }
