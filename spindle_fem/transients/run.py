@@ -16,6 +16,7 @@ from spindle_fem.network.history import InputHistory
 from spindle_fem.transients.coupled import CoupledInputs, coolant_heat
 from spindle_fem.transients.history import OperatingHistory
 from spindle_fem.transients.readings import ReadingRows
+from spindle_fem.units import kelvin_to_celsius
 
 Array = NDArray[np.float64]
 ENERGY_TOLERANCE = 1.0e-8
@@ -189,6 +190,22 @@ def start_from(coupled: CoupledState, time: float = 0.0) -> ThermalState:
     return ThermalState(time, solution.temperature.copy(), solution.lumped_temperature.copy())
 
 
+def require_state(machine: PreparedMachine, state: ThermalState) -> None:
+    """Refuse a state of another mesh.
+
+    Raises
+    ------
+    SpecError
+    """
+    needed = machine.operators.n_unknowns
+    if len(state.temperature) != needed:
+        raise SpecError(
+            "start state",
+            f"it has {len(state.temperature)} temperatures and belongs to another mesh.",
+            f"Allowed: a state of this machine, {needed} temperatures.",
+        )
+
+
 def simulate_full(
     machine: PreparedMachine,
     inputs: InputHistory,
@@ -240,16 +257,22 @@ def simulate_full(
     if start is None:
         first = history.at(float(inputs.times[0]))
         start = start_at(machine, history, first.ambient_temperature)
+    require_state(machine, start)
     samples = np.asarray(inputs.times if sample_times is None else sample_times, dtype=float)
     end = float(max(inputs.times[-1], samples.max(initial=-np.inf), max(breakpoints, default=-np.inf)))
     marks = np.concatenate((history.breakpoints(), np.asarray(breakpoints, dtype=float)))
     source = CoupledInputs(machine, history, options.coefficient_tolerance)
-    rows = ReadingRows.of(machine, source.lumped_names(start.temperature))
+    names = source.lumped_names(start.temperature)
+    if len(start.lumped_temperature) != len(names):
+        raise SpecError(
+            "start state", f"it has {len(start.lumped_temperature)} lumped nodes, the machine {len(names)}."
+        )
+    rows = ReadingRows.of(machine, names)
     restarts = history.restarts()
     edges = [start.time, *restarts[(restarts > start.time) & (restarts < end)].tolist(), end]
     legs: list[_Leg] = []
     state = start
-    for position, stop_time in enumerate(edges[1:]):
+    for stop_time in edges[1:]:
         inside = (samples >= state.time) & (samples < stop_time)
         if stop_time == end:
             inside |= samples == end
@@ -258,10 +281,8 @@ def simulate_full(
         legs.append(leg)
         # the last step's size says nothing after a jump
         state = leg.result.state if stop_time == end else replace(leg.result.state, step=0.0)
-        progress(f"{state.time / 3600.0:.2f} h, {leg.hottest[-1] - 273.15:.1f} °C")
+        progress(f"{state.time / 3600.0:.2f} h, {kelvin_to_celsius(leg.hottest[-1]):.1f} °C")
         if leg.stopped:
-            break
-        if position + 2 == len(edges):
             break
     return _joined(machine, history, rows, legs, clock.process_time() - began, source.evaluations)
 
@@ -316,7 +337,7 @@ class _Leg:
         if not self.hottest[-1] < RUNAWAY_TEMPERATURE:
             raise NoSteadyStateError(
                 f"{self.machine.spec.name} after {state.time / 3600.0:.2f} h",
-                f"the temperatures run away: {self.hottest[-1] - 273.15:.0f} °C.",
+                f"the temperatures run away: {kelvin_to_celsius(self.hottest[-1]):.0f} °C.",
                 "Lower the speed or the preload, or cool more.",
             )
         self.stopped = self.stop is not None and self.stop(state)

@@ -28,9 +28,17 @@ from spindle_fem.spec.fields import (
     raise_faults,
 )
 from spindle_fem.spec.load import read_toml
+from spindle_fem.transients.coupled import CoupledInputs
 from spindle_fem.transients.history import FIELD_OF, OperatingHistory
 from spindle_fem.transients.readings import ReadingRows
-from spindle_fem.transients.run import MachineTransient, TransientOptions, simulate_full, start_at, start_from
+from spindle_fem.transients.run import (
+    MachineTransient,
+    TransientOptions,
+    require_state,
+    simulate_full,
+    start_at,
+    start_from,
+)
 
 Array = NDArray[np.float64]
 
@@ -260,6 +268,8 @@ def run_study(
     if start is None and study.start == "steady":
         progress("steady start")
         start = start_from(solve_coupled(machine, point))
+    if start is not None:
+        require_state(machine, start)
     options = TransientOptions(error=study.error)
     values = {name: getattr(point, field) for name, field in FIELD_OF.items()}
     state, results = start, []
@@ -294,12 +304,7 @@ def _run_phase(
     samples = np.union1d(begin + study.sample_every * np.arange(number + 1), [begin + length])
     stop, looks = None, ()
     if until is not None:
-        names = tuple(
-            node.name
-            for node in machine.builder.at(history.at(begin), machine.field_state(state.temperature, {}))[
-                0
-            ].lumped
-        )
+        names = CoupledInputs(machine, history, 0.0).lumped_names(state.temperature)
         stop = Settled(ReadingRows.of(machine, names), history, until, state)
         looks = tuple(stop.looks)
     progress(f"{phase.name}, from {begin / 3600.0:.2f} h")
