@@ -10,10 +10,17 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint wheel-check clean
+.PHONY: run test setup lint wheel-check reference clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
+
+# The report in the repository: that of the reference run, without fields and data.
+reference: run
+	mkdir -p reports/reference_run/figures
+	cp $(RESULT)/report.html $(RESULT)/summary.json $(RESULT)/machine.toml reports/reference_run/
+	cp $(addprefix $(RESULT)/figures/,machine_definition.png temperature_cut.png channel_walls.png \
+	    bearings_front.png heat_balance.png over_speed_heat_terms.png) reports/reference_run/figures/
 
 test: $(READY) lint
 	$(BIN)/python -m pytest -q

@@ -31,6 +31,8 @@ _OWN = frozenset(
         "heat.json",
         "heat.csv",
         "sweep.json",
+        "results.parquet",
+        "study.toml",
         "transient.json",
         "reduced_network.toml",
         "state_space.npz",
