@@ -25,9 +25,7 @@ def test_flux_through_a_tube_converges_to_the_logarithmic_profile():
     for number in (2, 4):
         tube = build_tube(RADII, 0.02, (number, 10 * number, 1))
         radius = np.hypot(tube.points[:, 0], tube.points[:, 1])
-        flux = heat_flux(
-            tube, 300.0 - 20.0 * np.log(radius / RADII[0]), dict.fromkeys(tube.part_names, 50.0)
-        )
+        flux = heat_flux(tube, 300.0 - 20.0 * np.log(radius / RADII[0]), dict.fromkeys(tube.part_names, 50.0))
         outward = tube.points[:, :2] / radius[:, None]
         along = (flux[:, :2] * outward).sum(axis=1)
         errors.append(np.abs(along * radius / (50.0 * 20.0) - 1.0).max())
