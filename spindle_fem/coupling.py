@@ -35,6 +35,7 @@ ANDERSON_DEPTH = 6
 # Greases and seals are gone long before; a field beyond this is running away.
 RUNAWAY_TEMPERATURE = 600.0
 MIXING_BELOW = 0.5
+MAXIMUM_RETREATS = 10
 # A linear residual this small against the last change of the field costs no extra iteration of the loop.
 LINEAR_PER_KELVIN = 1.0e-4
 LOOSEST_LINEAR_TOLERANCE = 1.0e-5
@@ -191,13 +192,24 @@ def solve_coupled(
     change = np.inf
     follows_preload = machine.spec.heat.thermal_preload and machine.spec.heat.model != "table"
     assembled: dict[str, float] = {}
+    given: NDArray[np.float64] | None = None
+    mixed = unknowns
+    names: tuple[str, ...] = ()
+    retreats = 0
     for iteration in range(1, MAXIMUM_ITERATIONS + 1):
         try:
             loads, coolant = machine.builder.at(point, machine.field_state(unknowns, lumped))
         except (NoEquilibriumError, OutOfValidityError) as error:
-            if iteration == 1 or not follows_preload:
+            if given is None or (not follows_preload and retreats == MAXIMUM_RETREATS):
                 raise
-            raise _no_steady_state(machine, point, str(error)) from error
+            if follows_preload:
+                raise _no_steady_state(machine, point, str(error)) from error
+            # Cold grease makes more heat than the machine will ever see: go half the way back.
+            retreats += 1
+            mixing = _AndersonMixing(ANDERSON_DEPTH)
+            mixed = 0.5 * (given + mixed)
+            unknowns, lumped = _split(mixed, names, operators.n_unknowns)
+            continue
         solution = solve_steady(
             machine.problem(loads),
             guess=solution,
@@ -233,13 +245,19 @@ def solve_coupled(
             mixed = given + RELAXATION * (found - given)
         else:
             mixed = mixing.next(given, found)
-        unknowns = mixed[: operators.n_unknowns]
-        lumped = dict(zip(names, mixed[operators.n_unknowns :].tolist(), strict=True))
+        unknowns, lumped = _split(mixed, names, operators.n_unknowns)
     raise ConvergenceError(
         machine.spec.name,
         f"field and loads still change by {change:.2g} K after {MAXIMUM_ITERATIONS} iterations.",
         "Friction heat may rise with temperature faster than it is carried away; lower speed or preload.",
     )
+
+
+def _split(
+    vector: NDArray[np.float64], names: tuple[str, ...], n_unknowns: int
+) -> tuple[NDArray[np.float64], dict[str, float]]:
+    """Temperatures of the mesh and of the lumped nodes by name."""
+    return vector[:n_unknowns], dict(zip(names, vector[n_unknowns:].tolist(), strict=True))
 
 
 def coolant_mismatch(

@@ -123,6 +123,17 @@ def test_heat_enters_balls_and_rings_by_the_share(reference_result):
     assert bearing.heat_to["inner"] == pytest.approx(bearing.heat_to["outer"])
 
 
+@pytest.mark.parametrize("model", ["palmgren", "skf", "paper"])
+def test_every_heat_model_finds_its_fixed_point(reference, model):
+    """Palmgren with cold grease first asks for more heat than its viscosity fit reaches."""
+    spec = reference.spec
+    changed = spec.model_copy(update={"heat": spec.heat.model_copy(update={"model": model})})
+    result = solve_prepared(prepare_machine(changed))
+    assert all(check.passed for check in result.checks)
+    expected = {"palmgren": 300.0, "skf": 500.0, "paper": 17.0}[model]
+    assert result.bearings["F1"].heat == pytest.approx(expected, rel=0.2)
+
+
 def test_grease_beyond_its_limit_fails_the_run(recorded):
     spec = recorded.spec
     cool_grease = spec.model_copy(

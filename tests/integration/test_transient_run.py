@@ -77,6 +77,7 @@ def steady(paper_machine):
 
 
 # ------------------------------------------------------------------- balance
+@pytest.mark.slow
 def test_heat_in_less_out_is_stored(heat_up):
     energy = heat_up.energy
     assert energy.imbalance_relative < 1e-8
@@ -105,6 +106,7 @@ def test_energies_add_up():
 
 
 # ------------------------------------------------------------- steady state
+@pytest.mark.slow
 def test_steady_state_stays(paper_machine, steady):
     """Started from the coupled steady state nothing moves."""
     start = start_from(solve_coupled(paper_machine, OperatingPoint.of(paper_machine.spec)))
@@ -114,6 +116,7 @@ def test_steady_state_stays(paper_machine, steady):
     assert run.steps.bearing_heat[-1].sum() == pytest.approx(steady.energy.heat_in, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_heat_up_ends_at_the_steady_state(paper_machine, heat_up, steady):
     """From four hours on to thirty: the end is the state that the steady solver finds."""
     run = simulate_full(
@@ -126,6 +129,7 @@ def test_heat_up_ends_at_the_steady_state(paper_machine, heat_up, steady):
     assert run.energy.imbalance_relative < 1e-8
 
 
+@pytest.mark.slow
 def test_time_to_equilibrium_is_the_papers(heat_up, steady):
     """The slowest probe (rear seat) comes within half a kelvin after three to four hours."""
     final = np.array([steady.probes[name] for name in heat_up.probes])
@@ -133,11 +137,13 @@ def test_time_to_equilibrium_is_the_papers(heat_up, steady):
     assert 3.0 < hours < 4.0
 
 
+@pytest.mark.slow
 def test_nothing_gets_colder_than_the_coolant(heat_up):
     assert heat_up.steps.coldest.min() > 288.15 - 1e-6
     assert np.all(np.diff(heat_up.steps.hottest) > 0.0)
 
 
+@pytest.mark.slow
 def test_friction_falls_as_the_grease_warms(heat_up):
     heat, warm = heat_up.steps.bearing_heat.sum(axis=1), heat_up.steps.times > 600.0
     assert heat.max() > 1.1 * heat[-1]
@@ -145,6 +151,7 @@ def test_friction_falls_as_the_grease_warms(heat_up):
 
 
 # --------------------------------------------------------------------- steps
+@pytest.mark.slow
 def test_second_order_in_time(machine):
     """Speed and inlet on straight lines, heat, films and coolant following: error falls as the square."""
     times = [0.0, 1200.0]
@@ -165,6 +172,7 @@ def test_second_order_in_time(machine):
     assert order[1] == pytest.approx(2.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_error_asked_for_is_kept(quick):
     """A run at a tenth of the tolerance differs by less than the tolerance at every reading."""
     inputs, samples = held([0.0, 1800.0], speed=1500 * RPM, thrust=1750.0), np.arange(0.0, 1801.0, 60.0)
@@ -175,6 +183,7 @@ def test_error_asked_for_is_kept(quick):
     assert len(fine.steps.times) > 1.3 * len(asked.steps.times)
 
 
+@pytest.mark.slow
 def test_kept_coefficients_cost_little(quick):
     """Matrices that are not renewed at every stage: far below the step error, far fewer of them."""
     inputs = held([0.0, 1800.0], speed=1500 * RPM, thrust=1750.0)
@@ -269,6 +278,7 @@ def test_impossible_options_are_refused(bad):
         TransientOptions(**bad)
 
 
+@pytest.mark.slow
 def test_preload_follows_the_temperatures():
     """Rigid preload in a machine whose parts grow: it rises, at high speed until no equilibrium is left."""
     machine = prepare_machine(load_machine("wu_tan_2016", [*SMALL, "heat.thermal_preload=true"]))
@@ -282,6 +292,7 @@ def test_preload_follows_the_temperatures():
 
 
 # --------------------------------------------------------------------- cases
+@pytest.mark.slow
 def test_step_test_goes_on_when_settled(quick):
     """Each speed ends at the first look at which no probe has moved by the threshold."""
     study = study_of(
@@ -309,6 +320,7 @@ def test_step_test_goes_on_when_settled(quick):
     assert second.end - second.start == 600.0 or np.abs(earlier[0] - earlier[1]).max() >= 2.0
 
 
+@pytest.mark.slow
 def test_cool_down_after_switch_off(paper_machine, steady):
     study = study_of(
         {
@@ -362,6 +374,7 @@ def test_bad_studies_are_refused(change, said):
         study_of({**good, **change})
 
 
+@pytest.mark.slow
 def test_a_study_leaves_a_complete_folder(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(
