@@ -204,7 +204,9 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
     order = ("laminar", "transition", "turbulent")
 
     def mean(values: np.ndarray) -> float:
-        return float((values * area).sum() / area.sum())
+        # Of the channel itself; the short ports have a film of their own.
+        wall = area[:, ~cells.is_port]
+        return float((values[:, ~cells.is_port] * wall).sum() / wall.sum())
 
     return CoolantResult(
         flow=point.coolant_flow,

@@ -235,7 +235,7 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
         color=INK,
         linewidth=0.9,
         linestyle=(0, (4, 3)),
-        label="mean with ports" if ports else "mean",
+        label="mean",
     )
     right.set(
         xlabel="length along the channel / m", ylabel="film coefficient / W/(m²·K)", title="Film coefficient"

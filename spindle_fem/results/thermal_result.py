@@ -53,6 +53,8 @@ class CoolantResult:
         Helix angle of the cell centre from the inlet.
     bulk_temperature, wall_temperature : (n,) ndarray, [K]
     film_coefficient, film_low, film_high : (n,) ndarray, [W/(m²·K)]
+    mean_film_coefficient, mean_film_low, mean_film_high : float, [W/(m²·K)]
+        Area means over the channel's walls, without the ports.
     """
 
     flow: float
