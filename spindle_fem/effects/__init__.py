@@ -1,0 +1,1 @@
+"""Physics that a machine definition may have left out, one small module each."""
