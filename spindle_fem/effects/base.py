@@ -17,8 +17,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.effects.view import MachineView
-from spindle_fem.reduced.terms import Term, TermParameter
 
 Array = NDArray[np.float64]
 Kind = Literal["missing_physics", "parameter", "sensor"]

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import Term
 from spindle_fem.errors import SpecError
 from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.stepping import GAMMA, SHARE, STAGE_WEIGHT, START_WEIGHT, stage_values
-from spindle_fem.reduced.terms import Term
 from spindle_fem.reduced.transient import TransientRun, grid_weights
 
 Array = NDArray[np.float64]

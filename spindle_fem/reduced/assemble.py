@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import FLOW, Term
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.fast_model import ClassOperators, FastModel
-from spindle_fem.reduced.terms import FLOW, Term
 
 Array = NDArray[np.float64]
 

@@ -9,13 +9,13 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import FLOW
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.loads.coolant_loop import CoolantLoop
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
 from spindle_fem.reduced.coolant import CoolantMaps, coolant_maps, film_derivative
 from spindle_fem.reduced.model import ReducedModel
-from spindle_fem.reduced.terms import FLOW
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]

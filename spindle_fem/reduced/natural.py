@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.loads.films import film_coefficient
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import natural_reference
-from spindle_fem.reduced.terms import Term, TermContext
 from spindle_fem.spec.model import MachineSpec, NaturalFilm
 
 DIFFERENCE = 1e-3

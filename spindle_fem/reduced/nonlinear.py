@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from spindle_fem.effects.term import COOLANT_INLET, FLUID_PREFIX, Term, TermContext
 from spindle_fem.errors import ConvergenceError, SpecError, did_you_mean
 from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.terms import COOLANT_INLET, FLUID_PREFIX, Term, TermContext
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import RecordedHeat, Term
 from spindle_fem.errors import SpecError
 from spindle_fem.reduced.assemble import RunOperators, run_operators
 from spindle_fem.reduced.drive import Drive, heat_of_table
@@ -23,7 +24,6 @@ from spindle_fem.reduced.stepping import (
     sensitivity_forcing,
     stage_values,
 )
-from spindle_fem.reduced.terms import RecordedHeat, Term
 
 Array = NDArray[np.float64]
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.geometry.assembly import build_assembly
 from spindle_fem.reduced.adjoint import fast_gradient
@@ -12,7 +13,6 @@ from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import STANDARD, make_drive
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.model import ReducedModel
-from spindle_fem.reduced.terms import Term, TermParameter
 from spindle_fem.reduced.transient import simulate_fast
 from spindle_fem.spec.load import load_machine
 from spindle_fem.spec.model import NaturalFilm

@@ -1,11 +1,12 @@
 """Physics that the linear model lacks, as terms that can be added to it one by one.
 
-A term may do any of four things, each with parameters of its own:
+A term may do any of five things, each with parameters of its own:
 
 - put heat into named places, or shift the temperature of a fluid, as a
   function of inputs, temperatures, a state of its own, time and parameters
   (:meth:`Term.heat`);
 - multiply named coefficients by such a function (:meth:`Term.factor`);
+- multiply the friction heat of bearings by one (:meth:`Term.friction`);
 - multiply coefficients by a function of the operating point alone
   (:meth:`Term.operating_factor`), the coolant's flow included;
 - add heat capacity to a place, or a conductance from a place to the ambient
@@ -13,7 +14,8 @@ A term may do any of four things, each with parameters of its own:
 
 Functions of temperatures are called with complex arguments, several columns at
 once, and differentiated by complex steps: write them with numpy's analytic
-functions and choose branches by ``np.real``.
+functions and choose branches by ``np.real``. The columns may also be instants
+of time; write everything so that it broadcasts over the last axis.
 
 Source of the complex step: Squire & Trapp (1998), SIAM Review 40, 110-112.
 """
@@ -22,17 +24,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-from spindle_fem.loads.operating_point import OperatingPoint
 
 Array = NDArray[np.float64]
 
 FLOW = "coolant.flow"
 FLUID_PREFIX = "fluid."
 COOLANT_INLET = "fluid.coolant_inlet"
+
+
+class Operating(Protocol):
+    """What an operating point tells a term, SI."""
+
+    speed: float
+    thrust: float
+    ambient_temperature: float
+    coolant_inlet_temperature: float
+    coolant_flow: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +62,8 @@ class TermParameter:
     unit : str
     logarithmic : bool
         Whether derivatives are taken to the logarithm.
+    low, high : float
+        Values that it cannot pass, in its own unit.
     """
 
     name: str
@@ -58,16 +71,18 @@ class TermParameter:
     sigma: float = 0.0
     unit: str = ""
     logarithmic: bool = True
+    low: float = -np.inf
+    high: float = np.inf
 
 
 @dataclass(frozen=True, slots=True)
 class TermContext:
-    """What a term sees; the last axis counts complex perturbations.
+    """What a term sees; the last axis counts complex perturbations, or instants.
 
     Attributes
     ----------
-    time : float, [s]
-    inputs : mapping of str to float
+    time : float or (k,) ndarray, [s]
+    inputs : mapping of str to float or (k,) ndarray
         As :class:`spindle_fem.reduced.drive.Drive` names them.
     temperatures : (n_reads, k) ndarray, [K]
         Of the term's ``reads``.
@@ -75,8 +90,8 @@ class TermContext:
     parameters : mapping of str to (k,) ndarray
     """
 
-    time: float
-    inputs: Mapping[str, float]
+    time: float | Array
+    inputs: Mapping[str, float | Array]
     temperatures: NDArray[np.complex128]
     state: NDArray[np.complex128]
     parameters: Mapping[str, NDArray[np.complex128]]
@@ -95,6 +110,8 @@ class Term:
         K above what the inputs say.
     coefficients : tuple of str
         Coefficients that :meth:`factor` multiplies.
+    bearings : tuple of str
+        Bearings (sources of a network) whose friction heat :meth:`friction` multiplies.
     reads : tuple of str
         Places whose mean temperatures it needs.
     n_states : int
@@ -105,6 +122,7 @@ class Term:
     parameters: tuple[TermParameter, ...] = ()
     heat_places: tuple[str, ...] = ()
     coefficients: tuple[str, ...] = ()
+    bearings: tuple[str, ...] = ()
     reads: tuple[str, ...] = ()
     n_states: int = 0
 
@@ -116,6 +134,10 @@ class Term:
         """Factor on every coefficient, (n_coefficients, k)."""
         return np.ones((len(self.coefficients), context.temperatures.shape[-1]), dtype=complex)
 
+    def friction(self, context: TermContext) -> NDArray[np.complex128]:
+        """Factor on the friction heat of every one of ``bearings``, (n_bearings, k)."""
+        return np.ones((len(self.bearings), context.temperatures.shape[-1]), dtype=complex)
+
     def initial_state(self, parameters: Mapping[str, float]) -> Array:
         """State at time zero, (n_states,); must not depend on parameters that are fitted."""
         return np.zeros(self.n_states)
@@ -124,7 +146,7 @@ class Term:
         """State after a step, (n_states, k), from what holds at its start."""
         return context.state
 
-    def operating_factor(self, point: OperatingPoint, parameters: Mapping[str, float]) -> dict[str, float]:
+    def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:
         """Factors by coefficient at an operating point; ``coolant.flow`` is the flow itself."""
         return {}
 
@@ -148,7 +170,7 @@ class Term:
     @property
     def is_dynamic(self) -> bool:
         """Whether anything depends on temperatures, time or state."""
-        return bool(self.heat_places or self.coefficients)
+        return bool(self.heat_places or self.coefficients or self.bearings)
 
 
 class RecordedHeat(Term):
