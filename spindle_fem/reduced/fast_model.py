@@ -244,6 +244,11 @@ class FastModel:
             output_inputs[self._outlet_row, friction] = maps.outlet_constant
 
     # ------------------------------------------------------------- heat shares
+    def heat_rows(self, bearing: str) -> tuple[int, ...]:
+        """Positions among :attr:`heat_places` of the places that a bearing heats."""
+        first = 3 * self.bearings.index(bearing)
+        return (first, first + 1, first + 2)
+
     def friction_loads(
         self, heat: Array, factors: Mapping[str, float], parameters: Sequence[str] = ()
     ) -> tuple[Array, dict[str, Array]]:

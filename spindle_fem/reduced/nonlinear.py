@@ -163,6 +163,17 @@ class DynamicTerms:
                 self._require_place(term, place)
                 self.place_columns.append((count, place))
                 count += 1
+        # Friction: columns of the places that a bearing heats, and their positions among the heat places.
+        self._friction: list[list[tuple[slice, list[int]]]] = []
+        for term in terms:
+            scaled = []
+            for bearing in term.bearings:
+                positions = self._heat_rows(term, bearing)
+                scaled.append((slice(count, count + len(positions)), positions))
+                for position in positions:
+                    self.place_columns.append((count, fast.heat_places[position]))
+                    count += 1
+            self._friction.append(scaled)
         self._moved_columns: list[tuple[slice, Array]] = []
         for term in terms:
             moved = []
@@ -212,6 +223,15 @@ class DynamicTerms:
                 did_you_mean(place, [*model.place_names, *fluids]),
             )
 
+    def _heat_rows(self, term: Term, bearing: str) -> list[int]:
+        if bearing not in self.fast.bearings:
+            raise SpecError(
+                f"term {term.name}",
+                f'scales the friction of "{bearing}".',
+                did_you_mean(bearing, self.fast.bearings),
+            )
+        return list(self.fast.heat_rows(bearing))
+
     def _factorised(self, term: Term, coefficient: str) -> tuple[Array, Array]:
         """``K_i = Q D Qᵀ`` with the directions in which it conducts anything."""
         model = self.fast.model
@@ -259,6 +279,8 @@ class DynamicTerms:
         touched: Mapping[str, Sequence[int]],
         sensed: Array,
         states: Array,
+        friction: Array,
+        friction_by: Array,
     ) -> Evaluation:
         """Added quantities where the sensed temperatures are given.
 
@@ -272,6 +294,10 @@ class DynamicTerms:
             Which of the derivatives scale it.
         sensed : (n_y,) ndarray
         states : (n_x,) ndarray
+        friction : (n_heat_places,) ndarray, [W]
+            Heat that the machine itself gives to its heat places.
+        friction_by : (n_heat_places, p) ndarray, [W]
+            Its derivatives to the coordinates of the asked parameters.
         """
         n_sensed, n_derivatives = len(self.sense), len(self.derivatives)
         value = np.zeros(self.n_added)
@@ -293,6 +319,13 @@ class DynamicTerms:
                 for i, film in self._shifted[number]:
                     for target in touched.get(film, ()):
                         by_parameter[rows.start + i, target] += value[rows.start + i]
+            if term.bearings:
+                answers = np.asarray(term.friction(context), dtype=complex)
+                for i, (columns, positions) in enumerate(self._friction[number]):
+                    excess = answers[i, 0].real - 1.0
+                    value[columns] = excess * friction[positions]
+                    layout.spread(answers[i : i + 1], columns, friction[positions][:, None], slopes)
+                    by_parameter[columns] += excess * friction_by[positions]
             if term.coefficients:
                 answers = np.asarray(term.factor(context), dtype=complex)
                 for i, (coefficient, own_sensed, columns) in enumerate(self._moved[number]):

@@ -130,6 +130,9 @@ class TransientRun:
             self.group_of_step[rows] = number
         self.start, self.start_by = self._load_inputs(drive.start)
         self.end, self.end_by = self._load_inputs(drive.end)
+        self._n_heat = len(fast.heat_places)
+        self._friction_start_by = self._friction_derivatives(self.start_by)
+        self._friction_end_by = self._friction_derivatives(self.end_by)
         dynamic = [term for term in terms if term.is_dynamic]
         self.dynamic = DynamicTerms(fast, drive, dynamic, parameters, derivatives) if dynamic else None
 
@@ -146,6 +149,14 @@ class TransientRun:
         for number, temperature in enumerate(fast.fixed_fluids):
             found[:, fast.load_names.index(f"fixed[{number}]")] = temperature
         return found, by
+
+    def _friction_derivatives(self, by: Mapping[str, Array]) -> Array:
+        """Derivatives of the heat of every heat place to every asked parameter, (G, n_heat_places, p)."""
+        found = np.zeros((len(self.drive.steps), self._n_heat, len(self.derivatives)))
+        for column, parameter in enumerate(self.derivatives):
+            if parameter in by:
+                found[:, :, column] = by[parameter]
+        return found
 
     def solve(self, initial_temperature: float) -> FastTransient:
         """States, then sensitivities, then outputs."""
@@ -186,6 +197,8 @@ class TransientRun:
             self.built.coefficients[number],
             self.built.touched,
             states=memory,
+            friction=(self.end if at_end else self.start)[step, : self._n_heat],
+            friction_by=(self._friction_end_by if at_end else self._friction_start_by)[step],
         )
 
     def _march_terms(self, states: Array, response: Array) -> _Tracks:

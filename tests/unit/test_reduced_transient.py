@@ -8,6 +8,7 @@ import pytest
 from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.geometry.assembly import build_assembly
+from spindle_fem.reduced import nonlinear
 from spindle_fem.reduced.adjoint import fast_gradient
 from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import STANDARD, make_drive
@@ -328,10 +329,34 @@ class Steady(Term):
         return {"shaft": parameters["path"]}
 
 
-TERMS = (Feedback(), Closure(), Fading(), Steady())
+class Friction(Term):
+    """Friction that grows with what the rings differ by, after a while."""
+
+    name = "friction"
+    parameters = (
+        TermParameter("gain", 0.03, 0.02, logarithmic=False),
+        TermParameter("time", 600.0, 0.5, "s"),
+    )
+    bearings = ("F1", "R2")
+    reads = ("F1.inner_raceway", "F1.outer_raceway")
+    n_states = 1
+
+    def friction(self, context):
+        factor = 1.0 + context.parameters["gain"] * context.state[0] ** 2
+        return np.vstack((factor, 0.5 + 0.5 * factor))
+
+    def advance(self, context, step):
+        difference = context.temperatures[0] - context.temperatures[1]
+        kept = np.exp(-step / context.parameters["time"])
+        return kept * context.state + (1.0 - kept) * difference
 
 
-def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps):
+TERMS = (Feedback(), Closure(), Fading(), Steady(), Friction())
+
+
+def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monkeypatch):
+    # Derivatives are those at Newton's last but one iterate: exact to its last change.
+    monkeypatch.setattr(nonlinear, "TEMPERATURE_TOLERANCE", 1e-7)
     owned = {name: item for term in TERMS for name, item in term.names().items()}
     names = (
         *owned,
@@ -340,6 +365,8 @@ def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps):
         "heat_capacity_factor",
         "coolant.film_factor",
         "film.flange_back",
+        "heat.front",
+        "heat.inner_share",
     )
     run = simulate_fast(fast, steps, 293.15, terms=TERMS, derivatives=names)
     for column, name in enumerate(names):
@@ -401,6 +428,21 @@ def test_constant_heat_as_a_term_is_heat_of_the_table(fast):
     drive = drive_of(np.arange(0.0, 3600.0, 20.0), 3000.0)
     doubled = simulate_fast(fast, drive, 293.15, parameters={"heat.F1": 2.0}).temperature
     assert simulate_fast(fast, drive, 293.15, terms=(Heat(),)).temperature == pytest.approx(doubled, abs=1e-8)
+
+
+def test_scaled_friction_is_heat_of_the_table(fast):
+    class Scaled(Term):
+        name = "scaled"
+        bearings = ("F1", "F2", "F3")
+
+        def friction(self, context):
+            return np.full((3, context.temperatures.shape[-1]), 1.5, dtype=complex)
+
+    drive = drive_of(np.arange(0.0, 3600.0, 20.0), 3000.0)
+    heat = {"heat.R1": 1.2}
+    scaled = simulate_fast(fast, drive, 293.15, parameters={"heat.front": 1.5, **heat}).temperature
+    by_term = simulate_fast(fast, drive, 293.15, terms=(Scaled(),), parameters=heat).temperature
+    assert by_term == pytest.approx(scaled, abs=1e-8)
 
 
 def test_heat_that_a_recording_gives_enters_where_its_name_says(fast):
