@@ -16,13 +16,13 @@ from collections.abc import Callable
 import numpy as np
 
 from spindle_fem.coupling import prepare_machine
+from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.network.history import InputHistory
 from spindle_fem.reduced.adjoint import fast_gradient
 from spindle_fem.reduced.build import build_reduced_model
 from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import STANDARD, make_drive
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.terms import Term, TermParameter
 from spindle_fem.reduced.transient import simulate_fast
 from spindle_fem.spec.load import load_machine
 from spindle_fem.transients.run import TransientOptions, simulate_full

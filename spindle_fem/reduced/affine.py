@@ -22,6 +22,7 @@ from spindle_fem.errors import SpecError
 from spindle_fem.loads.build import FieldState
 from spindle_fem.loads.joints import group_of_contacts
 from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.reduced.probe_places import near_places, probe_positions, probe_slopes
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
@@ -50,12 +51,15 @@ class AffineSystem:
     storage : tuple of (n, n) csr_array
     place_names : tuple of str
         Volumes (``<part>.<segment>``, ``<bearing>.inner_ring``), surfaces,
-        ``<bearing>.balls`` and seats (``<contact>@0``, ``@1``).
+        ``<bearing>.balls``, seats (``<contact>@0``, ``@1``) and the
+        neighbourhoods of point probes (``near.<probe>``).
     places : (n_places, n) csr_array
         Mean over each place; its transpose is the load of 1 W spread over it.
     probe_names : tuple of str
     probes : (n_probes, n) csr_array
         Point probes only.
+    probe_slopes : (2 n_probes, n) csr_array, [1/m]
+        Change of each with a displacement along r and along z.
     n_unknowns, n_lumped : int
     prolongation : (n_unknowns, n_corners) csr_array or None
     """
@@ -72,6 +76,7 @@ class AffineSystem:
     places: sparse.csr_array
     probe_names: tuple[str, ...]
     probes: sparse.csr_array
+    probe_slopes: sparse.csr_array
     n_unknowns: int
     n_lumped: int
     prolongation: sparse.csr_array | None
@@ -168,11 +173,7 @@ def build_affine_system(machine: PreparedMachine) -> AffineSystem:
     storage = _storage(machine, names, size)
     places = dict(_places(machine, names, size))
     points = [probe for probe in spec.probe if probe.kind == "point"]
-    probes = sparse.csr_array((0, size))
-    if points:
-        where = [(-p.r * np.sin(p.angle), p.r * np.cos(p.angle), p.z) for p in points]
-        rows = probe_matrix(operators, where, [p.part for p in points])
-        probes = sparse.csr_array((rows.data, rows.indices, rows.indptr), shape=(len(points), size))
+    rows = probe_matrix(operators, probe_positions(points), [p.part for p in points])
     return AffineSystem(
         tuple(coefficients),
         tuple(coefficients.values()),
@@ -185,7 +186,8 @@ def build_affine_system(machine: PreparedMachine) -> AffineSystem:
         tuple(places),
         sparse.vstack([sparse.csr_array(vector[None, :]) for vector in places.values()], format="csr"),
         tuple(p.name for p in points),
-        probes,
+        _widened(rows, size),
+        _widened(probe_slopes(operators, points), size),
         operators.n_unknowns,
         len(names),
         operators.prolongation,
@@ -202,6 +204,11 @@ def _padded(matrix: sparse.csr_array, size: int) -> sparse.csr_array:
     padded = sparse.coo_array((entries.data, (entries.row, entries.col)), shape=(size, size)).tocsr()
     padded.eliminate_zeros()
     return padded
+
+
+def _widened(rows: sparse.csr_array, size: int) -> sparse.csr_array:
+    """Rows over the mesh's unknowns extended over the lumped nodes."""
+    return sparse.csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))
 
 
 Pieces = list[tuple[str, Array]]
@@ -342,6 +349,8 @@ def _places(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> Ite
         vector = np.zeros(size)
         vector[nodes] = 1.0 / len(nodes)
         yield f"{bearing.name}.balls", vector
+    for name, near in near_places(operators, [probe for probe in spec.probe if probe.kind == "point"]):
+        yield name, padded(near)
 
 
 def contact_group_names(spec: MachineSpec, contacts: tuple[str, ...]) -> dict[str, str]:

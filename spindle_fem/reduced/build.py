@@ -22,6 +22,7 @@ from spindle_fem.reduced.coefficients import (
     gap_radii_of,
 )
 from spindle_fem.reduced.model import ReducedModel, project, reduced_digest, reduced_path
+from spindle_fem.reduced.probe_places import NEAR
 from spindle_fem.reduced.snapshots import Sample, compress, helix_profiles, load_columns, solve_shifted
 from spindle_fem.spec.model import MachineSpec
 
@@ -274,6 +275,7 @@ def _source_places(affine: AffineSystem, spec: MachineSpec) -> tuple[list[str], 
     single = {f"{part.name}.{part.segment[0].name}" for part in spec.part if len(part.segment) == 1}
     other = [name for name in affine.place_names if name in segments - single or name in rings]
     other += [part.name for part in spec.part if len(part.segment) == 1]
+    other += [name for name in affine.place_names if name.startswith(NEAR)]
     return friction, other
 
 

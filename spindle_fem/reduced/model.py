@@ -22,9 +22,9 @@ from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
 
-FORMAT = "spindle-fem/reduced/1"
+FORMAT = "spindle-fem/reduced/2"
 # Raise it whenever the same machine gives another reduced model.
-REVISION = 1
+REVISION = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +68,9 @@ class ReducedModel:
     n_full : int
         Unknowns of the full model.
     digest : str
+    probe_gradients : (n_q, 2, r) ndarray, [1/m]
+        Change of each point probe's reading with a displacement of the probe
+        along r and along z, as :func:`probe_places.probe_slopes` has it.
     """
 
     coefficient_names: tuple[str, ...]
@@ -93,6 +96,7 @@ class ReducedModel:
     errors: Mapping[str, float] = field(default_factory=dict)
     n_full: int = 0
     digest: str = ""
+    probe_gradients: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
 
     @property
     def size(self) -> int:
@@ -214,6 +218,7 @@ def project(
         ranges=ranges,
         n_full=affine.size,
         digest=digest,
+        probe_gradients=np.asarray(affine.probe_slopes @ basis).reshape(-1, 2, basis.shape[1]),
     )
 
 

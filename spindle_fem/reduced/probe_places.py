@@ -1,0 +1,102 @@
+"""What the reduced model knows of the neighbourhood of each point probe.
+
+A patch of the probe's own part around it, where an unmodelled source may sit,
+and how the reading changes when the probe sits a little elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from spindle_fem.conduction.evaluate import locate_points, probe_matrix
+from spindle_fem.conduction.operators import ThermalOperators
+from spindle_fem.errors import GeometryError
+from spindle_fem.spec.model import Probe
+
+Array = NDArray[np.float64]
+
+NEAR = "near."
+# Root mean square distance from the probe, in space, of a patch that no wall cuts.
+STANDARD_DISTANCE = 20e-3
+DISPLACEMENT = 0.5e-3
+# A curved wall and its quadratic mesh differ by less.
+WALL_TOLERANCE = 2e-5
+
+
+def probe_positions(probes: Sequence[Probe]) -> Array:
+    """Cartesian places of point probes, (n, 3) [m]."""
+    return np.array([(-p.r * np.sin(p.angle), p.r * np.cos(p.angle), p.z) for p in probes]).reshape(-1, 3)
+
+
+def near_places(operators: ThermalOperators, probes: Sequence[Probe]) -> Iterator[tuple[str, Array]]:
+    """Means over a patch around each point probe, by name ``near.<probe>``.
+
+    Weighted by a Gaussian of the distance from the probe, 20 mm in root mean
+    square, within the probe's own part: what lies beyond a joint or across the
+    axis counts nothing.
+
+    Yields
+    ------
+    str, (n_unknowns,) ndarray
+        The weights sum to 1.
+    """
+    corners = operators.mesh.points[: operators.n_unknowns]
+    if operators.prolongation is not None:
+        corners = corners[: operators.prolongation.shape[1]]
+    for probe, position in zip(probes, probe_positions(probes), strict=True):
+        squared = np.sum((corners - position) ** 2, axis=1)
+        # Linear between corners: a quadratic interpolation could undershoot zero.
+        weight = np.exp(-1.5 * squared / STANDARD_DISTANCE**2)
+        if operators.prolongation is not None:
+            weight = operators.prolongation @ weight
+        vector = operators.part_storage(probe.part) @ weight
+        yield NEAR + probe.name, vector / vector.sum()
+
+
+def probe_slopes(operators: ThermalOperators, probes: Sequence[Probe]) -> sparse.csr_array:
+    """Change of point probes' readings with a displacement along r and along z.
+
+    A central difference over ± 0.5 mm of the finite-element field; where one
+    of the two places lies outside the part, the one-sided difference.
+
+    Returns
+    -------
+    (2 n_probes, n_unknowns) csr_array, [1/m]
+        Along r then along z of the first probe, then the next.
+
+    Raises
+    ------
+    GeometryError
+        The part is thinner than 0.5 mm on both sides of a probe.
+    """
+    rows = [sparse.csr_array((0, operators.n_unknowns))]
+    for probe, position in zip(probes, probe_positions(probes), strict=True):
+        outward = np.array([-np.sin(probe.angle), np.cos(probe.angle), 0.0])
+        for direction, word in ((outward, "r"), (np.array([0.0, 0.0, 1.0]), "z")):
+            ends = [
+                sign
+                for sign in (-1.0, 1.0)
+                if _is_inside(operators, position + sign * DISPLACEMENT * direction, probe.part)
+            ]
+            if not ends:
+                raise GeometryError(
+                    f"probe {probe.name}",
+                    f'"{probe.part}" ends within {1e3 * DISPLACEMENT:g} mm on both sides along {word}.',
+                    "Put the probe where its part is thicker.",
+                )
+            low, high = (ends[0], ends[-1]) if len(ends) == 2 else sorted((0.0, ends[0]))
+            places = [position + end * DISPLACEMENT * direction for end in (low, high)]
+            pair = probe_matrix(operators, places, [probe.part] * 2)
+            rows.append((pair[[1]] - pair[[0]]) / ((high - low) * DISPLACEMENT))
+    return sparse.csr_array(sparse.vstack(rows, format="csr"))
+
+
+def _is_inside(operators: ThermalOperators, position: Array, part: str) -> bool:
+    try:
+        return bool(locate_points(operators.mesh, position[None], [part]).distance[0] <= WALL_TOLERANCE)
+    except GeometryError:
+        return False
