@@ -166,7 +166,7 @@ def make_drive(
         else:
             on_grid = np.interp(grid, times, values[:, column])
             start[:, column], end[:, column] = on_grid[:-1], on_grid[1:]
-    step_class, points = _classes(0.5 * (start + end))
+    step_class, points = classes_of(0.5 * (start + end))
     return Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
 
 
@@ -190,7 +190,7 @@ def _grid(times: Array, held: Array, largest: float) -> Array:
     return np.append(np.concatenate(parts), times[-1])
 
 
-def _classes(inputs: Array) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
+def classes_of(inputs: Array) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
     """Steps whose films differ too little to matter share one operator."""
     speed, thrust, ambient, inlet, flow = inputs[:, : len(STANDARD)].T
     width = SPEED_BIN * max(float(speed.max()), 1.0)

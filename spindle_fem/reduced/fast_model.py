@@ -17,6 +17,7 @@ from spindle_fem.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, Coeffici
 from spindle_fem.reduced.coolant import CoolantMaps, coolant_maps, film_derivative
 from spindle_fem.reduced.model import ReducedModel
 from spindle_fem.spec.model import MachineSpec
+from spindle_fem.spec.parameters import uncertain_parameters
 
 Array = NDArray[np.float64]
 
@@ -87,6 +88,15 @@ class FastModel:
         self.load_names = (*self.heat_places, "ambient", "coolant_inlet", "coolant_friction", *fixed)
         self._positions = {name: i for i, name in enumerate(model.coefficient_names)}
         self._fluid_rows = {name: i for i, name in enumerate(model.fluid_names)}
+
+    def sigmas(self, names: Sequence[str]) -> dict[str, float]:
+        """1 σ of the logarithm of some of the machine's parameters; 0 for those that are not uncertain."""
+        known = {item.name: item.sigma_log for item in uncertain_parameters(self.spec)}
+        return {name: known.get(name, 0.0) for name in names}
+
+    def projected(self, basis: Array) -> FastModel:
+        """The same machine on a smaller basis, (r, s)."""
+        return FastModel(self.model.projected(basis), self.spec)
 
     # ------------------------------------------------------------- operators
     def storage(self, factors: Mapping[str, float], added: Mapping[str, float] = NO_CHANGES) -> Array:

@@ -8,7 +8,7 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +110,25 @@ class ReducedModel:
     def table(self, spec: MachineSpec) -> CoefficientTable:
         """Coefficients of a machine with this model's geometry."""
         return build_coefficient_table(spec, self.contacts, self.gap_radii)
+
+    def projected(self, basis: Array) -> ReducedModel:
+        """Galerkin projection on a smaller basis, (r, s)."""
+
+        def both(stack: Array) -> Array:
+            return np.einsum("ra,nrs,sb->nab", basis, stack, basis, optimize=True)
+
+        return replace(
+            self,
+            operators=both(self.operators),
+            fluid_load=self.fluid_load @ basis,
+            cell_film=both(self.cell_film),
+            cell_load=self.cell_load @ basis,
+            storage=both(self.storage),
+            places=self.places @ basis,
+            probes=self.probes @ basis,
+            probe_gradients=self.probe_gradients @ basis,
+            one=basis.T @ self.one,
+        )
 
     def channel_cells(self) -> ChannelCells:
         """The coolant's cells, without the mesh's facets."""

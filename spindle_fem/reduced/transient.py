@@ -164,7 +164,7 @@ class TransientRun:
         sensitivities = self._march_sensitivities(states, tracks) if self.derivatives else None
         return self._outputs(states, sensitivities, tracks)
 
-    def march(self, initial_temperature: float) -> tuple[Array, _Tracks | None]:
+    def march(self, initial_temperature: float) -> tuple[Array, Tracks | None]:
         """States at the ends of all steps, (G + 1, r), and what the terms did."""
         size, steps = self.fast.model.size, len(self.drive.steps)
         response = np.empty((steps, size))
@@ -201,7 +201,7 @@ class TransientRun:
             friction_by=(self._friction_end_by if at_end else self._friction_start_by)[step],
         )
 
-    def _march_terms(self, states: Array, response: Array) -> _Tracks:
+    def _march_terms(self, states: Array, response: Array) -> Tracks:
         dynamic, drive = self.dynamic, self.drive
         keys = list(self.groups)
         columns = [dynamic.columns(self._inlet_load(key[0])) for key in keys]
@@ -209,7 +209,7 @@ class TransientRun:
         from_end = [self.propagators[k].from_end @ c for k, c in zip(keys, columns, strict=True)]
         answer = [dynamic.sense @ matrix for matrix in from_end]
         steps = len(drive.steps)
-        tracks = _Tracks(columns, from_start, from_end, answer, dynamic, steps)
+        tracks = Tracks(columns, from_start, from_end, answer, dynamic, steps)
         memory = dynamic.initial_states()
         for step, group in enumerate(self.group_of_step):
             sensed = dynamic.sense @ states[step]
@@ -252,8 +252,8 @@ class TransientRun:
         return self.operators[number].loads[:, self.fast.load_names.index("coolant_inlet")]
 
     # ---------------------------------------------------------- sensitivities
-    def _forcing(self, states: Array, tracks: _Tracks | None) -> Array:
-        """What parameters add to the derivative of each step's end, (G, r, p)."""
+    def forcing_of(self, states: Array, tracks: Tracks | None) -> Array:
+        """What the asked parameters add to the derivative of each step's end, (G, r, p)."""
         forcing = np.zeros((len(self.drive.steps), states.shape[1], len(self.derivatives)))
         for group, (key, rows) in enumerate(self.groups.items()):
             operators, propagator = self.operators[key[0]], self.propagators[key]
@@ -279,7 +279,7 @@ class TransientRun:
         return forcing
 
     def _load_derivatives(
-        self, parameter: str, number: int, rows: NDArray[np.int64], tracks: _Tracks | None
+        self, parameter: str, number: int, rows: NDArray[np.int64], tracks: Tracks | None
     ) -> tuple[Array | None, Array | None]:
         """Derivative of the loads at both ends of some steps at fixed temperatures, the terms' own apart."""
         operators = self.operators[number]
@@ -301,9 +301,27 @@ class TransientRun:
             end = more_end if end is None else end + more_end
         return start, end
 
-    def _march_sensitivities(self, states: Array, tracks: _Tracks | None) -> Array:
-        forcing = self._forcing(states, tracks)
-        found = np.zeros((len(states), states.shape[1], len(self.derivatives)))
+    def _march_sensitivities(self, states: Array, tracks: Tracks | None) -> Array:
+        return self.tangents(self.forcing_of(states, tracks), tracks, explicit=True)
+
+    def tangents(self, forcing: Array, tracks: Tracks | None, *, explicit: bool = False) -> Array:
+        """Small changes of the states that follow from small changes of the loads.
+
+        Parameters
+        ----------
+        forcing : (G, r, p) ndarray
+            What each change adds to the end of each step.
+        tracks : Tracks or None
+            What the terms did in the run that the changes are small against; they answer.
+        explicit : bool
+            Whether the columns are the asked parameters, which the terms also know.
+
+        Returns
+        -------
+        (G + 1, r, p) ndarray
+        """
+        number = forcing.shape[2]
+        found = np.zeros((len(forcing) + 1, forcing.shape[1], number))
         advance = [self.propagators[key].advance for key in self.groups]
         if tracks is None:
             for step, group in enumerate(self.group_of_step):
@@ -311,25 +329,32 @@ class TransientRun:
                 found[step + 1] += forcing[step]
             return found
         sense = self.dynamic.sense
-        memory = np.zeros((self.dynamic.n_states, len(self.derivatives)))
+        memory = np.zeros((self.dynamic.n_states, number))
         identity = np.eye(self.dynamic.n_added)
         for step, group in enumerate(self.group_of_step):
             begin, end = tracks.begin[step], tracks.end[step]
             sensed = sense @ found[step]
-            added = begin.by_sensed @ sensed + begin.by_state @ memory + begin.by_parameter
-            tracks.start_by[step] = added
+            added = begin.by_sensed @ sensed + begin.by_state @ memory
+            if explicit:
+                added += begin.by_parameter
+                tracks.start_by[step] = added
             if self.dynamic.n_states:
                 _, by_sensed, by_state, by_parameter = tracks.moved[step]
-                memory = by_sensed @ sensed + by_state @ memory + by_parameter
+                memory = by_sensed @ sensed + by_state @ memory
+                if explicit:
+                    memory += by_parameter
             base = advance[group] @ found[step] + forcing[step] + tracks.from_start[group] @ added
-            right = end.by_sensed @ (sense @ base) + end.by_state @ memory + end.by_parameter
+            right = end.by_sensed @ (sense @ base) + end.by_state @ memory
+            if explicit:
+                right += end.by_parameter
             added = np.linalg.solve(identity - end.by_sensed @ tracks.answer[group], right)
             found[step + 1] = base + tracks.from_end[group] @ added
-            tracks.end_by[step] = added
+            if explicit:
+                tracks.end_by[step] = added
         return found
 
     # ----------------------------------------------------------------- outputs
-    def _outputs(self, states: Array, sensitivities: Array | None, tracks: _Tracks | None) -> FastTransient:
+    def _outputs(self, states: Array, sensitivities: Array | None, tracks: Tracks | None) -> FastTransient:
         """Outputs at the wanted times; the class is that of the step that begins there."""
         fast, drive = self.fast, self.drive
         n_out, n_par = len(fast.channels), len(self.derivatives)
@@ -364,7 +389,7 @@ class TransientRun:
             added,
         )
 
-    def _shift_inlet(self, inputs: Array, tracks: _Tracks | None) -> Array | None:
+    def _shift_inlet(self, inputs: Array, tracks: Tracks | None) -> Array | None:
         """Add the terms' shift of the inlet temperature in place; its derivatives (G + 1, p)."""
         if tracks is None or not self.dynamic.inlet_columns():
             return None
@@ -374,7 +399,7 @@ class TransientRun:
         return np.concatenate((tracks.start_by, tracks.end_by[-1:]))[:, shift].sum(axis=1)
 
 
-class _Tracks:
+class Tracks:
     """What the terms did in every step, kept for the derivatives."""
 
     def __init__(

@@ -1,0 +1,346 @@
+"""A machine on its recordings, quick enough to be simulated hundreds of times.
+
+Readings are averaged over bins of a minute or more; the model steps over the
+same time scale, from one change of the inputs to the next, and its basis is
+cut down to what these recordings can excite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.calibration.noise import ChannelBins, SlowError, channel_bins, whiten
+from spindle_fem.effects.base import Candidate
+from spindle_fem.effects.term import RecordedHeat, Term
+from spindle_fem.recordings.align import Recording
+from spindle_fem.reduced.drive import Drive, classes_of, drive_of_recording
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.natural import natural_film_terms
+from spindle_fem.reduced.transient import FastTransient, TransientRun, grid_weights
+
+Array = NDArray[np.float64]
+
+STEP = 60.0
+# Coordinates of a candidate's factors are not those of the machine's own parameters.
+EFFECT_PREFIX = "effect:"
+BASIS_TOLERANCE = 2.0e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """Readings of one channel of one recording, averaged over bins.
+
+    Attributes
+    ----------
+    recording : int
+    channel : int
+        Column of the recording.
+    bins : ChannelBins
+    values : (b,) ndarray, [K]
+        Mean reading of each bin.
+    right : (b,) int ndarray
+        Point of the model's grid after each bin's time.
+    part : (b,) ndarray
+        Share of the step before it that has passed.
+    """
+
+    recording: int
+    channel: int
+    bins: ChannelBins
+    values: Array
+    right: NDArray[np.int64]
+    part: Array
+
+    def at(self, on_grid: Array) -> Array:
+        """Values at the bins from values (G + 1, ...) on the grid."""
+        part = self.part.reshape(-1, *([1] * (on_grid.ndim - 1)))
+        left = on_grid[self.right - 1]
+        return left + part * (on_grid[self.right] - left)
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Readings of all channels of one recording on the model's grid.
+
+    Attributes
+    ----------
+    temperature : (G + 1, c) ndarray, [K]
+        In the order of the recording's channels, sensor effects included.
+    sensitivity : (G + 1, c, p) ndarray
+        To the coordinates asked for.
+    """
+
+    temperature: Array
+    sensitivity: Array
+
+
+class Plant:
+    """Machine and recordings.
+
+    Parameters
+    ----------
+    fast : FastModel
+        Or a network's, which has the same methods.
+    recordings : sequence of Recording
+    use : sequence of (N,) bool ndarray
+        Stamps that may be fitted, per recording; the rest is held out.
+    step : float, [s]
+        Longest step of the model.
+    """
+
+    def __init__(
+        self,
+        fast: FastModel,
+        recordings: Sequence[Recording],
+        use: Sequence[NDArray[np.bool_]],
+        *,
+        step: float = STEP,
+        drives: Sequence[Drive] | None = None,
+    ) -> None:
+        self.fast = fast
+        self.recordings = tuple(recordings)
+        self.use = tuple(use)
+        self.step = step
+        self.drives = tuple(drives or (coarse_drive(fast.spec, item, step) for item in recordings))
+        self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
+        self.observations = self._observe(self.use)
+        self.heldout = self._observe([~mask for mask in self.use])
+
+    def _observe(self, masks: Sequence[NDArray[np.bool_]]) -> tuple[Observation, ...]:
+        found = []
+        for number, (recording, mask) in enumerate(zip(self.recordings, masks, strict=True)):
+            for bins in channel_bins(recording, mask):
+                values = bins.average(recording.temperature[:, bins.channel])
+                right, part = grid_weights(bins.times, self.drives[number].grid)
+                found.append(Observation(number, bins.channel, bins, values, right, part))
+        return tuple(found)
+
+    def with_model(self, fast: FastModel) -> Plant:
+        """The same recordings on another reduction of the same machine."""
+        return Plant(fast, self.recordings, self.use, step=self.step, drives=self.drives)
+
+    # ---------------------------------------------------------------- simulation
+    def initial_temperature(self, number: int) -> float:
+        """Uniform temperature at the start of a recording, K."""
+        if self.fast.spec.initial == "ambient":
+            return self.drives[number].first("ambient")
+        return float(np.mean(list(self.recordings[number].first_readings().values())))
+
+    def transient(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        candidates: Sequence[Candidate] = (),
+        derivatives: Sequence[str] = (),
+    ) -> TransientRun:
+        """A run of one recording that is ready to march.
+
+        Parameters
+        ----------
+        number : int
+            Recording.
+        values : mapping of str to float
+            Factors of the machine's parameters, ``effect:<name>`` for factors of
+            candidates, values of term parameters; of readings, which the run ignores.
+        candidates : sequence of Candidate
+        derivatives : sequence of str
+            Names of the machine or of terms.
+        """
+        drive = self.drives[number]
+        terms: list[Term] = [
+            *natural_film_terms(self.fast.spec),
+            *(RecordedHeat(name) for name in drive.names if name.startswith("heat.")),
+        ]
+        known: dict[str, float] = {}
+        readings = set()
+        for candidate in candidates:
+            terms += candidate.terms
+            for term in candidate.terms:
+                known |= {name: values.get(name, item.value) for name, item in term.names().items()}
+            readings |= (
+                set()
+                if candidate.reading is None
+                else set(candidate.parameters) - {f.name for f in candidate.factors}
+            )
+        factors: dict[str, float] = {}
+        for name, value in values.items():
+            if name in known or name in readings:
+                continue
+            own = name.removeprefix(EFFECT_PREFIX)
+            factors[own] = factors.get(own, 1.0) * value
+        return TransientRun(self.fast, drive, factors | known, tuple(derivatives), tuple(terms))
+
+    def predict(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        candidates: Sequence[Candidate] = (),
+        derivatives: Sequence[str] = (),
+    ) -> Prediction:
+        """What every channel of one recording should read.
+
+        Parameters as for :meth:`transient`; ``derivatives`` may also name
+        factors of candidates (``effect:<name>``) and parameters of readings.
+        Derivatives are to logarithms, to values for parameters that say so.
+        """
+        owners = {
+            f"{c.reading.name}.{item.name}": (c.reading, item)
+            for c in candidates
+            if c.reading is not None
+            for item in c.reading.parameters
+        }
+        of_run = tuple(
+            dict.fromkeys(name.removeprefix(EFFECT_PREFIX) for name in derivatives if name not in owners)
+        )
+        run = self.transient(number, values, candidates, of_run)
+        found: FastTransient = run.solve(self.initial_temperature(number))
+        columns = self.columns[number]
+        temperature = found.temperature[:, columns]
+        sensitivity = np.zeros((*temperature.shape, len(derivatives)))
+        for position, name in enumerate(derivatives):
+            if name not in owners:
+                source = of_run.index(name.removeprefix(EFFECT_PREFIX))
+                sensitivity[:, :, position] = found.sensitivity[:, columns, source]
+        for candidate in candidates:
+            if candidate.reading is not None:
+                self._read(number, candidate.reading, values, derivatives, temperature, sensitivity)
+        return Prediction(temperature, sensitivity)
+
+    def _read(
+        self,
+        number: int,
+        reading,
+        values: Mapping[str, float],
+        derivatives: Sequence[str],
+        temperature: Array,
+        sensitivity: Array,
+    ) -> None:
+        """Pass one channel through a sensor effect, in place."""
+        names = self.recordings[number].temperature_names
+        if reading.channel not in names:
+            return
+        column = names.index(reading.channel)
+        inner = {
+            item.name: values.get(f"{reading.name}.{item.name}", item.value) for item in reading.parameters
+        }
+        own = [
+            (position, item)
+            for position, name in enumerate(derivatives)
+            for item in reading.parameters
+            if name == f"{reading.name}.{item.name}"
+        ]
+        n_par = len(derivatives)
+        # Affine in the temperatures: differences of whole columns; complex steps for its own parameters.
+        width = 1 + n_par + len(own)
+        series = np.repeat(temperature[:, column, None].astype(complex), width, axis=1)
+        series[:, 1 : 1 + n_par] += sensitivity[:, column]
+        parameters = {name: np.full(width, value, dtype=complex) for name, value in inner.items()}
+        for i, (_, item) in enumerate(own):
+            scale = inner[item.name] if item.logarithmic else 1.0
+            parameters[item.name][1 + n_par + i] += 1e-30j * scale
+        drive = self.drives[number]
+        inputs = {name: np.append(drive.start[:, i], drive.end[-1, i]) for i, name in enumerate(drive.names)}
+        told = reading.read(drive.grid, series, inputs, parameters)
+        temperature[:, column] = told[:, 0].real
+        sensitivity[:, column] = (told[:, 1 : 1 + n_par] - told[:, :1]).real
+        for i, (position, _) in enumerate(own):
+            sensitivity[:, column, position] += told[:, 1 + n_par + i].imag / 1e-30
+
+    # ------------------------------------------------------------------ reduction
+    def compressed(self, names: Sequence[str], places: Sequence[str]) -> Plant:
+        """The plant on the smaller basis that its own recordings need.
+
+        States and their sensitivities of every recording, with the machine's
+        parameters at their prior values and two standard deviations to either
+        side in a few combinations, and what heat at every place leaves.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Parameters of the machine.
+        places : sequence of str
+            Where candidates put heat.
+        """
+        model = self.fast.model
+        snapshots = [model.one[:, None] * 1.0]
+        generator = np.random.default_rng(0)
+        priors = self.fast.sigmas(names)
+        for number in range(len(self.recordings)):
+            for draw in range(4):
+                factors = {}
+                if draw:
+                    signs = generator.choice((-2.0, 2.0), len(names))
+                    factors = {n: float(np.exp(s * priors[n])) for n, s in zip(names, signs, strict=True)}
+                wanted = tuple(names) if draw == 0 else ()
+                run = self.transient(number, factors, (), wanted)
+                initial = self.initial_temperature(number)
+                states, tracks = run.march(initial)
+                snapshots.append((states - initial * model.one).T)
+                if wanted:
+                    tangent = run.tangents(run.forcing_of(states, tracks), tracks)
+                    snapshots.append(tangent[::4].transpose(1, 0, 2).reshape(model.size, -1))
+                    if number == 0:
+                        snapshots.append(self._place_snapshots(run, places))
+        gram = np.hstack([snapshots[0] / np.linalg.norm(snapshots[0]), *(_scaled(s) for s in snapshots[1:])])
+        vectors, values, _ = np.linalg.svd(gram, full_matrices=False)
+        kept = int(np.sum(values > BASIS_TOLERANCE * values[0]))
+        basis = vectors[:, : max(kept, 1)]
+        return self.with_model(self.fast.projected(basis))
+
+    def _place_snapshots(self, run: TransientRun, places: Sequence[str]) -> Array:
+        loads = np.array([self.fast.model.place(name) for name in places]).T
+        found = []
+        for key in run.groups:
+            conduction = run.operators[key[0]].conduction
+            for rate in (0.0, 3e-4, 3e-3):
+                found.append(np.linalg.solve(conduction + rate * run.built.storage, 50.0 * loads))
+        return np.hstack(found)
+
+
+def _scaled(columns: Array) -> Array:
+    """Columns so that a thousand snapshots of one kind weigh as much as one of another."""
+    return columns / np.sqrt(max(columns.shape[1], 1))
+
+
+def coarse_drive(spec, recording: Recording, step: float) -> Drive:
+    """Inputs on steps from change to change, none longer than ``step``; outputs at their ends."""
+    fine = drive_of_recording(spec, recording)
+    begin, finish = fine.grid[0], fine.grid[-1]
+    jumps = fine.grid[1:-1][np.any(fine.start[1:] != fine.end[:-1], axis=1)]
+    edges = np.unique(np.concatenate(([begin], jumps, [finish])))
+    # Stamps a second apart that all jump (an input that flickers) would only cost.
+    pieces = [
+        np.linspace(a, b, max(1, int(np.ceil((b - a) / step - 1e-6))) + 1)[:-1]
+        for a, b in zip(edges, edges[1:], strict=False)
+    ]
+    grid = np.append(np.concatenate(pieces), finish)
+    middle = 0.5 * (grid[:-1] + grid[1:])
+    start, end = np.empty((middle.size, len(fine.names))), np.empty((middle.size, len(fine.names)))
+    first = np.clip(np.searchsorted(fine.grid, grid[:-1], side="right") - 1, 0, fine.steps.size - 1)
+    last = np.clip(np.searchsorted(fine.grid, grid[1:], side="left") - 1, 0, fine.steps.size - 1)
+    for ends, owner, at in ((start, first, grid[:-1]), (end, last, grid[1:])):
+        part = ((at - fine.grid[owner]) / fine.steps[owner])[:, None]
+        ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
+    step_class, points = classes_of(0.5 * (start + end))
+    return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
+
+
+def whitening(observations: Sequence[Observation], slow: SlowError) -> list[Array]:
+    """Cholesky factor of the noise of every observation."""
+    return [item.bins.factor(slow) for item in observations]
+
+
+def whitened(
+    observations: Sequence[Observation], factors: Sequence[Array], on_grid: Sequence[Array]
+) -> Array:
+    """Columns (G + 1, c, k) of every recording at the bins, whitened and stacked, (n, k)."""
+    return np.concatenate(
+        [
+            whiten(factor, item.at(on_grid[item.recording][:, item.channel]))
+            for item, factor in zip(observations, factors, strict=True)
+        ]
+    )
