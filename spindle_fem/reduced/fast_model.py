@@ -9,13 +9,15 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.term import FLOW
+from spindle_fem.effects.term import FLOW, FLUID_PREFIX, RecordedHeat, Term
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.loads.coolant_loop import CoolantLoop
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
 from spindle_fem.reduced.coolant import CoolantMaps, coolant_maps, film_derivative
+from spindle_fem.reduced.drive import Drive, heat_of_table
 from spindle_fem.reduced.model import ReducedModel
+from spindle_fem.reduced.natural import natural_film_terms
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.spec.parameters import uncertain_parameters
 
@@ -237,6 +239,14 @@ class FastModel:
             conduction, loads, outputs, output_inputs, conduction_by, loads_by, outputs_by, output_inputs_by
         )
 
+    def fluid_temperature(self, coefficient: str, inputs: Mapping[str, float]) -> float:
+        """Temperature that a film's heat counts from; 0 for what conducts between solids."""
+        if coefficient not in self.model.fluid_names:
+            return 0.0
+        surface = coefficient.removeprefix("film.")
+        film = next(f for f in self.spec.film if surface in f.surface)
+        return inputs["ambient"] if film.temperature == "ambient" else film.temperature
+
     def _fluid_column(self, coefficient: str) -> int:
         surface = coefficient.removeprefix("film.")
         film = next(f for f in self.spec.film if surface in f.surface)
@@ -252,6 +262,86 @@ class FastModel:
             outputs[self._outlet_row] = maps.outlet
             output_inputs[self._outlet_row, inlet] = maps.outlet_inlet
             output_inputs[self._outlet_row, friction] = maps.outlet_constant
+
+    # ----------------------------------------------------------------- inputs
+    @property
+    def inlet_column(self) -> int:
+        """Position of the coolant's inlet among the load inputs."""
+        return self.load_names.index("coolant_inlet")
+
+    @property
+    def fluid_places(self) -> dict[str, str]:
+        """Coefficient of the film of every fluid that a term may shift, by the fluid's name."""
+        return {FLUID_PREFIX + name.removeprefix("film."): name for name in self.model.fluid_names}
+
+    def fluid_temperature(self, coefficient: str, inputs: Mapping[str, float]) -> float:
+        """Temperature that a film's heat counts from, K; 0 for what conducts between solids."""
+        if coefficient not in self._fluid_rows:
+            return 0.0
+        surface = coefficient.removeprefix("film.")
+        film = next(f for f in self.spec.film if surface in f.surface)
+        return inputs["ambient"] if film.temperature == "ambient" else film.temperature
+
+    def fluid_parameters(self, coefficient: str) -> tuple[str, ...]:
+        """Names whose factors multiply :meth:`fluid_temperature`; none here."""
+        return ()
+
+    def own_terms(self, drive: Drive) -> tuple[Term, ...]:
+        """Terms that are always there: natural films, and heat that the drive gives.
+
+        Raises
+        ------
+        SpecError
+            Heat that is not by table.
+        """
+        if self.spec.heat.model != "table":
+            raise SpecError(
+                "heat.model",
+                f'"{self.spec.heat.model}" follows the temperatures of every bearing.',
+                'The fast model takes heat.model = "table".',
+            )
+        recorded = tuple(RecordedHeat(name) for name in drive.names if name.startswith("heat."))
+        return (*natural_film_terms(self.spec), *recorded)
+
+    def load_inputs(
+        self,
+        names: Sequence[str],
+        inputs: Array,
+        factors: Mapping[str, float],
+        parameters: Sequence[str] = (),
+    ) -> tuple[Array, dict[str, Array]]:
+        """Load inputs, in the order of :attr:`load_names`, of the machine's inputs.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of the columns of ``inputs``.
+        inputs : (n, m) ndarray, SI
+        factors : mapping of str to float
+        parameters : sequence of str
+            To differentiate by.
+
+        Returns
+        -------
+        (n, n_w) ndarray
+        mapping of parameter to (n, n_w) ndarray
+            Derivatives to logarithms; absent where zero.
+        """
+        column = {name: inputs[:, position] for position, name in enumerate(names)}
+        heat = heat_of_table(self.spec, column["speed"], column["thrust"])
+        friction, friction_by = self.friction_loads(heat, factors, parameters)
+        found = np.zeros((len(inputs), len(self.load_names)))
+        found[:, : friction.shape[1]] = friction
+        found[:, self.load_names.index("ambient")] = column["ambient"]
+        found[:, self.inlet_column] = column["coolant_inlet"]
+        found[:, self.load_names.index("coolant_friction")] = 1.0
+        for number, temperature in enumerate(self.fixed_fluids):
+            found[:, self.load_names.index(f"fixed[{number}]")] = temperature
+        by = {}
+        for name, part in friction_by.items():
+            by[name] = np.zeros_like(found)
+            by[name][:, : part.shape[1]] = part
+        return found, by
 
     # ------------------------------------------------------------- heat shares
     def heat_rows(self, bearing: str) -> tuple[int, ...]:

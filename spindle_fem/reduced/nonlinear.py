@@ -330,7 +330,7 @@ class DynamicTerms:
                 answers = np.asarray(term.factor(context), dtype=complex)
                 for i, (coefficient, own_sensed, columns) in enumerate(self._moved[number]):
                     strength = coefficients[coefficient] * self._spectra[coefficient]
-                    fluid = self._fluid_temperature(coefficient, inputs)
+                    fluid = self.fast.fluid_temperature(coefficient, inputs)
                     difference = sensed[own_sensed] - fluid * self._uniform[own_sensed]
                     excess = answers[i, 0].real - 1.0
                     value[columns] = -excess * strength * difference
@@ -339,14 +339,6 @@ class DynamicTerms:
                     for target in touched.get(coefficient, ()):
                         by_parameter[columns, target] += value[columns]
         return Evaluation(value, by_sensed, by_state, by_parameter)
-
-    def _fluid_temperature(self, coefficient: str, inputs: Mapping[str, float]) -> float:
-        """Temperature that a film's heat counts from; 0 for what conducts between solids."""
-        if coefficient not in self.fast.model.fluid_names:
-            return 0.0
-        surface = coefficient.removeprefix("film.")
-        film = next(f for f in self.fast.spec.film if surface in f.surface)
-        return inputs["ambient"] if film.temperature == "ambient" else film.temperature
 
     def advance(
         self, time: float, step: float, inputs: Mapping[str, float], sensed: Array, states: Array
