@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +47,8 @@ class Drive:
     points : tuple of OperatingPoint
         Mean operating point of each class.
     notes : tuple of str
+    restarts : tuple of int
+        Points of the grid at which a network starts again, after a long gap.
     """
 
     times: Array
@@ -57,6 +59,7 @@ class Drive:
     step_class: NDArray[np.int64]
     points: tuple[OperatingPoint, ...]
     notes: tuple[str, ...]
+    restarts: tuple[int, ...] = ()
 
     @property
     def steps(self) -> Array:
@@ -157,32 +160,54 @@ def make_drive(
     """
     if names[: len(STANDARD)] != STANDARD:
         raise RecordingError("inputs", f"named {names}.", f"Allowed: {STANDARD} first.")
-    grid = _grid(np.asarray(times, dtype=float), values[:, held], largest_step)
-    start, end = np.empty((grid.size - 1, len(names))), np.empty((grid.size - 1, len(names)))
+    grid, start, end = inputs_on_steps(np.asarray(times, dtype=float), values, held, largest_step)
+    step_class, points = classes_of(0.5 * (start + end))
+    return Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
+
+
+def inputs_on_steps(
+    times: Array, values: Array, held: NDArray[np.bool_], largest_step: float, breaks: Sequence[float] = ()
+) -> tuple[Array, Array, Array]:
+    """Ends of the steps (G + 1,), and the inputs at the start and end of each (G, m).
+
+    Parameters
+    ----------
+    times : (N,) ndarray, [s]
+    values : (N, m) ndarray
+    held : (m,) bool ndarray
+    largest_step : float, [s]
+    breaks : sequence of float, [s]
+        Stamps that begin a new segment: one step, of any length, leads to each.
+    """
+    grid = _grid(times, values[:, held], largest_step, np.asarray(breaks, dtype=float))
+    start, end = np.empty((grid.size - 1, len(held))), np.empty((grid.size - 1, len(held)))
     owner = np.searchsorted(times, 0.5 * (grid[:-1] + grid[1:]), side="right") - 1
-    for column in range(len(names)):
+    for column in range(len(held)):
         if held[column]:
             start[:, column] = end[:, column] = values[owner, column]
         else:
             on_grid = np.interp(grid, times, values[:, column])
             start[:, column], end[:, column] = on_grid[:-1], on_grid[1:]
-    step_class, points = classes_of(0.5 * (start + end))
-    return Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
+    return grid, start, end
 
 
-def _grid(times: Array, held: Array, largest: float) -> Array:
+def _grid(times: Array, held: Array, largest: float, breaks: Array) -> Array:
     """Ends of the steps: every stamp, long gaps divided; few sizes only where stamps jitter."""
     gaps = np.diff(times)
-    pieces = np.maximum(1, np.ceil(gaps / largest - 1e-9).astype(int))
-    if np.unique(np.round(gaps / pieces, 6)).size <= MOST_STEP_SIZES:
+    bridges = np.isin(times[1:], breaks)
+    pieces = np.where(bridges, 1, np.maximum(1, np.ceil(gaps / largest - 1e-9).astype(int)))
+    if np.unique(np.round((gaps / pieces)[~bridges], 6)).size <= MOST_STEP_SIZES:
         within = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
         return np.append(np.repeat(times[:-1], pieces) + within * np.repeat(gaps / pieces, pieces), times[-1])
     # Equal steps between the changes of held inputs; outputs are interpolated between them.
     changes = times[1:][np.any(np.diff(held, axis=0) != 0.0, axis=1)]
     step = min(largest, float(np.median(gaps)))
-    edges = np.unique(np.concatenate(([times[0]], changes, [times[-1]])))
+    edges = np.unique(np.concatenate(([times[0]], changes, times[:-1][bridges], breaks, [times[-1]])))
     parts = []
     for begin, stop in itertools.pairwise(edges):
+        if stop in breaks:
+            parts.append(np.array([begin]))
+            continue
         whole = int(np.floor((stop - begin) / step * (1.0 + 1e-9)))
         parts.append(
             begin + step * np.arange(whole + 1 if begin + whole * step < stop - 1e-6 * step else whole)

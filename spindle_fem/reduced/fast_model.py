@@ -239,14 +239,6 @@ class FastModel:
             conduction, loads, outputs, output_inputs, conduction_by, loads_by, outputs_by, output_inputs_by
         )
 
-    def fluid_temperature(self, coefficient: str, inputs: Mapping[str, float]) -> float:
-        """Temperature that a film's heat counts from; 0 for what conducts between solids."""
-        if coefficient not in self.model.fluid_names:
-            return 0.0
-        surface = coefficient.removeprefix("film.")
-        film = next(f for f in self.spec.film if surface in f.surface)
-        return inputs["ambient"] if film.temperature == "ambient" else film.temperature
-
     def _fluid_column(self, coefficient: str) -> int:
         surface = coefficient.removeprefix("film.")
         film = next(f for f in self.spec.film if surface in f.surface)
