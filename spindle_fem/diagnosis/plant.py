@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from spindle_fem.calibration.noise import ChannelBins, SlowError, channel_bins, whiten
 from spindle_fem.effects.base import Candidate, Reading
-from spindle_fem.effects.term import RecordedHeat, Term
+from spindle_fem.effects.term import Term
 from spindle_fem.recordings.align import Recording
 from spindle_fem.reduced.drive import Drive, classes_of, drive_of_recording
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.natural import natural_film_terms
 from spindle_fem.reduced.transient import FastTransient, TransientRun, grid_weights
 
 Array = NDArray[np.float64]
@@ -28,6 +27,9 @@ Array = NDArray[np.float64]
 STEP = 60.0
 # Coordinates of a candidate's factors are not those of the machine's own parameters.
 EFFECT_PREFIX = "effect:"
+# Displacement of a probe from its nominal place, m: ``probe.<probe>.<direction>``.
+PROBE_PREFIX = "probe."
+DIRECTIONS = ("r", "z")
 BASIS_TOLERANCE = 3.0e-4
 
 
@@ -152,10 +154,7 @@ class Plant:
             Names of the machine or of terms.
         """
         drive = self.drives[number]
-        terms: list[Term] = [
-            *natural_film_terms(self.fast.spec),
-            *(RecordedHeat(name) for name in drive.names if name.startswith("heat.")),
-        ]
+        terms: list[Term] = list(self.fast.own_terms(drive))
         known: dict[str, float] = {}
         readings = set()
         for candidate in candidates:
@@ -169,7 +168,7 @@ class Plant:
             )
         factors: dict[str, float] = {}
         for name, value in values.items():
-            if name in known or name in readings:
+            if name in known or name in readings or name.startswith(PROBE_PREFIX):
                 continue
             own = name.removeprefix(EFFECT_PREFIX)
             factors[own] = factors.get(own, 1.0) * value
@@ -195,7 +194,11 @@ class Plant:
             for item in c.reading.parameters
         }
         of_run = tuple(
-            dict.fromkeys(name.removeprefix(EFFECT_PREFIX) for name in derivatives if name not in owners)
+            dict.fromkeys(
+                name.removeprefix(EFFECT_PREFIX)
+                for name in derivatives
+                if name not in owners and not name.startswith(PROBE_PREFIX)
+            )
         )
         run = self.transient(number, values, candidates, of_run)
         found: FastTransient = run.solve(self.initial_temperature(number))
@@ -203,13 +206,48 @@ class Plant:
         temperature = found.temperature[:, columns]
         sensitivity = np.zeros((*temperature.shape, len(derivatives)))
         for position, name in enumerate(derivatives):
-            if name not in owners:
+            if name not in owners and not name.startswith(PROBE_PREFIX):
                 source = of_run.index(name.removeprefix(EFFECT_PREFIX))
                 sensitivity[:, :, position] = found.sensitivity[:, columns, source]
+        self._displace(number, found.states, values, derivatives, temperature, sensitivity)
         for candidate in candidates:
             if candidate.reading is not None:
                 self._read(number, candidate.reading, values, derivatives, temperature, sensitivity)
         return Prediction(temperature, sensitivity)
+
+    def displacements(self) -> tuple[str, ...]:
+        """Names of the displacements of every point probe that is read."""
+        model = self.fast.model
+        read = {probe for recording in self.recordings for probe in recording.probes}
+        return tuple(
+            f"{PROBE_PREFIX}{probe}.{direction}"
+            for probe in model.probe_names
+            if probe in read
+            for direction in DIRECTIONS
+        )
+
+    def _displace(
+        self,
+        number: int,
+        states: Array,
+        values: Mapping[str, float],
+        derivatives: Sequence[str],
+        temperature: Array,
+        sensitivity: Array,
+    ) -> None:
+        """Read each probe where it sits, to first order in its displacement, in place."""
+        model, probes = self.fast.model, self.recordings[number].probes
+        for name in {name for name in (*values, *derivatives) if name.startswith(PROBE_PREFIX)}:
+            probe, _, direction = name.removeprefix(PROBE_PREFIX).rpartition(".")
+            if probe not in probes:
+                continue
+            slope = (
+                states @ model.probe_gradients[model.probe_names.index(probe), DIRECTIONS.index(direction)]
+            )
+            column = probes.index(probe)
+            temperature[:, column] += values.get(name, 0.0) * slope
+            if name in derivatives:
+                sensitivity[:, column, derivatives.index(name)] += slope
 
     def read(
         self, number: int, candidates: Sequence[Candidate], values: Mapping[str, float], temperature: Array

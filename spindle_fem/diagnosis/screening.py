@@ -83,9 +83,9 @@ class BaseRun:
 
     # ------------------------------------------------------------------ answers
     def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
-        """Channels' answer (G + 1, c, m) to changes of the states (G + 1, r, m) and of the coolant's inlet."""
+        """Channels' answer (G + 1, c, m) to changes of states (G + 1, r, m) and coolant inlet."""
         owner = np.append(self.drive.step_class, self.drive.step_class[-1])
-        column = self.plant.fast.load_names.index("coolant_inlet") if inlet is not None else None
+        column = self.plant.fast.inlet_column if inlet is not None else None
         found = np.zeros((tangent.shape[0], len(self.columns), tangent.shape[2]))
         for number, operators in enumerate(self.run.operators):
             rows = np.flatnonzero(owner == number)
@@ -193,8 +193,9 @@ class BaseRun:
             for row, place in enumerate(term.heat_places):
                 if place == COOLANT_INLET:
                     shift = heat[row] * np.ones(steps)
-                    inlet = self.plant.fast.load_names.index("coolant_inlet")
-                    loads = np.array([operators.loads[:, inlet] for operators in run.operators])
+                    loads = np.array(
+                        [operators.loads[:, self.plant.fast.inlet_column] for operators in run.operators]
+                    )
                     added += shift[:, None] * loads[self.drive.step_class]
                 elif place.startswith(FLUID_PREFIX) and place not in model.place_names:
                     film = model.fluid_names[self._fluid(place)]
@@ -251,7 +252,7 @@ class BaseRun:
         return told - without.temperature
 
     def _steady(self, variants: Sequence[Variant]) -> Array:
-        """Factors on the machine's parameters, capacities, conductances: from derivatives where they do nothing."""
+        """Constant changes of the operators, by their derivatives where they do nothing."""
         terms: list[Term] = []
         names: list[list[tuple[str, float]]] = []
         values = dict(self.values)

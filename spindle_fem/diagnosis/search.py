@@ -1,0 +1,194 @@
+"""Which few of many candidates explain what is left, to first order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.diagnosis.inference import Fit, LinearProblem, Problem
+from spindle_fem.diagnosis.screening import BaseRun, Variant
+
+Array = NDArray[np.float64]
+
+# An effect more must make the data so much likelier (natural logarithm) to be looked at.
+SMALLEST_GAIN = 3.0
+KEPT_FOR_TRIPLES = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Screened:
+    """Candidates against what one fit leaves.
+
+    Attributes
+    ----------
+    variants : tuple of Variant
+    gram : (m, m) ndarray
+        Inner products of their answers, less what the machine's own coordinates absorb.
+    data : (m,) ndarray
+        With the data.
+    total : float
+        Of the data.
+    spread : (m,) ndarray
+        Prior standard deviation of each amplitude in units of its reference.
+    signs : (m,) ndarray
+        1: the amplitude cannot be negative; 0: it can.
+    log_prior : (m,) ndarray
+    """
+
+    variants: tuple[Variant, ...]
+    gram: Array
+    data: Array
+    total: float
+    spread: Array
+    signs: Array
+    log_prior: Array
+
+    def singles(self) -> Array:
+        """Logarithm of the evidence of every variant alone over nothing, priors included, (m,)."""
+        return self._gain(np.arange(len(self.variants))[:, None])
+
+    def _gain(self, sets: NDArray[np.int64]) -> Array:
+        """The same for sets of equal size (k, s)."""
+        size = sets.shape[1]
+        gram = self.gram[sets[:, :, None], sets[:, None, :]]
+        data = self.data[sets]
+        spread = self.spread[sets]
+        scaled = spread[:, :, None] * gram * spread[:, None, :] + np.eye(size)
+        right = spread * data
+        solution = np.linalg.solve(scaled, right[:, :, None])[:, :, 0]
+        _, log_det = np.linalg.slogdet(scaled)
+        gain = 0.5 * np.sum(right * solution, axis=1) - 0.5 * log_det
+        signs = self.signs[sets]
+        allowed = np.all((signs == 0.0) | (solution >= 0.0), axis=1)
+        gain = gain + np.log(2.0) * signs.sum(axis=1) + self.log_prior[sets].sum(axis=1)
+        return np.where(allowed, gain, -np.inf)
+
+    def amplitudes(self, members: Sequence[int]) -> dict[int, float]:
+        """Most probable amplitudes of a set, in units of the references."""
+        sets = np.asarray(members)
+        matrix = self.gram[np.ix_(sets, sets)] + np.diag(1.0 / self.spread[sets] ** 2)
+        found = np.linalg.solve(matrix, self.data[sets])
+        return dict(zip(members, found.tolist(), strict=True))
+
+    def best(self, size: int, number: int) -> list[tuple[tuple[int, ...], float]]:
+        """Best sets of a size with their gains, each combination of effects and places once.
+
+        Parameters
+        ----------
+        size : int
+            1 to 3; triples extend the best pairs.
+        number : int
+        """
+        count = len(self.variants)
+        if size == 1:
+            sets = np.arange(count)[:, None]
+        elif size == 2:
+            first, second = np.triu_indices(count, 1)
+            sets = np.column_stack((first, second))
+        else:
+            pairs = [members for members, _ in self.best(2, KEPT_FOR_TRIPLES)]
+            sets = np.array([(*pair, third) for pair in pairs for third in range(count) if third not in pair])
+            if sets.size == 0:
+                return []
+        sets = sets[self._distinct(sets)]
+        if sets.size == 0:
+            return []
+        gain = np.concatenate([self._gain(chunk) for chunk in np.array_split(sets, 1 + len(sets) // 100_000)])
+        found: dict[frozenset[tuple[str, str]], tuple[tuple[int, ...], float]] = {}
+        for index in np.argsort(-gain)[: 60 * number]:
+            if not np.isfinite(gain[index]):
+                break
+            members = tuple(int(i) for i in sets[index])
+            key = frozenset(self.variants[i].key for i in members)
+            if key not in found:
+                found[key] = (members, float(gain[index]))
+            if len(found) == number:
+                break
+        return list(found.values())
+
+    def _distinct(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Sets of different candidates, no two of one effect at one place."""
+        names = {key: i for i, key in enumerate(dict.fromkeys(v.key for v in self.variants))}
+        label = np.array([names[v.key] for v in self.variants])[sets]
+        keep = np.ones(len(sets), dtype=bool)
+        for i in range(sets.shape[1]):
+            for j in range(i):
+                keep &= label[:, i] != label[:, j]
+        return keep
+
+
+def log_priors(variants: Sequence[Variant], weights: Mapping[str, float]) -> Array:
+    """Logarithm of the prior of each variant given that one effect more is there.
+
+    Every effect has a weight, shared evenly by its places, their forms and
+    starting shapes.
+    """
+    total = sum(weights.values())
+    places: dict[str, set[str]] = {}
+    shapes: dict[tuple[str, str], int] = {}
+    for variant in variants:
+        places.setdefault(variant.candidate.effect, set()).add(variant.candidate.component)
+        shapes[variant.key] = shapes.get(variant.key, 0) + 1
+    return np.array(
+        [
+            np.log(weights[v.candidate.effect] / total)
+            - np.log(len(places[v.candidate.effect]))
+            - np.log(shapes[v.key])
+            for v in variants
+        ]
+    )
+
+
+def screen(problem: Problem, fit: Fit, variants: Sequence[Variant], weights: Mapping[str, float]) -> Screened:
+    """Answers of all variants about a fit, and their inner products.
+
+    Parameters
+    ----------
+    problem : Problem
+    fit : Fit
+        What the model already holds.
+    variants : sequence of Variant
+    weights : mapping of effect to float
+    """
+    known = {c.name for c in fit.coordinates}
+    values = fit.values
+    on_grid = []
+    for number in range(len(problem.plant.recordings)):
+        base = BaseRun(problem.plant, number, {k: v for k, v in values.items() if k in known}, fit.candidates)
+        on_grid.append(base.responses(variants))
+    columns = problem.whitened(on_grid)
+    linear = LinearProblem.about(problem, fit)
+    gram, data, total = linear.gram(columns)
+    spread = np.array([_spread(v) for v in variants])
+    signs = np.array([_one_sided(v) for v in variants])
+    return Screened(tuple(variants), gram, data, total, spread, signs, log_priors(variants, weights))
+
+
+def _spread(variant: Variant) -> float:
+    candidate = variant.candidate
+    item = candidate.parameters[candidate.amplitude]
+    if item.logarithmic:
+        return item.sigma / abs(float(np.log(candidate.reference / candidate.null)))
+    return item.sigma / abs(candidate.reference - candidate.null)
+
+
+def _one_sided(variant: Variant) -> float:
+    candidate = variant.candidate
+    item = candidate.parameters[candidate.amplitude]
+    upwards = candidate.reference > candidate.null
+    bound = item.low if upwards else item.high
+    return 1.0 if bound == candidate.null else 0.0
+
+
+def amplitude_value(variant: Variant, scaled: float) -> float:
+    """Amplitude from one in units of the reference."""
+    candidate = variant.candidate
+    item = candidate.parameters[candidate.amplitude]
+    if item.logarithmic:
+        value = candidate.null * float(np.exp(scaled * np.log(candidate.reference / candidate.null)))
+    else:
+        value = candidate.null + scaled * (candidate.reference - candidate.null)
+    return float(np.clip(value, item.low, item.high))
