@@ -1,0 +1,213 @@
+"""From data and candidates to hypotheses with probabilities.
+
+A beam search: what the best fits so far leave is screened to first order
+against all candidates; the most promising additions are fitted with their full
+terms. Pairs and triples that only make sense together come from the same
+screening.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit, Problem
+from spindle_fem.diagnosis.locate import OnOff, Onsets, Pattern, find_intervals, onset_answers
+from spindle_fem.diagnosis.screening import Variant, variants_of
+from spindle_fem.diagnosis.search import Screened, amplitude_value, screen
+from spindle_fem.effects.base import Candidate, Effect, IntervalEffect
+from spindle_fem.effects.view import MachineView
+from spindle_fem.errors import ConvergenceError, SpecError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+LARGEST_SET = 3
+#: Prior probability of 0, 1, 2 and 3 effects.
+NUMBER_PRIOR = (0.4, 0.35, 0.2, 0.05)
+SINGLES, PAIRS, TRIPLES = 8, 6, 3
+BEAM, ADDITIONS = 3, 4
+# A hypothesis this much less likely (natural logarithm) than the best is not extended.
+HOPELESS = 60.0
+ENOUGH_GAIN = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """A fitted set of candidates.
+
+    Attributes
+    ----------
+    fit : Fit
+    log_prior : float
+        Of the set, with the choice of its intervals.
+    """
+
+    fit: Fit
+    log_prior: float
+
+    @property
+    def score(self) -> float:
+        """Logarithm of evidence times prior."""
+        return self.fit.log_evidence + self.log_prior
+
+    @property
+    def keys(self) -> frozenset[tuple[str, str]]:
+        """Effects and places."""
+        return self.fit.keys
+
+
+@dataclass(slots=True)
+class Search:
+    """Everything that a search needs and has found.
+
+    Attributes
+    ----------
+    problem : Problem
+    view : MachineView
+    candidates : tuple of Candidate
+    interval_effects : tuple of IntervalEffect
+    weights : mapping of effect to float
+        Prior weight of each.
+    found : dict
+        Hypotheses by their keys and forms.
+    """
+
+    problem: Problem
+    view: MachineView
+    effects: Mapping[str, Effect]
+    candidates: tuple[Candidate, ...]
+    interval_effects: tuple[IntervalEffect, ...]
+    weights: Mapping[str, float]
+    progress: Progress = lambda stage: None
+    found: dict[frozenset, Hypothesis] | None = None
+
+    def run(self) -> list[Hypothesis]:
+        """All fitted hypotheses, the most probable first."""
+        self.found = {}
+        null = self.problem.fit()
+        self._keep(Hypothesis(null, float(np.log(NUMBER_PRIOR[0]))))
+        self.progress("diagnosis: screening")
+        self._extend(null, SINGLES, PAIRS, TRIPLES)
+        for size in range(1, LARGEST_SET):
+            ranked = [h for h in self.ranked() if len(h.keys) == size]
+            best = self.ranked()[0].score
+            for hypothesis in ranked[:BEAM]:
+                if hypothesis.score < best - HOPELESS:
+                    continue
+                self.progress(f"diagnosis: {size + 1} effects")
+                self._extend(hypothesis.fit, ADDITIONS, 0, 0)
+        return self.ranked()
+
+    def ranked(self) -> list[Hypothesis]:
+        """Hypotheses, the most probable first."""
+        return sorted(self.found.values(), key=lambda h: -h.score)
+
+    # ------------------------------------------------------------------ steps
+    def _extend(self, fit: Fit, singles: int, pairs: int, triples: int) -> None:
+        """Fit the most promising additions to a hypothesis."""
+        screened, intervals = self.screened(fit)
+        size = len(fit.candidates)
+        tried = 0
+        for number, count in ((1, singles), (2, pairs), (3, triples)):
+            if count == 0 or size + number > LARGEST_SET:
+                continue
+            for members, gain in screened.best(number, count):
+                if gain < ENOUGH_GAIN and tried >= 3:
+                    break
+                tried += 1
+                amplitudes = screened.amplitudes(members)
+                additions = [(screened.variants[i], amplitudes[i]) for i in members]
+                self._try(fit, additions, intervals)
+
+    def screened(self, fit: Fit) -> tuple[Screened, dict[int, OnOff]]:
+        """Candidates, and intervals at every spot, against what a fit leaves."""
+        present = fit.keys
+        allowed = [c for c in self.candidates if (c.effect, c.component) not in present]
+        variants = variants_of(allowed)
+        intervals = {}
+        if not any(isinstance(self.effects[c.effect], IntervalEffect) for c in fit.candidates):
+            for found, candidate in self._interval_candidates(fit):
+                variant = Variant(candidate, {})
+                intervals[id(candidate)] = found
+                variants.append(variant)
+        return screen(self.problem, fit, variants, self.weights), intervals
+
+    def _interval_candidates(self, fit: Fit) -> Iterable[tuple[OnOff, Candidate]]:
+        patterns = [
+            (effect, Pattern(spot, self.view.spots[spot], effect.name == "unrecorded_cooling"))
+            for effect in self.interval_effects
+            for spot in effect.places(self.view)
+        ]
+        found: list[tuple[IntervalEffect, OnOff]] = []
+        for recording in range(len(self.problem.plant.recordings)):
+            answers: list[Onsets] = onset_answers(
+                self.problem, fit, [pattern for _, pattern in patterns], recording
+            )
+            stop = float(self.problem.plant.drives[recording].grid[-1])
+            for (effect, pattern), onsets in zip(patterns, answers, strict=True):
+                probe = effect.over(self.view, pattern.spot, [(0.0, stop)])
+                spread = probe.parameters[probe.amplitude].sigma
+                options = find_intervals(onsets, spread, stop)
+                if options:
+                    found.append((effect, max(options, key=lambda item: item.gain)))
+        found.sort(key=lambda item: -item[1].gain)
+        for effect, item in found[:12]:
+            if item.gain > 0.0:
+                candidate = effect.over(self.view, item.pattern.spot, item.intervals)
+                yield item, replace(candidate, reference=max(item.strength, 1e-3))
+
+    def _try(
+        self, fit: Fit, additions: Sequence[tuple[Variant, float]], intervals: Mapping[int, OnOff]
+    ) -> None:
+        candidates = (*fit.candidates, *(variant.candidate for variant, _ in additions))
+        key = _identity(candidates)
+        start = fit.values
+        paid = 0.0
+        for variant, scaled in additions:
+            factors = {item.name for item in variant.candidate.factors}
+            values = dict(variant.shape) | {variant.candidate.amplitude: amplitude_value(variant, scaled)}
+            start |= {EFFECT_PREFIX + n if n in factors else n: v for n, v in values.items()}
+            if id(variant.candidate) in intervals:
+                paid += intervals_cost(intervals[id(variant.candidate)])
+        if key in self.found:
+            return
+        try:
+            fitted = self.problem.fit(candidates, start)
+        except (ConvergenceError, SpecError):
+            # What cannot be simulated explains nothing; its neighbours are tried.
+            return
+        self._keep(Hypothesis(fitted, self.log_prior(candidates) - paid))
+
+    def _keep(self, hypothesis: Hypothesis) -> None:
+        self.found[_identity(hypothesis.fit.candidates)] = hypothesis
+
+    def log_prior(self, candidates: Sequence[Candidate]) -> float:
+        """Logarithm of the prior of a set."""
+        total = sum(self.weights.values())
+        found = float(np.log(NUMBER_PRIOR[len(candidates)]))
+        for candidate in candidates:
+            effect = self.effects[candidate.effect]
+            if isinstance(effect, IntervalEffect):
+                places, forms = len(effect.places(self.view)), 1
+            else:
+                same = [c for c in self.candidates if c.effect == candidate.effect]
+                places = len({c.component for c in same})
+                forms = sum(c.component == candidate.component for c in same)
+            found += float(np.log(self.weights[candidate.effect] / total / places / max(forms, 1)))
+        # A set counts once, in whatever order it is drawn.
+        return found + float(np.sum(np.log(np.arange(1, len(candidates) + 1))))
+
+
+def intervals_cost(item: OnOff) -> float:
+    """What choosing the intervals costs, as a logarithm."""
+    options = 40 * 41 / 2
+    number = len(item.intervals)
+    return number * float(np.log(options)) - float(np.sum(np.log(np.arange(1, number + 1))))
+
+
+def _identity(candidates: Iterable[Candidate]) -> frozenset:
+    return frozenset((c.effect, c.component, c.form, len(c.free)) for c in candidates)

@@ -1,0 +1,305 @@
+"""Where and when heat is missing: regularised inversion of the residual, place by place.
+
+For every place the answer of all channels to heat that begins at each of a
+row of instants is marched through the linear model. From these answers follow
+
+- the heat over time at that one place which explains the residual best, as a
+  Gaussian random walk whose size the evidence chooses, and how well it does;
+- the intervals of constant heat (or of a constant conductance to the
+  surroundings) that explain it best, by trying every pair of instants.
+
+Source of the random-walk inversion: Tarantola (2005), Inverse Problem Theory,
+chapter 3 (linear Gaussian problems).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.diagnosis.inference import Fit, LinearProblem, Problem
+from spindle_fem.diagnosis.screening import BaseRun
+from spindle_fem.reduced.stepping import group_steps
+
+Array = NDArray[np.float64]
+
+ONSETS = 40
+WALK_SCALES = (1.0, 3.0, 10.0, 30.0, 100.0)
+MOST_INTERVALS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Heat that comes or goes at one spot.
+
+    Attributes
+    ----------
+    spot : str
+    places : tuple of str
+        Of the model, equal parts.
+    cooling : bool
+        True: a unit conductance to the ambient; False: unit heat.
+    """
+
+    spot: str
+    places: tuple[str, ...]
+    cooling: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Onsets:
+    """Inner products of the answers to heat from each instant on, at one spot.
+
+    Attributes
+    ----------
+    pattern : Pattern
+    recording : int
+    times : (k,) ndarray, [s]
+    gram : (k, k) ndarray
+    data : (k,) ndarray
+    """
+
+    pattern: Pattern
+    recording: int
+    times: Array
+    gram: Array
+    data: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """Heat over time at one spot that explains what is left.
+
+    Attributes
+    ----------
+    spot : str
+    recording : int
+    log_evidence : float
+        Over no heat.
+    times : (k,) ndarray, [s]
+    heat : (k,) ndarray, [W]
+        From each time to the next.
+    sigma : (k,) ndarray, [W]
+    """
+
+    spot: str
+    recording: int
+    log_evidence: float
+    times: Array
+    heat: Array
+    sigma: Array
+
+
+@dataclass(frozen=True, slots=True)
+class OnOff:
+    """Intervals of one strength at one spot.
+
+    Attributes
+    ----------
+    pattern : Pattern
+    recording : int
+    intervals : tuple of (float, float), [s]
+    strength : float
+        W, or W/K for cooling.
+    gain : float
+        Logarithm of the evidence over nothing, choice of the instants paid for.
+    """
+
+    pattern: Pattern
+    recording: int
+    intervals: tuple[tuple[float, float], ...]
+    strength: float
+    gain: float
+
+
+def onset_answers(
+    problem: Problem, fit: Fit, patterns: Sequence[Pattern], recording: int, *, number: int = ONSETS
+) -> list[Onsets]:
+    """Inner products of all spots' answers about a fit.
+
+    Parameters
+    ----------
+    problem : Problem
+    fit : Fit
+    patterns : sequence of Pattern
+    recording : int
+        The one in which heat comes and goes.
+    number : int
+        Instants.
+    """
+    base = BaseRun(problem.plant, recording, fit.values, fit.candidates)
+    grid = base.drive.grid
+    onsets = np.linspace(grid[0], grid[-1], number + 1)[:-1]
+    linear = LinearProblem.about(problem, fit)
+    found = []
+    chunk = max(1, 320 // number)
+    for first in range(0, len(patterns), chunk):
+        chosen = patterns[first : first + chunk]
+        answers = _march(base, chosen, onsets)
+        on_grid = [
+            answers
+            if other == recording
+            else np.zeros((problem.plant.drives[other].grid.size, len(columns), answers.shape[2]))
+            for other, columns in enumerate(problem.plant.columns)
+        ]
+        gram, data, _ = linear.gram(problem.whitened(on_grid))
+        for index, pattern in enumerate(chosen):
+            own = slice(index * number, (index + 1) * number)
+            found.append(Onsets(pattern, recording, onsets, gram[own, own], data[own]))
+    return found
+
+
+def _march(base: BaseRun, patterns: Sequence[Pattern], onsets: Array) -> Array:
+    """Answers of the channels, (G + 1, c, n_patterns * n_onsets)."""
+    model, run, drive = base.plant.fast.model, base.run, base.drive
+    loads = np.array([np.mean([model.place(p) for p in pattern.places], axis=0) for pattern in patterns]).T
+    strength = np.ones((drive.grid.size, len(patterns)))
+    for index, pattern in enumerate(patterns):
+        if pattern.cooling:
+            ambient = np.append(base.start_inputs["ambient"], base.end_inputs["ambient"][-1])
+            strength[:, index] = ambient - base.states @ loads[:, index]
+    # Share of each step for which heat that begins at an onset is on.
+    on = np.clip((drive.grid[1:, None] - onsets) / drive.steps[:, None], 0.0, 1.0)
+    steps, size = len(drive.steps), model.size
+    forcing = np.zeros((steps, size, len(patterns), len(onsets)))
+    for key, rows in group_steps(drive.step_class, drive.steps).items():
+        propagator = run.propagators[key]
+        start, end = propagator.from_start @ loads, propagator.from_end @ loads
+        answer = start[None] * strength[rows, None, :] + end[None] * strength[rows + 1, None, :]
+        forcing[rows] = answer[:, :, :, None] * on[rows, None, None, :]
+    tangent = run.tangents(forcing.reshape(steps, size, -1), base.tracks)
+    return base.outputs(tangent)
+
+
+def explain(onsets: Onsets) -> Explanation:
+    """Heat over time at one spot as a random walk from zero.
+
+    The size of its steps is that of the highest evidence among
+    ``WALK_SCALES`` (W a step).
+    """
+    best: tuple[float, float, Array, Array] | None = None
+    count = len(onsets.times)
+    for scale in WALK_SCALES:
+        matrix = np.eye(count) + scale**2 * onsets.gram
+        lower = np.linalg.cholesky(0.5 * (matrix + matrix.T))
+        right = scale * onsets.data
+        solution = np.linalg.solve(matrix, right)
+        evidence = 0.5 * float(right @ solution) - float(np.log(np.diag(lower)).sum())
+        if best is None or evidence > best[0]:
+            best = (evidence, scale, scale * solution, scale**2 * np.linalg.inv(matrix))
+    evidence, _, increments, covariance = best
+    total = np.tril(np.ones((count, count)))
+    heat = total @ increments
+    sigma = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", total, covariance, total), 0.0))
+    return Explanation(
+        onsets.pattern.spot,
+        onsets.recording,
+        evidence - np.log(len(WALK_SCALES)),
+        onsets.times,
+        heat,
+        sigma,
+    )
+
+
+def find_intervals(onsets: Onsets, spread: float, stop: float) -> list[OnOff]:
+    """Best one, two and three intervals of one strength at a spot.
+
+    Parameters
+    ----------
+    onsets : Onsets
+    spread : float
+        Prior standard deviation of the strength, W or W/K; it is positive.
+    stop : float, [s]
+        End of the recording.
+    """
+    count = len(onsets.times)
+    # Heat that never ends again has no closing instant: an answer of zero closes it.
+    gram = np.zeros((count + 1, count + 1))
+    gram[:count, :count] = onsets.gram
+    data = np.append(onsets.data, 0.0)
+    first, last = np.triu_indices(count + 1, 1)
+    pairs = np.column_stack((first, last))
+    times = np.append(onsets.times, stop)
+    chosen: list[int] = []
+    found = []
+    weights = np.zeros(count + 1)
+    for number in range(1, MOST_INTERVALS + 1):
+        allowed = np.ones(len(pairs), dtype=bool)
+        for index in chosen:
+            # At least one instant of rest between two intervals.
+            allowed &= (pairs[:, 0] > pairs[index, 1]) | (pairs[:, 1] < pairs[index, 0])
+        options = np.flatnonzero(allowed)
+        if options.size == 0:
+            break
+        cross = gram @ weights
+        own = gram[first, first] + gram[last, last] - 2.0 * gram[first, last]
+        size = own + 2.0 * (cross[first] - cross[last]) + weights @ gram @ weights
+        overlap = data[first] - data[last] + weights @ data
+        gain = _gain(overlap[options], size[options], spread)
+        best = int(options[np.argmax(gain)])
+        chosen.append(best)
+        weights[first[best]] += 1.0
+        weights[last[best]] -= 1.0
+        square, along = float(weights @ gram @ weights), float(weights @ data)
+        strength = along / (square + 1.0 / spread**2)
+        paid = number * np.log(len(pairs)) - sum(np.log(i) for i in range(1, number + 1))
+        intervals = sorted((float(times[first[i]]), float(times[last[i]])) for i in chosen)
+        found.append(
+            OnOff(
+                onsets.pattern,
+                onsets.recording,
+                tuple(intervals),
+                strength,
+                float(_gain(np.array([along]), np.array([square]), spread)[0]) - paid,
+            )
+        )
+    return found
+
+
+def _gain(overlap: Array, size: Array, spread: float) -> Array:
+    """Logarithm of the evidence of one positive strength over none."""
+    scaled = 1.0 + spread**2 * size
+    gain = 0.5 * spread**2 * overlap**2 / scaled - 0.5 * np.log(scaled) + np.log(2.0)
+    return np.where(overlap > 0.0, gain, -np.inf)
+
+
+def conditions_of(times: Array, speed: Array, temperature: Array) -> list[str]:
+    """What the machine does at each time: standstill, heating, cooling or steady running.
+
+    Parameters
+    ----------
+    times : (n,) ndarray, [s]
+    speed : (n,) ndarray, [rad/s]
+    temperature : (n,) ndarray, [K]
+        Of the machine.
+    """
+    rate = np.gradient(temperature, times) if len(times) > 1 else np.zeros(len(times))
+    limit = max(0.1 * float(np.abs(rate).max(initial=0.0)), 1e-12)
+    words = []
+    for value, slope in zip(speed, rate, strict=True):
+        if value <= 0.0:
+            words.append("standstill")
+        elif slope > limit:
+            words.append("heating")
+        elif slope < -limit:
+            words.append("cooling")
+        else:
+            words.append("steady running")
+    return words
+
+
+def stretches(mask: NDArray[np.bool_], times: Array) -> list[tuple[float, float]]:
+    """Intervals over which a mask holds, from each first to each last true entry."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+    return [(float(times[a]), float(times[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def shares(evidence: Mapping[str, float]) -> dict[str, float]:
+    """Probabilities from logarithms of evidence."""
+    highest = max(evidence.values())
+    weight = {key: float(np.exp(value - highest)) for key, value in evidence.items()}
+    total = sum(weight.values())
+    return {key: value / total for key, value in weight.items()}
