@@ -63,11 +63,12 @@ class Hierarchy:
 
         Parameters
         ----------
-        residual : (n,) float64 ndarray
+        residual : (n,) or (n, m) float64 ndarray
+            Several columns cost far less than one after the other: each matrix
+            is read once for all of them.
         """
-        scale = float(np.abs(residual).max(initial=0.0))
-        if scale == 0.0:
-            return np.zeros_like(residual)
+        scale = np.abs(residual).max(axis=0, initial=0.0)
+        scale = np.where(scale > 0.0, scale, 1.0)
         # scaled, so that small residuals stay inside the range of single precision
         return scale * self._descend(0, (residual / scale).astype(PRECISION)).astype(np.float64)
 
@@ -151,14 +152,15 @@ def _smooth(level: Level, residual: NDArray) -> NDArray:
     centre, half = 0.5 * (high + low), 0.5 * (high - low)
     ratio = centre / half
     rho = 1.0 / ratio
-    step = level.inverse_diagonal * residual
+    inverse_diagonal = level.inverse_diagonal if residual.ndim == 1 else level.inverse_diagonal[:, None]
+    step = inverse_diagonal * residual
     step *= PRECISION(1.0 / centre)
     unknowns = step.copy()
     for _ in range(SMOOTHING_DEGREE - 1):
         residual = residual - level.matrix @ step
         following = 1.0 / (2.0 * ratio - rho)
         step *= PRECISION(following * rho)
-        step += PRECISION(2.0 * following / half) * (level.inverse_diagonal * residual)
+        step += PRECISION(2.0 * following / half) * (inverse_diagonal * residual)
         rho = following
         unknowns += step
     return unknowns

@@ -121,8 +121,8 @@ def _weighted(matrices: tuple[sparse.csr_array, ...], weights: object, size: int
     for matrix, weight in zip(matrices, weights, strict=True):
         if weight != 0.0:
             entries = matrix.tocoo()
-            rows.append(entries.row)
-            columns.append(entries.col)
+            rows.append(entries.row.astype(np.int32, copy=False))
+            columns.append(entries.col.astype(np.int32, copy=False))
             values.append(weight * entries.data)
     if not rows:
         return sparse.csr_array((size, size))

@@ -23,7 +23,13 @@ from spindle_fem.reduced.coefficients import (
 )
 from spindle_fem.reduced.model import ReducedModel, project, reduced_digest, reduced_path
 from spindle_fem.reduced.probe_places import NEAR
-from spindle_fem.reduced.snapshots import Sample, compress, helix_profiles, load_columns, solve_shifted
+from spindle_fem.reduced.snapshots import (
+    Sample,
+    SnapshotSpace,
+    helix_profiles,
+    load_columns,
+    shifted_systems,
+)
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
@@ -37,7 +43,7 @@ class ReductionOptions:
     Attributes
     ----------
     samples : int
-        Sets of coefficients beside the nominal one.
+        Sets of coefficients beside the nominal one; where too few, the checks add some.
     checks : int
         Sets that the basis is not made from.
     sigmas : float
@@ -53,7 +59,7 @@ class ReductionOptions:
         where that is higher, when None.
     """
 
-    samples: int = 8
+    samples: int = 5
     checks: int = 3
     sigmas: float = 3.0
     tolerance: float = 3.0e-6
@@ -78,8 +84,9 @@ SHIFTS = (0.0, 3.0e-4, 3.0e-3)
 FAST_SHIFT = 3.0e-2
 FRICTION_HEAT = 80.0
 PLACE_HEAT = 50.0
-GUESS_TOLERANCE = 1e-4
 GUESS_SIZE = 80
+# Of an error itself.
+CHECK_TOLERANCE = 0.05
 FLUID_RISE = 10.0
 # Of the highest speed; the second is the nominal one.
 SPEED_SHARES = (0.0, 2.0 / 3.0, 0.25, 1.0, 0.45)
@@ -189,9 +196,11 @@ def build_reduced_model(
     Snapshots are full solutions at several Laplace frequencies (moment
     matching, rational Krylov) for every source and fluid at the nominal
     coefficients, and for the physical loads at coefficients drawn over the
-    range; their proper orthogonal decomposition in the energy of the nominal
-    operator is the basis. Where a check at other coefficients errs by more
-    than ``options.error``, its solutions join the snapshots.
+    range, each begun from the projection on those before; their proper
+    orthogonal decomposition in the energy of the nominal operator is the
+    basis. The check corrects projected solutions at other coefficients by the
+    full model; where they err by more than ``options.error``, the full
+    solutions join the snapshots.
 
     Raises
     ------
@@ -211,49 +220,41 @@ def build_reduced_model(
         affine.conduction(nominal.coefficients, nominal.channel_film)
         + 1e-4 * affine.capacity(nominal.capacities)
     ).tocsr()
-    uniform = np.ones((affine.size, 1))
-    snapshots = [_nominal_snapshots(affine, nominal, spec)]
-    # Fields at other coefficients begin as the best combination of those at the nominal ones.
-    known = compress(snapshots[0], energy, GUESS_TOLERANCE, GUESS_SIZE, uniform)
-
-    def exact_at(sample: Sample) -> list[tuple[float, Array]]:
-        loads = physical_loads(affine, sample, spec)
-        return [(shift, solve_shifted(affine, sample, shift, loads, known)) for shift in SHIFTS]
-
+    space = SnapshotSpace(energy, np.ones((affine.size, 1)), chosen.tolerance)
+    _add_nominal(space, affine, nominal, spec)
     for sample in workshop.random_samples(chosen.samples, 1, chosen.sigmas):
-        snapshots += [solution for _, solution in exact_at(sample)]
-    checks = workshop.random_samples(chosen.checks, 2, 0.9 * chosen.sigmas)
-    exact = [exact_at(sample) for sample in checks]
+        # Fields at other coefficients begin as the best combination of those known.
+        known = space.basis(GUESS_SIZE)
+        loads = physical_loads(affine, sample, spec)
+        systems = shifted_systems(affine, sample, SHIFTS, known)
+        space.add(np.hstack([system.solve(loads) for system in systems]))
+    seed = 2
     for attempt in range(3):
         progress("reduced model: basis")
-        basis = compress(
-            np.hstack(snapshots), energy, chosen.tolerance, chosen.largest + 30 * attempt, uniform
-        )
-        one = basis.T @ (energy @ uniform[:, 0])
+        basis = space.basis(chosen.largest + 30 * attempt)
         model = project(
             affine,
             basis,
-            one,
+            basis.T @ (energy @ np.ones(affine.size)),
             cells=machine.builder.cells,
             contacts=tuple(machine.mesh.joints),
             gap_radii=radii,
             ranges=workshop.ranges(),
             digest=reduced_digest(spec, chosen.key(spec)),
         )
-        errors = [
-            _check(affine, model, basis, sample, found, spec)
-            for sample, found in zip(checks, exact, strict=True)
-        ]
-        worst = {key: max(error[key] for error in errors) for key in errors[0]}
+        progress("reduced model: check")
+        worst: dict[str, float] = {}
+        # Solutions that have joined can no longer judge: every round draws others.
+        for sample in workshop.random_samples(chosen.checks, seed, 0.9 * chosen.sigmas):
+            found = _check(affine, basis, sample, spec)
+            worst = {key: max(value, worst.get(key, 0.0)) for key, value in found.errors.items()}
+            if found.errors["probes"] > chosen.error:
+                for solution in found.solutions:
+                    space.add(solution)
+        seed += 100
         model = replace(model, errors=worst)
         if worst["probes"] <= chosen.error:
             return model
-        for number, error in enumerate(errors):
-            if error["probes"] > chosen.error:
-                snapshots += [solution for _, solution in exact[number]]
-        # Solutions that have joined can no longer judge: draw others.
-        checks = workshop.random_samples(chosen.checks, 100 + len(snapshots), 0.9 * chosen.sigmas)
-        exact = [exact_at(sample) for sample in checks]
     raise ConvergenceError(
         "reduced model",
         f"its probes still err by {worst['probes']:.3g} K with {model.size} basis vectors.",
@@ -279,16 +280,19 @@ def _source_places(affine: AffineSystem, spec: MachineSpec) -> tuple[list[str], 
     return friction, other
 
 
-def _nominal_snapshots(affine: AffineSystem, nominal: Sample, spec: MachineSpec) -> Array:
+def _add_nominal(space: SnapshotSpace, affine: AffineSystem, nominal: Sample, spec: MachineSpec) -> None:
+    """Every source and fluid by itself at the nominal coefficients."""
     friction, other = _source_places(affine, spec)
     heat = FRICTION_HEAT * load_columns(affine, friction)
     fluids = [nominal.coefficients[name] * FLUID_RISE * load for name, load in affine.fluid_load.items()]
     columns = [heat, PLACE_HEAT * load_columns(affine, other), np.array(fluids).reshape(-1, affine.size).T]
     columns.append(_coolant_loads(affine, nominal, 5))
     loads = np.hstack(columns)
-    found = [solve_shifted(affine, nominal, shift, loads) for shift in SHIFTS]
-    found.append(solve_shifted(affine, nominal, FAST_SHIFT, heat))
-    return np.hstack(found)
+    known = None
+    for shift in (*SHIFTS, FAST_SHIFT):
+        [system] = shifted_systems(affine, nominal, [shift], known)
+        space.add(system.solve(heat if shift == FAST_SHIFT else loads))
+        known = space.basis(GUESS_SIZE)
 
 
 def _coolant_loads(affine: AffineSystem, sample: Sample, degree: int) -> Array:
@@ -312,27 +316,34 @@ def physical_loads(affine: AffineSystem, sample: Sample, spec: MachineSpec) -> A
     return np.column_stack([*columns, *coolant.T])
 
 
-def _check(
-    affine: AffineSystem,
-    model: ReducedModel,
-    basis: Array,
-    sample: Sample,
-    exact: list[tuple[float, Array]],
-    spec: MachineSpec,
-) -> dict[str, float]:
-    """Largest error of each kind over loads and frequencies."""
-    loads = basis.T @ physical_loads(affine, sample, spec)
-    weights = np.array([sample.coefficients[name] for name in model.coefficient_names])
-    conduction = np.einsum("c,cij->ij", weights, model.operators)
-    conduction += np.einsum("c,cij->ij", sample.channel_film, model.cell_film)
-    capacities = np.array([sample.capacities[name] for name in model.storage_names])
-    storage = np.einsum("c,cij->ij", capacities, model.storage)
+@dataclass(frozen=True, slots=True)
+class _Check:
+    """A basis against the full model at one sample.
+
+    Attributes
+    ----------
+    errors : mapping of str to float, [K]
+        Largest over loads and frequencies, by what was compared.
+    solutions : tuple of (n, m) ndarray
+        Of the full model.
+    """
+
+    errors: dict[str, float]
+    solutions: tuple[Array, ...]
+
+
+def _check(affine: AffineSystem, basis: Array, sample: Sample, spec: MachineSpec) -> _Check:
+    """Correct the projected solutions by the full model; the corrections are the errors."""
+    loads = physical_loads(affine, sample, spec)
     worst = {"probes": 0.0, "places": 0.0}
-    for shift, full in exact:
-        small = np.linalg.solve(conduction + shift * storage, loads)
-        worst["probes"] = max(worst["probes"], _largest(model.probes @ small - affine.probes @ full))
-        worst["places"] = max(worst["places"], _largest(model.places @ small - affine.places @ full))
-    return worst
+    solutions = []
+    for system in shifted_systems(affine, sample, SHIFTS, basis):
+        projected = basis @ np.linalg.solve(system.projected, basis.T @ loads)
+        missing = system.correct(loads, projected, CHECK_TOLERANCE)
+        worst["probes"] = max(worst["probes"], _largest(affine.probes @ missing))
+        worst["places"] = max(worst["places"], _largest(affine.places @ missing))
+        solutions.append(projected + missing)
+    return _Check(worst, tuple(solutions))
 
 
 def _largest(values: Array) -> float:

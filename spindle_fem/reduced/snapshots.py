@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import eigh
 
-from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear
+from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_many
 from spindle_fem.reduced.affine import AffineSystem
 
 Array = NDArray[np.float64]
 
-# Of the residual; a field of tens of kelvin is then right to some 1e-5 K.
-SOLVER_TOLERANCE = 1e-8
+# Of a solution's norm in energy: a field of tens of kelvin is then right to some 1e-4 K.
+# Tighter ones changed no checked error in its third digit.
+SOLVER_TOLERANCE = 3e-5
+# Directions below this share of what the basis drops are dropped at once.
+KEPT_SHARE = 0.3
+# What projecting twice leaves of a solution that is already held.
+ROUND_OFF = 1e-11
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,77 +40,120 @@ class Sample:
     capacities: dict[str, float]
 
 
-def solve_shifted(
-    affine: AffineSystem, sample: Sample, shift: float, loads: Array, known: Array | None = None
-) -> Array:
-    """``(K + s M)⁻¹ F`` column by column.
+@dataclass(frozen=True, slots=True)
+class ShiftedSystem:
+    """``K + s M`` of one sample, and what is known of its solutions.
+
+    Attributes
+    ----------
+    shift : float, [1/s]
+    matrix : (n, n) csr_array
+    known : (n, k) ndarray
+        Independent fields from which first guesses are combined.
+    projected : (k, k) ndarray
+        The matrix on them.
+    affine : AffineSystem
+    """
+
+    shift: float
+    matrix: sparse.csr_array
+    known: Array
+    projected: Array
+    affine: AffineSystem
+
+    def solve(self, loads: Array) -> Array:
+        """``(K + s M)⁻¹ F``, (n, m) [K], from loads (n, m) [W]."""
+        guesses = None
+        if self.known.shape[1]:
+            guesses = self.known @ np.linalg.solve(self.projected, self.known.T @ loads)
+        return self._iterate(loads, guesses, SOLVER_TOLERANCE)
+
+    def correct(self, loads: Array, solutions: Array, relative_tolerance: float) -> Array:
+        """What is missing from approximate solutions, to a share of it, (n, m) [K]."""
+        return self._iterate(loads - self.matrix @ solutions, None, relative_tolerance)
+
+    def _iterate(self, loads: Array, guesses: Array | None, relative_tolerance: float) -> Array:
+        preconditioner = build_preconditioner(self.affine.system(self.matrix))
+        return solve_many(self.matrix, loads, preconditioner, guesses, relative_tolerance=relative_tolerance)
+
+
+def shifted_systems(
+    affine: AffineSystem, sample: Sample, shifts: Sequence[float], known: Array | None = None
+) -> Iterator[ShiftedSystem]:
+    """Systems of one sample at several Laplace frequencies.
 
     Parameters
     ----------
     affine : AffineSystem
     sample : Sample
-    shift : float, [1/s]
-    loads : (n, m) ndarray, [W]
+    shifts : sequence of float, [1/s]
     known : (n, k) ndarray, optional
-        Independent fields from which the first guesses are combined.
-
-    Returns
-    -------
-    (n, m) ndarray, [K]
+        See :class:`ShiftedSystem`.
     """
-    matrix = affine.conduction(sample.coefficients, sample.channel_film)
-    if shift > 0.0:
-        matrix = matrix + shift * affine.capacity(sample.capacities)
-    matrix = matrix.tocsr()
-    guesses = np.zeros_like(loads)
-    if known is not None:
-        guesses = known @ np.linalg.solve(known.T @ (matrix @ known), known.T @ loads)
-    preconditioner = build_preconditioner(affine.system(matrix))
-    solved = np.empty_like(loads)
-    for column in range(loads.shape[1]):
-        solved[:, column] = solve_linear(
-            matrix,
-            loads[:, column],
-            preconditioner,
-            guesses[:, column],
-            relative_tolerance=SOLVER_TOLERANCE,
-        ).unknowns
-    return solved
+    conduction = affine.conduction(sample.coefficients, sample.channel_film)
+    capacity = affine.capacity(sample.capacities)
+    fields = np.zeros((affine.size, 0)) if known is None else known
+    parts = [fields.T @ (matrix @ fields) for matrix in (conduction, capacity)]
+    for shift in shifts:
+        matrix = conduction + shift * capacity if shift > 0.0 else conduction
+        yield ShiftedSystem(shift, matrix.tocsr(), fields, parts[0] + shift * parts[1], affine)
 
 
-def compress(
-    snapshots: Array, energy: sparse.csr_array, tolerance: float, largest: int, keep: Array
-) -> Array:
-    """Energy-orthonormal basis of snapshots by proper orthogonal decomposition.
+class SnapshotSpace:
+    """Solutions gathered so far, in an energy-orthonormal basis that grows with them.
 
     Parameters
     ----------
-    snapshots : (n, m) ndarray
-        Each scaled to the size at which it occurs.
     energy : (n, n) csr_array
         Symmetric positive definite inner product.
-    tolerance : float, [-]
-        Singular values below this share of the largest are dropped.
-    largest : int
-        Vectors at most.
     keep : (n, q) ndarray
-        Vectors that the basis must hold exactly.
-
-    Returns
-    -------
-    (n, r) ndarray
+        Vectors that every basis must hold exactly.
+    tolerance : float, [-]
+        Singular values below this share of the largest are not wanted.
     """
-    fixed = orthonormalise(keep, energy)
-    rest = snapshots - fixed @ (fixed.T @ (energy @ snapshots))
-    gram = rest.T @ (energy @ rest)
-    values, vectors = eigh(0.5 * (gram + gram.T))
-    order = np.argsort(values)[::-1]
-    values, vectors = values[order], vectors[:, order]
-    number = int(np.count_nonzero(np.sqrt(np.maximum(values, 0.0)) > tolerance * np.sqrt(values[0])))
-    number = min(number, largest - fixed.shape[1])
-    modes = rest @ (vectors[:, :number] / np.sqrt(values[:number]))
-    # Once more: the smallest modes have lost orthogonality to round-off.
-    return orthonormalise(np.hstack((fixed, modes)), energy)
+
+    def __init__(self, energy: sparse.csr_array, keep: Array, tolerance: float) -> None:
+        self._energy = energy
+        self._tolerance = tolerance
+        self._directions = orthonormalise(keep, energy)
+        self._kept = keep.shape[1]
+        self._coordinates = np.zeros((self._kept, 0))
+
+    def add(self, snapshots: Array) -> None:
+        """Let solutions join, (n, m), each scaled to the size at which it occurs."""
+        coordinates = self._directions.T @ (self._energy @ snapshots)
+        rest = snapshots - self._directions @ coordinates
+        image = self._energy @ rest
+        gram = rest.T @ image
+        values, vectors = eigh(0.5 * (gram + gram.T))
+        size = max(np.sum(block[self._kept :] ** 2) for block in (self._coordinates, coordinates))
+        wanted = (KEPT_SHARE * self._tolerance) ** 2 * (size + values.clip(min=0.0).sum())
+        chosen = values > max(wanted, ROUND_OFF**2 * np.sum(coordinates**2))
+        turn = vectors[:, chosen] / np.sqrt(values[chosen])
+        fresh, image = rest @ turn, image @ turn
+        # Once more: the smallest directions have lost orthogonality to round-off.
+        fresh -= self._directions @ (self._directions.T @ image)
+        fresh = orthonormalise(fresh, self._energy)
+        added = turn.T @ gram if chosen.any() else np.zeros((0, snapshots.shape[1]))
+        old = np.vstack((self._coordinates, np.zeros((fresh.shape[1], self._coordinates.shape[1]))))
+        self._coordinates = np.hstack((old, np.vstack((coordinates, added))))
+        self._directions = np.hstack((self._directions, fresh))
+
+    def basis(self, largest: int, tolerance: float | None = None) -> Array:
+        """Proper orthogonal decomposition, (n, r), what must be held first.
+
+        Parameters
+        ----------
+        largest : int
+            Vectors at most.
+        tolerance : float, optional
+            Singular values below this share of the largest are dropped; that
+            of the space when None.
+        """
+        kept, rest = self._directions[:, : self._kept], self._directions[:, self._kept :]
+        vectors, values, _ = np.linalg.svd(self._coordinates[self._kept :], full_matrices=False)
+        wanted = np.count_nonzero(values > (tolerance or self._tolerance) * values.max(initial=0.0))
+        return np.hstack((kept, rest @ vectors[:, : min(int(wanted), largest - self._kept)]))
 
 
 def orthonormalise(vectors: Array, energy: sparse.csr_array) -> Array:

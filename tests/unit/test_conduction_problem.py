@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from spindle_fem.conduction.assemble import assemble_capacity, assemble_system
 from spindle_fem.conduction.balance import require_balance
-from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear
+from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear, solve_many
 from spindle_fem.conduction.multigrid import largest_eigenvalue
 from spindle_fem.conduction.nonlinear import film_heat_flux, linearise_films
 from spindle_fem.conduction.operators import build_operators
@@ -241,3 +242,47 @@ def test_film_law_that_runs_away_is_an_error():
     laws = (FilmLaw("outer.outer", lambda t: 40.0 / (1.0 + np.maximum(t - 293.15, 0.0)), 293.15),)
     with pytest.raises(ConvergenceError, match="film laws: temperatures still change"):
         solve_steady(replace(PROBLEM, films=(), film_laws=laws, surface_heat={"inner.inner": 600.0}))
+
+
+@pytest.fixture(scope="module")
+def quadratic_system():
+    """Several levels of multigrid, and a lumped node."""
+    operators = build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((3, 2), 30, 4)), 2)
+    node = LumpedNode("balls", (("inner.z0", 100.0), ("outer.z0", 100.0)), heat=10.0)
+    return assemble_system(replace(PROBLEM, operators=operators, lumped_nodes=(node,))).tied()
+
+
+@pytest.mark.parametrize("method", ["direct", "multigrid"])
+def test_several_loads_at_once_are_solved_as_one_by_one(quadratic_system, method):
+    system, matrix = quadratic_system, sparse.csr_array(quadratic_system.full_matrix())
+    preconditioner = build_preconditioner(system, method)
+    rng = np.random.default_rng(0)
+    loads = rng.normal(size=(matrix.shape[0], 30)) * np.logspace(-6.0, 6.0, 30)
+    solved = solve_many(matrix, loads, preconditioner, relative_tolerance=1e-9)
+    for column in (0, 17, 29):
+        single = solve_linear(matrix, loads[:, column], preconditioner).unknowns
+        error = solved[:, column] - single
+        assert error @ (matrix @ error) <= 1e-17 * (single @ loads[:, column])
+
+
+def test_loads_that_converge_early_leave_and_zero_ones_stay_zero(quadratic_system):
+    system, matrix = quadratic_system, sparse.csr_array(quadratic_system.full_matrix())
+    preconditioner = build_preconditioner(system, "multigrid")
+    exact = np.random.default_rng(1).normal(size=(matrix.shape[0], 3))
+    loads = matrix @ exact
+    loads[:, 1] = 0.0
+    guesses = np.column_stack((exact[:, 0], np.zeros(len(exact)), 0.9 * exact[:, 2]))
+    solved = solve_many(matrix, loads, preconditioner, guesses, relative_tolerance=1e-8)
+    assert not solved[:, 1].any()
+    assert solved[:, 0] == pytest.approx(exact[:, 0], abs=1e-6)
+    assert solved[:, 2] == pytest.approx(exact[:, 2], abs=1e-6)
+
+
+def test_several_loads_that_do_not_converge_are_refused(quadratic_system):
+    system, matrix = quadratic_system, sparse.csr_array(quadratic_system.full_matrix())
+    preconditioner = build_preconditioner(system, "multigrid")
+    loads = np.random.default_rng(2).normal(size=(matrix.shape[0], 4))
+    with pytest.raises(ConvergenceError, match=r"of the solution after 2 iterations.*Asked: 1.0e-12"):
+        solve_many(matrix, loads, preconditioner, relative_tolerance=1e-12, max_iterations=2)
+    with pytest.raises(ConvergenceError, match="not positive definite"):
+        solve_many((-1.0 * matrix).tocsr(), loads, preconditioner, relative_tolerance=1e-6)

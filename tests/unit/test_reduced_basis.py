@@ -12,7 +12,7 @@ from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.affine import build_affine_system
 from spindle_fem.reduced.coefficients import build_coefficient_table
 from spindle_fem.reduced.model import reduced_digest
-from spindle_fem.reduced.snapshots import compress, helix_profiles, orthonormalise
+from spindle_fem.reduced.snapshots import SnapshotSpace, helix_profiles, orthonormalise
 from spindle_fem.spec.load import load_machine
 from spindle_fem.surroundings.rotating import rotating_film
 
@@ -30,8 +30,10 @@ def test_the_basis_is_orthonormal_in_energy_and_holds_what_it_must(energy):
     rng = np.random.default_rng(1)
     keep = np.ones((80, 1))
     snapshots = rng.normal(size=(80, 6)) @ rng.normal(size=(6, 30))
-    # Singular values come from a Gram matrix: below 1e-8 of the largest they are round-off.
-    basis = compress(snapshots, energy, 1e-6, 40, keep)
+    space = SnapshotSpace(energy, keep, 1e-6)
+    for first in range(0, 30, 10):
+        space.add(snapshots[:, first : first + 10])
+    basis = space.basis(40)
     assert basis.shape[1] == 7
     assert basis.T @ (energy @ basis) == pytest.approx(np.eye(7), abs=1e-12)
     for vectors in (keep, snapshots):
@@ -39,17 +41,46 @@ def test_the_basis_is_orthonormal_in_energy_and_holds_what_it_must(energy):
         assert np.abs(rest).max() < 1e-9
 
 
-def test_what_is_dropped_is_as_small_as_was_asked(energy):
+@pytest.mark.parametrize("portions", [1, 4])
+def test_what_is_dropped_is_as_small_as_was_asked(energy, portions):
     rng = np.random.default_rng(2)
     directions = orthonormalise(rng.normal(size=(80, 20)), energy)
     sizes = 10.0 ** -np.arange(20)
-    basis = compress(directions * sizes, energy, 1e-5, 60, np.ones((80, 1)))
+    space = SnapshotSpace(energy, np.ones((80, 1)), 1e-5)
+    for block in np.array_split(directions * sizes, portions, axis=1):
+        space.add(block)
+    basis = space.basis(60)
     rest = directions * sizes
     rest = rest - basis @ (basis.T @ (energy @ rest))
     left = np.sqrt(np.sum(rest * (energy @ rest), axis=0))
     assert left.max() <= 1.01e-5
     assert basis.shape[1] <= 8
-    assert compress(directions, energy, 1e-12, 5, np.ones((80, 1))).shape[1] == 5
+    assert space.basis(5).shape[1] == 5
+
+
+def test_the_best_directions_are_those_of_all_solutions_together(energy):
+    rng = np.random.default_rng(3)
+    snapshots = rng.normal(size=(80, 12)) * np.logspace(0.0, -4.0, 12)
+    keep = np.ones((80, 1))
+    space = SnapshotSpace(energy, keep, 1e-9)
+    for column in range(0, 12, 3):
+        space.add(snapshots[:, column : column + 3])
+    basis = space.basis(6)
+    # Independent: singular values of the whole in the Cholesky factor's coordinates.
+    factor = np.linalg.cholesky(energy.toarray()).T
+    fixed = factor @ keep
+    rest = factor @ snapshots
+    rest -= fixed @ np.linalg.lstsq(fixed, rest, rcond=None)[0]
+    values = np.linalg.svd(rest, compute_uv=False)
+    left = factor @ (snapshots - basis @ (basis.T @ (energy @ snapshots)))
+    assert np.linalg.norm(left) == pytest.approx(np.sqrt(np.sum(values[5:] ** 2)), rel=1e-6)
+
+
+def test_an_empty_space_has_what_must_be_held(energy):
+    space = SnapshotSpace(energy, np.ones((80, 1)), 1e-6)
+    assert space.basis(10).shape == (80, 1)
+    space.add(np.full((80, 2), 3.0))
+    assert space.basis(10).shape == (80, 1)
 
 
 def test_shapes_along_the_channel_are_polynomials_of_each_start_alone():
