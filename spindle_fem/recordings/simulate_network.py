@@ -138,12 +138,14 @@ def _gain_unit_faults(network: ThermalNetwork, units: dict[str, str], where: str
     return faults
 
 
-def magnitude_history(network: ThermalNetwork, recording: Recording) -> InputHistory:
-    """The inputs a network needs, rotational speeds without their direction.
+def magnitude_history(
+    network: ThermalNetwork, recording: Recording, names: tuple[str, ...] | None = None
+) -> InputHistory:
+    """The inputs a network needs, or others by name, rotational speeds without their direction.
 
     Friction and windage do not know which way a spindle turns.
     """
-    history = recording.input_history(network.input_names)
+    history = recording.input_history(network.input_names if names is None else names)
     units = dict(zip(recording.input_names, recording.input_units, strict=True))
     values = history.values.copy()
     for column, name in enumerate(history.names):

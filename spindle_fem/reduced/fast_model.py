@@ -18,6 +18,7 @@ from spindle_fem.reduced.coolant import CoolantMaps, coolant_maps, film_derivati
 from spindle_fem.reduced.drive import Drive, heat_of_table
 from spindle_fem.reduced.model import ReducedModel
 from spindle_fem.reduced.natural import natural_film_terms
+from spindle_fem.reduced.stepping import build_propagator
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.spec.parameters import uncertain_parameters
 
@@ -256,6 +257,8 @@ class FastModel:
             output_inputs[self._outlet_row, friction] = maps.outlet_constant
 
     # ----------------------------------------------------------------- inputs
+    propagator = staticmethod(build_propagator)
+
     @property
     def inlet_column(self) -> int:
         """Position of the coolant's inlet among the load inputs."""

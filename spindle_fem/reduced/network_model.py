@@ -25,6 +25,7 @@ from spindle_fem.recordings.simulate_network import (
     require_compatible,
 )
 from spindle_fem.reduced.drive import LARGEST_STEP, STANDARD, Drive, inputs_on_steps
+from spindle_fem.reduced.exact_step import build_exact_propagator
 from spindle_fem.reduced.fast_model import NO_CHANGES, ClassOperators
 from spindle_fem.reduced.network_parts import (
     LINK,
@@ -205,6 +206,8 @@ class NetworkFastModel:
         return self.load_names.index(f"boundary.{self.ambient_boundary}")
 
     # ----------------------------------------------------------------- inputs
+    propagator = staticmethod(build_exact_propagator)
+
     @property
     def inlet_column(self) -> None:
         """A network has no coolant."""

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.reduced.exact_step import ExactPropagator
+
 Array = NDArray[np.float64]
 
 GAMMA = 2.0 - np.sqrt(2.0)
@@ -81,7 +83,7 @@ def build_propagator(storage: Array, conduction: Array, step: float) -> Propagat
     )
 
 
-def load_response(propagator: Propagator, start: Array, end: Array, loads: Array) -> Array:
+def load_response(propagator: Propagator | ExactPropagator, start: Array, end: Array, loads: Array) -> Array:
     """What linear loads add to ``u_1`` in many equal steps.
 
     Parameters
@@ -97,15 +99,19 @@ def load_response(propagator: Propagator, start: Array, end: Array, loads: Array
     return start @ (propagator.from_start @ loads).T + end @ (propagator.from_end @ loads).T
 
 
-def stage_values(propagator: Propagator, before: Array, start: Array, end: Array, loads: Array) -> Array:
-    """``u_γ`` of many equal steps, (n, r), from the values before each."""
+def stage_values(
+    propagator: Propagator | ExactPropagator, before: Array, start: Array, end: Array, loads: Array
+) -> Array:
+    """What :func:`sensitivity_forcing` needs of equal steps: ``u_γ`` (n, r); of exact ones, the loads."""
+    if isinstance(propagator, ExactPropagator):
+        return propagator.load_values(start, end, loads)
     weight = SHARE * propagator.step
     matrix = propagator.inverse @ loads
     return before @ propagator.stage.T + weight * ((2.0 - GAMMA) * start + GAMMA * end) @ matrix.T
 
 
 def sensitivity_forcing(
-    propagator: Propagator,
+    propagator: Propagator | ExactPropagator,
     before: Array,
     stage: Array,
     after: Array,
@@ -119,7 +125,7 @@ def sensitivity_forcing(
     Parameters
     ----------
     before, stage, after : (n, r) ndarray
-        ``u_0``, ``u_γ`` and ``u_1`` of each step.
+        ``u_0``, :func:`stage_values` and ``u_1`` of each step.
     conduction_by, storage_by : (r, r) ndarray or None
         Derivatives of the matrices.
     load_start, load_end : (n, r) ndarray or None
@@ -129,6 +135,8 @@ def sensitivity_forcing(
     -------
     (n, r) ndarray
     """
+    if isinstance(propagator, ExactPropagator):
+        return propagator.forcing(before, stage, conduction_by, storage_by, load_start, load_end)
     weight = SHARE * propagator.step
     carried, inverse = propagator.carried, propagator.inverse
     found = np.zeros_like(before)
