@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from spindle_fem.recordings.checks import ChannelNoise
@@ -59,6 +59,28 @@ class ChannelDefects:
 
 
 @dataclass(frozen=True, slots=True)
+class Thinning:
+    """What averaging over bins of time did.
+
+    Attributes
+    ----------
+    step_s : float
+    rows, bins : int
+        Before and after.
+    missing : int
+        Means (bin and channel) that stand for too few readings.
+    readings_left_out : int
+        Readings that carried a flag, or were missing, and entered no mean.
+    """
+
+    step_s: float
+    rows: int
+    bins: int
+    missing: int
+    readings_left_out: int
+
+
+@dataclass(frozen=True, slots=True)
 class DefectReport:
     """Everything that reading found, row by row and channel by channel.
 
@@ -84,6 +106,8 @@ class DefectReport:
         Stretches between gaps longer than ``long_gap_s``.
     unused_columns : tuple of str
     channels : tuple of ChannelDefects
+    thinned : Thinning or None
+        Where the recording was averaged since; everything else is of the file.
     """
 
     name: str
@@ -104,6 +128,7 @@ class DefectReport:
     segments: int
     unused_columns: tuple[str, ...]
     channels: tuple[ChannelDefects, ...]
+    thinned: Thinning | None = None
 
     def channel(self, column: str) -> ChannelDefects:
         """Defects of one column."""
@@ -133,6 +158,12 @@ class DefectReport:
             + (f" (longest {_duration(longest)})" if self.gaps else "")
             + f", {self.segments} segments"
         )
+        if self.thinned is not None:
+            text.append(
+                f"averaged over {self.thinned.step_s:g} s: {self.thinned.bins} bins, "
+                f"{self.thinned.missing} means missing, "
+                f"{self.thinned.readings_left_out} readings left out"
+            )
         if self.unused_columns:
             text.append("columns not in the manifest: " + ", ".join(self.unused_columns))
         for item in self.channels:
@@ -152,6 +183,7 @@ class DefectReport:
         content: dict[str, Any] = {name: getattr(self, name) for name in _PLAIN}
         content["gaps"] = [{"start_s": gap.start, "end_s": gap.end} for gap in self.gaps]
         content["unused_columns"] = list(self.unused_columns)
+        content["thinned"] = None if self.thinned is None else asdict(self.thinned)
         content["channels"] = [
             {
                 "channel": item.column,
