@@ -9,18 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from spindle_fem.loads.model import BearingHeat
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.spec.model import BearingSet, MachineSpec
+from spindle_fem.spec.seats import seat_diameter
+from spindle_fem.spec.solids import Material, SetBearing
 from spindle_fem.tribology import mounting
-from spindle_fem.tribology.bearing import BearingGeometry
+from spindle_fem.tribology.bearing import STEEL_EXPANSION, BearingGeometry
 from spindle_fem.tribology.bearing_set import solve_bearing_set
 from spindle_fem.tribology.contact_heat import ball_conductance
+from spindle_fem.tribology.fits import RingFits
 from spindle_fem.tribology.grease import Lubricant
 from spindle_fem.tribology.heat import HeatOptions
+from spindle_fem.tribology.rings import SeatMaterial
 from spindle_fem.tribology.state import BearingState
 from spindle_fem.validity import CodedWarning
 
@@ -151,9 +156,13 @@ class BearingMechanics:
         found: dict[str, BearingState] = {}
         for group in self.spec.bearing_set:
             around = [temperatures[bearing.name] for bearing in group.bearing]
-            set_temperatures = self._expanded(around) if expand else self._as_assembled(around)
+            mounted = self.sets[group.name]
+            if expand:
+                set_temperatures = self._expanded(around, group.assembly_temperature)
+            else:
+                set_temperatures, mounted = self._as_assembled(around), mounted.with_rigid_rings()
             states = solve_bearing_set(
-                self.sets[group.name],
+                mounted,
                 point.speed,
                 point.thrust if group.carries_thrust else 0.0,
                 set_temperatures,
@@ -165,13 +174,17 @@ class BearingMechanics:
         return found
 
     @staticmethod
-    def _expanded(around: list[BearingTemperatures]) -> mounting.SetTemperatures:
+    def _expanded(around: list[BearingTemperatures], assembly: float) -> mounting.SetTemperatures:
         return mounting.SetTemperatures(
             bearings=tuple(
-                mounting.BearingTemperatures(item.inner, item.outer, item.ball) for item in around
+                mounting.BearingTemperatures(
+                    item.inner, item.outer, item.ball, shaft_seat=item.shaft, housing_seat=item.housing
+                )
+                for item in around
             ),
             shaft=float(np.mean([item.shaft for item in around])),
             housing=float(np.mean([item.housing for item in around])),
+            assembly=assembly,
         )
 
     @staticmethod
@@ -197,6 +210,7 @@ class BearingMechanics:
         kinds = {
             bearing.name: self.spec.bearing_types[group.bearing_type] for group, bearing in self.spec.bearings
         }
+        grease = self.spec.grease
         heat, warnings = {}, []
         for name, state in states.items():
             ring = self.spec.materials[kinds[name].ring_material].thermal_conductivity
@@ -206,7 +220,7 @@ class BearingMechanics:
                 self.lubricant,
                 ring_conductivity=ring,
                 ball_conductivity=ball,
-                wetted_share=self.spec.grease.free_volume_fill,
+                wetted_share=grease.free_volume_fill if grease.wetted_share is None else grease.wetted_share,
             )
             balls = state.balls
             terms = {term: factors[name] * value for term, value in state.heat.terms.items()}
@@ -243,6 +257,8 @@ def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
         young_modulus=kind.young_modulus,
         poisson_ratio=kind.poisson_ratio,
         density=spec.materials[kind.ball_material].density,
+        thermal_expansion=spec.materials[kind.ring_material].thermal_expansion,
+        ball_thermal_expansion=spec.materials[kind.ball_material].thermal_expansion,
         bore_diameter=kind.bore_diameter,
         outer_diameter=kind.outer_diameter,
         width=kind.width,
@@ -255,27 +271,54 @@ def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
                 geometry,
                 _ORIENTATION[bearing.takes_thrust],
                 0.5 * (bearing.z[0] + bearing.z[1]),
+                _ring_fits(spec, group, bearing),
             )
             for bearing in group.bearing
         ),
         preload=group.preload,
         preload_kind=group.preload_kind,
+        shaft_expansion=_seat_expansion(spec, group, "inner"),
+        housing_expansion=_seat_expansion(spec, group, "outer"),
         shaft_bore_diameter=_shaft_bore(spec, group),
         raceway_roughness=kind.roughness_raceway,
         ball_roughness=kind.roughness_ball,
     )
 
 
+def _ring_fits(spec: MachineSpec, group: BearingSet, bearing: SetBearing) -> RingFits | None:
+    """Seats of one bearing's rings; None where the set has no fit."""
+    if group.fit is None:
+        return None
+    kind = spec.bearing_types[group.bearing_type]
+    shaft, shaft_bore = seat_diameter(spec, kind, bearing, "inner")
+    housing, wall = seat_diameter(spec, kind, bearing, "outer")
+    own = group.fit.housing_outer_diameter
+    return RingFits(
+        inner_interference=group.fit.inner_interference,
+        outer_clearance=group.fit.outer_clearance,
+        housing_outer_diameter=wall if own is None else own,
+        shaft_bore_diameter=shaft_bore,
+        inner_ring_outer_diameter=kind.inner_ring_outer_diameter,
+        outer_ring_inner_diameter=kind.outer_ring_inner_diameter,
+        ring_density=spec.materials[kind.ring_material].density,
+        shaft=_seat_material(spec.part_material(shaft)),
+        housing=_seat_material(spec.part_material(housing)),
+    )
+
+
+def _seat_material(material: Material) -> SeatMaterial:
+    return SeatMaterial(
+        material.young_modulus, material.poisson_ratio, material.density, material.thermal_expansion
+    )
+
+
+def _seat_expansion(spec: MachineSpec, group: BearingSet, side: Literal["inner", "outer"]) -> float:
+    """Thermal expansion of what carries the set, 1/K; steel's where its rings sit on no part."""
+    seat = seat_diameter(spec, spec.bearing_types[group.bearing_type], group.bearing[0], side)
+    return STEEL_EXPANSION if seat is None else spec.part_material(seat[0]).thermal_expansion
+
+
 def _shaft_bore(spec: MachineSpec, group: BearingSet) -> float | None:
     """Bore of the rotating part that carries the set; None under a solid shaft."""
-    bore = spec.bearing_types[group.bearing_type].bore_diameter
-    middle = 0.5 * (group.bearing[0].z[0] + group.bearing[0].z[1])
-    for part in spec.part:
-        for segment in part.segment:
-            if (
-                part.rotating
-                and segment.z[0] <= middle <= segment.z[1]
-                and abs(segment.outer_diameter - bore) < 1e-6
-            ):
-                return segment.inner_diameter or None
-    return None
+    seat = seat_diameter(spec, spec.bearing_types[group.bearing_type], group.bearing[0], "inner")
+    return None if seat is None else seat[1] or None

@@ -10,6 +10,7 @@ from typing import Any
 from spindle_fem.errors import SpecError, SpindleFemError, UnknownSurfaceError, did_you_mean
 from spindle_fem.spec.model import BearingType, MachineSpec, Probe
 from spindle_fem.spec.schema import names_of
+from spindle_fem.spec.seats import seat_faults
 
 _LISTS = ("part", "bearing_set", "joint", "surface", "film", "gap", "factor", "probe")
 _TOLERANCE = 1.0e-9
@@ -177,6 +178,8 @@ def _bearings(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError
                     f"spans {width * 1e3:g} mm.",
                     f'Allowed: {kind.width * 1e3:g} mm, the width of "{group.bearing_type}".',
                 )
+        if group.fit is not None:
+            yield from seat_faults(spec, group, kind)
     carriers = [group.name for group in spec.bearing_set if group.carries_thrust]
     if spec.bearing_set and len(carriers) != 1 and "bearing_set" not in declared.unsound:
         yield SpecError(

@@ -38,6 +38,8 @@ GrooveCurvature = quantity_field("", at_least=0.505, at_most=0.6)
 PoissonRatio = quantity_field("", at_least=0.0, at_most=0.5)
 PathFill = quantity_field("", at_least=0.0, at_most=0.3)
 FilmStarvation = quantity_field("", at_least=0.1, at_most=1.0)
+ThermalExpansion = quantity_field("1/K", at_least=0.0, at_most=1.0e-4)
+FitDiameter = quantity_field("m", at_least=-1.0e-3, at_most=1.0e-3)
 
 
 class Material(SpecModel):
@@ -49,6 +51,12 @@ class Material(SpecModel):
     """Constant over temperature."""
     specific_heat_capacity: SpecificHeat
     """Constant over temperature."""
+    young_modulus: Pressure = 206.0e9
+    """Where bearings sit with a `fit`; rings take that of their type."""
+    poisson_ratio: PoissonRatio = 0.3
+    """Where bearings sit with a `fit`; rings take that of their type."""
+    thermal_expansion: ThermalExpansion = 12.5e-6
+    """Linear, for rings, balls, shaft and housing with `heat.thermal_preload`."""
 
     @property
     def volumetric_heat_capacity(self) -> float:
@@ -241,6 +249,23 @@ class BallRow(SpecModel):
         return self
 
 
+class Fit(SpecModel):
+    """Seats of a set's rings, cold and at rest.
+
+    With `heat.thermal_preload` they change with temperature and speed, rings
+    and seats give way as thick-walled cylinders do, and `contact_angle` is that
+    of the unmounted bearing. Without it, or without a fit, rings are rigid and
+    `contact_angle` is that of the mounted one.
+    """
+
+    inner_interference: FitDiameter
+    """Of the inner rings on the shaft, on the diameter; negative: clearance."""
+    outer_clearance: FitDiameter
+    """Of the outer rings in the housing, on the diameter; negative: interference."""
+    housing_outer_diameter: PositiveLength | None = None
+    """Of the wall around the outer rings; that of the part they sit in where none is given."""
+
+
 class BearingSet(SpecModel):
     """Bearings mounted and preloaded against one another."""
 
@@ -252,6 +277,10 @@ class BearingSet(SpecModel):
     """Force through the set; bearings in tandem share it."""
     preload_kind: Literal["rigid", "spring"] = "rigid"
     """Held by a distance (rings, locknut) or by a force (springs)."""
+    fit: Fit | None = None
+    """How its rings sit; rigid rings where none is given."""
+    assembly_temperature: Temperature = 293.15
+    """At which preload and fits are measured."""
     carries_thrust: Flag = False
     """Exactly one set of a machine takes the external thrust."""
     heat_factor: UncertainNumber = Uncertain(1.0)
@@ -294,7 +323,9 @@ class Grease(SpecModel):
     path_fill: PathFill = 0.01
     """Share of the balls' path that grease fills once channelled; it drags on the balls."""
     free_volume_fill: Fraction = 0.3
-    """Share of the bearing's free volume that grease fills; it wets the balls."""
+    """Share of the bearing's free volume that grease fills."""
+    wetted_share: Fraction | None = None
+    """Share of the balls' surface in grease, half of it to each raceway; the fill where none is given."""
     thermal_conductivity: Conductivity = 0.14
     """Of the base oil."""
     temperature_limit: Temperature = 393.15
@@ -323,6 +354,7 @@ __all__ = [
     "BallRow",
     "BearingSet",
     "BearingType",
+    "Fit",
     "Grease",
     "Material",
     "Part",

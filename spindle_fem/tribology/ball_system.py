@@ -10,7 +10,7 @@ shaft displacement of a whole preloaded set) that enters every ball through
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.tribology.bearing import BearingGeometry
 from spindle_fem.tribology.hertz import INNER, OUTER, contact_polynomials
+from spindle_fem.tribology.rings import RingCompliance, RingLaw
 
 FloatArray = NDArray[np.float64]
 
@@ -42,6 +43,9 @@ class BallSystem:
     smoothing : float, [m]
         Width over which contact sets in; above 0 only on the way to a
         solution, where a free ball would leave the Newton matrix singular.
+    rings : RingCompliance or None
+        Displacements that are raceway growths, held by rings that give way;
+        None: rigid rings.
     """
 
     ball_diameter: FloatArray
@@ -57,6 +61,7 @@ class BallSystem:
     radial_map: FloatArray
     polynomials: FloatArray
     smoothing: float = 0.0
+    rings: RingCompliance | None = None
 
     @property
     def number(self) -> int:
@@ -155,12 +160,27 @@ def build_ball_rows(
     }
 
 
-def join_rows(rows: list[dict[str, FloatArray]], displacements: list[int]) -> BallSystem:
-    """One system of several bearings' rows that keeps the displacements named by index."""
+def join_rows(
+    rows: list[dict[str, FloatArray]], displacements: list[int], laws: Sequence[RingLaw | None] = ()
+) -> BallSystem:
+    """One system of several bearings' rows that keeps the displacements named by index.
+
+    Every bearing with a ring law gets one displacement more, the growth of its
+    inner raceway over the outer one, counted from ``start``.
+    """
     joined = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-    joined["axial_map"] = np.ascontiguousarray(joined["axial_map"][:, displacements])
-    joined["radial_map"] = np.ascontiguousarray(joined["radial_map"][:, displacements])
-    return BallSystem(**joined)
+    axial_map, radial_map = joined["axial_map"][:, displacements], joined["radial_map"][:, displacements]
+    seated = [index for index, law in enumerate(laws) if law is not None]
+    rings = None
+    if seated:
+        bearing = np.repeat(np.arange(len(rows)), [len(row["weight"]) for row in rows])
+        growth = (bearing[:, None] == np.array(seated)).astype(float)
+        columns = axial_map.shape[1] + np.arange(len(seated))
+        axial_map = np.hstack([axial_map, np.zeros_like(growth)])
+        radial_map = np.hstack([radial_map, growth])
+        rings = RingCompliance.of([laws[index] for index in seated], columns)
+    joined |= {"axial_map": np.ascontiguousarray(axial_map), "radial_map": np.ascontiguousarray(radial_map)}
+    return BallSystem(**joined, rings=rings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -300,13 +320,13 @@ def solve_bordered(
     lever = np.maximum(np.abs(system.axial_map).max(axis=0), np.abs(system.radial_map).max(axis=0))
     x, q = unknowns.copy(), displacement.copy()
     current = evaluate(x, *system.groove_distances(q))
-    ring = _ring_residual(system, current, load)
+    ring = _ring_residual(system, current, load, q)
     merit = _merit(current, ring, row_scale, load_scale)
     iterations, fresh = 0, True
-    tangent = _tangent(system, current)[0]
+    tangent = _tangent(system, current, q)[0]
     while iterations < max_iterations and merit > tolerance:
         iterations += 1
-        tangent, solved_residual, solved_distance = _tangent(system, current)
+        tangent, solved_residual, solved_distance = _tangent(system, current, q)
         if len(q):
             p = x.shape[1]
             force_change = -np.einsum("nij,nj->ni", current.by_unknown[:, p:, :], solved_residual)
@@ -325,8 +345,9 @@ def solve_bordered(
         fraction = min(1.0, step_limit / largest) if largest > 0.0 else 1.0
         fresh = False
         for _ in range(9):
-            trial = evaluate(x + fraction * step_x, *system.groove_distances(q + fraction * step_q))
-            trial_ring = _ring_residual(system, trial, load)
+            trial_q = q + fraction * step_q
+            trial = evaluate(x + fraction * step_x, *system.groove_distances(trial_q))
+            trial_ring = _ring_residual(system, trial, load, trial_q)
             trial_merit = _merit(trial, trial_ring, row_scale, load_scale)
             if trial_merit < merit * (1.0 - 1e-3 * fraction):
                 fresh = True
@@ -336,7 +357,7 @@ def solve_bordered(
             break
         x, q = x + fraction * step_x, q + fraction * step_q
         current, ring, merit = trial, trial_ring, trial_merit
-    tangent = _tangent(system, current)[0]
+    tangent = _tangent(system, current, q)[0]
     return BorderedSolution(x, q, merit, bool(merit < accept), iterations, tangent)
 
 
@@ -349,9 +370,14 @@ def _solve_rings(tangent: FloatArray, right: FloatArray) -> FloatArray:
     return step if np.isfinite(step).all() else np.linalg.lstsq(tangent, right, rcond=1e-14)[0]
 
 
-def _ring_residual(system: BallSystem, evaluation: Evaluation, load: FloatArray) -> FloatArray:
+def _ring_residual(
+    system: BallSystem, evaluation: Evaluation, load: FloatArray, displacement: FloatArray
+) -> FloatArray:
     weighted = system.weight[:, None] * evaluation.ring_force
-    return system.axial_map.T @ weighted[:, 0] + system.radial_map.T @ weighted[:, 1] - load
+    residual = system.axial_map.T @ weighted[:, 0] + system.radial_map.T @ weighted[:, 1] - load
+    if system.rings is not None:
+        residual[system.rings.columns] -= system.rings.force(displacement)[0]
+    return residual
 
 
 def _merit(evaluation: Evaluation, ring: FloatArray, row_scale: FloatArray, load_scale: FloatArray) -> float:
@@ -362,7 +388,9 @@ def _merit(evaluation: Evaluation, ring: FloatArray, row_scale: FloatArray, load
     return merit if np.isfinite(merit) else np.inf
 
 
-def _tangent(system: BallSystem, evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _tangent(
+    system: BallSystem, evaluation: Evaluation, displacement: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Ring stiffness with the balls eliminated, and J_xx⁻¹R, J_xx⁻¹J_xA of every ball."""
     p = evaluation.residual.shape[1]
     if p:
@@ -380,4 +408,7 @@ def _tangent(system: BallSystem, evaluation: Evaluation) -> tuple[FloatArray, Fl
         stiffness = evaluation.by_distance
     maps = np.stack([system.axial_map, system.radial_map], axis=1)
     tangent = np.einsum("n,nia,nij,njb->ab", system.weight, maps, stiffness, maps)
+    if system.rings is not None:
+        columns = system.rings.columns
+        tangent[columns, columns] += system.rings.force(displacement)[1]
     return tangent, solved_residual, solved_distance

@@ -12,6 +12,7 @@ from spindle_fem.errors import NoEquilibriumError, SpecError
 from spindle_fem.tribology.ball_system import build_ball_rows, join_rows
 from spindle_fem.tribology.bearing import BearingGeometry
 from spindle_fem.tribology.equilibrium import Equilibrium, RacewayControl, solve_equilibrium
+from spindle_fem.tribology.fits import FitTemperatures, mounted_state, seated_rings
 from spindle_fem.tribology.grease import Lubricant
 from spindle_fem.tribology.heat import HeatOptions
 from spindle_fem.tribology.mounting import (
@@ -23,6 +24,7 @@ from spindle_fem.tribology.mounting import (
     rotation_growth,
     uniform_temperatures,
 )
+from spindle_fem.tribology.rings import RingLaw
 from spindle_fem.tribology.set_problem import SetProblem, start_displacement
 from spindle_fem.tribology.state import BearingState
 from spindle_fem.tribology.state_report import build_states, lubricant_state, require_seated
@@ -242,7 +244,7 @@ def _build_problem(
     middle = float(np.mean([bearing.axial_position for bearing in bearing_set.bearings]))
     shaft_rise = temperatures.shaft - temperatures.assembly
     housing_rise = temperatures.housing - temperatures.assembly
-    rows = []
+    rows, laws, growths = [], [], []
     for bearing, heat, approach in zip(bearing_set.bearings, temperatures.bearings, approaches, strict=True):
         geometry, sign = bearing.geometry, bearing.orientation
         position = bearing.axial_position - middle
@@ -256,12 +258,17 @@ def _build_problem(
         single = external.is_axial
         count = geometry.ball_count
         azimuth = np.zeros(1) if single else 2.0 * np.pi * np.arange(count) / count
+        law, growth = _ring_law(bearing_set, bearing, heat, temperatures, speed, external)
+        laws.append(law)
+        if law is not None:
+            growths.append(growth)
         rows.append(
             build_ball_rows(
                 geometry, azimuth, float(count) if single else 1.0,
                 ring_rise=(heat.inner_ring - temperatures.assembly, heat.outer_ring - temperatures.assembly),
                 ball_rise=heat.ball - temperatures.assembly,
-                radial_growth=rotation_growth(geometry, speed, bearing_set.shaft_bore_diameter),
+                radial_growth=rotation_growth(geometry, speed, bearing_set.shaft_bore_diameter)
+                if law is None else 0.0,
                 axial_offset=approach + thermal,
                 orientation=sign,
                 axial_position=position,
@@ -269,8 +276,9 @@ def _build_problem(
             | {"azimuth": azimuth}
         )  # fmt: skip
     columns = [0] if external.is_axial else [0, 1, 2, 3, 4]
-    system = join_rows([{k: v for k, v in row.items() if k != "azimuth"} for row in rows], columns)
+    system = join_rows([{k: v for k, v in row.items() if k != "azimuth"} for row in rows], columns, laws)
     load = np.array([external.thrust, external.radial, 0.0, external.moment, 0.0])[columns]
+    load = np.append(load, np.zeros(len(growths)))
     spring = bearing_set.preload_kind == "spring" and bearing_set.has_counter_bearings
     if spring:
         sides = np.repeat([b.orientation for b in bearing_set.bearings], [len(row["weight"]) for row in rows])
@@ -280,7 +288,42 @@ def _build_problem(
             radial_map=np.hstack([system.radial_map, np.zeros_like(floating)]),
         )  # fmt: skip
         load = np.append(load, bearing_set.preload)
-    return SetProblem(bearing_set, rows, system, load, spring, _ball_load(bearing_set, external))
+    return SetProblem(
+        bearing_set, rows, system, load, spring, _ball_load(bearing_set, external), np.array(growths)
+    )
+
+
+def _ring_law(
+    bearing_set: BearingSet,
+    bearing: MountedBearing,
+    heat: BearingTemperatures,
+    temperatures: SetTemperatures,
+    speed: float,
+    external: ExternalLoad,
+) -> tuple[RingLaw | None, float]:
+    """How the rings of a bearing give way, and the growth to look for first (m); None for rigid rings."""
+    if bearing.fits is None:
+        return None, 0.0
+    rise = FitTemperatures(
+        *(
+            kelvin - temperatures.assembly
+            for kelvin in (
+                heat.inner_ring,
+                heat.outer_ring,
+                temperatures.shaft if heat.shaft_seat is None else heat.shaft_seat,
+                temperatures.housing if heat.housing_seat is None else heat.housing_seat,
+            )
+        )
+    )
+    geometry = bearing.geometry
+    # the outer ring carries the balls' own centrifugal force too; they orbit as in pure rolling
+    orbital = 0.5 * speed * (1.0 - geometry.diameter_ratio * math.cos(geometry.contact_angle))
+    centrifugal = 0.5 * geometry.ball_count * geometry.ball_mass * geometry.pitch_diameter * orbital**2
+    law = seated_rings(geometry, bearing.fits).law(rise, speed, centrifugal)
+    beside = sum(1 for other in bearing_set.bearings if other.orientation == bearing.orientation)
+    force = (bearing_set.preload or abs(external.thrust)) / beside
+    radial = mounted_state(geometry, bearing.fits, force).radial_force if force > 0.0 else 0.0
+    return law, law.growth(radial)
 
 
 def _ball_load(bearing_set: BearingSet, external: ExternalLoad) -> float:

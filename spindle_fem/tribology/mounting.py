@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import SpecError
 from spindle_fem.tribology.bearing import STEEL_EXPANSION, BearingGeometry
+from spindle_fem.tribology.fits import RingFits, mounted_state, seated_rings
 from spindle_fem.tribology.preload import require_force, tandem_approach
 from spindle_fem.tribology.surface import SurfaceRoughness, roughness_from_rms
 
@@ -30,14 +31,19 @@ class MountedBearing:
         +1: shaft motion towards +z loads it.
     axial_position : float, [m]
         Of the bearing's middle along z.
+    fits : RingFits or None
+        Seats of its rings; None: rigid rings that keep their size on any seat.
     """
 
     name: str
     geometry: BearingGeometry
     orientation: int = 1
     axial_position: float = 0.0
+    fits: RingFits | None = None
 
     def __post_init__(self) -> None:
+        if self.fits is not None:
+            seated_rings(self.geometry, self.fits)
         if self.orientation not in (1, -1):
             raise SpecError(f"{self.name}.orientation", f"it is {self.orientation}.", "Allowed: 1, -1.")
 
@@ -105,26 +111,45 @@ class BearingSet:
             return self.roughness
         return roughness_from_rms(self.raceway_roughness) + roughness_from_rms(self.ball_roughness)
 
+    def with_rigid_rings(self) -> BearingSet:
+        """The same set on rings that keep their size: the contact angle is that of the mounted bearing."""
+        return replace(self, bearings=tuple(replace(bearing, fits=None) for bearing in self.bearings))
+
     def assembly_approaches(self) -> FloatArray:
-        """Axial approach of each bearing after assembly, (n_bearings,), m."""
-        approach = {}
+        """Axial approach of each bearing after assembly, (n_bearings,), m.
+
+        Counts from where the unmounted bearing touches. Bearings with fits share
+        the force of their side equally, as matched rings do.
+        """
+        approach = np.zeros(len(self.bearings))
+        if self.preload == 0.0:
+            return approach
         for side in (1, -1):
-            group = tuple(b.geometry for b in self.bearings if b.orientation == side)
-            approach[side] = tandem_approach(group, self.preload) if group and self.preload else 0.0
-        return np.array([approach[bearing.orientation] for bearing in self.bearings])
+            group = [index for index, bearing in enumerate(self.bearings) if bearing.orientation == side]
+            together = tandem_approach(tuple(self.bearings[index].geometry for index in group), self.preload)
+            for index in group:
+                bearing = self.bearings[index]
+                approach[index] = together
+                if bearing.fits is not None:
+                    share = self.preload / len(group)
+                    approach[index] = mounted_state(bearing.geometry, bearing.fits, share).approach
+        return approach
 
 
 @dataclass(frozen=True, slots=True)
 class BearingTemperatures:
     """Temperatures of one bearing, K.
 
-    ``lubricant`` None: the mean of rings and balls.
+    ``lubricant`` None: the mean of rings and balls. ``shaft_seat`` and
+    ``housing_seat`` None: shaft and housing of the set.
     """
 
     inner_ring: float
     outer_ring: float
     ball: float
     lubricant: float | None = None
+    shaft_seat: float | None = None
+    housing_seat: float | None = None
 
     @property
     def film(self) -> float:

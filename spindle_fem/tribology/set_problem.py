@@ -24,7 +24,8 @@ class SetProblem:
     """Ball rows of every bearing, joined, with the load on the displacements.
 
     ``ball_load`` is the size of the largest ball load at rest, N; ``spring``
-    adds the floating outer rings as the last displacement.
+    adds the floating outer rings as the last displacement; ``ring_growth`` is
+    where the raceways of bearings with fits are looked for, m.
     """
 
     bearing_set: BearingSet
@@ -33,12 +34,13 @@ class SetProblem:
     load: FloatArray
     spring: bool
     ball_load: float
+    ring_growth: FloatArray
 
 
 def start_displacement(problem: SetProblem, where: str) -> FloatArray:
     """Displacements at rest under the axial part of the load."""
     system, load = problem.system, problem.load
-    displacement = np.zeros(system.axial_map.shape[1])
+    displacement = _unloaded(problem)
     axial = problem.spring or not problem.bearing_set.has_counter_bearings
 
     def approach_of(side: int, force: float) -> float:
@@ -72,13 +74,21 @@ def start_displacement(problem: SetProblem, where: str) -> FloatArray:
             displacement[0] = side * (approach if alpha_free else tandem_approach(group, abs(load[0])))
     else:
         displacement[0] = _balanced_shift(problem, load[0], where)
-    if len(load) >= 5 and load[1] != 0.0:
+    if len(problem.rows[0]["weight"]) > 1 and load[1] != 0.0:
         geometry = problem.bearing_set.bearings[0].geometry
         count = float(system.weight.sum())
         share = 4.37 * abs(load[1]) / (count * math.cos(geometry.contact_angle))
         guess = (share / mean_load_constant(geometry)) ** (2.0 / 3.0)
         loosened = 0.0 if load[0] or problem.bearing_set.preload else 1.0
         displacement[1] = math.copysign(guess * (loosened or 0.3), load[1])
+    return displacement
+
+
+def _unloaded(problem: SetProblem) -> FloatArray:
+    """No motion of the shaft; raceways grown as expected."""
+    displacement = np.zeros(problem.system.axial_map.shape[1])
+    if problem.system.rings is not None:
+        displacement[problem.system.rings.columns] = problem.ring_growth
     return displacement
 
 
@@ -96,12 +106,12 @@ def _row_sides(problem: SetProblem) -> NDArray[np.int64]:
 
 def _balanced_shift(problem: SetProblem, thrust: float, where: str) -> float:
     """Shaft displacement of a rigid set that balances the thrust at rest, m."""
-    system = problem.system
-    direction = np.zeros(system.axial_map.shape[1])
+    system, base = problem.system, _unloaded(problem)
+    direction = np.zeros_like(base)
     direction[0] = 1.0
 
     def excess(shift: float) -> float:
-        axial, radial = system.groove_distances(direction * shift)
+        axial, radial = system.groove_distances(base + direction * shift)
         force = static_evaluation(system, axial, radial).ring_force[:, 0]
         return float(system.axial_map[:, 0] @ (system.weight * force)) - thrust
 

@@ -158,8 +158,8 @@ def build_states(
         total = bearing_heat_record.total if bearing_heat_record is not None else 0.0
         free = geometry.curvature_centre_distance * math.sin(geometry.contact_angle)
         radial_shift = 0.0
-        if len(solved.displacement) >= 5:
-            radial_shift = float(system.radial_map[part][0] @ solved.displacement)
+        if len(weight) > 1:
+            radial_shift = float(system.radial_map[part][0, :5] @ solved.displacement[:5])
         states.append(
             BearingState(
                 bearing.name, geometry, speed, float(np.mean(distance[0][part])) - free, radial_shift,

@@ -1,0 +1,89 @@
+"""Fits, expansion and assembly temperature in a machine definition."""
+
+import math
+
+import pytest
+
+from spindle_fem.errors import BadInputError
+from spindle_fem.loads.bearing_heat import BearingMechanics, BearingTemperatures
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.spec.load import load_machine
+from spindle_fem.spec.seats import seat_diameter
+
+
+def mechanics(*settings: str) -> tuple[BearingMechanics, OperatingPoint]:
+    spec = load_machine("wu_tan_2016", settings)
+    return BearingMechanics(spec), OperatingPoint.of(spec)
+
+
+def everywhere(machine: BearingMechanics, celsius: float) -> dict[str, BearingTemperatures]:
+    kelvin = celsius + 273.15
+    return {bearing.name: BearingTemperatures(*(kelvin,) * 5) for _, bearing in machine.spec.bearings}
+
+
+def test_fits_of_the_reference_spindle_find_their_parts() -> None:
+    spec = load_machine("wu_tan_2016")
+    kind = spec.bearing_types["71928_CD"]
+    front = spec.bearing_set[0]
+    assert [seat_diameter(spec, kind, bearing, "outer") for bearing in front.bearing] == [
+        ("housing", 0.380), ("housing", 0.300), ("housing", 0.300),
+    ]  # fmt: skip
+    assert seat_diameter(spec, kind, front.bearing[0], "inner") == ("shaft", 0.060)
+    fits = BearingMechanics(spec).sets["front"].bearings[1].fits
+    assert (fits.inner_interference, fits.outer_clearance) == pytest.approx((8e-6, 5e-6))
+    assert (fits.housing.young_modulus, fits.housing.thermal_expansion) == pytest.approx((110e9, 10.5e-6))
+    assert fits.shaft.young_modulus == pytest.approx(206e9)
+
+
+def test_fits_act_with_thermal_preload_only() -> None:
+    with_fit, point = mechanics()
+    without, _ = mechanics("bearing_set.front.fit=none", "bearing_set.rear.fit=none")
+    warm = everywhere(with_fit, 30.0)
+    angle = {
+        (fit, expand): machine.states(point, warm, expand=expand)["F1"].contact_angle_inner
+        for fit, machine in (("fit", with_fit), ("none", without))
+        for expand in (True, False)
+    }
+    assert angle["fit", False] == angle["none", False]
+    assert angle["fit", True] < angle["none", True] - math.radians(0.2)
+
+
+def test_assembly_temperature_moves_the_neutral_state() -> None:
+    """Steel shaft in iron housing: what is assembled warm loosens the housing less when warm."""
+    cold, point = mechanics()
+    warm, _ = mechanics("bearing_set.front.assembly_temperature=30 degC")
+    state = {
+        name: machine.states(point, everywhere(cold, 30.0), expand=True)["F3"].preload
+        for name, machine in (("cold", cold), ("warm", warm))
+    }
+    # 10 K above assembly the steel rings have grown 2e-6/K more than the iron around them
+    assert state["cold"] > state["warm"]
+
+
+def test_wetted_share_sets_the_way_of_heat_through_the_grease() -> None:
+    paths = {}
+    for share in ("none", "0", "0.3", "0.6"):
+        machine, point = mechanics(f"grease.wetted_share={share}")
+        paths[share] = machine(point, everywhere(machine, 30.0))[0]["F1"].conductance_inner
+    assert paths["none"] == paths["0.3"]
+    assert paths["0.6"] - paths["0.3"] == pytest.approx(paths["0.3"] - paths["0"])
+    assert 0.5 < paths["0"] < 2.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["bearing_set.front.fit.inner_interference=2 mm"], "Allowed: -0.001 to 0.001 m."),
+        (["bearing_set.front.fit.outer_clearance=5 N"], "5 N"),
+        (["bearing_set.front.fit.play=5 um"], "bearing_set.front.fit.play"),
+        (
+            ["part.shaft.segment.front_seat.outer_diameter=139 mm"],
+            "bearing_set.front.fit: the inner ring of F1 sits on no part: none has a face of 140 mm there.",
+        ),
+        (["materials.cast_iron.thermal_expansion=12 K"], "thermal_expansion"),
+    ],
+)
+def test_bad_fits_are_refused(settings: list[str], message: str) -> None:
+    with pytest.raises(BadInputError) as caught:
+        load_machine("wu_tan_2016", settings)
+    assert message in str(caught.value)
