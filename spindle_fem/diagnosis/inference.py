@@ -27,7 +27,9 @@ Array = NDArray[np.float64]
 # Whitened residuals beyond this count linearly.
 OUTLIER_SIGMAS = 3.0
 MOST_ITERATIONS = 30
+# A step that gains less, or less than this share of the misfit, is the last.
 SMALLEST_GAIN = 0.02
+SMALLEST_SHARE = 3.0e-4
 LARGEST_MOVE = 2.0
 THETA_BOUND = 4.0
 
@@ -111,6 +113,8 @@ class Fit:
         Up to what all hypotheses share.
     misfit : float
         Robust sum of squared whitened residuals.
+    misfit_with_prior : float
+        The same with the squared distance from what was known before.
     residual : (n,) ndarray
         Whitened.
     slow : SlowError
@@ -122,6 +126,7 @@ class Fit:
     covariance: Array
     log_evidence: float
     misfit: float
+    misfit_with_prior: float
     residual: Array
     slow: SlowError
 
@@ -287,7 +292,7 @@ class Problem:
                 if largest < 1e-6:
                     break
                 damping *= 10.0
-            if not improved or gain < SMALLEST_GAIN:
+            if not improved or gain < SMALLEST_GAIN + SMALLEST_SHARE * cost:
                 break
         if not np.isfinite(cost):
             raise ConvergenceError("diagnosis", "a hypothesis cannot be simulated at any of its parameters.")
@@ -309,6 +314,7 @@ class Problem:
             0.5 * (covariance + covariance.T),
             -0.5 * cost - 0.5 * log_det + log_root + one_sided,
             float(np.sum(_huber(residual))),
+            cost,
             residual,
             self.slow,
         )

@@ -18,9 +18,11 @@ from spindle_fem.calibration.noise import ChannelBins, SlowError, channel_bins, 
 from spindle_fem.effects.base import Candidate, Reading
 from spindle_fem.effects.term import Term
 from spindle_fem.recordings.align import Recording
+from spindle_fem.reduced.coefficients import INNER_SHARE
 from spindle_fem.reduced.drive import Drive, classes_of, drive_of_recording
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.transient import FastTransient, TransientRun, grid_weights
+from spindle_fem.spec.parameters import UncertainParameter, uncertain_parameters
 
 Array = NDArray[np.float64]
 
@@ -125,6 +127,13 @@ class Plant:
     def with_model(self, fast: FastModel) -> Plant:
         """The same recordings on another reduction of the same machine."""
         return Plant(fast, self.recordings, self.use, step=self.step, drives=self.drives)
+
+    def uncertain(self) -> list[tuple[UncertainParameter, float]]:
+        """The machine's uncertain parameters, each with the highest factor that it may have."""
+        return [
+            (item, 0.999 / item.value if item.name == INNER_SHARE else np.inf)
+            for item in uncertain_parameters(self.fast.spec)
+        ]
 
     # ---------------------------------------------------------------- simulation
     def initial_temperature(self, number: int) -> float:

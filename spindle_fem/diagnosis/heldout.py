@@ -1,0 +1,58 @@
+"""Which readings a diagnosis does not look at, to show afterwards what it predicts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import SpecError
+from spindle_fem.recordings.align import Recording
+
+BLOCKS = 20
+EVERY = 4
+FIRST = 2
+
+
+def heldout_stamps(recording: Recording, choice: str = "blocks") -> tuple[NDArray[np.bool_], str]:
+    """Stamps that are held out, and how they were chosen, in words.
+
+    Parameters
+    ----------
+    recording : Recording
+    choice : str
+        ``blocks``: every fourth of twenty equal stretches of time; ``last:0.4``:
+        the last 40 % of the time (any share up to 0.8).
+
+    Returns
+    -------
+    (N,) bool ndarray
+    str
+
+    Raises
+    ------
+    SpecError
+        Another choice.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from types import SimpleNamespace
+    >>> held, how = heldout_stamps(SimpleNamespace(times=np.arange(20.0)), "last:0.25")
+    >>> int(held.sum()), how
+    (5, 'the last 25 % of the time')
+    """
+    times = recording.times
+    begin, duration = float(times[0]), float(times[-1] - times[0])
+    share = np.clip((times - begin) / max(duration, 1e-9), 0.0, 1.0)
+    if choice == "blocks":
+        block = np.minimum((share * BLOCKS).astype(int), BLOCKS - 1)
+        text = f"every {EVERY}th of {BLOCKS} stretches of {duration / BLOCKS / 60.0:.0f} min"
+        return block % EVERY == FIRST, text
+    kind, _, amount = choice.partition(":")
+    try:
+        part = float(amount)
+    except ValueError:
+        part = -1.0
+    if kind != "last" or not 0.0 < part <= 0.8:
+        raise SpecError("heldout", f'"{choice}".', 'Allowed: "blocks", or "last:0.4" (a share up to 0.8).')
+    return share > 1.0 - part, f"the last {100.0 * part:.0f} % of the time"

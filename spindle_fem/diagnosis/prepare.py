@@ -1,0 +1,94 @@
+"""From a machine and its recordings to a problem that can be searched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.calibration.noise import SlowError, likely_slow_error
+from spindle_fem.diagnosis.inference import THETA_BOUND, Belief, Coordinate, Fit, Problem
+from spindle_fem.diagnosis.plant import Plant
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+# Holes for probes are drilled and sensors fill them to about a millimetre.
+PROBE_PLACE_SIGMA = 1.0e-3
+# Error that neighbouring readings share: of logger and sensor, and of the model against its machine.
+EXPECTED_SLOW = SlowError(0.045, 1500.0)
+SLOW_SIGMAS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13)
+SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """What the calibration recordings told.
+
+    Attributes
+    ----------
+    belief : Belief
+    slow : SlowError
+    fit : Fit or None
+        None without calibration recordings.
+    """
+
+    belief: Belief
+    slow: SlowError
+    fit: Fit | None
+
+
+def machine_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
+    """The machine's uncertain parameters, and the places of the probes."""
+    found = [
+        Coordinate(
+            item.name,
+            1.0,
+            item.sigma_log,
+            True,
+            -THETA_BOUND,
+            min(THETA_BOUND, float(np.log(highest)) / item.sigma_log),
+        )
+        for item, highest in plant.uncertain()
+    ]
+    found += [
+        Coordinate(name, 0.0, PROBE_PLACE_SIGMA, False, -THETA_BOUND, THETA_BOUND, "m")
+        for name in plant.displacements()
+    ]
+    return tuple(found)
+
+
+def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
+    """Most probable slow error of what a fit leaves."""
+    predicted = [
+        problem.plant.predict(number, fit.values, fit.candidates).temperature
+        for number in range(len(problem.plant.recordings))
+    ]
+    residuals = [
+        (item.bins, item.at(predicted[item.recording][:, item.channel]) - item.values)
+        for item in problem.observations
+    ]
+    return likely_slow_error(residuals, prior=EXPECTED_SLOW, sigmas=SLOW_SIGMAS, times=SLOW_TIMES)
+
+
+def calibrate(plant: Plant | None, coordinates: Sequence[Coordinate]) -> Calibrated:
+    """Fit calibration recordings; the prior where there are none."""
+    prior = Belief.prior(coordinates)
+    if plant is None:
+        return Calibrated(prior, EXPECTED_SLOW, None)
+    slow = EXPECTED_SLOW
+    fit = None
+    for _ in range(2):
+        problem = Problem(plant, prior, slow, plant.observations)
+        fit = problem.fit((), None if fit is None else fit.values)
+        slow = slow_error_of(problem, fit)
+    precision = np.linalg.inv(fit.covariance)
+    root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
+    return Calibrated(Belief(tuple(coordinates), fit.position, root), slow, fit)
+
+
+def all_stamps(recordings: Sequence[Recording]) -> list[NDArray[np.bool_]]:
+    """Masks that use every stamp."""
+    return [np.ones(item.times.size, dtype=bool) for item in recordings]

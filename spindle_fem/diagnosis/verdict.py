@@ -1,0 +1,204 @@
+"""What the fitted hypotheses amount to: probabilities, verdict, alternatives, p-value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from spindle_fem.diagnosis.engine import Hypothesis
+from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit
+from spindle_fem.effects.base import Candidate
+
+Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
+
+# Laws of the catalogue are simpler than nature: differences of evidence count a share of what they say.
+TEMPERATURE = 4.0
+# Below this the most probable set is named together with what else may be.
+DECIDED = 0.75
+LISTED = 0.02
+SIGNIFICANT = 0.01
+# A residual this much above the noise after the best set: something else is there.
+UNEXPLAINED_MISFIT = 1.6
+# Shift of an uncertain parameter that its prior holds with at least 1 %.
+PRIOR_SIGMAS = float(norm.ppf(0.995))
+
+
+@dataclass(frozen=True, slots=True)
+class Ranked:
+    """All forms of one set of effects at their places.
+
+    Attributes
+    ----------
+    best : Hypothesis
+        Most probable form.
+    probability : float
+    """
+
+    best: Hypothesis
+    probability: float
+
+    @property
+    def fit(self) -> Fit:
+        """Fit of the most probable form."""
+        return self.best.fit
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What is concluded.
+
+    Attributes
+    ----------
+    verdict : str
+    p_value : float
+        Of the recording if nothing were missing.
+    chosen : Ranked
+    alternatives : tuple of Ranked
+        What the data cannot rule out, the chosen set apart.
+    other : float
+        Probability of something that is not in the catalogue.
+    reason : str
+    """
+
+    verdict: Verdict
+    p_value: float
+    chosen: Ranked
+    alternatives: tuple[Ranked, ...]
+    other: float
+    reason: str
+
+
+def rank(hypotheses: Sequence[Hypothesis], temperature: float = TEMPERATURE) -> list[Ranked]:
+    """Probabilities of sets of effects at places, forms added up, the most probable first.
+
+    The evidence of data (not the prior) is divided by ``temperature``: the
+    catalogue's laws never hold exactly, so that a difference in the tail of a
+    misfit is no proof of a different cause.
+    """
+    null = next(h for h in hypotheses if not h.fit.candidates)
+    groups: dict[frozenset, list[tuple[float, Hypothesis]]] = {}
+    for item in hypotheses:
+        gain = item.fit.log_evidence - null.fit.log_evidence
+        groups.setdefault(item.keys, []).append((gain / temperature + item.log_prior, item))
+    highest = max(score for group in groups.values() for score, _ in group)
+    weights = {
+        key: float(sum(np.exp(score - highest) for score, _ in group)) for key, group in groups.items()
+    }
+    total = sum(weights.values())
+    found = [
+        Ranked(max(group, key=lambda pair: pair[0])[1], weights[key] / total) for key, group in groups.items()
+    ]
+    return sorted(found, key=lambda item: -item.probability)
+
+
+def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
+    """Probability that some single effect would improve a consistent recording as much.
+
+    Wilks' theorem for each candidate with its free parameters, Šidák's
+    correction for the number of candidates. The slow error, which carries a
+    small structural difference between model and machine, is in the noise.
+    """
+    null = next(h for h in hypotheses if not h.fit.candidates)
+    smallest = 1.0
+    for item in hypotheses:
+        if len(item.fit.candidates) == 1:
+            gain = null.fit.misfit_with_prior - item.fit.misfit_with_prior
+            freedom = len(item.fit.coordinates) - len(null.fit.coordinates)
+            smallest = min(smallest, float(chi2.sf(max(gain, 0.0) / np.sqrt(TEMPERATURE), freedom)))
+    return float(-np.expm1(trials * np.log1p(-min(smallest, 1.0 - 1e-16))))
+
+
+def within_prior(fit: Fit, calibrated: bool) -> bool:
+    """Whether every candidate is a shift of a parameter that the definition's prior still holds."""
+    if calibrated or not fit.candidates:
+        return False
+    values = fit.values
+    for candidate in fit.candidates:
+        if not candidate.shift_of_prior:
+            return False
+        for factor in candidate.factors:
+            coordinate = next((c for c in fit.coordinates if c.name == factor.name), None)
+            if coordinate is None:
+                return False
+            total = values[EFFECT_PREFIX + factor.name] * values[factor.name] / coordinate.value
+            if abs(float(np.log(total))) > PRIOR_SIGMAS * coordinate.sigma:
+                return False
+    return True
+
+
+def kind_of(candidates: Sequence[Candidate]) -> Verdict:
+    """Verdict of a set: physics before parameters before sensors."""
+    kinds = {candidate.kind for candidate in candidates}
+    for kind in ("missing_physics", "parameter", "sensor"):
+        if kind in kinds:
+            return kind
+    return "consistent"
+
+
+def judge(
+    hypotheses: Sequence[Hypothesis],
+    *,
+    trials: int,
+    calibrated: bool,
+    same_place: Mapping[tuple[str, str], frozenset[str]] | None = None,
+) -> Judgement:
+    """Conclude from fitted hypotheses.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+        The empty one among them.
+    trials : int
+        Candidates that were tried.
+    calibrated : bool
+        Whether a calibration recording fixed the parameters before.
+    same_place : mapping, optional
+        Places that count as one for a decision (a bearing and its set), by
+        effect and place.
+    """
+    ranked = rank(hypotheses)
+    p_value = detection_p_value(hypotheses, trials)
+    empty = next(item for item in ranked if not item.fit.candidates)
+    chosen = ranked[0]
+    if p_value > SIGNIFICANT or not chosen.fit.candidates or within_prior(chosen.fit, calibrated):
+        rest = (
+            tuple(item for item in ranked if item is not empty and item.probability >= LISTED)
+            if p_value > SIGNIFICANT and not empty.probability > 0.9
+            else ()
+        )
+        consistent = max(empty.probability, 1.0 - p_value if not rest else empty.probability)
+        return Judgement("consistent", p_value, Ranked(empty.best, consistent), (), 0.0, "")
+    misfit = float(np.sqrt(chosen.fit.reduced_misfit))
+    other = float(np.clip((misfit - 1.1) / (2.0 * UNEXPLAINED_MISFIT), 0.0, 0.5))
+    scaled = [Ranked(item.best, item.probability * (1.0 - other)) for item in ranked]
+    chosen = scaled[0]
+    alternatives = tuple(item for item in scaled[1:] if item.probability >= LISTED and item.fit.candidates)
+    similar = sum(item.probability for item in scaled if _alike(item, chosen, same_place or {}))
+    if similar < DECIDED * (1.0 - other):
+        return Judgement("ambiguous", p_value, chosen, alternatives, other, "several sets explain the data")
+    return Judgement(kind_of(chosen.fit.candidates), p_value, chosen, alternatives, other, "")
+
+
+def _alike(item: Ranked, chosen: Ranked, same_place: Mapping[tuple[str, str], frozenset[str]]) -> bool:
+    """Whether two sets name the same effects at the same or overlapping places."""
+    if len(item.fit.candidates) != len(chosen.fit.candidates):
+        return False
+    left = [(c.effect, c.component) for c in chosen.fit.candidates]
+    for candidate in item.fit.candidates:
+        match = next(
+            (
+                key
+                for key in left
+                if key[0] == candidate.effect
+                and (key[1] == candidate.component or candidate.component in same_place.get(key, frozenset()))
+            ),
+            None,
+        )
+        if match is None:
+            return False
+        left.remove(match)
+    return True
