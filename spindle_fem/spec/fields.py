@@ -267,6 +267,12 @@ class RangeRule:
     """Metadata of a field that takes from and to; a place may be a single length too."""
 
     single: bool
+    example: str = '["45 mm", "137 mm"]'
+
+
+@dataclass(frozen=True, slots=True)
+class FreeQuantityRule:
+    """Metadata of a field that takes a quantity of any dimension, kept as it is written."""
 
 
 def _write_range(ends: tuple[float, float]) -> list[str]:

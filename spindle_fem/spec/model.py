@@ -9,10 +9,11 @@ concerns one table is checked here and in :mod:`spindle_fem.spec.solids` and
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from spindle_fem.spec.effects import EffectEntry
 from spindle_fem.spec.exchange import (
     Channel,
     ConstantFilm,
@@ -255,8 +256,8 @@ class MachineSpec(SpecModel):
     """Where temperatures are read."""
     mesh: MeshSettings = MeshSettings()
     """Fineness of the mesh."""
-    effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """Effects of the catalogue that are switched on, by id, with their parameters."""
+    effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
+    """Effects of the catalogue that are switched on."""
 
     @property
     def bearings(self) -> tuple[tuple[BearingSet, SetBearing], ...]:
@@ -303,6 +304,7 @@ __all__ = [
     "Channel",
     "ConstantFilm",
     "Coolant",
+    "EffectEntry",
     "FaceSelector",
     "Film",
     "Gap",

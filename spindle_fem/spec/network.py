@@ -20,6 +20,7 @@ from spindle_fem.errors import (
     UnknownSurfaceError,
     did_you_mean,
 )
+from spindle_fem.spec.effects import EffectEntry
 from spindle_fem.spec.faults import validation_faults
 from spindle_fem.spec.fields import Name, SpecModel, uncertain_field
 from spindle_fem.spec.inherit import apply_overrides
@@ -197,6 +198,7 @@ class NetworkMachineSpec(SpecModel):
     description: str = ""
     initial: Literal["first_reading", "ambient", "steady"] = "first_reading"
     network: NetworkSpec
+    effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
 
 
 def validate_network_machine(content: Mapping[str, Any], source: str) -> NetworkMachineSpec:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from spindle_fem.spec.fields import Name, QuantityRule, RangeRule
+from spindle_fem.spec.fields import FreeQuantityRule, Name, QuantityRule, RangeRule
 from spindle_fem.units import quantity_example
 
 
@@ -80,8 +80,10 @@ def value_text(annotation: Any) -> str:
         return ", ".join(str(value) for value in values)
     ranges = [item for item in metadata if isinstance(item, RangeRule)]
     if ranges:
-        text = 'from and to, such as ["45 mm", "137 mm"]'
+        text = f"from and to, such as {ranges[0].example}"
         return f"a length, or {text}" if ranges[0].single else text
+    if any(isinstance(item, FreeQuantityRule) for item in metadata):
+        return "a number, or a quantity with its unit"
     if bool in alternatives:
         return "true, false"
     if int in alternatives:
