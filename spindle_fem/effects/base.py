@@ -17,8 +17,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.laws import RPM
 from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.effects.view import MachineView
+from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 Kind = Literal["missing_physics", "parameter", "sensor"]
@@ -110,6 +112,8 @@ class Candidate:
     shift_of_prior : bool
         Whether the candidate is a wider prior for something that the machine
         definition itself calls uncertain (kind ``parameter``).
+    constants : mapping of str to float
+        Numbers of the machine that a report needs.
     """
 
     effect: str
@@ -124,6 +128,7 @@ class Candidate:
     reading: Reading | None = None
     starts: tuple[Mapping[str, float], ...] = field(default=(MappingProxyType({}),))
     shift_of_prior: bool = False
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -167,13 +172,81 @@ class Effect(ABC):
     title: str
     check: str
 
-    @abstractmethod
     def candidates(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Every form at every place of a machine; none where the definition already has it."""
+        return tuple(
+            item for item in self.forms(machine) if not machine.switched_on(self.name, item.component)
+        )
 
     @abstractmethod
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Every form at every place, whatever the definition already has."""
+
+    def candidate(
+        self,
+        component: str,
+        term: Term | None = None,
+        *,
+        amplitude: str,
+        reference: float,
+        form: str = "",
+        null: float = 0.0,
+        starts: Sequence[Mapping[str, float]] = ({},),
+        reading: Reading | None = None,
+        constants: Mapping[str, float] | None = None,
+    ) -> Candidate:
+        """Candidate of one term or reading; ``amplitude`` and ``starts`` by inner names."""
+        owner = term.name if term is not None else reading.name
+        return Candidate(
+            self.name,
+            component,
+            form,
+            self.kind,
+            f"{owner}.{amplitude}",
+            null,
+            reference,
+            terms=() if term is None else (term,),
+            reading=reading,
+            starts=tuple({f"{owner}.{name}": value for name, value in start.items()} for start in starts),
+            constants=constants or {},
+        )
+
+    def term_name(self, key: str, form: str = "") -> str:
+        """Name of a term, unique over effects, places and forms."""
+        return ".".join(part.replace(" ", "_") for part in (self.name, key, form) if part)
+
+    def factor_candidate(
+        self, component: str, parameters: Sequence[TermParameter], form: str, reference: float, *, shift: bool
+    ) -> Candidate:
+        """Candidate that multiplies a parameter of the machine."""
+        return Candidate(
+            self.name,
+            component,
+            form,
+            self.kind,
+            parameters[0].name,
+            1.0,
+            reference,
+            factors=tuple(parameters),
+            shift_of_prior=shift,
+        )
+
+    def starts_from(
+        self, candidate: Candidate, times: Array, residual: Array
+    ) -> tuple[Mapping[str, float], ...]:
+        """Where to begin searches, given what a model without the effect leaves unexplained.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        times : (N,) ndarray, [s]
+        residual : (N, c) ndarray, [K]
+            Measured less predicted; NaN where nothing was read.
+        """
+        return candidate.starts
+
     def report(self, candidate: Candidate, values: Mapping[str, float]) -> dict[str, Reported]:
-        """Fitted values under the names and in the units that a finding states.
+        """Fitted values under the names and in the units that a finding states, the amplitude first.
 
         Parameters
         ----------
@@ -181,29 +254,93 @@ class Effect(ABC):
         values : mapping of str to float
             By outer name, SI.
         """
+        own = candidate.parameters
+        order = [candidate.amplitude, *(name for name in candidate.free if name != candidate.amplitude)]
+        return {own[name].name: stated(own[name], values.get(name, own[name].value)) for name in order}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """One sentence for a report."""
-        numbers = ", ".join(
-            f"{name.replace('_', ' ')} {item.value:.3g}{' ' + item.unit if item.unit else ''}"
-            for name, item in reported.items()
-        )
-        return f"{candidate.component.replace('_', ' ')}: {self.title} ({numbers})."
+        numbers = ", ".join(f"{name.replace('_', ' ')} {quantity(item)}" for name, item in reported.items())
+        return f"{capital(place_words(candidate.component))}: {self.title} ({numbers})."
+
+
+def stated(parameter: TermParameter, value: float) -> Reported:
+    """A parameter in the unit in which engineers state it.
+
+    >>> stated(TermParameter("onset_speed", 0.0, unit="rad/s"), 314.159265)
+    Reported(value=3000.0, unit='rpm')
+    """
+    if parameter.unit == "rad/s":
+        return Reported(float(round(value / RPM, 6)), "rpm")
+    if parameter.unit == "K/s":
+        return Reported(value * 3600.0, "K/h")
+    if parameter.unit == "K" and parameter.name.endswith("_temperature"):
+        return Reported(value - ZERO_CELSIUS_K, "degC")
+    return Reported(value, parameter.unit)
+
+
+def quantity(item: Reported) -> str:
+    """Value and unit in words.
+
+    >>> quantity(Reported(20.0, "degC"))
+    '20 °C'
+    """
+    value = f"{item.value:.3g}" if abs(item.value) < 1000.0 else f"{item.value:.0f}"
+    return f"{value} {item.unit.replace('degC', '°C')}".strip()
+
+
+def place_words(component: str) -> str:
+    """A component as it stands in a sentence.
+
+    >>> place_words("front_bearings"), place_words("F2"), place_words("drive_end")
+    ('the front bearings', 'F2', 'the drive end')
+    """
+    plain = component.replace("_", " ")
+    return plain if plain.upper() == plain or "|" in plain else f"the {plain}"
+
+
+def capital(text: str) -> str:
+    """With a capital first letter, the rest untouched."""
+    return text[:1].upper() + text[1:]
 
 
 Intervals = Sequence[tuple[float, float]]
 
 
 class IntervalEffect(Effect):
-    """An effect that is on in intervals of time, found in the data rather than searched blindly."""
+    """An effect that is on in intervals of time, found in the data rather than searched blindly.
+
+    Attributes
+    ----------
+    interval_forms : tuple of str
+        Forms that :meth:`over` takes, the usual one first.
+    """
+
+    interval_forms: tuple[str, ...] = ("",)
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """None: its candidates come from intervals."""
+        return ()
 
     @abstractmethod
     def places(self, machine: MachineView) -> tuple[str, ...]:
-        """Components where it can act."""
+        """Where it can act: spots of the view, finer than the components that findings name."""
 
     @abstractmethod
-    def over(self, machine: MachineView, component: str, intervals: Intervals) -> Candidate:
-        """Candidate that begins from intervals, [s]; their ends are free."""
+    def over(
+        self, machine: MachineView, component: str, intervals: Intervals, form: str | None = None
+    ) -> Candidate:
+        """Candidate that begins from intervals, [s]; their ends are free.
+
+        Parameters
+        ----------
+        machine : MachineView
+        component : str
+            One of :meth:`places`.
+        intervals : sequence of (float, float), [s]
+        form : str, optional
+            One of :attr:`interval_forms`; the first when None.
+        """
 
     @abstractmethod
     def intervals(self, candidate: Candidate, values: Mapping[str, float]) -> list[tuple[float, float]]:

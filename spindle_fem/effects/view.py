@@ -8,8 +8,80 @@ bearing set), one bearing, ``shaft``, ``housing``, ``channel``, ``flange``,
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
+
+NOTHING: Mapping = MappingProxyType({})
+
+
+def fluid_place(coefficient: str) -> str:
+    """Place of a term that shifts the fluid of a film or boundary link.
+
+    >>> fluid_place("film.housing.outside")
+    'fluid.housing.outside'
+    """
+    return "fluid." + coefficient.removeprefix("film.").removeprefix("link.")
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """Contacts that may conduct differently from nominal, all by one factor.
+
+    Attributes
+    ----------
+    component : str
+        Where a finding places them.
+    form : str
+        Which contacts of it: ``outer ring seats``, a joint group's name.
+    coefficients : tuple of str
+        Of the model.
+    parameter : str
+        The machine's own factor on exactly these; empty where it has none.
+    """
+
+    component: str
+    form: str
+    coefficients: tuple[str, ...]
+    parameter: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionTable:
+    """Friction heat of one bearing as the definition has it.
+
+    Attributes
+    ----------
+    speed : tuple of float, [rad/s]
+    heat : tuple of float, [W]
+        At the reference thrust, factors of the definition included.
+    thrust_coefficient : float
+        c of the factor ``1 + c (thrust / reference_thrust - 1)``.
+    reference_thrust : float, [N]
+    """
+
+    speed: tuple[float, ...]
+    heat: tuple[float, ...]
+    thrust_coefficient: float = 0.0
+    reference_thrust: float = 1750.0
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelFlow:
+    """What the Reynolds number of the coolant follows from.
+
+    Attributes
+    ----------
+    fluid : str
+        As :func:`spindle_fem.coolant.properties.coolant_by_name` knows it.
+    hydraulic_diameter : float, [m]
+    area : float, [m²]
+        Of the flow, all starts together.
+    """
+
+    fluid: str
+    hydraulic_diameter: float
+    area: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +106,7 @@ class MachineView:
     joints : mapping of component to tuple of str
         Parameters of the machine that scale the contacts there.
     joint_coefficients : mapping of component to tuple of str
-        Coefficients of the same contacts.
+        Coefficients of the outer ring seats there; a network: of the link.
     parameters : mapping of str to float
         1 σ of the logarithm of every uncertain parameter of the definition.
     channels : tuple of str
@@ -43,13 +115,56 @@ class MachineView:
         Inputs of the recording.
     covariates : tuple of str
     has : frozenset of str
-        Effects that the definition already switches on.
+        Effects that the definition already switches on, by id, or
+        ``<id> @ <component>`` where that is all they concern.
     reference_temperature : float, [K]
         Of the surroundings, nominal.
     highest_speed : float, [rad/s]
         In the recording.
     duration : float, [s]
         Of the recording.
+    lowest_speed : float, [rad/s]
+        Lowest that the recording holds, standstill apart.
+    seats : tuple of Seat
+    spots : mapping of str to tuple of str
+        Places where heat may come and go unrecorded, by a name of their own.
+    reported : mapping of str to str
+        Component that a finding names for a spot, source or link; itself where absent.
+    walls : mapping of coefficient to str
+        Place whose temperature drives a film.
+    fluids : mapping of coefficient to str or float
+        Input that gives the temperature on a film's other side, or that temperature [K].
+    probes : mapping of channel to str
+        Probe of every temperature channel.
+    outlets : tuple of str
+        Channels that read the mixed coolant after the channel.
+    speed_inputs : mapping of component to tuple of str
+        Inputs that tell how fast the machine turns there.
+    input_scale : mapping of str to float
+        Largest magnitude of every input in the recording.
+    capacity : mapping of component to float, [J/K]
+    typical_heat : float, [W]
+        All recorded heat at full load.
+    typical_rise : float, [K]
+        Above the surroundings, in the recording.
+    channel : ChannelFlow or None
+    reynolds : (float, float)
+        Range that occurs; zeros without a channel.
+    friction : mapping of bearing to FrictionTable
+    inner_share : float
+        Nominal share of the inner ring in a bearing's heat, of what rings take.
+    ring_share : float
+        Share of both rings together.
+    viscosity : (float, float), [m²/s]
+        Kinematic, of the grease's oil at 40 and 100 °C.
+    coolant_links : mapping of boundary to tuple of str
+        Links of a network to one coolant, in the order in which it passes them.
+    conductance : mapping of coefficient to float, [W/K]
+        Nominal, of a network's links.
+    source_inputs : mapping of source to str
+        Input that drives a network's source.
+    surroundings : mapping of component to tuple of str
+        Films whose fluid is that of ``ambient``, or of one boundary of a network.
     """
 
     kind: Literal["geometry", "network"]
@@ -68,3 +183,66 @@ class MachineView:
     reference_temperature: float
     highest_speed: float
     duration: float
+    lowest_speed: float = 0.0
+    seats: tuple[Seat, ...] = ()
+    spots: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    reported: Mapping[str, str] = field(default_factory=dict)
+    walls: Mapping[str, str] = field(default_factory=dict)
+    fluids: Mapping[str, str | float] = field(default_factory=dict)
+    probes: Mapping[str, str] = field(default_factory=dict)
+    outlets: tuple[str, ...] = ()
+    speed_inputs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    input_scale: Mapping[str, float] = field(default_factory=dict)
+    capacity: Mapping[str, float] = field(default_factory=dict)
+    typical_heat: float = 100.0
+    typical_rise: float = 10.0
+    channel: ChannelFlow | None = None
+    reynolds: tuple[float, float] = (0.0, 0.0)
+    friction: Mapping[str, FrictionTable] = field(default_factory=dict)
+    inner_share: float = 0.5
+    ring_share: float = 1.0
+    # Klueber Isoflex NBU 15, a usual grease of spindle bearings.
+    viscosity: tuple[float, float] = (21.0e-6, 4.7e-6)
+    coolant_links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    conductance: Mapping[str, float] = field(default_factory=dict)
+    source_inputs: Mapping[str, str] = field(default_factory=dict)
+    surroundings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Bearing sets; every source of a network."""
+        sets = tuple(key for key, members in self.sets.items() if members != (key,))
+        return sets or tuple(self.sets)
+
+    def speeds(self, component: str) -> tuple[str, ...]:
+        """Inputs that tell how fast the machine turns there, those that the recording moves."""
+        return tuple(n for n in self.speed_inputs.get(component, ()) if self.highest(n) > 0.0)
+
+    def running(self, component: str) -> tuple[str, ...]:
+        """Input that tells whether there is friction or other heat there, if any does."""
+        own = self.source_inputs.get(component)
+        found = self.speeds(component) or (() if own is None else (own,))
+        return tuple(name for name in found if self.highest(name) > 0.0)[:1]
+
+    def highest(self, name: str) -> float:
+        """Largest magnitude of an input in the recording; the highest speed where it is not known."""
+        return self.input_scale.get(name, self.highest_speed)
+
+    def grease_places(self, bearing: str) -> tuple[str, ...]:
+        """Places whose mean temperature the grease has."""
+        if self.kind == "network":
+            return (self.inner[bearing],)
+        return (self.inner[bearing], self.outer[bearing])
+
+    def component(self, key: str) -> str:
+        """Component that a finding names for a spot, source or link."""
+        return self.reported.get(key, key)
+
+    def form(self, key: str, form: str = "") -> str:
+        """Form that tells a spot or source from others of the same component."""
+        own = "" if self.component(key) == key else key
+        return " ".join(part for part in (own, form) if part)
+
+    def switched_on(self, effect: str, component: str) -> bool:
+        """Whether the definition already holds an effect there."""
+        return effect in self.has or f"{effect} @ {component}" in self.has

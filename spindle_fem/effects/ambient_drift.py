@@ -1,0 +1,135 @@
+"""A room that warms or cools without being recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from spindle_fem.effects.base import Candidate, Effect, Reported
+from spindle_fem.effects.laws import HOUR, Complex, amplitude, linear, repeated, shape, smooth_step
+from spindle_fem.effects.term import Term, TermContext, TermParameter
+from spindle_fem.effects.view import MachineView, fluid_place
+
+RAMP, STEP, WAVE = "ramp", "step", "wave"
+
+
+class DriftTerm(Term):
+    """Shift of the surroundings' temperature by a law of time.
+
+    Parameters
+    ----------
+    name : str
+    films : tuple of str
+        Whose fluid it is.
+    form : str
+        ramp, step or wave.
+    parameters : tuple of TermParameter
+    """
+
+    def __init__(
+        self, name: str, films: tuple[str, ...], form: str, parameters: tuple[TermParameter, ...]
+    ) -> None:
+        self.name, self._form, self.parameters = name, form, parameters
+        self.heat_places = tuple(fluid_place(film) for film in films)
+
+    def heat(self, context: TermContext) -> Complex:
+        """The same shift for every film, (n, k) K."""
+        own, time = context.parameters, context.time
+        if self._form == RAMP:
+            shift = own["rate"] * time
+        elif self._form == STEP:
+            shift = own["change"] * smooth_step((time - own["time"]) / own["width"])
+        else:
+            shift = own["amplitude"] * np.sin(2.0 * np.pi * time / own["period"] + own["phase"])
+        return repeated(context, shift, len(self.heat_places))
+
+
+class AmbientDrift(Effect):
+    """The air at the machine differs from what the ambient sensor tells.
+
+    Source: machine halls drift by 0.5 to 2 K/h and step with doors and heating
+    (ISO 230-3, environmental temperature variation error).
+    """
+
+    name = "ambient_drift"
+    kind = "missing_physics"
+    title = "the room at the machine warms or cools without being recorded"
+    check = (
+        "Place and shielding of the ambient sensor, doors, heating, neighbouring machines; log the air temperature "
+        "beside the spindle at three heights."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Ramp, step and slow wave of the ambient, or of every boundary of a network."""
+        found = []
+        span = machine.duration
+        for key, films in machine.surroundings.items():
+            laws = {
+                RAMP: (
+                    (linear("rate", 0.0, max(2.0 / HOUR, 3.0 / span), "K/s"),),
+                    "rate",
+                    max(1.0 / HOUR, 2.0 / span),
+                    ({},),
+                ),
+                STEP: (
+                    (
+                        linear("change", 0.0, 3.0, "K", low=-40.0, high=40.0),
+                        linear("time", 0.5 * span, 0.35 * span, "s", low=-0.1 * span, high=1.1 * span),
+                        shape("width", 300.0, 0.8, "s", low=10.0, high=20000.0),
+                    ),
+                    "change",
+                    3.0,
+                    [{"time": share * span} for share in (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)],
+                ),
+                WAVE: (
+                    (
+                        amplitude("amplitude", 2.0, "K", high=40.0),
+                        shape("period", span, 0.6, "s", low=0.05 * span),
+                        linear("phase", 0.0, np.pi, "rad", low=-3.0 * np.pi, high=3.0 * np.pi),
+                    ),
+                    "amplitude",
+                    2.0,
+                    [
+                        {"period": share * span, "phase": phase}
+                        for share in (0.4, 0.8, 1.6)
+                        for phase in (0.0, np.pi / 2.0, np.pi, -np.pi / 2.0)
+                    ],
+                ),
+            }
+            for form, (parameters, size, reference, starts) in laws.items():
+                term = DriftTerm(self.term_name(key, form), films, form, parameters)
+                found.append(
+                    self.candidate(
+                        machine.component(key),
+                        term,
+                        amplitude=size,
+                        reference=reference,
+                        form=form,
+                        starts=starts,
+                    )
+                )
+        return tuple(found)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How fast, how much, when."""
+        subject = (
+            "The room at the machine"
+            if candidate.component == "ambient"
+            else f"The temperature of {candidate.component}"
+        )
+        if candidate.form == RAMP:
+            rate = reported["rate"].value
+            word = "warms" if rate >= 0.0 else "cools"
+            return f"{subject} {word} by {abs(rate):.2g} K/h more than recorded."
+        if candidate.form == STEP:
+            change = reported["change"].value
+            word = "warmer" if change >= 0.0 else "colder"
+            return (
+                f"{subject} becomes {abs(change):.2g} K {word} than recorded about "
+                f"{reported['time'].value / 60.0:.0f} min after the start."
+            )
+        return (
+            f"{subject} swings by ±{reported['amplitude'].value:.2g} K with a period of "
+            f"{reported['period'].value / 3600.0:.1f} h without being recorded."
+        )

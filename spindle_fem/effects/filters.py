@@ -1,0 +1,102 @@
+"""First-order lag and delay of readings at any stamps, exact for straight lines between them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Complex = NDArray[np.complex128]
+Array = NDArray[np.float64]
+
+# A lag below this share of the shortest step follows at once.
+PROMPT = 1e-4
+
+
+def first_order_lag(times: Array, values: ArrayLike, time_constant: ArrayLike) -> Complex:
+    """``τ y' = x - y`` from ``y = x`` at the first stamp, x straight between the stamps.
+
+    Parameters
+    ----------
+    times : (N,) ndarray, [s]
+        Increasing, not uniform.
+    values : (N, k) array_like
+        May be complex.
+    time_constant : (k,) array_like, [s]
+        May be complex; 0 follows at once.
+
+    Returns
+    -------
+    (N, k) ndarray
+
+    >>> time = np.array([0.0, 3.0, 4.0, 60.0])
+    >>> lagged = first_order_lag(time, 2.0 * time[:, None], np.array([5.0]))
+    >>> bool(np.allclose(lagged[:, 0], 2.0 * (time - 5.0 * (1.0 - np.exp(-time / 5.0)))))
+    True
+    """
+    x = np.asarray(values, dtype=complex)
+    tau = np.broadcast_to(np.asarray(time_constant, dtype=complex), x.shape[1:])
+    if len(times) < 2:
+        return x.copy()
+    step = np.diff(times)[:, None]
+    slope = np.diff(x, axis=0) / step
+    prompt = tau.real <= PROMPT * step
+    keep = np.where(prompt, 0.0, np.exp(-step / np.where(prompt, 1.0, tau)))
+    # y = x - τ x' + decaying part, on every step.
+    target = x[1:] - tau * slope
+    gain = target - keep * (x[:-1] - tau * slope)
+    return np.concatenate((x[:1], scan(keep, gain, x[0])))
+
+
+def scan(keep: Complex, gain: Complex, first: Complex) -> Complex:
+    """``y_i = keep_i y_(i-1) + gain_i`` by doubling, (N, k) from y_0 (k,).
+
+    Source: Hillis & Steele (1986), Commun. ACM 29, 1170-1183.
+
+    >>> scan(np.full((3, 1), 0.5), np.ones((3, 1)), np.zeros(1)).ravel()
+    array([1.  , 1.5 , 1.75])
+    """
+    keep, gain = keep.copy(), gain.copy()
+    gain[0] = gain[0] + keep[0] * first
+    distance = 1
+    while distance < len(gain):
+        gain[distance:] = gain[distance:] + keep[distance:] * gain[:-distance]
+        keep[distance:] = keep[distance:] * keep[:-distance]
+        distance *= 2
+    return gain
+
+
+def delayed(times: Array, values: ArrayLike, shift: ArrayLike) -> Complex:
+    """Values ``shift`` seconds earlier, on straight lines; the ends go on as they are.
+
+    Parameters
+    ----------
+    times : (N,) ndarray, [s]
+    values : (N, k) array_like
+    shift : (k,) array_like, [s]
+        Positive: the reading is late.
+
+    Returns
+    -------
+    (N, k) ndarray
+
+    >>> time = np.arange(5.0)
+    >>> delayed(time, time[:, None], np.array([0.5])).real.ravel()
+    array([0. , 0.5, 1.5, 2.5, 3.5])
+    """
+    x = np.asarray(values, dtype=complex)
+    late = np.broadcast_to(np.asarray(shift, dtype=complex), x.shape[1:])
+    if len(times) < 2:
+        return x.copy()
+    found = np.empty_like(x)
+    for amount in np.unique(late.real):
+        chosen = np.flatnonzero(late.real == amount)
+        wanted = times - amount
+        left = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, len(times) - 2)
+        part = (wanted - times[left]) / (times[left + 1] - times[left])
+        outside = (part < 0.0) | (part > 1.0)
+        part = np.clip(part, 0.0, 1.0)[:, None]
+        own = x[:, chosen]
+        rise = own[left + 1] - own[left]
+        slope = np.where(outside[:, None], 0.0, rise / (times[left + 1] - times[left])[:, None])
+        found[:, chosen] = own[left] + part * rise - 1j * late[chosen].imag * slope
+    return found

@@ -1,0 +1,124 @@
+"""A clearance seat that closes, and conducts better, as the outer ring expands into it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words, quantity
+from spindle_fem.effects.laws import Complex, amplitude, linear, relaxed, repeated, shape, smooth_step
+from spindle_fem.effects.term import Term, TermContext
+from spindle_fem.effects.view import MachineView
+
+
+class GapClosureTerm(Term):
+    """Factor ``1 - a (1 - S((x - x0)/w))`` on the seats; x lags behind the ring's excess.
+
+    Parameters
+    ----------
+    name : str
+    seats : tuple of str
+        Coefficients.
+    rings : tuple of str
+        Places that expand.
+    around : tuple of str
+        Places that they expand into; none counts from the rings' own temperature at the start.
+    """
+
+    def __init__(
+        self, name: str, seats: tuple[str, ...], rings: tuple[str, ...], around: tuple[str, ...]
+    ) -> None:
+        self.name, self.coefficients = name, seats
+        self.reads = (*rings, *around)
+        self._rings = len(rings)
+        # The lagged excess; the temperature that it counts from, 0 until the first step knows it.
+        self.n_states = 1 if around else 2
+        self.parameters = (
+            amplitude("opening", 0.6, high=0.995),
+            linear("closing_difference", 8.0, 4.0, "K", low=-5.0, high=60.0),
+            shape("width", 5.0, 0.5, "K", low=0.3, high=40.0),
+            shape("lag", 600.0, 0.4, "s", low=5.0, high=10000.0),
+        )
+
+    def factor(self, context: TermContext) -> Complex:
+        """Of every seat, (n, k)."""
+        own = context.parameters
+        closed = smooth_step((context.state[0] - own["closing_difference"]) / own["width"])
+        return repeated(context, 1.0 - own["opening"] * (1.0 - closed), len(self.coefficients))
+
+    def advance(self, context: TermContext, step: float) -> Complex:
+        """Lagged excess, and what it counts from where that is the start, (1 or 2, k) K."""
+        ring = context.temperatures[: self._rings].mean(axis=0)
+        if self.n_states == 1:
+            base = context.temperatures[self._rings :].mean(axis=0)
+        else:
+            known = context.state[1]
+            base = np.where(known.real == 0.0, ring, known)
+        lagged = relaxed(context.state[0], ring - base, step, context.parameters["lag"])
+        return np.array([lagged] if self.n_states == 1 else [lagged, base])
+
+
+class GapClosure(Effect):
+    """A loose seat conducts through air and few contact spots; closed, through metal.
+
+    Source: 5 µm of air conduct 0.026/5e-6 = 5000 W/(m²·K) at the most, and a
+    loose ring touches on a small part; rings of 190 mm close 5 µm of
+    clearance on the diameter with 2 to 3 K (12e-6 1/K).
+    """
+
+    name = "gap_closure"
+    kind = "missing_physics"
+    title = "the loose outer-ring seats conduct better as the rings expand into the bores"
+    check = (
+        "Outer-ring fits and bore roundness: measure clearance cold; look for fretting rust; compare ring and "
+        "housing temperatures during warm-up, where the difference must rise first and then fall."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Outer seats of a set, against the housing or the start; node to node in a network."""
+        found = []
+        for key, rings, around, seats in self._seats(machine):
+            for form, reads in (("ring over housing", around), ("ring over start", ())):
+                term = GapClosureTerm(self.term_name(key, form), seats, rings, reads)
+                found.append(
+                    self.candidate(
+                        machine.component(key),
+                        term,
+                        amplitude="opening",
+                        reference=0.8,
+                        form=machine.form(key, form),
+                        starts=[{"closing_difference": k} for k in (4.0, 8.0, 15.0)],
+                    )
+                )
+        return tuple(found)
+
+    @staticmethod
+    def _seats(
+        machine: MachineView,
+    ) -> list[tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]]:
+        """Component, what expands, what holds it, and coefficients."""
+        if machine.kind == "network":
+            return [
+                (link, (machine.walls[seats[0]],), (str(machine.fluids[seats[0]]),), seats)
+                for link, seats in machine.joint_coefficients.items()
+            ]
+        return [
+            (
+                group,
+                tuple(machine.outer[b] for b in machine.sets[group]),
+                machine.heat["housing"][:1],
+                machine.joint_coefficients[group],
+            )
+            for group in machine.groups
+            if machine.joint_coefficients.get(group) and "housing" in machine.heat
+        ]
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How open, and when it closes."""
+        over = "the housing" if "housing" in candidate.form else "its temperature at the start"
+        return (
+            f"{capital(place_words(candidate.component))}: cold, the outer seats conduct down to "
+            f"{1.0 - reported['opening'].value:.2f} of nominal; they close where the outer rings are "
+            f"{quantity(reported['closing_difference'])} above {over}."
+        )

@@ -1,0 +1,107 @@
+"""Extra friction after a start or a refill, which fades while the machine turns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.base import Candidate, Effect
+from spindle_fem.effects.laws import Complex, amplitude, relaxed, repeated, shape
+from spindle_fem.effects.term import Term, TermContext
+from spindle_fem.effects.view import MachineView
+
+# Below this share of the highest speed nothing churns.
+TURNING_SHARE = 1e-3
+RESTARTS = "after every rest"
+
+
+class GreaseChurningTerm(Term):
+    """Factor ``1 + a f`` on friction; the fresh share f decays with running time.
+
+    Parameters
+    ----------
+    name : str
+    bearings : tuple of str
+    speed : str
+        Input that tells whether the machine turns.
+    threshold : float
+        Magnitude of it above which it does.
+    restarts : bool
+        Whether grease flows back at rest, so that every start begins anew.
+    """
+
+    n_states = 1
+
+    def __init__(
+        self, name: str, bearings: tuple[str, ...], speed: str, threshold: float, *, restarts: bool
+    ) -> None:
+        self.name, self.bearings = name, bearings
+        self._speed, self._threshold, self._restarts = speed, threshold, restarts
+        self.parameters = (
+            amplitude("extra_friction", 0.4, high=10.0),
+            shape("time_constant", 1800.0, 0.9, "s", low=30.0, high=50000.0),
+        )
+        if restarts:
+            self.parameters += (shape("settling_time", 300.0, 1.0, "s", low=1.0, high=20000.0),)
+
+    def initial_state(self, parameters: dict[str, float]) -> NDArray[np.float64]:
+        """All of the grease is fresh."""
+        return np.ones(1)
+
+    def friction(self, context: TermContext) -> Complex:
+        """Factor on every bearing, (n, k)."""
+        factor = 1.0 + context.parameters["extra_friction"] * context.state[0]
+        return repeated(context, factor, len(self.bearings))
+
+    def advance(self, context: TermContext, step: float) -> Complex:
+        """Fresh share, (1, k)."""
+        own = context.parameters
+        turning = np.abs(context.inputs[self._speed]) > self._threshold
+        run = relaxed(context.state, 0.0, step, own["time_constant"])
+        rest = relaxed(context.state, 1.0, step, own["settling_time"]) if self._restarts else context.state
+        return np.where(turning, run, rest)
+
+
+class GreaseChurning(Effect):
+    """Churning until the grease is pushed out of the balls' path.
+
+    Source: Lugt (2009), Tribol. Trans. 52, 470-480, churning phase of grease
+    lubrication; its duration is taken from run-in instructions of spindle
+    bearings (minutes to hours).
+    """
+
+    name = "grease_churning"
+    kind = "missing_physics"
+    title = "extra friction that fades with running time, as of grease not yet distributed"
+    check = (
+        "Lubrication record: was the set refilled, overfilled or long at rest? Run the grease in step by step and "
+        "repeat the test; the extra heat must not come back."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Once, or at every start; sets, single bearings and sources."""
+        found = []
+        for key, bearings in machine.sets.items():
+            # Every start of a single bearing anew is left to its set: grease rests in all of them.
+            forms = (("", False), (RESTARTS, True)) if key in machine.groups else (("", False),)
+            for speed in machine.running(key):
+                for form, restarts in forms:
+                    term = GreaseChurningTerm(
+                        self.term_name(key, form),
+                        bearings,
+                        speed,
+                        TURNING_SHARE * machine.highest(speed),
+                        restarts=restarts,
+                    )
+                    times = [600.0, 1800.0, 5000.0]
+                    found.append(
+                        self.candidate(
+                            machine.component(key),
+                            term,
+                            amplitude="extra_friction",
+                            reference=0.4,
+                            form=machine.form(key, form),
+                            starts=[{"time_constant": time} for time in times],
+                        )
+                    )
+        return tuple(found)

@@ -1,0 +1,86 @@
+"""Heat exchanged with a machine frame that is not at ambient temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from spindle_fem.effects.base import Candidate, Effect, Reported, quantity
+from spindle_fem.effects.laws import Complex, amplitude, repeated, shape
+from spindle_fem.effects.term import Term, TermContext
+from spindle_fem.effects.view import MachineView, fluid_place
+
+NAME = "temperature_above_ambient"
+
+
+class MountSinkTerm(Term):
+    """The frame is some kelvin above (below) the ambient, at once or warming up.
+
+    Parameters
+    ----------
+    name : str
+    films : tuple of str
+        Those to the frame.
+    warming : bool
+    """
+
+    def __init__(self, name: str, films: tuple[str, ...], *, warming: bool) -> None:
+        self.name = name
+        self.heat_places = tuple(fluid_place(film) for film in films)
+        self._warming = warming
+        self.parameters = (amplitude(NAME, 5.0, "K", low=-50.0, high=80.0),)
+        if warming:
+            self.parameters += (shape("warm_up_time", 7200.0, 0.8, "s", low=300.0, high=2.0e5),)
+
+    def heat(self, context: TermContext) -> Complex:
+        """Shift of the frame's temperature, (n, k) K."""
+        share: Complex | float = 1.0
+        if self._warming:
+            share = 1.0 - np.exp(-np.maximum(context.time, 0.0) / context.parameters["warm_up_time"])
+        return repeated(context, context.parameters[NAME] * share, len(self.heat_places))
+
+
+class MountSink(Effect):
+    """A frame warmed by hydraulics or motor, or cooled by the floor."""
+
+    name = "mount_sink"
+    kind = "missing_physics"
+    title = "the frame behind the flange is not at ambient temperature"
+    check = (
+        "Temperature of the machine frame beside the flange: a contact thermometer over one shift; hydraulic unit, "
+        "motor or coolant tank on the same casting."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """The flange's film to the frame; boundary links of a network."""
+        keys = machine.films if machine.kind == "network" else ("flange",)
+        found = []
+        for key in keys:
+            films = machine.films.get(key, ())
+            for form, warming in (("", False), ("warming up", True)) if films else ():
+                term = MountSinkTerm(self.term_name(key, form), films, warming=warming)
+                found.append(
+                    self.candidate(
+                        machine.component(key),
+                        term,
+                        amplitude=NAME,
+                        reference=5.0,
+                        form=form,
+                        starts=[{"warm_up_time": t} for t in (3600.0, 12000.0)] if warming else ({},),
+                    )
+                )
+        return tuple(found)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """By how much, and since when."""
+        value = reported[NAME]
+        word = "above" if value.value >= 0.0 else "below"
+        size = quantity(Reported(abs(value.value), "K"))
+        since = (
+            f", reached over {reported['warm_up_time'].value / 3600.0:.1f} h"
+            if "warm_up_time" in reported
+            else ""
+        )
+        what = "flange" if candidate.component == "flange" else candidate.component
+        return f"The frame that the {what} is joined to is {size} {word} the ambient temperature{since}."

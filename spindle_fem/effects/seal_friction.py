@@ -1,0 +1,58 @@
+"""Rubbing heat of a lip or labyrinth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from spindle_fem.effects.base import Candidate, Effect, Reported, place_words, quantity
+from spindle_fem.effects.laws import RPM
+from spindle_fem.effects.speed_heat import SpeedHeatTerm
+from spindle_fem.effects.view import MachineView
+
+NAME = "heat_per_1000rpm"
+
+
+class SealFriction(Effect):
+    """Constant torque at a seal, so heat in proportion to speed.
+
+    Source: Freudenberg, Simrit catalogue of radial shaft seals: power loss in
+    proportion to speed at given contact force; 20-60 W per 1000 rpm at 100-180 mm.
+    """
+
+    name = "seal_friction"
+    kind = "missing_physics"
+    title = "a seal rubs: heat in proportion to speed"
+    check = (
+        "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the spindle by "
+        "hand with and without the seal."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Both shaft ends; every node of a network that has something turning."""
+        ends = machine.spots if machine.kind == "network" else ("nose", "drive_end")
+        found = []
+        for key in ends:
+            speeds = machine.speeds(key)
+            for speed in speeds if key in machine.heat else ():
+                form = speed if len(speeds) > 1 else ""
+                size = (NAME, max(5.0, 0.1 * machine.typical_heat), 1000.0 * RPM)
+                term = SpeedHeatTerm(
+                    self.term_name(key, form), machine.heat[key], speed, size, exponent=(1.0, 0.08)
+                )
+                found.append(
+                    self.candidate(
+                        machine.component(key),
+                        term,
+                        amplitude=NAME,
+                        reference=size[1],
+                        form=machine.form(key, form),
+                    )
+                )
+        return tuple(found)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How much at which end."""
+        return (
+            f"A seal rubs at {place_words(candidate.component)}: {quantity(reported[NAME])} per 1000 rpm of heat "
+            "that the model lacks, in proportion to speed."
+        )

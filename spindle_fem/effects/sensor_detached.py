@@ -1,0 +1,88 @@
+"""A sensor that has come off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.base import Array, Candidate, Reading, Reported
+from spindle_fem.effects.filters import first_order_lag
+from spindle_fem.effects.laws import Complex, amplitude, linear, shape, smooth_step
+from spindle_fem.effects.sensor import Form, SensorEffect
+from spindle_fem.effects.term import TermParameter
+from spindle_fem.effects.view import MachineView
+
+LOOSE = "from the start"
+# Of the instant at which it comes off, s.
+EDGE = 10.0
+
+
+class DetachedReading(Reading):
+    """From an instant on the sensor relaxes towards a mix of its place and the ambient air.
+
+    Parameters
+    ----------
+    channel, name : str
+    parameters : tuple of TermParameter
+    ambient : float, [K]
+        Where no input tells it.
+    """
+
+    def __init__(
+        self, channel: str, name: str, parameters: tuple[TermParameter, ...], ambient: float
+    ) -> None:
+        self.channel, self.name, self.parameters = channel, name, parameters
+        self._ambient = ambient
+
+    def read(
+        self,
+        times: Array,
+        values: NDArray[np.complex128],
+        inputs: Mapping[str, Array],
+        parameters: Mapping[str, NDArray[np.complex128]],
+    ) -> Complex:
+        """Reading, (N, k) K."""
+        ambient = np.asarray(inputs.get("ambient", self._ambient), dtype=float)
+        air = np.broadcast_to(ambient, times.shape)[:, None]
+        loss = parameters["share_of_air"] * (air - values)
+        if "time" not in parameters:
+            return values + loss
+        off = smooth_step((times[:, None] - parameters["time"]) / EDGE)
+        return values + first_order_lag(times, off * loss, parameters["lag"])
+
+
+class SensorDetached(SensorEffect):
+    """A sensor that has lost its contact reads a mix of the part and the air."""
+
+    name = "sensor_detached"
+    title = "the sensor has come off and reads partly the air"
+    check = "Is the sensor still in its bore or glued on? Pull gently at the cable; look at the clamp and the paste."
+
+    def __init__(self) -> None:
+        self._ambient = 293.15
+
+    def of_forms(self, machine: MachineView) -> dict[str, Form]:
+        """Comes off at an instant, or was loose all the time."""
+        self._ambient = machine.reference_temperature
+        span = machine.duration
+        share = amplitude("share_of_air", 0.4, high=1.0)
+        time = linear("time", 0.5 * span, 0.35 * span, "s", low=0.0, high=span)
+        starts = [{"time": float(part) * span} for part in np.linspace(0.08, 0.92, 8)]
+        return {
+            "": ((share, time, shape("lag", 120.0, 0.8, "s", low=1.0, high=7200.0)), 0.5, starts),
+            LOOSE: ((share,), 0.3, ({},)),
+        }
+
+    def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
+        """Of a channel."""
+        return DetachedReading(channel, name, parameters, self._ambient)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """Since when, and how far."""
+        since = f"since {reported['time'].value / 60.0:.0f} min" if "time" in reported else "from the start"
+        return (
+            f"Sensor {candidate.component} has been off its place {since}: it reads the air to "
+            f"{100.0 * reported['share_of_air'].value:.0f} %; the machine is as modelled."
+        )

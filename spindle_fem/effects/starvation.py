@@ -1,0 +1,88 @@
+"""Friction that changes above a speed where the grease can no longer refill the tracks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words, quantity
+from spindle_fem.effects.laws import RPM, Complex, amplitude, linear, repeated, shape, smooth_step
+from spindle_fem.effects.term import Term, TermContext
+from spindle_fem.effects.view import MachineView
+
+ONSETS = 8
+
+
+class StarvationTerm(Term):
+    """Factor ``1 + a S((n - n0)/w)`` on friction with a smooth step S.
+
+    Parameters
+    ----------
+    name : str
+    bearings : tuple of str
+    speed : str
+        Input.
+    highest : float, [rad/s]
+        Of it, for the prior of the onset.
+    """
+
+    def __init__(self, name: str, bearings: tuple[str, ...], speed: str, highest: float) -> None:
+        self.name, self.bearings, self._speed = name, bearings, speed
+        self.parameters = (
+            amplitude("friction_change", 0.4, low=-0.9, high=5.0),
+            linear("onset_speed", 0.6 * highest, 0.3 * highest, "rad/s", low=0.0, high=1.3 * highest),
+            shape("width", 120.0 * RPM, 0.7, "rad/s", low=5.0 * RPM, high=1500.0 * RPM),
+        )
+
+    def friction(self, context: TermContext) -> Complex:
+        """Factor on every bearing, (n, k)."""
+        own = context.parameters
+        speed = np.abs(context.inputs[self._speed])
+        step = smooth_step((speed - own["onset_speed"]) / own["width"])
+        return repeated(context, 1.0 + own["friction_change"] * step, len(self.bearings))
+
+
+class Starvation(Effect):
+    """Replenishment fails above a speed.
+
+    Source: Cann, Damiens & Lubrecht (2004), Tribol. Int. 37, 859-864: film of
+    grease-lubricated contacts against the starvation number, which grows with speed.
+    """
+
+    name = "starvation"
+    kind = "missing_physics"
+    title = "friction changes above a certain speed, where the grease no longer refills the tracks"
+    check = (
+        "Grease quantity, age and bleeding; ramp the speed slowly through the onset and watch drag torque, "
+        "temperature and noise; compare with freshly greased bearings."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Sets, single bearings and sources."""
+        found = []
+        for key, bearings in machine.sets.items():
+            for speed in machine.speeds(key)[:1]:
+                highest = machine.highest(speed)
+                lowest = min(max(machine.lowest_speed, 0.15 * highest), 0.8 * highest)
+                term = StarvationTerm(self.term_name(key), bearings, speed, highest)
+                onsets = np.linspace(lowest, highest, ONSETS + 1)
+                starts = [{"onset_speed": float(n)} for n in 0.5 * (onsets[1:] + onsets[:-1])]
+                found.append(
+                    self.candidate(
+                        machine.component(key),
+                        term,
+                        amplitude="friction_change",
+                        reference=0.4,
+                        form=machine.form(key),
+                        starts=starts,
+                    )
+                )
+        return tuple(found)
+
+    def statement(self, candidate: Candidate, reported: dict[str, Reported]) -> str:
+        """Where, by how much, above which speed."""
+        change = 100.0 * reported["friction_change"].value
+        word = "more" if change >= 0.0 else "less"
+        return (
+            f"{capital(place_words(candidate.component))}: above {quantity(reported['onset_speed'])} the friction "
+            f"heat is {abs(change):.0f} % {word} than modelled, as when the grease no longer refills the tracks."
+        )
