@@ -56,8 +56,8 @@ class AmbientDrift(Effect):
     kind = "missing_physics"
     title = "the room at the machine warms or cools without being recorded"
     check = (
-        "Place and shielding of the ambient sensor, doors, heating, neighbouring machines; log the air temperature "
-        "beside the spindle at three heights."
+        "Place and shielding of the ambient sensor, doors, heating, neighbouring machines; log the air "
+        "temperature beside the spindle at three heights."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -63,8 +63,8 @@ class CoolantBypass(Effect):
     kind = "missing_physics"
     title = "part of the coolant misses the channel"
     check = (
-        "O-rings between sleeve and body, relief valve, crossed hoses; measure the flow at the outlet and compare "
-        "the pressure drop with that of the full flow."
+        "O-rings between sleeve and body, relief valve, crossed hoses; measure the flow at the outlet and "
+        "compare the pressure drop with that of the full flow."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
@@ -90,4 +90,7 @@ class CoolantBypass(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """Which part, and where the outlet sensor sits."""
         where = " and joins it before the outlet sensor" if candidate.form == MIXED else ""
-        return f"Channel: {100.0 * reported['fraction'].value:.0f} % of the coolant flow misses the channel{where}."
+        return (
+            f"Channel: {100.0 * reported['fraction'].value:.0f} % of the coolant flow misses the "
+            f"channel{where}."
+        )

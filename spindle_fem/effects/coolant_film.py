@@ -103,7 +103,8 @@ class CoolantFilm(Effect):
     kind = "missing_physics"
     title = "the film coefficient in the cooling channel is not the modelled one"
     check = (
-        "Channel for deposits, air pockets and the right flow (pressure drop against flow); where the film changes "
+        "Channel for deposits, air pockets and the right flow (pressure drop against flow); where the "
+        "film changes "
         "with the Reynolds number, step the oil temperature and watch the housing beside the channel."
     )
 
@@ -156,8 +157,8 @@ class CoolantFilm(Effect):
         """Which factor, and from where on."""
         if candidate.form == FOULING:
             return (
-                f"Channel: the film coefficient is {reported['factor'].value:.2f} times the modelled one at every "
-                "flow (fouling, where below 1)."
+                f"Channel: the film coefficient is {reported['factor'].value:.2f} times the modelled one "
+                "at every flow (fouling, where below 1)."
             )
         if candidate.form == TRANSITION:
             return (
@@ -165,6 +166,7 @@ class CoolantFilm(Effect):
                 f"coefficient is {reported['factor_above'].value:.1f} times the modelled one (transition)."
             )
         return (
-            f"Channel: the film coefficient grows with a further power {reported['further_exponent'].value:.2f} of "
+            "Channel: the film coefficient grows with a further power "
+            f"{reported['further_exponent'].value:.2f} of "
             "the Reynolds number (secondary flow in the curved channel)."
         )

@@ -87,6 +87,6 @@ class CoolantHeating(Effect):
         """The capacity rate."""
         rate = 1.0 / max(reported[NAME].value, 1e-12)
         return (
-            f"{capital(place_words(candidate.component))}: the coolant warms as it passes; its capacity rate is "
-            f"{rate:.3g} W/K."
+            f"{capital(place_words(candidate.component))}: the coolant warms as it passes; its capacity "
+            f"rate is {rate:.3g} W/K."
         )

@@ -24,8 +24,8 @@ class DriveHeat(Effect):
     kind = "missing_physics"
     title = "heat from the motor, belt or gear reaches the drive end"
     check = (
-        "Belt tension and pulley temperature, coupling, motor flange: compare their temperatures with the rear "
-        "bearings after an hour at constant speed; run uncoupled if possible."
+        "Belt tension and pulley temperature, coupling, motor flange: compare their temperatures with the "
+        "rear bearings after an hour at constant speed; run uncoupled if possible."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -71,8 +71,8 @@ class GapClosure(Effect):
     kind = "missing_physics"
     title = "the loose outer-ring seats conduct better as the rings expand into the bores"
     check = (
-        "Outer-ring fits and bore roundness: measure clearance cold; look for fretting rust; compare ring and "
-        "housing temperatures during warm-up, where the difference must rise first and then fall."
+        "Outer-ring fits and bore roundness: measure clearance cold; look for fretting rust; compare ring "
+        "and housing temperatures during warm-up, where the difference must rise first and then fall."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

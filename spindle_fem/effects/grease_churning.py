@@ -74,8 +74,8 @@ class GreaseChurning(Effect):
     kind = "missing_physics"
     title = "extra friction that fades with running time, as of grease not yet distributed"
     check = (
-        "Lubrication record: was the set refilled, overfilled or long at rest? Run the grease in step by step and "
-        "repeat the test; the extra heat must not come back."
+        "Lubrication record: was the set refilled, overfilled or long at rest? Run the grease in step by "
+        "step and repeat the test; the extra heat must not come back."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -60,6 +60,6 @@ class HeatCapacity(Effect):
         """How much, and what that is in steel."""
         size = reported["capacity"].value
         return (
-            f"{capital(place_words(candidate.component))}: {size / 1e3:.3g} kJ/K of heat capacity is missing, as of "
-            f"{size / 470.0:.2g} kg of steel."
+            f"{capital(place_words(candidate.component))}: {size / 1e3:.3g} kJ/K of heat capacity is "
+            f"missing, as of {size / 470.0:.2g} kg of steel."
         )

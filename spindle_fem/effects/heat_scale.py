@@ -16,8 +16,8 @@ class HeatScale(Effect):
     kind = "parameter"
     title = "bearing heat differs from nominal by a constant factor"
     check = (
-        "Preload, grease quantity and the drag torque of the set against its data sheet; where the heat comes from "
-        "a measured power, the calibration of that measurement."
+        "Preload, grease quantity and the drag torque of the set against its data sheet; where the heat "
+        "comes from a measured power, the calibration of that measurement."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
@@ -44,6 +44,6 @@ class HeatScale(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """By how much."""
         return (
-            f"{capital(place_words(candidate.component))}: the heat is {reported['factor'].value:.2f} times the "
-            "modelled one at every speed and temperature."
+            f"{capital(place_words(candidate.component))}: the heat is {reported['factor'].value:.2f} "
+            "times the modelled one at every speed and temperature."
         )

@@ -79,8 +79,8 @@ class HeatSplit(Effect):
     kind = "parameter"
     title = "the bearing heat is shared differently between inner and outer rings"
     check = (
-        "Nothing to repair as such: compare shaft and housing temperatures beside the bearings, and ask whether "
-        "preload or contact angle differ from the drawing."
+        "Nothing to repair as such: compare shaft and housing temperatures beside the bearings, and ask "
+        "whether preload or contact angle differ from the drawing."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
@@ -113,6 +113,6 @@ class HeatSplit(Effect):
         """How far the share moves."""
         place = EVERY if candidate.form == EVERY else place_words(candidate.component)
         return (
-            f"{capital(place)}: the share of the friction heat that enters the inner rings differs from nominal by "
-            f"{100.0 * reported['inner_share_change'].value:+.0f} percentage points."
+            f"{capital(place)}: the share of the friction heat that enters the inner rings differs from "
+            f"nominal by {100.0 * reported['inner_share_change'].value:+.0f} percentage points."
         )

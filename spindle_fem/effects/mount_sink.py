@@ -48,8 +48,8 @@ class MountSink(Effect):
     kind = "missing_physics"
     title = "the frame behind the flange is not at ambient temperature"
     check = (
-        "Temperature of the machine frame beside the flange: a contact thermometer over one shift; hydraulic unit, "
-        "motor or coolant tank on the same casting."
+        "Temperature of the machine frame beside the flange: a contact thermometer over one shift; "
+        "hydraulic unit, motor or coolant tank on the same casting."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -33,8 +33,8 @@ class NaturalConvection(Effect):
     kind = "missing_physics"
     title = "the outside film grows with the temperature difference to the room"
     check = (
-        "Outside surfaces for covers, draught and dirt; measure wall and air temperature at two steady states of "
-        "different heat."
+        "Outside surfaces for covers, draught and dirt; measure wall and air temperature at two steady "
+        "states of different heat."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
@@ -55,7 +55,8 @@ class NaturalConvection(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How strongly the film follows."""
         return (
-            f"{place_words(candidate.component).capitalize()}: the film to the air is not constant but grows with "
-            f"the power {reported['exponent'].value:.2f} of the temperature difference (natural convection); that "
+            f"{place_words(candidate.component).capitalize()}: the film to the air is not constant but "
+            f"grows with the power {reported['exponent'].value:.2f} of the temperature difference (natural "
+            "convection); that "
             f"part is {reported['convective_share'].value:.2f} of the constant film at 10 K."
         )

@@ -44,8 +44,8 @@ class Radiation(Effect):
     kind = "missing_physics"
     title = "surfaces lose heat by radiation, faster than in proportion to their temperature"
     check = (
-        "Paint and bare metal of the outside (emissivity), hot or cold bodies in sight (oven, window, coolant "
-        "tank); compare a surface with and without a reflecting foil."
+        "Paint and bare metal of the outside (emissivity), hot or cold bodies in sight (oven, window, "
+        "coolant tank); compare a surface with and without a reflecting foil."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
@@ -65,7 +65,8 @@ class Radiation(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How large the part is."""
         return (
-            f"{place_words(candidate.component).capitalize()}: heat is lost by radiation besides the constant film; "
-            f"at 10 K it is {reported['radiative_share'].value:.2f} of that film and grows with the fourth power of "
-            "the absolute temperature."
+            f"{place_words(candidate.component).capitalize()}: heat is lost by radiation besides the "
+            "constant film; "
+            f"at 10 K it is {reported['radiative_share'].value:.2f} of that film and grows with the "
+            "fourth power of the absolute temperature."
         )

@@ -23,8 +23,8 @@ class SealFriction(Effect):
     kind = "missing_physics"
     title = "a seal rubs: heat in proportion to speed"
     check = (
-        "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the spindle by "
-        "hand with and without the seal."
+        "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the "
+        "spindle by hand with and without the seal."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
@@ -53,6 +53,6 @@ class SealFriction(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much at which end."""
         return (
-            f"A seal rubs at {place_words(candidate.component)}: {quantity(reported[NAME])} per 1000 rpm of heat "
-            "that the model lacks, in proportion to speed."
+            f"A seal rubs at {place_words(candidate.component)}: {quantity(reported[NAME])} per 1000 rpm "
+            "of heat that the model lacks, in proportion to speed."
         )

@@ -58,7 +58,10 @@ class SensorDetached(SensorEffect):
 
     name = "sensor_detached"
     title = "the sensor has come off and reads partly the air"
-    check = "Is the sensor still in its bore or glued on? Pull gently at the cable; look at the clamp and the paste."
+    check = (
+        "Is the sensor still in its bore or glued on? Pull gently at the cable; look at the clamp and "
+        "the paste."
+    )
 
     def __init__(self) -> None:
         self._ambient = 293.15

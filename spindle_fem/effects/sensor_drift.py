@@ -64,6 +64,6 @@ class SensorDrift(SensorEffect):
         """How fast."""
         since = f" from {reported['start'].value / 60.0:.0f} min on" if "start" in reported else ""
         return (
-            f"Sensor {candidate.component} drifts by {reported['rate'].value:+.2g} K/h{since}; the machine is as "
-            "modelled."
+            f"Sensor {candidate.component} drifts by {reported['rate'].value:+.2g} K/h{since}; the "
+            "machine is as modelled."
         )

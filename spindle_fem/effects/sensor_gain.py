@@ -51,6 +51,6 @@ class SensorGain(SensorEffect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """The scale."""
         return (
-            f"Sensor {candidate.component} has a wrong scale: it shows {reported['gain'].value:.3f} times the "
-            "distance from 20 °C; the machine is as modelled."
+            f"Sensor {candidate.component} has a wrong scale: it shows {reported['gain'].value:.3f} times "
+            "the distance from 20 °C; the machine is as modelled."
         )

@@ -42,7 +42,10 @@ class SensorLag(SensorEffect):
 
     name = "sensor_lag"
     title = "the sensor follows the temperature late"
-    check = "Seat of the sensor: is it pushed home, with thermal paste, and not in a thick well? Touch it with a hot tip."
+    check = (
+        "Seat of the sensor: is it pushed home, with thermal paste, and not in a thick well? Touch it "
+        "with a hot tip."
+    )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """One form."""

@@ -36,7 +36,10 @@ class SensorOffset(SensorEffect):
 
     name = "sensor_offset"
     title = "the sensor reads a constant too much or too little"
-    check = "Compare the sensor with a reference in one bath or before the start, when everything has one temperature."
+    check = (
+        "Compare the sensor with a reference in one bath or before the start, when everything has one "
+        "temperature."
+    )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """One form."""
@@ -50,4 +53,7 @@ class SensorOffset(SensorEffect):
         """By how much."""
         offset = reported["offset"].value
         word = "too high" if offset >= 0.0 else "too low"
-        return f"Sensor {candidate.component} reads {abs(offset):.2g} K {word} all the time; the machine is as modelled."
+        return (
+            f"Sensor {candidate.component} reads {abs(offset):.2g} K {word} all the time; the machine is as "
+            "modelled."
+        )

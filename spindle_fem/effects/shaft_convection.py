@@ -76,8 +76,8 @@ class ShaftConvection(Effect):
     kind = "missing_physics"
     title = "the turning shaft loses heat to the air, growing with speed"
     check = (
-        "Draught at the shaft ends, open guards, air through the hollow shaft (drawbar bore, purge air); measure "
-        "the shaft end's temperature at two speeds."
+        "Draught at the shaft ends, open guards, air through the hollow shaft (drawbar bore, purge air); "
+        "measure the shaft end's temperature at two speeds."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

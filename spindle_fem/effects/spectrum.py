@@ -31,7 +31,8 @@ def strongest_periods(
     Source: Scargle (1982), Astrophys. J. 263, 835-853.
 
     >>> time = np.arange(0.0, 7200.0, 10.0)
-    >>> abs(strongest_periods(time, np.sin(2 * np.pi * time / 437.0)[:, None], 100.0, 3000.0)[0] - 437.0) < 5.0
+    >>> wave = np.sin(2 * np.pi * time / 437.0)[:, None]
+    >>> abs(strongest_periods(time, wave, 100.0, 3000.0)[0] - 437.0) < 5.0
     True
     """
     every = max(1, times.size // MOST_SAMPLES)

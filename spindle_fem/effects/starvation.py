@@ -83,6 +83,8 @@ class Starvation(Effect):
         change = 100.0 * reported["friction_change"].value
         word = "more" if change >= 0.0 else "less"
         return (
-            f"{capital(place_words(candidate.component))}: above {quantity(reported['onset_speed'])} the friction "
-            f"heat is {abs(change):.0f} % {word} than modelled, as when the grease no longer refills the tracks."
+            f"{capital(place_words(candidate.component))}: above {quantity(reported['onset_speed'])} the "
+            "friction "
+            f"heat is {abs(change):.0f} % {word} than modelled, as when the grease no longer refills the "
+            "tracks."
         )

@@ -62,7 +62,8 @@ class ThermalPreload(Effect):
     title = "friction rises as the inner rings become warmer than the outer ones (thermally induced preload)"
     check = (
         "Preload and fits of the set: measure the preload cold and warm (axial stiffness or drag torque), "
-        "check spacer lengths, and whether the outer rings can still slide; compare cooling of housing and shaft."
+        "check spacer lengths, and whether the outer rings can still slide; compare cooling of housing "
+        "and shaft."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -65,8 +65,8 @@ class UnrecordedCooling(UnrecordedEffect):
     kind = "missing_physics"
     title = "something cools this place in intervals that no recorded input explains"
     check = (
-        "What runs in these intervals: cutting fluid, air blast, an open door or guard, a second coolant circuit; "
-        "compare the intervals with the machine's programme and record the suspect."
+        "What runs in these intervals: cutting fluid, air blast, an open door or guard, a second coolant "
+        "circuit; compare the intervals with the machine's programme and record the suspect."
     )
     interval_forms = ("conductance", "heat")
 

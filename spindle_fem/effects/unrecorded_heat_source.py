@@ -39,8 +39,8 @@ class UnrecordedHeatSource(UnrecordedEffect):
     kind = "missing_physics"
     title = "something heats this place in intervals that no recorded input explains"
     check = (
-        "What runs in these intervals: cutting, hydraulic clamping, chip heap, lamp, neighbouring drive; compare "
-        "the intervals with the machine's programme and record the suspect."
+        "What runs in these intervals: cutting, hydraulic clamping, chip heap, lamp, neighbouring drive; "
+        "compare the intervals with the machine's programme and record the suspect."
     )
     interval_forms = ("heat",)
 

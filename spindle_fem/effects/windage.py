@@ -25,8 +25,8 @@ class Windage(Effect):
     kind = "missing_physics"
     title = "air friction heats the shaft with about the third power of speed"
     check = (
-        "Parts that stir air (clamping unit, fan, bolt heads, rotor), gap widths; measure the power at the highest "
-        "speed without load, and at half of it: an eighth should be left."
+        "Parts that stir air (clamping unit, fan, bolt heads, rotor), gap widths; measure the power at "
+        "the highest speed without load, and at half of it: an eighth should be left."
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
@@ -48,6 +48,6 @@ class Windage(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and its law."""
         return (
-            f"Air friction heats {place_words(candidate.component)}: {quantity(reported[NAME])} at 4500 rpm, with "
-            f"the power {reported['exponent'].value:.1f} of speed."
+            f"Air friction heats {place_words(candidate.component)}: {quantity(reported[NAME])} at 4500 "
+            f"rpm, with the power {reported['exponent'].value:.1f} of speed."
         )
