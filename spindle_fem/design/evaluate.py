@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spindle_fem import __version__
@@ -18,10 +19,14 @@ from spindle_fem.conduction.operators import ThermalOperators, build_operators
 from spindle_fem.coupling import machine_on_mesh
 from spindle_fem.design.designs import Design
 from spindle_fem.design.outputs import derived_values, value_of
-from spindle_fem.design.table import FAILED, IMPOSSIBLE, OK, Row
+from spindle_fem.design.fast.inputs import refusal, structure_digest
+from spindle_fem.design.table import FAILED, FULL, IMPOSSIBLE, OK, Row
 from spindle_fem.errors import FaultsError, SpecError, SpindleFemError
 from spindle_fem.geometry.assembly import AssemblyGeometry, build_assembly
+from spindle_fem.loads.channel_cells import ChannelCells
+from spindle_fem.loads.coolant_loop import CoolantLoop
 from spindle_fem.loads.joints import group_of_contacts
+from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.meshing.build import build_mesh
 from spindle_fem.meshing.cache import cache_directory, mesh_digest
 from spindle_fem.meshing.sizes import build_sizes
@@ -32,21 +37,33 @@ from spindle_fem.solve import solve_prepared
 from spindle_fem.spec.inherit import apply_overrides
 from spindle_fem.spec.load import validate
 from spindle_fem.spec.model import MachineSpec
-from spindle_fem.units import Uncertain
 
 # Tables of a definition that shape the mesh; designs that agree in them share it.
 _SHAPING = ("part", "bearing_types", "bearing_set", "channel", "surface", "remaining_surfaces", "mesh")
 # What does not change a result.
 _NOT_IN_KEY = ("name", "title", "description", "marks")
 FILM_LOW, FILM_HIGH = "@film_low", "@film_high"
+# What a design may fail with; anything else is a fault of the program.
+SOLVE_ERRORS = (SpindleFemError, ArithmeticError, np.linalg.LinAlgError)
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What is asked of every design of a study: outputs, and whether the film's band is carried."""
+    """What is asked of every design of a study.
+
+    Attributes
+    ----------
+    outputs : tuple of str
+    film_uncertainty : bool
+        Whether the film's band is carried.
+    backend : {"auto", "full", "reduced"}
+        What may answer: full solves, or also the projected model of a group
+        of designs; with "auto" where the group is large enough to pay.
+    """
 
     outputs: tuple[str, ...]
     film_uncertainty: bool
+    backend: str = "auto"
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -70,6 +87,9 @@ class DesignTask:
         Hash of mesh and order of the temperature's polynomials.
     reason : str
         Why the design is impossible.
+    structure : str
+        Hash of the mesh and of all that a projected model is made for: designs
+        that agree in it can share one. Empty where none can answer the design.
     """
 
     design: Design
@@ -77,6 +97,7 @@ class DesignTask:
     spec: MachineSpec | None
     geometry: str
     reason: str = ""
+    structure: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +141,10 @@ class TaskBuilder:
             group_of_contacts(spec, found.joints)
         except SpindleFemError as error:
             return DesignTask(design, key, None, "", reason_of(error))
-        return DesignTask(design, key, spec, found.geometry)
+        structure = ""
+        if self._question.backend != "full" and not refusal(spec):
+            structure = _digest([found.geometry, structure_digest(dump)])
+        return DesignTask(design, key, spec, found.geometry, structure=structure)
 
     def _impossible(self, design: Design, error: SpindleFemError) -> DesignTask:
         # Without a machine to hash, the key is that of the definition and what the design changes.
@@ -128,7 +152,7 @@ class TaskBuilder:
         return DesignTask(design, key, None, "", reason_of(error))
 
     def _key(self, machine: Any) -> str:
-        asked = [self._question.outputs, self._question.film_uncertainty]
+        asked = [self._question.outputs, self._question.film_uncertainty, self._question.backend]
         return _digest([__version__, asked, machine])[:24]
 
 
@@ -179,55 +203,84 @@ def evaluate_tasks(tasks: Sequence[DesignTask], question: Question) -> list[Row]
 
 def evaluate(task: DesignTask, question: Question) -> Row:
     """Row of one task; an error of the model becomes a row with its reason."""
-    empty = {**dict.fromkeys(question.columns), "geometry": task.geometry[:12]}
-    head = {"design": task.design.number, **task.design.values, "key": task.key}
     if task.spec is None:
-        return {**head, **empty, "status": IMPOSSIBLE, "reason": task.reason}
+        return _without_answers(task, question, IMPOSSIBLE, task.reason)
     try:
-        answers = _answers(task, question)
-    except (SpindleFemError, ArithmeticError, np.linalg.LinAlgError) as error:
-        return {**head, **empty, "status": FAILED, "reason": reason_of(error)}
-    return {**head, **empty, **answers, "status": OK, "reason": ""}
+        return row_of(task, question, solve_checked(task))
+    except SOLVE_ERRORS as error:
+        return _without_answers(task, question, FAILED, reason_of(error))
+
+
+def row_of(task: DesignTask, question: Question, result: ThermalResult) -> Row:
+    """Row of a design that was solved in full; the ends of its film's band are solved here.
+
+    Raises
+    ------
+    SpindleFemError, ArithmeticError, LinAlgError
+        An end of the band has no solution.
+    """
+    spec = task.spec
+    answers = _values(result, spec, question.outputs)
+    if question.film_uncertainty:
+        coolant = result.coolant
+        for ending, film in ((FILM_LOW, coolant.film_low), (FILM_HIGH, coolant.film_high)):
+            at_end = solve_checked(task, film / coolant.film_coefficient)
+            answers |= {
+                path + ending: value for path, value in _values(at_end, spec, question.outputs).items()
+            }
+    head = _without_answers(task, question, OK, "")
+    return {**head, **answers, "backend": FULL}
+
+
+def _without_answers(task: DesignTask, question: Question, status: str, reason: str) -> Row:
+    head = {"design": task.design.number, **task.design.values, "key": task.key}
+    empty = dict.fromkeys((*question.columns, "backend", "error_estimate_K"))
+    return {**head, **empty, "geometry": task.geometry[:12], "status": status, "reason": reason}
 
 
 def solve_task(task: DesignTask) -> ThermalResult:
     """The whole result of a possible design, as its row was made from; for pictures."""
     with threadpool_limits(1):
-        return _solved(task.spec, *shared_operators(task.spec, task.geometry))
+        return solve_checked(task)
 
 
-def _answers(task: DesignTask, question: Question) -> dict[str, Any]:
-    spec = task.spec
-    mesh, operators = shared_operators(spec, task.geometry)
-    result = _solved(spec, mesh, operators)
-    answers = _values(result, spec, question.outputs)
-    if not question.film_uncertainty:
-        return answers
-    coolant = result.coolant
-    for ending, film in ((FILM_LOW, coolant.mean_film_low), (FILM_HIGH, coolant.mean_film_high)):
-        changed = _with_film_factor(spec, film / coolant.mean_film_coefficient)
-        at_end = _values(_solved(changed, mesh, operators), spec, question.outputs)
-        answers |= {path + ending: value for path, value in at_end.items()}
-    return answers
+def solve_checked(task: DesignTask, film_ratio: NDArray[np.float64] | None = None) -> ThermalResult:
+    """Full solve of a possible design that passes its self-checks.
 
+    Parameters
+    ----------
+    task : DesignTask
+    film_ratio : (n_along,) ndarray, optional
+        Further factor on the film of each cell along the channel.
 
-def _solved(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOperators) -> ThermalResult:
-    result = solve_prepared(machine_on_mesh(spec, mesh, operators))
-    require_checks(result.checks, spec.name)
+    Raises
+    ------
+    SpindleFemError
+        The solve or a check fails.
+    """
+    machine = machine_on_mesh(task.spec, *shared_operators(task.spec, task.geometry))
+    if film_ratio is not None:
+        machine.builder.coolant_loop = _BandLoop(task.spec, machine.builder.cells, film_ratio)
+    result = solve_prepared(machine)
+    require_checks(result.checks, task.spec.name)
     return result
+
+
+class _BandLoop(CoolantLoop):
+    """The coolant with its film elsewhere in the band, each cell by its own ratio."""
+
+    def __init__(self, spec: MachineSpec, cells: ChannelCells, ratio: NDArray[np.float64]) -> None:
+        super().__init__(spec, cells)
+        self._ratio = ratio
+
+    def _port_factor(self, point: OperatingPoint, inlet: float) -> NDArray[np.float64]:
+        return super()._port_factor(point, inlet) * self._ratio
 
 
 def _values(result: ThermalResult, spec: MachineSpec, outputs: Iterable[str]) -> dict[str, Any]:
     summary = build_summary(result, 0.0, 0.0)
     summary["derived"] = derived_values(summary, spec)
     return {path: value_of(summary, path) for path in outputs}
-
-
-def _with_film_factor(spec: MachineSpec, ratio: float) -> MachineSpec:
-    """The machine with its channel film scaled; the band of a film is a factor on all of it."""
-    factor = spec.coolant.film_factor
-    scaled = Uncertain(factor.value * ratio, factor.sigma_log)
-    return spec.model_copy(update={"coolant": spec.coolant.model_copy(update={"film_factor": scaled})})
 
 
 def shared_operators(spec: MachineSpec, geometry: str) -> tuple[TaggedMesh, ThermalOperators]:

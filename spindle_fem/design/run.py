@@ -5,17 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 from spindle_fem.design.evaluate import DesignTask, Question, evaluate_tasks
+from spindle_fem.design.fast.backend import GroupTask, answer_group
+from spindle_fem.design.fast.outputs import ONLY_FULL
 from spindle_fem.design.table import Row
 from spindle_fem.errors import BadInputError, SpindleFemError
 
 # Rows that a worker holds before they land in the table: few are lost when it dies,
 # and its mesh is not prepared again for each.
 CHUNK = 4
+# Designs of one group from which making a projected model of them pays: it costs some twenty full solves.
+LEAST_GROUP = 32
 
 Land = Callable[[Row], None]
+Task = TypeVar("Task")
 
 
 def run_tasks(
@@ -23,6 +28,7 @@ def run_tasks(
     question: Question,
     land: Land,
     *,
+    plan: Sequence[DesignTask] = (),
     jobs: int = 1,
     scheduler: str | None = None,
 ) -> None:
@@ -34,6 +40,8 @@ def run_tasks(
     question : Question
     land : callable
         Called in this process only.
+    plan : sequence of DesignTask
+        All designs of the study: what makes groups for projected models.
     jobs : int
         Worker processes of this machine; below 1 for one a core.
     scheduler : str, optional
@@ -46,19 +54,53 @@ def run_tasks(
     SpindleFemError
         The cluster lost a task for good.
     """
-    ready = [task for task in tasks if task.spec is not None]
     for task in tasks:
         if task.spec is None:
             land(evaluate_tasks([task], question)[0])
-    if scheduler is not None:
-        found: Iterable[list[Row]] = _on_cluster(ready, question, scheduler)
-    elif worker_count(jobs) == 1 or len(ready) <= 1:
-        found = (evaluate_tasks([task], question) for task in _sorted(ready))
-    else:
-        found = _in_processes(ready, question, worker_count(jobs))
-    for rows in found:
-        for row in rows:
-            land(row)
+    left = {task.key: task for task in tasks if task.spec is not None}
+    groups = groups_of(plan, tuple(left.values()), question)
+    for answer, pieces in ((answer_group, groups), (evaluate_tasks, None)):
+        if pieces is None:
+            pieces = _pieces(tuple(left.values()), jobs, scheduler)
+        if not pieces:
+            continue
+        if scheduler is not None:
+            found = _on_cluster(answer, pieces, question, scheduler)
+        elif worker_count(jobs) == 1 or len(pieces) == 1:
+            found = (answer(piece, question) for piece in pieces)
+        else:
+            found = _in_processes(answer, pieces, question, worker_count(jobs))
+        for rows in found:
+            for row in rows:
+                land(row)
+                del left[row["key"]]
+
+
+def groups_of(
+    plan: Sequence[DesignTask], wanted: Sequence[DesignTask], question: Question
+) -> list[GroupTask]:
+    """Groups of planned designs for projected models, with those of them and others that need rows."""
+    if question.backend == "full" or ONLY_FULL & set(question.outputs):
+        return []
+    planned: dict[str, dict[str, DesignTask]] = {}
+    for task in plan:
+        if task.spec is not None and task.structure:
+            planned.setdefault(task.structure, {}).setdefault(task.key, task)
+    least = LEAST_GROUP if question.backend == "auto" else 1
+    found = []
+    for structure, members in planned.items():
+        missing = tuple(task for task in wanted if task.structure == structure)
+        if missing and len(members) >= least:
+            found.append(GroupTask(tuple(members.values()), missing))
+    return found
+
+
+def _pieces(
+    tasks: Sequence[DesignTask], jobs: int, scheduler: str | None
+) -> list[list[DesignTask]] | list[Sequence[DesignTask]]:
+    if scheduler is None and worker_count(jobs) == 1:
+        return [[task] for task in _sorted(tasks)]
+    return chunks_of(tasks, worker_count(jobs) if scheduler is None else _cluster_size(scheduler))
 
 
 def worker_count(jobs: int) -> int:
@@ -89,23 +131,30 @@ def _sorted(tasks: Sequence[DesignTask]) -> list[DesignTask]:
     return sorted(tasks, key=lambda task: first[task.geometry])
 
 
-def _in_processes(tasks: Sequence[DesignTask], question: Question, jobs: int) -> Iterator[list[Row]]:
+def _in_processes(
+    answer: Callable[[Task, Question], list[Row]], pieces: Sequence[Task], question: Question, jobs: int
+) -> Iterator[list[Row]]:
     from joblib import Parallel, delayed, parallel_config
 
     with parallel_config(backend="loky", inner_max_num_threads=1):
         parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
-        yield from parallel(delayed(evaluate_tasks)(chunk, question) for chunk in chunks_of(tasks, jobs))
+        yield from parallel(delayed(answer)(piece, question) for piece in pieces)
 
 
-def _on_cluster(tasks: Sequence[DesignTask], question: Question, address: str) -> Iterator[list[Row]]:
+def _cluster_size(address: str) -> int:
+    with _client(address) as client:
+        return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+
+
+def _on_cluster(
+    answer: Callable[[Task, Question], list[Row]], pieces: Sequence[Task], question: Question, address: str
+) -> Iterator[list[Row]]:
     with _client(address) as client:
         from distributed import as_completed
         from distributed.scheduler import KilledWorker
 
-        workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-        chunks = chunks_of(tasks, workers)
-        # A chunk that dies with its worker goes to another one; Dask gives up after some.
-        futures = client.map(_evaluate_chunk, chunks, question=question, pure=False)
+        # A piece that dies with its worker goes to another one; Dask gives up after some.
+        futures = client.map(answer, pieces, question=question, pure=False)
         for future in as_completed(futures):
             try:
                 rows = future.result()
@@ -117,10 +166,6 @@ def _on_cluster(tasks: Sequence[DesignTask], question: Question, address: str) -
                 ) from error
             future.release()
             yield rows
-
-
-def _evaluate_chunk(chunk: Sequence[DesignTask], question: Question) -> list[Row]:
-    return evaluate_tasks(chunk, question)
 
 
 @contextmanager

@@ -88,6 +88,9 @@ class StudySettings(SpecModel):
     """Dotted paths into the summary of a run, or `derived` ones."""
     speeds: tuple[RotationalSpeed, ...] = ()
     """Every design is solved at each of them."""
+    backend: Literal["auto", "full", "reduced"] = "auto"
+    """What answers designs that share a mesh: a solve of each, or one projected model of all with an
+    error estimate; "auto" takes it where enough designs share it."""
     film_uncertainty: Flag = False
     """Solve each design also at the low and the high film coefficient of the channel."""
 

@@ -9,7 +9,7 @@ from spindle_fem.design.files import SWEEP_SCHEMA
 from spindle_fem.design.judge import Ranking, rank
 from spindle_fem.design.outputs import unit_of
 from spindle_fem.design.sensitivity import neighbours, sensitivities
-from spindle_fem.design.table import FAILED, IMPOSSIBLE, OK, Row
+from spindle_fem.design.table import FAILED, FULL, IMPOSSIBLE, OK, REDUCED, Row
 from spindle_fem.results.summary import package_versions
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> d
         "feasible": sum(row["feasible"] == "yes" for row in rows),
         "geometries": len({row["geometry"] for row in rows if row["geometry"]}),
         "reused_rows": reused,
+        "backends": _backends(rows),
         "optimum": None if ranking is None else _optimum(prepared, rows, ranking),
         "pictured": pictured_designs(prepared, rows, ranking),
         "references": {
@@ -66,6 +67,16 @@ def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> d
             for item in sensitivities(prepared.axes, rows, numbers)
         ],
         "versions": package_versions(),
+    }
+
+
+def _backends(rows: Sequence[Row]) -> dict[str, Any]:
+    """How many designs were solved in full, how many by a projected model, and its largest error estimate."""
+    errors = [row["error_estimate_K"] for row in rows if row["backend"] == REDUCED]
+    return {
+        FULL: sum(row["backend"] == FULL for row in rows),
+        REDUCED: len(errors),
+        "largest_error_estimate_K": max(errors, default=None),
     }
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from spindle_fem.design.designs import Axis, Design, build_axes, plan_designs, reference_designs
 from spindle_fem.design.evaluate import DesignTask, Question, TaskBuilder, solve_task
+from spindle_fem.design.fast.outputs import ONLY_FULL
 from spindle_fem.design.files import MACHINE_FILE, STUDY_FILE, SUMMARY_FILE
 from spindle_fem.design.judge import Limit, judged, limits_of
 from spindle_fem.design.optimise import search_designs
@@ -28,7 +29,8 @@ from spindle_fem.spec.load import apply_overrides, find_machine, load_machine, r
 from spindle_fem.spec.model import MachineSpec
 
 # Rows that stand in the table for designs of a study, besides parameters and outputs.
-_HEAD, _TAIL = ("design",), ("status", "reason", "feasible", "geometry", "key")
+_HEAD = ("design",)
+_TAIL = ("status", "reason", "feasible", "backend", "error_estimate_K", "geometry", "key")
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +184,7 @@ def prepare_study(machine: str | Path, study: str | Path, overrides: Iterable[st
         limits = limits_of(read, where)
     if faults:
         raise FaultsError(where, faults)
-    question = Question(read.judged, read.study.film_uncertainty)
+    question = Question(read.judged, read.study.film_uncertainty, read.study.backend)
     builder = TaskBuilder(content, question)
     designs = plan_designs(read, axes, where)
     compared = reference_designs(read, axes, content, where, len(designs) + 1)
@@ -211,6 +213,15 @@ def _output_faults(study: Study, spec: MachineSpec, where: str) -> list[SpindleF
         for key, path in numeric
         if path in WORDS
     ]
+    only_full = sorted(ONLY_FULL & set(study.judged))
+    if study.study.backend == "reduced" and only_full:
+        faults.append(
+            SpecError(
+                f"{where}: study.backend",
+                f'is "reduced", but only full solves have {", ".join(only_full)}.',
+                'Allowed: "auto" or "full" with it.',
+            )
+        )
     if study.study.film_uncertainty and spec.channel is None:
         faults.append(
             SpecError(
@@ -257,7 +268,9 @@ def _solve_missing(
         table.append({**row, **judged(row, prepared.limits)})
         tell(1)
 
-    run_tasks(list(missing.values()), prepared.question, land, jobs=jobs, scheduler=scheduler)
+    run_tasks(
+        list(missing.values()), prepared.question, land, plan=prepared.tasks, jobs=jobs, scheduler=scheduler
+    )
 
 
 def _pictured(

@@ -19,6 +19,9 @@ EARLIER = "earlier_results.csv"
 OK, FAILED, IMPOSSIBLE = "ok", "failed", "impossible"
 STATUSES = (OK, FAILED, IMPOSSIBLE)
 
+# What answered a design: a solve of the whole field, or the projected model of its group.
+FULL, REDUCED = "full", "reduced"
+
 Row = dict[str, Any]
 
 

@@ -36,8 +36,8 @@ def test_a_killed_worker_loses_no_row_and_changes_no_digit(tmp_path, monkeypatch
         victim = next(iter(cluster.workers.values())).pid
         original = runner._on_cluster
 
-        def killing(tasks, question, address):
-            for rows in original(tasks, question, address):
+        def killing(answer, pieces, question, address):
+            for rows in original(answer, pieces, question, address):
                 if not landed:
                     os.kill(victim, signal.SIGKILL)
                 landed.extend(row["design"] for row in rows)

@@ -1,0 +1,1 @@
+"""Steady designs of one geometry by a projected model: thousands at once."""
