@@ -267,7 +267,7 @@ class Effect(ABC):
 def stated(parameter: TermParameter, value: float) -> Reported:
     """A parameter in the unit in which engineers state it.
 
-    >>> stated(TermParameter("onset_speed", 0.0, unit="rad/s"), 314.159265)
+    >>> stated(TermParameter("onset_speed", 0.0, unit="rad/s"), 100.0 * np.pi)
     Reported(value=3000.0, unit='rpm')
     """
     if parameter.unit == "rad/s":

@@ -1,0 +1,603 @@
+"""Every effect of the catalogue on a lumped spindle and a small network."""
+
+import importlib.util
+import sys
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.diagnosis.view import view_of, view_of_network
+from spindle_fem.effects.catalogue import (
+    build,
+    candidates_for,
+    catalogue,
+    definition_entry,
+    effect_of,
+    fixed,
+    interval_effects,
+)
+from spindle_fem.effects.term import TermContext
+from spindle_fem.errors import SpecError, UnitError
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.build import build_network
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.reduced.drive import drive_of_recording
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.network_model import NetworkFastModel
+from spindle_fem.reduced.transient import simulate_fast
+from spindle_fem.spec.load import load_machine
+from spindle_fem.spec.network import validate_network_machine
+
+SPINDLE_RECORDING = """
+schema = "spindle-fem/recording/1"
+name = "steps"
+data = "spindle.csv"
+time = {column = "t", unit = "s"}
+"""
+CHANNEL = """
+[[channel]]
+column = "%s"
+role = "temperature"
+probe = "%s"
+unit = "degC"
+sigma = 0.1
+"""
+INPUT = """
+[[channel]]
+column = "%s"
+role = "input"
+hold = "%s"
+drives = "%s"
+unit = "%s"
+"""
+NETWORK = """
+schema = "spindle-fem/machine/1"
+name = "small motor"
+[[network.node]]
+name = "winding"
+capacity = {value = "180 J/K", sigma_rel = 0.5}
+[[network.node]]
+name = "body"
+capacity = {value = "500 J/K", sigma_rel = 0.5}
+[[network.node]]
+name = "jacket"
+capacity = {value = "300 J/K", sigma_rel = 0.5}
+[[network.boundary]]
+name = "ambient"
+temperature = "ambient"
+[[network.boundary]]
+name = "coolant"
+temperature = "18 degC"
+[[network.link]]
+between = ["winding", "body"]
+conductance = {value = "2.3 W/K", sigma_rel = 0.5}
+[[network.link]]
+between = ["body", "ambient"]
+conductance = {value = "0.5 W/K", sigma_rel = 0.5}
+[[network.link]]
+between = ["body", "jacket"]
+conductance = {value = "1.5 W/K", sigma_rel = 0.5}
+[[network.link]]
+between = ["jacket", "coolant"]
+conductance = {value = "0.8 W/K", sigma_rel = 0.5}
+[[network.link]]
+between = ["body", "coolant"]
+conductance = {value = "0.4 W/K", sigma_rel = 0.5}
+[[network.source]]
+node = "winding"
+input = "power"
+gain = {value = "0.8 W/W", sigma_rel = 0.1}
+[[network.source]]
+node = "body"
+input = "speed"
+gain = {value = "15 W", sigma_rel = 0.3}
+reference = "1000 rpm"
+"""
+
+
+def _lumped_model():
+    path = Path(__file__).with_name("test_reduced_transient.py")
+    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
+    module = importlib.util.module_from_spec(loaded)
+    sys.modules[loaded.name] = module
+    loaded.loader.exec_module(module)
+    return module.lumped_model
+
+
+def _spindle(folder):
+    """Fast model, recording, view and drive of a lumped reference spindle."""
+    time = np.arange(0.0, 7200.0, 30.0)
+    speed = np.select([time < 300, time < 2700, time < 3600, time < 5400], [0.0, 3000.0, 0.0, 1500.0], 4000.0)
+    columns = {"t": time, "speed": speed, "ambient": 20.0 + 0.5 * np.sin(time / 900.0)}
+    columns["coolant_in"] = np.where(time < 4000.0, 15.0, 30.0)
+    text = SPINDLE_RECORDING
+    probes = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
+    for probe in probes:
+        columns[f"{probe}_degC"] = 22.0 + 8.0 * time / time[-1]
+        text += CHANNEL % (f"{probe}_degC", probe)
+    for column, hold, drives, unit in (
+        ("speed", "previous", "speed", "rpm"),
+        ("ambient", "linear", "ambient", "degC"),
+        ("coolant_in", "linear", "coolant_inlet", "degC"),
+    ):
+        text += INPUT % (column, hold, drives, unit)
+    recording = _written(folder, "spindle", columns, text)
+    spec = load_machine("recorded_spindle")
+    fast = FastModel(_lumped_model()(spec), spec)
+    return fast, recording, view_of(fast, recording), drive_of_recording(spec, recording)
+
+
+def _network(folder):
+    """Fast model, recording, view and drive of a small network."""
+    time = np.arange(0.0, 5000.0, 25.0)
+    columns = {
+        "t": time,
+        "winding": 20.0 + 20.0 * time / 5000.0,
+        "body": 20.0 + 10.0 * time / 5000.0,
+        "ambient": 20.0 + np.sin(time / 900.0),
+        "power": np.where(time < 2500.0, 120.0, 40.0),
+        "speed": np.select([time < 500, time < 2500, time < 3000], [0.0, 1500.0, 0.0], 800.0),
+    }
+    text = SPINDLE_RECORDING.replace("spindle.csv", "network.csv")
+    for probe in ("winding", "body"):
+        text += CHANNEL % (probe, probe)
+    for name, hold, unit in (
+        ("ambient", "linear", "degC"),
+        ("power", "previous", "W"),
+        ("speed", "previous", "rpm"),
+    ):
+        text += INPUT % (name, hold, name, unit)
+    recording = _written(folder, "network", columns, text)
+    spec = validate_network_machine(tomllib.loads(NETWORK), "motor.toml")
+    fast = NetworkFastModel(build_network(spec.network), spec)
+    return fast, recording, view_of_network(fast.network, recording), fast.drive(recording)
+
+
+def _written(folder, name, columns, text):
+    pd.DataFrame(columns).to_csv(folder / f"{name}.csv", index=False)
+    (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    return read_recording(folder / f"{name}.toml")
+
+
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory):
+    """Both machines by kind: fast model, recording, view, drive."""
+    folder = tmp_path_factory.mktemp("machines")
+    return {"geometry": _spindle(folder), "network": _network(folder)}
+
+
+INTERVALS = [(900.0, 1800.0), (2600.0, 3900.0)]
+
+
+def everything(view):
+    """Candidates of all effects, those of intervals at every place in every form."""
+    found = list(candidates_for(view))
+    for effect in interval_effects():
+        for place in effect.places(view):
+            found += [effect.over(view, place, INTERVALS, form) for form in effect.interval_forms]
+    return found
+
+
+def amplitude_at(candidate, value):
+    """Parameters with the amplitude at a value, shapes at their first start."""
+    values = {name: item.value for name, item in candidate.parameters.items()}
+    return values | dict(candidate.starts[0]) | {candidate.amplitude: value}
+
+
+def context_of(term, values, drive, rows, *, seed=1):
+    """A term's context at some instants of a drive, with temperatures and states of its own."""
+    random = np.random.default_rng(seed)
+    inputs = {name: drive.start[rows, i] for i, name in enumerate(drive.names)}
+    inputs |= {"ambient": np.full(len(rows), 293.0)}
+    temperatures = 300.0 + 15.0 * random.random((len(term.reads), len(rows)))
+    state = random.random((term.n_states, len(rows))) * (8.0 if term.n_states else 1.0)
+    if term.n_states == 2:
+        state[1] += 280.0
+    own = {name: np.full(len(rows), value, dtype=complex) for name, value in term.values(values).items()}
+    return TermContext(drive.grid[rows], inputs, temperatures.astype(complex), state.astype(complex), own)
+
+
+def parts_of(term):
+    """What a term does, as functions of a context."""
+    found = {}
+    if term.heat_places:
+        found["heat"] = term.heat
+    if term.coefficients:
+        found["factor"] = term.factor
+    if term.bearings:
+        found["friction"] = term.friction
+    if term.n_states:
+        found["advance"] = lambda context: term.advance(context, 20.0)
+    return found
+
+
+KINDS = ("geometry", "network")
+POINT = OperatingPoint(260.0, 1500.0, 293.0, 295.0, 3.0e-4)
+
+
+# ------------------------------------------------------------------ catalogue
+IDS = {
+    "thermal_preload": "missing_physics",
+    "viscosity_heat": "missing_physics",
+    "grease_churning": "missing_physics",
+    "starvation": "missing_physics",
+    "seal_friction": "missing_physics",
+    "windage": "missing_physics",
+    "drive_heat": "missing_physics",
+    "joint_conductance": "parameter",
+    "gap_closure": "missing_physics",
+    "mount_sink": "missing_physics",
+    "shaft_convection": "missing_physics",
+    "radiation": "missing_physics",
+    "natural_convection": "missing_physics",
+    "coolant_heating": "missing_physics",
+    "coolant_film": "missing_physics",
+    "coolant_bypass": "missing_physics",
+    "chiller_cycling": "missing_physics",
+    "ambient_drift": "missing_physics",
+    "heat_split": "parameter",
+    "heat_scale": "parameter",
+    "heat_capacity": "parameter",
+    "sensor_offset": "sensor",
+    "sensor_gain": "sensor",
+    "sensor_lag": "sensor",
+    "sensor_drift": "sensor",
+    "sensor_detached": "sensor",
+    "clock_shift": "sensor",
+    "unrecorded_heat_source": "missing_physics",
+    "unrecorded_cooling": "missing_physics",
+}
+
+
+def test_the_catalogue_is_complete_and_each_kind_is_right():
+    assert {name: effect.kind for name, effect in catalogue().items()} == IDS
+    assert {effect.name for effect in interval_effects()} == {"unrecorded_heat_source", "unrecorded_cooling"}
+    for effect in catalogue().values():
+        assert effect.title
+        assert effect.check.endswith(".")
+
+
+def test_every_effect_is_offered_somewhere(machines):
+    offered = {c.effect for kind in KINDS for c in everything(machines[kind][2])}
+    assert offered == set(IDS)
+
+
+def test_an_effect_that_the_machine_already_has_is_not_offered(machines):
+    view = machines["geometry"][2]
+    assert "coolant_heating" not in {c.effect for c in candidates_for(view)}
+    less = replace(view, has=view.has | {"windage", "thermal_preload @ front_bearings"})
+    left = {(c.effect, c.component) for c in candidates_for(less)}
+    assert ("windage", "shaft") not in left
+    assert ("thermal_preload", "front_bearings") not in left
+    assert ("thermal_preload", "rear_bearings") in left
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_candidates_are_told_apart_and_well_formed(machines, kind):
+    found = everything(machines[kind][2])
+    labels = [(c.effect, c.component, c.form) for c in found]
+    assert len(set(labels)) == len(labels)
+    for candidate in found:
+        amplitude = candidate.parameters[candidate.amplitude]
+        assert amplitude.value == candidate.null
+        assert amplitude.sigma > 0.0
+        assert amplitude.low <= candidate.reference <= amplitude.high
+        assert candidate.reference != candidate.null
+        assert 1 <= len(candidate.starts) <= 12
+        for item in candidate.parameters.values():
+            assert item.low <= item.value <= item.high, (candidate.label, item)
+        for start in candidate.starts:
+            assert set(start) <= set(candidate.parameters), candidate.label
+            for name, value in start.items():
+                assert candidate.parameters[name].low <= value <= candidate.parameters[name].high
+
+
+# ------------------------------------------------------------------ terms
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_amplitude_nothing_happens(machines, kind):
+    _, _, view, drive = machines[kind]
+    rows = np.arange(0, len(drive.steps), 7)
+    for candidate in everything(view):
+        values = amplitude_at(candidate, candidate.null)
+        for term in candidate.terms:
+            context = context_of(term, values, drive, rows)
+            for name, part in parts_of(term).items():
+                if name != "advance":
+                    neutral = 0.0 if name == "heat" else 1.0
+                    assert np.abs(part(context) - neutral).max() < 1e-12, (candidate.label, name)
+            own = term.values(values)
+            assert all(f == pytest.approx(1.0) for f in term.operating_factor(POINT, own).values())
+            assert all(c == 0.0 for c in term.place_capacity(own).values())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_complex_steps_are_differences(machines, kind):
+    _, _, view, drive = machines[kind]
+    rows = np.array([15, 60, 130])
+    for candidate in everything(view):
+        values = amplitude_at(candidate, candidate.reference)
+        for term in candidate.terms:
+            context = context_of(term, values, drive, rows)
+            directions = [("temperatures", i) for i in range(len(term.reads))]
+            directions += [("state", i) for i in range(term.n_states)]
+            directions += [("parameters", item.name) for item in term.parameters]
+            for where, which in directions:
+                for name, part in parts_of(term).items():
+                    slope = part(_moved(context, where, which, 1e-30j)).imag / 1e-30
+                    value = np.abs(getattr(context, where)[which]).max()
+                    width = 1e-6 * max(value, 1e-3)
+                    upper = part(_moved(context, where, which, width)).real
+                    lower = part(_moved(context, where, which, -width)).real
+                    difference = (upper - lower) / (2.0 * width)
+                    scale = np.abs(difference).max() + np.abs(part(context)).max() / max(value, 1e-3)
+                    assert np.abs(slope - difference).max() <= 2e-5 * scale, (candidate.label, name, which)
+
+
+def _moved(context, where, which, step):
+    if where == "parameters":
+        return replace(context, parameters={**context.parameters, which: context.parameters[which] + step})
+    moved = getattr(context, where).copy()
+    moved[which] += step
+    return replace(context, **{where: moved})
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_instants_together_are_instants_one_by_one(machines, kind):
+    _, _, view, drive = machines[kind]
+    rows = np.arange(3, len(drive.steps), 17)
+    for candidate in everything(view):
+        values = amplitude_at(candidate, candidate.reference)
+        for term in candidate.terms:
+            context = context_of(term, values, drive, rows)
+            for name, part in parts_of(term).items():
+                together = part(context)
+                for i in range(len(rows)):
+                    one = TermContext(
+                        float(context.time[i]),
+                        {key: float(value[i]) for key, value in context.inputs.items()},
+                        context.temperatures[:, [i]],
+                        context.state[:, [i]],
+                        {key: value[[i]] for key, value in context.parameters.items()},
+                    )
+                    alone = part(one)
+                    assert alone.shape == (together.shape[0], 1), (candidate.label, name)
+                    assert alone[:, 0] == pytest.approx(together[:, i], rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_candidate_runs_and_moves_the_machine(machines, kind):
+    fast, recording, view, drive = machines[kind]
+    plain = _run(fast, recording, drive, (), {})
+    for candidate in everything(view):
+        values = amplitude_at(candidate, candidate.reference)
+        if candidate.reading is not None and not candidate.terms:
+            continue
+        run = _run(fast, recording, drive, candidate.terms, values)
+        moved = np.abs(run - plain).max()
+        assert np.isfinite(run).all(), candidate.label
+        assert moved > 1e-5, candidate.label
+
+
+def _run(fast, recording, drive, terms, values):
+    start = 293.15
+    if isinstance(fast, NetworkFastModel):
+        start = fast.start(recording, drive)
+    return simulate_fast(fast, drive, start, parameters=values, terms=terms).temperature
+
+
+# Sign of the mean change of the named channel at positive amplitude.
+WARMER = {
+    ("thermal_preload", "front_bearings"): 0,
+    ("seal_friction", "nose"): 0,
+    ("windage", "shaft"): 3,
+    ("drive_heat", "drive_end"): 4,
+    ("mount_sink", "flange"): 3,
+    ("grease_churning", "front_bearings"): 0,
+    ("starvation", "front_bearings"): 0,
+    ("coolant_bypass", "channel"): 3,
+    ("unrecorded_heat_source", "housing"): 3,
+}
+COLDER = {
+    ("shaft_convection", "shaft"): 3,
+    ("unrecorded_cooling", "housing"): 3,
+    ("coolant_film", "channel"): 3,
+}
+
+
+def test_heat_warms_and_losses_cool(machines):
+    fast, recording, view, drive = machines["geometry"]
+    plain = _run(fast, recording, drive, (), {})
+    seen = set()
+    for candidate in everything(view):
+        key = (candidate.effect, candidate.component)
+        sign = 1.0 if key in WARMER else -1.0 if key in COLDER else 0.0
+        if not sign or not candidate.terms or "curvature" in candidate.form:
+            continue
+        run = _run(fast, recording, drive, candidate.terms, amplitude_at(candidate, candidate.reference))
+        channel = WARMER.get(key, COLDER.get(key))
+        assert sign * (run - plain)[:, channel].mean() > 0.0, candidate.label
+        seen.add(key)
+    assert seen == set(WARMER) | set(COLDER)
+
+
+def test_more_capacity_follows_more_slowly(machines):
+    fast, recording, view, drive = machines["geometry"]
+    plain = _run(fast, recording, drive, (), {})
+    housing = next(c for c in candidates_for(view) if (c.effect, c.component) == ("heat_capacity", "housing"))
+    run = _run(fast, recording, drive, housing.terms, {housing.amplitude: 50000.0})
+    early = drive.times < 2700.0
+    assert (run - plain)[early, 3].mean() < -0.1
+
+
+# ------------------------------------------------------------------ reports
+NAMES = {
+    "heat_scale": {"factor": ""},
+    "heat_split": {"inner_share_change": ""},
+    "joint_conductance": {"factor": ""},
+    "coolant_bypass": {"fraction": ""},
+    "heat_capacity": {"capacity": "J/K"},
+    "sensor_offset": {"offset": "K"},
+    "sensor_gain": {"gain": ""},
+    "sensor_lag": {"time_constant": "s"},
+    "sensor_drift": {"rate": "K/h"},
+    "clock_shift": {"shift": "s"},
+    "drive_heat": {"heat_at_3000rpm": "W"},
+    "seal_friction": {"heat_per_1000rpm": "W"},
+    "windage": {"heat_at_4500rpm": "W"},
+    "mount_sink": {"temperature_above_ambient": "K"},
+    "chiller_cycling": {"period": "s", "amplitude": "K"},
+    "starvation": {"onset_speed": "rpm"},
+    "unrecorded_heat_source": {"heat": "W"},
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_findings_carry_the_agreed_names_and_units(machines, kind):
+    for candidate in everything(machines[kind][2]):
+        effect = effect_of(candidate.effect)
+        reported = effect.report(candidate, amplitude_at(candidate, candidate.reference))
+        for name, unit in NAMES.get(candidate.effect, {}).items():
+            assert reported[name].unit == unit, candidate.label
+        if candidate.effect == "unrecorded_cooling":
+            assert "conductance" in reported or "heat" in reported
+        if candidate.form == "fouling":
+            assert set(reported) == {"factor"}
+        assert all(np.isfinite(item.value) for item in reported.values())
+        sentence = effect.statement(candidate, reported)
+        assert sentence[0] == sentence[0].upper(), sentence
+        assert sentence.endswith("."), sentence
+
+
+def test_values_come_out_in_the_units_of_engineers(machines):
+    view = machines["geometry"][2]
+
+    def reported(effect, form, **values):
+        candidate = next(c for c in candidates_for(view) if c.effect == effect and c.form == form)
+        own = {
+            outer: values[item.name] for outer, item in candidate.parameters.items() if item.name in values
+        }
+        return catalogue()[effect].report(candidate, own)
+
+    assert reported("starvation", "", onset_speed=100.0 * np.pi)["onset_speed"].value == pytest.approx(3000.0)
+    assert reported("sensor_drift", "", rate=1.0 / 3600.0)["rate"].value == pytest.approx(1.0)
+    split = {"heat.inner_share": 1.2}
+    candidate = next(c for c in candidates_for(view) if c.form == "every bearing")
+    assert catalogue()["heat_split"].report(candidate, split)["inner_share_change"].value == pytest.approx(
+        0.1
+    )
+    transition = reported("coolant_film", "transition", film_increase=2.0, onset_reynolds=640.0)
+    assert transition["factor_above"].value == pytest.approx(3.0)
+
+
+def test_heat_while_on_is_the_mean_over_the_intervals(machines):
+    effect = catalogue()["unrecorded_heat_source"]
+    candidate = effect.over(machines["geometry"][2], "housing", [(0.0, 100.0), (200.0, 500.0)])
+    name = candidate.terms[0].name
+    values = {f"{name}.heat": 40.0, f"{name}.factor_1": 0.8, f"{name}.factor_2": 1.0}
+    assert effect.report(candidate, values)["heat"].value == pytest.approx(40.0 * 0.95)
+    assert effect.intervals(candidate, {f"{name}.end_2": 510.0}) == [(0.0, 100.0), (200.0, 510.0)]
+
+
+# ------------------------------------------------------------------ definitions
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_entry_of_a_definition_builds_the_same_effect_again(machines, kind):
+    _, _, view, drive = machines[kind]
+    rows = np.array([15, 60, 130])
+    for candidate in everything(view):
+        values = amplitude_at(candidate, candidate.reference)
+        entry = definition_entry(candidate, values)
+        assert all(isinstance(text, str) for text in entry["parameters"].values())
+        again = build(
+            entry["effect"],
+            entry["component"],
+            entry.get("form", ""),
+            entry["parameters"],
+            view,
+            entry.get("intervals", ()),
+        )
+        assert not again.free
+        assert again.label == candidate.label
+        for outer, item in again.parameters.items():
+            assert item.value == pytest.approx(values[outer], rel=1e-9, abs=1e-9), (candidate.label, outer)
+        for term, other in zip(candidate.terms, again.terms, strict=True):
+            ours, theirs = (context_of(t, v, drive, rows) for t, v in ((term, values), (other, {})))
+            for name, part in parts_of(term).items():
+                assert parts_of(other)[name](theirs) == pytest.approx(part(ours), rel=1e-7, abs=1e-9)
+
+
+def test_building_says_what_is_wrong(machines):
+    view = machines["geometry"][2]
+    good = {"load_per_kelvin": "0.08 1/K"}
+    assert build("thermal_preload", "front_bearings", "", good, view).effect == "thermal_preload"
+    for change, error, message in (
+        ({"effect": "thermal_preloud"}, SpecError, 'Did you mean "thermal_preload"'),
+        ({"component": "front_bearing"}, SpecError, 'cannot have thermal_preload.*"front_bearings"'),
+        ({"form": "odd"}, SpecError, "form.*'odd'|\"odd\" is unknown"),
+        ({"values": {}}, SpecError, '"load_per_kelvin" is missing'),
+        ({"values": {**good, "lagg": "3 s"}}, SpecError, '"lagg" is unknown'),
+        ({"values": {"load_per_kelvin": "0.08 W"}}, UnitError, "wrong dimension"),
+        ({"values": {"load_per_kelvin": "-0.08 1/K"}}, SpecError, "Allowed: 0 to 1"),
+        ({"intervals": [("0 s", "5 s")]}, SpecError, "takes none"),
+    ):
+        given = {"effect": "thermal_preload", "component": "front_bearings", "form": "", "values": good}
+        with pytest.raises(error, match=message):
+            build(**(given | change), view=view)
+    heat = {"heat": "30 W"}
+    with pytest.raises(SpecError, match="has none"):
+        build("unrecorded_heat_source", "flange", "", heat, view)
+    with pytest.raises(SpecError, match="growing"):
+        build("unrecorded_heat_source", "flange", "", heat, view, [("9 s", "5 s")])
+    two = build("unrecorded_heat_source", "flange", "", heat, view, [("5 s", "9 s"), (20.0, 30.0)])
+    assert catalogue()["unrecorded_heat_source"].intervals(two, {}) == [(5.0, 9.0), (20.0, 30.0)]
+
+
+def test_fixing_leaves_the_candidate_itself_free(machines):
+    candidate = next(c for c in candidates_for(machines["geometry"][2]) if c.effect == "windage")
+    held = fixed(candidate, {"heat_at_4500rpm": 12.0})
+    assert candidate.free
+    assert not held.free
+    assert held.parameters[held.amplitude].value == 12.0
+
+
+# ------------------------------------------------------------------ views
+def test_a_view_names_what_the_machine_has(machines):
+    view = machines["geometry"][2]
+    assert view.sets["front_bearings"] == ("F1", "F2", "F3")
+    assert view.films["flange"] == ("film.housing.flange_back",)
+    assert view.films["nose"] == ("film.shaft.nose_end",)
+    assert set(view.joint_coefficients["rear_bearings"]) == {
+        "joint.R1.outer_ring|housing",
+        "joint.R2.outer_ring|housing",
+        "joint.housing|rear_outer_spacer",
+    }
+    assert view.outlets == ("COOLANT_OUT_degC",)
+    assert view.probes["SP01_degC"] == "SP01"
+    assert view.highest_speed == pytest.approx(4000.0 * np.pi / 30.0)
+    assert view.lowest_speed == pytest.approx(1500.0 * np.pi / 30.0)
+    assert 280.0 < view.reynolds[0] < 300.0 < 500.0 < view.reynolds[1]
+    assert view.parameters["film.outside"] == pytest.approx(0.3)
+    assert view.has == {"coolant_heating"}
+
+
+def test_a_network_is_seen_by_its_nodes_links_and_sources(machines):
+    view = machines["network"][2]
+    assert view.films == {
+        "body|ambient": ("link.body|ambient",),
+        "jacket|coolant": ("link.jacket|coolant",),
+        "body|coolant": ("link.body|coolant",),
+    }
+    assert view.speeds("body.speed") == ("speed",)
+    assert view.speeds("winding.power") == ()
+    assert view.fluids["link.body|ambient"] == "ambient"
+    assert view.fluids["link.jacket|coolant"] == pytest.approx(291.15)
+    assert view.coolant_links == {"coolant": ("link.jacket|coolant", "link.body|coolant")}
+    assert view.joint_coefficients == {
+        "winding|body": ("link.winding|body",),
+        "body|jacket": ("link.body|jacket",),
+    }
+    assert view.component("winding.power") == "winding"
+    assert view.typical_heat == pytest.approx(0.8 * 120.0 + 15.0 * 1.5)
