@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from spindle_fem.effects.term import Term
 from spindle_fem.errors import SpecError
 from spindle_fem.reduced.drive import Drive
+from spindle_fem.reduced.exact_step import ExactPropagator
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.start import Start
 from spindle_fem.reduced.stepping import GAMMA, SHARE, STAGE_WEIGHT, START_WEIGHT, stage_values
 from spindle_fem.reduced.transient import TransientRun, grid_weights
 
@@ -20,7 +22,7 @@ Array = NDArray[np.float64]
 def fast_gradient(
     fast: FastModel,
     drive: Drive,
-    initial_temperature: float,
+    initial: float | Array | Start,
     by_prediction: Array,
     derivatives: Sequence[str],
     *,
@@ -37,7 +39,8 @@ def fast_gradient(
     ----------
     fast : FastModel
     drive : Drive
-    initial_temperature : float, [K]
+    initial : float, (r,) ndarray or Start
+        As :func:`spindle_fem.reduced.transient.simulate_fast` takes it.
     by_prediction : (N, c) ndarray, [1/K]
         Derivative of the scalar to every prediction, channels as the model has
         them; for half a sum of squared residuals these are the residuals.
@@ -62,7 +65,8 @@ def fast_gradient(
             "a term depends on temperature or time.",
             "Contract the sensitivities of simulate_fast instead.",
         )
-    states, _ = run.march(initial_temperature)
+    start = Start.of(initial, fast.model.one)
+    states, _ = run.march(start)
     weights = np.zeros((len(states), len(fast.channels)))
     right, part = grid_weights(drive.times, drive.grid)
     np.add.at(weights, right - 1, (1.0 - part)[:, None] * by_prediction)
@@ -72,22 +76,31 @@ def fast_gradient(
     for number, operators in enumerate(run.operators):
         rows = np.flatnonzero(owner == number)
         seeds[rows] = weights[rows] @ operators.outputs
-    adjoint = _march_back(run, seeds)
-    gradient = _direct(run, states, weights, owner)
+    adjoint, gradient = _march_back(run, start, seeds)
+    gradient += _direct(run, states, weights, owner)
+    if any(isinstance(item, ExactPropagator) for item in run.propagators.values()):
+        # A few unknowns: their derivatives are as cheap as anything cleverer.
+        return gradient + np.einsum("nr,nrp->p", adjoint, run.forcing_of(states, None))
     for key, rows in run.groups.items():
         gradient += _of_group(run, key, rows, states, adjoint[rows])
     return gradient
 
 
-def _march_back(run: TransientRun, seeds: Array) -> Array:
-    """Derivative of the scalar to the end of each step, (G, r)."""
+def _march_back(run: TransientRun, start: Start, seeds: Array) -> tuple[Array, Array]:
+    """Derivative of the scalar to the end of each step, (G, r); gradient through the given states, (p,)."""
+    given, slopes = start.rows(), start.derivatives(run.derivatives)
+    gradient = np.zeros(len(run.derivatives))
     transposed = [np.ascontiguousarray(run.propagators[key].advance.T) for key in run.groups]
     adjoint = np.empty((len(seeds) - 1, seeds.shape[1]))
     carried = seeds[-1].copy()
     for step in range(len(adjoint) - 1, -1, -1):
         adjoint[step] = carried
         carried = transposed[run.group_of_step[step]] @ carried + seeds[step]
-    return adjoint
+        if step in given:
+            gradient += carried @ slopes[given[step]]
+            # What came before a given state does not move it.
+            carried = np.zeros_like(carried)
+    return adjoint, gradient
 
 
 def _direct(run: TransientRun, states: Array, weights: Array, owner: NDArray[np.int64]) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from spindle_fem.effects.term import COOLANT_INLET, FLUID_PREFIX, Term, TermContext
+from spindle_fem.effects.term import COOLANT_INLET, Term, TermContext
 from spindle_fem.errors import ConvergenceError, SpecError, did_you_mean
 from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.fast_model import FastModel
@@ -202,20 +202,21 @@ class DynamicTerms:
             self._layouts.append(
                 _Layout.of(term, self.values[number], self._reads[number], self._states[number], own)
             )
-            films = [f"film.{place.removeprefix(FLUID_PREFIX)}" for place in term.heat_places]
+            fluids = fast.fluid_places
             self._shifted.append(
-                [
-                    (i, film)
-                    for i, (place, film) in enumerate(zip(term.heat_places, films, strict=True))
-                    if place.startswith(FLUID_PREFIX) and film in model.fluid_names
-                ]
+                [(i, fluids[place]) for i, place in enumerate(term.heat_places) if place in fluids]
             )
+        self._fluids: dict[str, tuple[float, list[int]]] = {}
+        for coefficient in self._spectra:
+            own = fast.fluid_parameters(coefficient)
+            scale = float(np.prod([values.get(name, 1.0) for name in own]))
+            self._fluids[coefficient] = (scale, [i for i, n in enumerate(self.derivatives) if n in own])
 
     def _require_place(self, term: Term, place: str) -> None:
         model = self.fast.model
-        fluids = [f"{FLUID_PREFIX}{name.removeprefix('film.')}" for name in model.fluid_names] + [
-            COOLANT_INLET
-        ]
+        fluids = list(self.fast.fluid_places)
+        if self.fast.inlet_column is not None:
+            fluids.append(COOLANT_INLET)
         if place not in model.place_names and place not in fluids:
             raise SpecError(
                 f"term {term.name}",
@@ -253,8 +254,8 @@ class DynamicTerms:
         for column, place in self.place_columns:
             if place == COOLANT_INLET:
                 found[:, column] = inlet_load
-            elif place.startswith(FLUID_PREFIX) and place not in model.place_names:
-                film = "film." + place.removeprefix(FLUID_PREFIX)
+            elif place in self.fast.fluid_places:
+                film = self.fast.fluid_places[place]
                 found[:, column] = model.fluid_load[model.fluid_names.index(film)]
             else:
                 found[:, column] = model.place(place)
@@ -330,7 +331,8 @@ class DynamicTerms:
                 answers = np.asarray(term.factor(context), dtype=complex)
                 for i, (coefficient, own_sensed, columns) in enumerate(self._moved[number]):
                     strength = coefficients[coefficient] * self._spectra[coefficient]
-                    fluid = self.fast.fluid_temperature(coefficient, inputs)
+                    scale, moves = self._fluids[coefficient]
+                    fluid = scale * self.fast.fluid_temperature(coefficient, inputs)
                     difference = sensed[own_sensed] - fluid * self._uniform[own_sensed]
                     excess = answers[i, 0].real - 1.0
                     value[columns] = -excess * strength * difference
@@ -338,6 +340,8 @@ class DynamicTerms:
                     layout.spread(answers[i : i + 1], columns, -(strength * difference)[:, None], slopes)
                     for target in touched.get(coefficient, ()):
                         by_parameter[columns, target] += value[columns]
+                    for target in moves:
+                        by_parameter[columns, target] += excess * strength * fluid * self._uniform[own_sensed]
         return Evaluation(value, by_sensed, by_state, by_parameter)
 
     def advance(

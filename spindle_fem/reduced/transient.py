@@ -9,16 +9,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.term import RecordedHeat, Term
+from spindle_fem.effects.term import Term
 from spindle_fem.errors import SpecError
 from spindle_fem.reduced.assemble import RunOperators, run_operators
-from spindle_fem.reduced.drive import Drive, heat_of_table
+from spindle_fem.reduced.drive import Drive
+from spindle_fem.reduced.exact_step import ExactPropagator
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.natural import natural_film_terms
 from spindle_fem.reduced.nonlinear import DynamicTerms, Evaluation, solve_added
+from spindle_fem.reduced.start import Start
 from spindle_fem.reduced.stepping import (
     Propagator,
-    build_propagator,
     group_steps,
     load_response,
     sensitivity_forcing,
@@ -61,19 +61,21 @@ class FastTransient:
 def simulate_fast(
     fast: FastModel,
     drive: Drive,
-    initial_temperature: float,
+    initial: float | Array | Start,
     *,
     parameters: Mapping[str, float] | None = None,
     derivatives: Sequence[str] = (),
     terms: Sequence[Term] = (),
 ) -> FastTransient:
-    """Follow a drive from a uniform temperature.
+    """Follow a drive from a uniform temperature or a given state.
 
     Parameters
     ----------
-    fast : FastModel
+    fast : FastModel or NetworkFastModel
     drive : Drive
-    initial_temperature : float, [K]
+    initial : float, (r,) ndarray or Start
+        Uniform temperature [K]; unknowns; or unknowns with derivatives, at
+        time zero and after long gaps. What the terms remember outlasts a gap.
     parameters : mapping of str to float, optional
         Factors of the machine's parameters, 1 where absent; values of the
         terms' (``<term>.<parameter>``), nominal where absent.
@@ -94,16 +96,9 @@ def simulate_fast(
     ConvergenceError
         The terms run away.
     """
-    if fast.spec.heat.model != "table":
-        raise SpecError(
-            "heat.model",
-            f'"{fast.spec.heat.model}" follows the temperatures of every bearing.',
-            'The fast model takes heat.model = "table".',
-        )
-    recorded = tuple(RecordedHeat(name) for name in drive.names if name.startswith("heat."))
-    everything = (*natural_film_terms(fast.spec), *recorded, *terms)
+    everything = (*fast.own_terms(drive), *terms)
     run = TransientRun(fast, drive, parameters or {}, tuple(derivatives), everything)
-    return run.solve(initial_temperature)
+    return run.solve(initial)
 
 
 class TransientRun:
@@ -121,13 +116,14 @@ class TransientRun:
         self.built: RunOperators = run_operators(fast, drive.points, parameters, derivatives, terms)
         self.operators = self.built.classes
         self.groups = group_steps(drive.step_class, drive.steps)
-        self.propagators: dict[tuple[int, float], Propagator] = {
-            key: build_propagator(self.built.storage, self.operators[key[0]].conduction, key[1])
+        self.propagators: dict[tuple[int, float], Propagator | ExactPropagator] = {
+            key: fast.propagator(self.built.storage, self.operators[key[0]].conduction, key[1])
             for key in self.groups
         }
         self.group_of_step = np.empty(len(drive.steps), dtype=np.int64)
         for number, rows in enumerate(self.groups.values()):
             self.group_of_step[rows] = number
+        self._given = (0, *drive.restarts)
         self.start, self.start_by = self._load_inputs(drive.start)
         self.end, self.end_by = self._load_inputs(drive.end)
         self._n_heat = len(fast.heat_places)
@@ -138,49 +134,53 @@ class TransientRun:
 
     def _load_inputs(self, inputs: Array) -> tuple[Array, dict[str, Array]]:
         """Load inputs of every step at one of its ends, and their derivatives."""
-        fast, drive = self.fast, self.drive
-        heat = heat_of_table(fast.spec, inputs[:, drive.column("speed")], inputs[:, drive.column("thrust")])
-        friction, by = fast.friction_loads(heat, self.built.factors, self.built.machine_derivatives)
-        found = np.zeros((len(inputs), len(fast.load_names)))
-        found[:, : friction.shape[1]] = friction
-        found[:, fast.load_names.index("ambient")] = inputs[:, drive.column("ambient")]
-        found[:, fast.load_names.index("coolant_inlet")] = inputs[:, drive.column("coolant_inlet")]
-        found[:, fast.load_names.index("coolant_friction")] = 1.0
-        for number, temperature in enumerate(fast.fixed_fluids):
-            found[:, fast.load_names.index(f"fixed[{number}]")] = temperature
-        return found, by
+        built = self.built
+        return self.fast.load_inputs(self.drive.names, inputs, built.factors, built.machine_derivatives)
 
     def _friction_derivatives(self, by: Mapping[str, Array]) -> Array:
         """Derivatives of the heat of every heat place to every asked parameter, (G, n_heat_places, p)."""
         found = np.zeros((len(self.drive.steps), self._n_heat, len(self.derivatives)))
         for column, parameter in enumerate(self.derivatives):
             if parameter in by:
-                found[:, :, column] = by[parameter]
+                found[:, :, column] = by[parameter][:, : self._n_heat]
         return found
 
-    def solve(self, initial_temperature: float) -> FastTransient:
+    def solve(self, initial: float | Array | Start) -> FastTransient:
         """States, then sensitivities, then outputs."""
-        states, tracks = self.march(initial_temperature)
-        sensitivities = self._march_sensitivities(states, tracks) if self.derivatives else None
+        start = Start.of(initial, self.fast.model.one)
+        states, tracks = self.march(start)
+        sensitivities = None
+        if self.derivatives:
+            forcing, slopes = self.forcing_of(states, tracks), start.derivatives(self.derivatives)
+            sensitivities = self.tangents(forcing, tracks, explicit=True, start=slopes)
         return self._outputs(states, sensitivities, tracks)
 
-    def march(self, initial_temperature: float) -> tuple[Array, Tracks | None]:
+    def march(self, initial: float | Array | Start) -> tuple[Array, Tracks | None]:
         """States at the ends of all steps, (G + 1, r), and what the terms did."""
+        start = Start.of(initial, self.fast.model.one)
+        if start.points.tolist() != [0, *self.drive.restarts]:
+            raise SpecError(
+                "start",
+                f"states at {start.points.size} points of the grid.",
+                f"The drive needs one at the first and after each of {len(self.drive.restarts)} long gaps.",
+            )
         size, steps = self.fast.model.size, len(self.drive.steps)
         response = np.empty((steps, size))
         for key, rows in self.groups.items():
             loads = self.operators[key[0]].loads
             response[rows] = load_response(self.propagators[key], self.start[rows], self.end[rows], loads)
         states = np.empty((steps + 1, size))
-        states[0] = initial_temperature * self.fast.model.one
+        given = start.rows()
         tracks = None
         if self.dynamic is None:
             advance = [self.propagators[key].advance for key in self.groups]
             for step, group in enumerate(self.group_of_step):
+                if step in given:
+                    states[step] = start.states[given[step]]
                 np.dot(advance[group], states[step], out=states[step + 1])
                 states[step + 1] += response[step]
         else:
-            tracks = self._march_terms(states, response)
+            tracks = self._march_terms(start, states, response)
         return states, tracks
 
     # ------------------------------------------------------------------ terms
@@ -201,7 +201,8 @@ class TransientRun:
             friction_by=(self._friction_end_by if at_end else self._friction_start_by)[step],
         )
 
-    def _march_terms(self, states: Array, response: Array) -> Tracks:
+    def _march_terms(self, start: Start, states: Array, response: Array) -> Tracks:
+        given = start.rows()
         dynamic, drive = self.dynamic, self.drive
         keys = list(self.groups)
         columns = [dynamic.columns(self._inlet_load(key[0])) for key in keys]
@@ -212,8 +213,10 @@ class TransientRun:
         tracks = Tracks(columns, from_start, from_end, answer, dynamic, steps)
         memory = dynamic.initial_states()
         for step, group in enumerate(self.group_of_step):
+            if step in given:
+                states[step] = start.states[given[step]]
             sensed = dynamic.sense @ states[step]
-            if step > 0 and self._goes_on(step):
+            if step > 0 and step not in given and self._goes_on(step):
                 # Nothing jumps between the steps: what held at the end of the last still does.
                 begin = replace(tracks.end[-1], value=tracks.added_end[step - 1])
                 guess = 2.0 * begin.value - tracks.added_start[step - 1]
@@ -221,6 +224,10 @@ class TransientRun:
                 begin = self._evaluator(step, at_end=False, memory=memory)(sensed)
                 guess = begin.value
             tracks.begin.append(begin)
+            if step + 1 in given:
+                # A gap: nothing is known of it, and what comes after it is given.
+                tracks.bridge(step, begin)
+                continue
             if dynamic.n_states:
                 inputs = self._term_inputs(drive.start[step])
                 moved = dynamic.advance(
@@ -249,7 +256,10 @@ class TransientRun:
         return bool(same_class and np.array_equal(drive.start[step], drive.end[step - 1]))
 
     def _inlet_load(self, number: int) -> Array:
-        return self.operators[number].loads[:, self.fast.load_names.index("coolant_inlet")]
+        column = self.fast.inlet_column
+        if column is None:
+            return np.zeros(self.fast.model.size)
+        return self.operators[number].loads[:, column]
 
     # ---------------------------------------------------------- sensitivities
     def forcing_of(self, states: Array, tracks: Tracks | None) -> Array:
@@ -301,10 +311,9 @@ class TransientRun:
             end = more_end if end is None else end + more_end
         return start, end
 
-    def _march_sensitivities(self, states: Array, tracks: Tracks | None) -> Array:
-        return self.tangents(self.forcing_of(states, tracks), tracks, explicit=True)
-
-    def tangents(self, forcing: Array, tracks: Tracks | None, *, explicit: bool = False) -> Array:
+    def tangents(
+        self, forcing: Array, tracks: Tracks | None, *, explicit: bool = False, start: Array | None = None
+    ) -> Array:
         """Small changes of the states that follow from small changes of the loads.
 
         Parameters
@@ -315,6 +324,8 @@ class TransientRun:
             What the terms did in the run that the changes are small against; they answer.
         explicit : bool
             Whether the columns are the asked parameters, which the terms also know.
+        start : (S, r, p) ndarray, optional
+            Changes of the given states: the first, and those after long gaps.
 
         Returns
         -------
@@ -322,9 +333,12 @@ class TransientRun:
         """
         number = forcing.shape[2]
         found = np.zeros((len(forcing) + 1, forcing.shape[1], number))
+        given = {point: 0.0 if start is None else start[row] for row, point in enumerate(self._given)}
         advance = [self.propagators[key].advance for key in self.groups]
         if tracks is None:
             for step, group in enumerate(self.group_of_step):
+                if step in given:
+                    found[step] = given[step]
                 np.dot(advance[group], found[step], out=found[step + 1])
                 found[step + 1] += forcing[step]
             return found
@@ -332,12 +346,18 @@ class TransientRun:
         memory = np.zeros((self.dynamic.n_states, number))
         identity = np.eye(self.dynamic.n_added)
         for step, group in enumerate(self.group_of_step):
+            if step in given:
+                found[step] = given[step]
             begin, end = tracks.begin[step], tracks.end[step]
             sensed = sense @ found[step]
             added = begin.by_sensed @ sensed + begin.by_state @ memory
             if explicit:
                 added += begin.by_parameter
                 tracks.start_by[step] = added
+            if step + 1 in given:
+                if explicit:
+                    tracks.end_by[step] = added
+                continue
             if self.dynamic.n_states:
                 _, by_sensed, by_state, by_parameter = tracks.moved[step]
                 memory = by_sensed @ sensed + by_state @ memory
@@ -365,7 +385,7 @@ class TransientRun:
         inputs = np.vstack((self.start, self.end[last:]))
         added = np.zeros((len(states), 0)) if tracks is None else tracks.added()
         shift_by = self._shift_inlet(inputs, tracks)
-        inlet = fast.load_names.index("coolant_inlet")
+        inlet = fast.inlet_column
         for number, operators in enumerate(self.operators):
             rows = np.flatnonzero(owner == number)
             at_grid[rows] = states[rows] @ operators.outputs.T + inputs[rows] @ operators.output_inputs.T
@@ -412,6 +432,7 @@ class Tracks:
         steps: int,
     ) -> None:
         self.columns, self.from_start, self.from_end, self.answer = columns, from_start, from_end, answer
+        self.dynamic = dynamic
         self.added_start = np.zeros((steps, dynamic.n_added))
         self.added_end = np.zeros((steps, dynamic.n_added))
         self.start_by = np.zeros((steps, dynamic.n_added, len(dynamic.derivatives)))
@@ -419,6 +440,14 @@ class Tracks:
         self.begin: list[Evaluation] = []
         self.end: list[Evaluation] = []
         self.moved: list[tuple[Array, Array, Array, Array]] = []
+
+    def bridge(self, step: int, begin: Evaluation) -> None:
+        """Keep what held before a gap for the step that leads over it."""
+        self.end.append(begin)
+        self.added_start[step] = self.added_end[step] = begin.value
+        if self.dynamic.n_states:
+            # Never used: the memory stays as it is.
+            self.moved.append((np.zeros(0),) * 4)
 
     def added(self) -> Array:
         """Added quantities at the ends of the steps, (G + 1, m)."""
