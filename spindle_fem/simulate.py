@@ -19,11 +19,13 @@ from spindle_fem.calibration.fit import calibrate as fit_parameters
 from spindle_fem.calibration.noise import SlowError
 from spindle_fem.calibration.plots import draw_channels
 from spindle_fem.calibration.predictor import MachinePredictor, NetworkPredictor, Predictor
+from spindle_fem.effect_entries import ActiveEffects, effects_on
 from spindle_fem.network.build import build_network
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.compare import ALL, Comparison, compare, simulation_summary, write_simulated
 from spindle_fem.reduced.build import ReductionOptions, reduced_model_of
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.network_model import NetworkFastModel
 from spindle_fem.reporting.output import output_folder, replace_text
 from spindle_fem.results.summary import package_versions
 from spindle_fem.spec import network as network_spec
@@ -150,22 +152,23 @@ def _simulate_geometry(
     spec: MachineSpec, recording: Recording, calibration: Sequence[Recording], progress: Progress
 ) -> Simulation:
     fast = fast_model_for(spec, (recording, *calibration), progress=progress)
+    effects = effects_on(spec.effects, fast, recording)
     result = None
     if calibration:
-        result = fit_parameters(MachinePredictor(fast, calibration), progress=progress)
-    predictor = MachinePredictor(fast, [recording])
+        result = fit_parameters(MachinePredictor(fast, calibration, effects=effects), progress=progress)
+    predictor = MachinePredictor(fast, [recording], effects=effects)
     factors = {} if result is None else result.factors
     outside = _outside_range(predictor, factors)
     if outside:
         progress("reduced model: outside its range, made anew")
         centred = reduced_model_of(with_parameters(spec, factors), progress=progress)
         fast = FastModel(centred, spec)
-        predictor = MachinePredictor(fast, [recording])
+        predictor = MachinePredictor(fast, [recording], effects=effects)
         outside = _outside_range(predictor, factors)
     progress("simulation")
     log_factors = np.zeros(len(predictor.priors)) if result is None else result.log_factors
     predicted, sensitivity = predictor.predict(log_factors)[0]
-    notes = [*predictor.drives[0].notes]
+    notes = [*predictor.drives[0].notes, *_effect_notes(effects)]
     if spec.coolant is not None and spec.coolant.properties_at == "bulk":
         notes.append("the coolant's film is taken at its inlet temperature, not along the channel")
     if outside:
@@ -187,7 +190,7 @@ def _simulate_geometry(
 
 def _outside_range(predictor: MachinePredictor, parameters: Mapping[str, float]) -> tuple[str, ...]:
     fast = predictor.fast
-    factors = fast.table.factors(parameters)
+    factors = fast.table.factors(predictor.effects.times_parameters(parameters))
     found: dict[str, None] = {}
     for drive in predictor.drives:
         for point in drive.points:
@@ -204,10 +207,13 @@ def _simulate_network(
 ) -> Simulation:
     spec = network_spec.load_network_machine(machine, overrides)
     network = build_network(spec.network)
+    effects = effects_on(spec.effects, NetworkFastModel(network, spec), recording)
     result, text = None, None
     if calibration:
-        result = fit_parameters(NetworkPredictor(network, calibration, spec.initial), progress=progress)
-    predictor = NetworkPredictor(network, [recording], spec.initial)
+        result = fit_parameters(
+            NetworkPredictor(network, calibration, spec.initial, effects), progress=progress
+        )
+    predictor = NetworkPredictor(network, [recording], spec.initial, effects)
     progress("simulation")
     # Starting temperatures belong to each recording: those of the calibration say nothing here.
     learned = {} if result is None else result.factors
@@ -226,7 +232,12 @@ def _simulate_network(
             if e.name in own
         }
         text = network_spec.write_network_machine(network_spec.with_parameters(spec, values))
-    return _simulation(recording, predictor, predicted, sensitivity, result, text, [], {})
+    notes = _effect_notes(effects)
+    return _simulation(recording, predictor, predicted, sensitivity, result, text, notes, {})
+
+
+def _effect_notes(effects: ActiveEffects) -> list[str]:
+    return [f"with {candidate.label}, as the definition says" for candidate in effects.candidates]
 
 
 def _in_definition(spec: Any, network: Any, name: str, factor: float) -> float:

@@ -9,13 +9,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effect_entries import NO_EFFECTS, ActiveEffects
 from spindle_fem.network.model import Parameter, ThermalNetwork
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.simulate_network import initial_parameters, simulate_on_recording
 from spindle_fem.reduced.coefficients import INNER_SHARE
-from spindle_fem.reduced.drive import Drive, drive_of_recording
+from spindle_fem.reduced.drive import Drive, drive_of_recording, inputs_at
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.transient import simulate_fast
+from spindle_fem.reduced.network_model import NetworkFastModel
+from spindle_fem.reduced.transient import FastTransient, simulate_fast
 from spindle_fem.spec.parameters import uncertain_parameters
 
 Array = NDArray[np.float64]
@@ -64,12 +66,18 @@ class MachinePredictor:
     recordings : sequence of Recording
     fixed : mapping of str to float
         Factors of parameters that stay as they are.
+    effects : ActiveEffects
+        Physics beyond the machine's own, as its definition has it.
     """
 
     def __init__(
-        self, fast: FastModel, recordings: Sequence[Recording], fixed: Mapping[str, float] | None = None
+        self,
+        fast: FastModel,
+        recordings: Sequence[Recording],
+        fixed: Mapping[str, float] | None = None,
+        effects: ActiveEffects = NO_EFFECTS,
     ) -> None:
-        self.fast = fast
+        self.fast, self.effects = fast, effects
         self.recordings = tuple(recordings)
         self.fixed = dict(fixed or {})
         self.priors = tuple(
@@ -105,12 +113,23 @@ class MachinePredictor:
                 self.fast,
                 drive,
                 self.initial_temperature(number),
-                parameters=factors,
+                parameters=self.effects.times_parameters(factors),
                 derivatives=names if derivatives else (),
+                terms=self.effects.terms,
             )
-            columns = self.columns[number]
-            found.append((run.temperature[:, columns], run.sensitivity[:, columns]))
+            found.append(_readings(run, drive, self.recordings[number], self.columns[number], self.effects))
         return found
+
+
+def _readings(
+    run: FastTransient, drive: Drive, recording: Recording, columns: NDArray[np.int64], effects: ActiveEffects
+) -> tuple[Array, Array]:
+    """What the channels of a recording tell, and derivatives."""
+    temperature, sensitivity = run.temperature[:, columns], run.sensitivity[:, columns]
+    if not effects.readings:
+        return temperature, sensitivity
+    inputs = inputs_at(drive, recording.times)
+    return effects.read(recording.temperature_names, recording.times, temperature, sensitivity, inputs)
 
 
 class NetworkPredictor:
@@ -125,12 +144,18 @@ class NetworkPredictor:
     recordings : sequence of Recording
     initial : str
         As the machine's ``initial``.
+    effects : ActiveEffects
+        Physics beyond the network's own, as its definition has it.
     """
 
     def __init__(
-        self, network: ThermalNetwork, recordings: Sequence[Recording], initial: str = "first_reading"
+        self,
+        network: ThermalNetwork,
+        recordings: Sequence[Recording],
+        initial: str = "first_reading",
+        effects: ActiveEffects = NO_EFFECTS,
     ) -> None:
-        self.network = network
+        self.network, self.effects = network, effects
         self.recordings = tuple(recordings)
         self.initial = initial
         self.free = tuple(p for p in network.parameters if p.sigma_log > 0.0)
@@ -146,6 +171,8 @@ class NetworkPredictor:
 
     def predict(self, log_factors: Array, *, derivatives: bool = True) -> list[tuple[Array, Array]]:
         """Prediction and derivatives for every recording."""
+        if self.effects.candidates:
+            return self._predict_with_effects(log_factors, derivatives=derivatives)
         factors = np.exp(log_factors)
         own = {p.name: p.value * f for p, f in zip(self.free, factors, strict=False)}
         network = self.network.with_values(own)
@@ -162,4 +189,32 @@ class NetworkPredictor:
             sensitivity[:, :, position : position + len(begun)] = run.sensitivity[:, :, len(moved) :]
             position += len(begun)
             found.append((run.predicted, sensitivity))
+        return found
+
+    def _predict_with_effects(self, log_factors: Array, *, derivatives: bool) -> list[tuple[Array, Array]]:
+        """By the fast model, which takes terms."""
+        fast = NetworkFastModel(self.network)
+        own = tuple(p.name for p in self.free)
+        factors = np.exp(log_factors)
+        position = len(own)
+        found = []
+        for recording, items in zip(self.recordings, self.starts, strict=True):
+            begun = tuple(p.name for p in items)
+            places = [*range(len(own)), *range(position, position + len(begun))]
+            names = (*own, *begun)
+            position += len(begun)
+            values = dict(zip(names, factors[places].tolist(), strict=True))
+            values = self.effects.times_parameters(values)
+            asked = names if derivatives else ()
+            drive = fast.drive(recording)
+            start = fast.start(recording, drive, values, asked, kind=self.initial, initial=items)
+            run = simulate_fast(
+                fast, drive, start, parameters=values, derivatives=asked, terms=self.effects.terms
+            )
+            columns = fast.require_channels(recording.probes, recording.source)
+            predicted, part = _readings(run, drive, recording, columns, self.effects)
+            sensitivity = np.zeros((*predicted.shape, len(self.priors)))
+            if derivatives:
+                sensitivity[:, :, places] = part
+            found.append((predicted, sensitivity))
         return found

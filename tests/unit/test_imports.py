@@ -39,6 +39,7 @@ ABOVE = {
     "crosscheck",
     "reduced",
     "simulate",
+    "effect_entries",
     "calibration",
     "transients",
     "transient_run",
