@@ -26,13 +26,18 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 LARGEST_SET = 3
+# Root mean square of whitened residuals below which there is nothing left for a further effect to explain.
+EXPLAINED = 1.03
 #: Prior probability of 0, 1, 2 and 3 effects.
 NUMBER_PRIOR = (0.4, 0.35, 0.2, 0.05)
 SINGLES, PAIRS, TRIPLES = 8, 6, 3
 BEAM, ADDITIONS = 3, 4
 # A hypothesis this much less likely (natural logarithm) than the best is not extended.
-HOPELESS = 60.0
+HOPELESS = 400.0
+# An addition must promise to make the data this much likelier, its prior paid.
 ENOUGH_GAIN = 4.0
+# So many singles are fitted however little they promise.
+ALWAYS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +96,19 @@ class Search:
         null = self.problem.fit()
         self._keep(Hypothesis(null, float(np.log(NUMBER_PRIOR[0]))))
         self.progress("diagnosis: screening")
-        self._extend(null, SINGLES, PAIRS, TRIPLES)
+        screened, intervals = self.screened(null)
+        self._extend(null, screened, intervals, 1, SINGLES, always=ALWAYS)
+        if not self._explained(self.ranked()[0]):
+            self.progress("diagnosis: 2 effects")
+            self._extend(null, screened, intervals, 2, PAIRS)
+            self._extend(null, screened, intervals, 3, TRIPLES)
         for size in range(1, LARGEST_SET):
-            ranked = [h for h in self.ranked() if len(h.keys) == size]
-            best = self.ranked()[0].score
-            for hypothesis in ranked[:BEAM]:
-                if hypothesis.score < best - HOPELESS:
-                    continue
-                self.progress(f"diagnosis: {size + 1} effects")
-                self._extend(hypothesis.fit, ADDITIONS, 0, 0)
+            best = self.ranked()[0]
+            ranked = [h for h in self.ranked() if len(h.keys) == size and h.score > best.score - HOPELESS]
+            self.progress(f"diagnosis: {size + 1} effects")
+            for hypothesis in ranked[: 1 if self._explained(best) else BEAM]:
+                screened, intervals = self.screened(hypothesis.fit)
+                self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
         return self.ranked()
 
     def ranked(self) -> list[Hypothesis]:
@@ -107,21 +116,28 @@ class Search:
         return sorted(self.found.values(), key=lambda h: -h.score)
 
     # ------------------------------------------------------------------ steps
-    def _extend(self, fit: Fit, singles: int, pairs: int, triples: int) -> None:
-        """Fit the most promising additions to a hypothesis."""
-        screened, intervals = self.screened(fit)
-        size = len(fit.candidates)
-        tried = 0
-        for number, count in ((1, singles), (2, pairs), (3, triples)):
-            if count == 0 or size + number > LARGEST_SET:
-                continue
-            for members, gain in screened.best(number, count):
-                if gain < ENOUGH_GAIN and tried >= 3:
-                    break
-                tried += 1
-                amplitudes = screened.amplitudes(members)
-                additions = [(screened.variants[i], amplitudes[i]) for i in members]
-                self._try(fit, additions, intervals)
+    @staticmethod
+    def _explained(hypothesis: Hypothesis) -> bool:
+        return hypothesis.fit.reduced_misfit < EXPLAINED**2
+
+    def _extend(
+        self,
+        fit: Fit,
+        screened: Screened,
+        intervals: Mapping[int, OnOff],
+        number: int,
+        count: int,
+        always: int = 0,
+    ) -> None:
+        """Fit the most promising additions of so many effects to a hypothesis."""
+        if len(fit.candidates) + number > LARGEST_SET:
+            return
+        for tried, (members, gain) in enumerate(screened.best(number, count)):
+            if gain < ENOUGH_GAIN and tried >= always:
+                break
+            amplitudes = screened.amplitudes(members)
+            additions = [(screened.variants[i], amplitudes[i]) for i in members]
+            self._try(fit, additions, intervals)
 
     def screened(self, fit: Fit) -> tuple[Screened, dict[int, OnOff]]:
         """Candidates, and intervals at every spot, against what a fit leaves."""

@@ -32,6 +32,8 @@ EFFECT_PREFIX = "effect:"
 # Displacement of a probe from its nominal place, m: ``probe.<probe>.<direction>``.
 PROBE_PREFIX = "probe."
 DIRECTIONS = ("r", "z")
+# Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
+INLET_BIN = 3.0
 BASIS_TOLERANCE = 3.0e-4
 
 
@@ -387,7 +389,7 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     for ends, owner, at in ((start, first, grid[:-1]), (end, last, grid[1:])):
         part = ((at - fine.grid[owner]) / fine.steps[owner])[:, None]
         ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
-    step_class, points = classes_of(0.5 * (start + end))
+    step_class, points = classes_of(0.5 * (start + end), INLET_BIN)
     return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
 
 

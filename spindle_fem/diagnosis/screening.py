@@ -80,6 +80,7 @@ class BaseRun:
         self.end_inputs = {name: drive.end[:, i] for i, name in enumerate(drive.names)}
         self.columns = plant.columns[number]
         self._coefficient: dict[str, Array] = {}
+        self._told: Array | None = None
 
     # ------------------------------------------------------------------ answers
     def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
@@ -246,10 +247,10 @@ class BaseRun:
 
     def _reading(self, variant: Variant) -> Array:
         """Difference of one channel that a sensor effect makes, (G + 1, c)."""
-        without = self.plant.predict(self.number, self.values, self.candidates)
+        if self._told is None:
+            self._told = self.plant.predict(self.number, self.values, self.candidates).temperature
         values = self.values | variant.values(variant.candidate.reference)
-        told = self.plant.read(self.number, [variant.candidate], values, without.temperature)
-        return told - without.temperature
+        return self.plant.read(self.number, [variant.candidate], values, self._told) - self._told
 
     def _steady(self, variants: Sequence[Variant]) -> Array:
         """Constant changes of the operators, by their derivatives where they do nothing."""

@@ -75,15 +75,13 @@ class Judgement:
 def rank(hypotheses: Sequence[Hypothesis], temperature: float = TEMPERATURE) -> list[Ranked]:
     """Probabilities of sets of effects at places, forms added up, the most probable first.
 
-    The evidence of data (not the prior) is divided by ``temperature``: the
-    catalogue's laws never hold exactly, so that a difference in the tail of a
-    misfit is no proof of a different cause.
+    What the data gain (not what complexity costs) is divided by
+    ``temperature``: the catalogue's laws never hold exactly, so that a
+    difference in the tail of a misfit is no proof of a different cause.
     """
-    null = next(h for h in hypotheses if not h.fit.candidates)
     groups: dict[frozenset, list[tuple[float, Hypothesis]]] = {}
     for item in hypotheses:
-        gain = item.fit.log_evidence - null.fit.log_evidence
-        groups.setdefault(item.keys, []).append((gain / temperature + item.log_prior, item))
+        groups.setdefault(item.keys, []).append((tempered(item, temperature), item))
     highest = max(score for group in groups.values() for score, _ in group)
     weights = {
         key: float(sum(np.exp(score - highest) for score, _ in group)) for key, group in groups.items()
@@ -93,6 +91,13 @@ def rank(hypotheses: Sequence[Hypothesis], temperature: float = TEMPERATURE) -> 
         Ranked(max(group, key=lambda pair: pair[0])[1], weights[key] / total) for key, group in groups.items()
     ]
     return sorted(found, key=lambda item: -item.probability)
+
+
+def tempered(hypothesis: Hypothesis, temperature: float = TEMPERATURE) -> float:
+    """Logarithm of prior, complexity and a share of the likelihood."""
+    fit = hypothesis.fit
+    complexity = fit.log_evidence + 0.5 * fit.misfit_with_prior
+    return hypothesis.log_prior + complexity - 0.5 * fit.misfit_with_prior / temperature
 
 
 def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:

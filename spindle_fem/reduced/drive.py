@@ -215,12 +215,14 @@ def _grid(times: Array, held: Array, largest: float, breaks: Array) -> Array:
     return np.append(np.concatenate(parts), times[-1])
 
 
-def classes_of(inputs: Array) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
+def classes_of(
+    inputs: Array, inlet_bin: float = INLET_BIN
+) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
     """Steps whose films differ too little to matter share one operator."""
     speed, thrust, ambient, inlet, flow = inputs[:, : len(STANDARD)].T
     width = SPEED_BIN * max(float(speed.max()), 1.0)
     flow_width = FLOW_BIN * max(float(flow.max()), 1e-9)
-    inlet_width = INLET_BIN
+    inlet_width = inlet_bin
     while True:
         keys = np.column_stack(
             (np.round(speed / width), np.round(inlet / inlet_width), np.round(flow / flow_width))

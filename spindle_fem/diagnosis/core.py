@@ -1,0 +1,177 @@
+"""The diagnosis itself: from a machine and its recordings to a judgement with everything it rests on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.diagnosis.engine import Hypothesis, Search
+from spindle_fem.diagnosis.heldout import heldout_stamps
+from spindle_fem.diagnosis.inference import Fit, Problem
+from spindle_fem.diagnosis.locate import Explanation, Pattern, explain, onset_answers
+from spindle_fem.diagnosis.plant import Plant
+from spindle_fem.diagnosis.prepare import (
+    Calibrated,
+    all_stamps,
+    calibrate,
+    machine_coordinates,
+    slow_error_of,
+)
+from spindle_fem.diagnosis.screening import variants_of
+from spindle_fem.diagnosis.verdict import Judgement, judge, rank
+from spindle_fem.effects.catalogue import candidates_for, catalogue, interval_effects
+from spindle_fem.effects.view import MachineView
+from spindle_fem.recordings.align import Recording
+from spindle_fem.reduced.fast_model import FastModel
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+# Hypotheses that are fitted again with the slow error that the best of them leaves, on the whole basis.
+REFITTED = 8
+#: Prior weight of effects; the ways out for what no other fits count less.
+WEIGHTS = {"unrecorded_heat_source": 0.5, "unrecorded_cooling": 0.5}
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What was found, and what it rests on.
+
+    Attributes
+    ----------
+    plant : Plant
+        Machine on the diagnosed recordings, full basis.
+    view : MachineView
+    calibrated : Calibrated
+    hypotheses : tuple of Hypothesis
+        The most probable first.
+    judgement : Judgement
+    null : Fit
+        Nothing missing, the machine's own parameters fitted.
+    final : Fit
+        The chosen set.
+    explanations : tuple of Explanation
+        Missing heat over time at every spot, if it were the only one.
+    heldout : str
+        How the held-out readings were chosen.
+    candidates_tried : int
+    seconds : mapping of stage to float
+    """
+
+    plant: Plant
+    view: MachineView
+    calibrated: Calibrated
+    hypotheses: tuple[Hypothesis, ...]
+    judgement: Judgement
+    null: Fit
+    final: Fit
+    explanations: tuple[Explanation, ...]
+    heldout: str
+    candidates_tried: int
+    seconds: Mapping[str, float]
+
+
+def diagnose_recordings(
+    fast: FastModel,
+    recordings: Sequence[Recording],
+    calibration: Sequence[Recording],
+    view: MachineView,
+    *,
+    heldout: str = "blocks",
+    progress: Progress = lambda stage: None,
+) -> Diagnosis:
+    """Diagnose recordings with a machine's fast model.
+
+    Parameters
+    ----------
+    fast : FastModel
+    recordings : sequence of Recording
+        To be explained.
+    calibration : sequence of Recording
+        Of the same machine when nothing was missing; may be empty.
+    view : MachineView
+    heldout : str
+        As :func:`heldout_stamps` takes it.
+    progress : callable
+    """
+    clock = _Clock()
+    chosen = [heldout_stamps(item, heldout) for item in recordings]
+    plant = Plant(fast, recordings, [~mask for mask, _ in chosen])
+    coordinates = machine_coordinates(plant)
+    progress("diagnosis: calibration" if calibration else "diagnosis: what is known")
+    earlier = Plant(fast, calibration, all_stamps(calibration)) if calibration else None
+    calibrated = calibrate(earlier, coordinates)
+    clock.lap("calibration")
+    candidates = candidates_for(view)
+    effects = catalogue()
+    weights = {name: WEIGHTS.get(name, 1.0) for name in effects}
+    places = sorted(
+        {p for spot in view.spots.values() for p in spot}
+        | {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)}
+    )
+    known = [p for p in places if p in fast.model.place_names]
+    names = [item.name for item, _ in plant.uncertain()]
+    small = plant.compressed(names, known)
+    problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
+    clock.lap("reduction")
+    search = Search(problem, view, effects, candidates, interval_effects(), weights, progress)
+    found = search.run()
+    clock.lap("search")
+    progress("diagnosis: final fits")
+    best = rank(found)[0].best
+    slow = slow_error_of(problem, best.fit)
+    final = Problem(plant, calibrated.belief, slow, plant.observations)
+    refitted = _refit(final, found)
+    clock.lap("final fits")
+    tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
+    judgement = judge(
+        refitted, trials=len({(c.effect, c.component) for c in candidates}), calibrated=bool(calibration)
+    )
+    null = next(h.fit for h in refitted if not h.fit.candidates)
+    progress("diagnosis: where and when")
+    explanations = []
+    about = problem.fit((), null.values)
+    patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]
+    for number in range(len(recordings)):
+        explanations += [explain(item) for item in onset_answers(problem, about, patterns, number)]
+    clock.lap("location")
+    return Diagnosis(
+        plant,
+        view,
+        calibrated,
+        tuple(refitted),
+        judgement,
+        null,
+        judgement.chosen.fit,
+        tuple(explanations),
+        chosen[0][1],
+        tried,
+        clock.laps,
+    )
+
+
+def _refit(problem: Problem, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The most probable hypotheses and the empty one, fitted on the whole basis."""
+    ranked = sorted(found, key=lambda h: -h.score)
+    chosen = ranked[:REFITTED]
+    chosen += [h for h in ranked[REFITTED:] if not h.fit.candidates]
+    fitted = [
+        Hypothesis(problem.fit(item.fit.candidates, item.fit.values, iterations=12), item.log_prior)
+        for item in chosen
+    ]
+    return sorted(fitted, key=lambda h: -h.score)
+
+
+class _Clock:
+    def __init__(self) -> None:
+        self._last = time.perf_counter()
+        self.laps: dict[str, float] = {}
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self.laps[name] = now - self._last
+        self._last = now
