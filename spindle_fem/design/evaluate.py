@@ -18,8 +18,8 @@ from spindle_fem.checks import require_checks
 from spindle_fem.conduction.operators import ThermalOperators, build_operators
 from spindle_fem.coupling import machine_on_mesh
 from spindle_fem.design.designs import Design
-from spindle_fem.design.outputs import derived_values, value_of
 from spindle_fem.design.fast.inputs import refusal, structure_digest
+from spindle_fem.design.outputs import derived_values, value_of
 from spindle_fem.design.table import FAILED, FULL, IMPOSSIBLE, OK, Row
 from spindle_fem.errors import FaultsError, SpecError, SpindleFemError
 from spindle_fem.geometry.assembly import AssemblyGeometry, build_assembly

@@ -15,6 +15,7 @@ from spindle_fem.design.evaluate import DesignTask, Question, TaskBuilder, solve
 from spindle_fem.design.fast.outputs import ONLY_FULL
 from spindle_fem.design.files import MACHINE_FILE, STUDY_FILE, SUMMARY_FILE
 from spindle_fem.design.judge import Limit, judged, limits_of
+from spindle_fem.design.lock import folder_lock
 from spindle_fem.design.optimise import search_designs
 from spindle_fem.design.outputs import WORDS, output_fault
 from spindle_fem.design.run import run_tasks
@@ -123,7 +124,11 @@ def sweep_machine(
     started = time.perf_counter()
     prepared = prepare_study(machine, study, overrides)
     _require_own_table(Path(folder), prepared.columns)
-    with output_folder(folder) as place, _progress(progress, prepared.size) as tell:
+    with (
+        folder_lock(folder),
+        output_folder(folder) as place,
+        _progress(progress, prepared.size) as tell,
+    ):
         replace_text(place / MACHINE_FILE, write_machine(prepared.spec))
         replace_text(place / STUDY_FILE, Path(study).read_text(encoding="utf-8"))
         table = ResultTable(place, prepared.columns)

@@ -347,15 +347,35 @@ def _cells(row: Row, parameters: Sequence[Scale], outputs: Sequence[Scale]) -> l
 
 
 def _table(rows: Sequence[Row], parameters: Sequence[Scale], outputs: Sequence[Scale]) -> list[Any]:
-    heads = (*_columns(parameters, outputs), column("status"), column("limits"), column("reason"))
+    heads = (
+        *_columns(parameters, outputs),
+        column("status"),
+        column("limits"),
+        column("answered by"),
+        column("reason"),
+    )
     words = {"yes": "kept", "no": "broken", None: "–"}
     cells = [
-        [*_cells(row, parameters, outputs), row["status"], words[row["feasible"]], row["reason"] or ""]
+        [
+            *_cells(row, parameters, outputs),
+            row["status"],
+            words[row["feasible"]],
+            _backend(row),
+            row["reason"] or "",
+        ]
         for row in rows
     ]
     return [
         Table(heads, rows_of(cells), folded=f"{len(rows)} designs (results.csv has them with all digits)")
     ]
+
+
+def _backend(row: Row) -> str:
+    """What answered a design, with the error estimate where that is not a full solve."""
+    if row["backend"] is None:
+        return "–"
+    error = row["error_estimate_K"]
+    return row["backend"] if error is None else f"{row['backend']}, within {1e3 * error:.2g} mK"
 
 
 def _explorer(
