@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,9 @@ class FilmChart:
     amount : float
         What is held, m/s or m³/s.
     chart : FilmMap
+    laminar_share : (n_depths, n_temperatures) ndarray, [-]
+        Reynolds number over that at which the model leaves laminar flow: 1 is
+        the laminar-turbulent line.
     pressure_drop : (n_depths, n_temperatures) ndarray, [Pa]
         From port to port without the ports.
     pumping_power : (n_depths, n_temperatures) ndarray, [W]
@@ -50,6 +53,7 @@ class FilmChart:
     held: str
     amount: float
     chart: FilmMap
+    laminar_share: NDArray[np.float64]
     pressure_drop: NDArray[np.float64]
     pumping_power: NDArray[np.float64]
     best: tuple[float, float]
@@ -99,6 +103,7 @@ def film_study(spec: MachineSpec) -> tuple[FilmChart, ...]:
                     held=hold,
                     amount=float(amount),
                     chart=chart,
+                    laminar_share=_laminar_share(model, section, chart),
                     pressure_drop=drop,
                     pumping_power=drop * chart.volume_flow[:, None],
                     best=(float(DEPTHS[row]), float(TEMPERATURES[column])),
@@ -109,13 +114,21 @@ def film_study(spec: MachineSpec) -> tuple[FilmChart, ...]:
     return tuple(charts)
 
 
+def _laminar_share(model: str, section: ChannelSection, chart: FilmMap) -> NDArray[np.float64]:
+    """The paper takes 2300 on the depth, the helical duct Schmidt's limit on its hydraulic diameter."""
+    sections = [replace(section, depth=float(depth)) for depth in chart.depth]
+    if model == "paper":
+        factor = [one.depth / one.hydraulic_diameter / PAPER_CRITICAL_REYNOLDS for one in sections]
+    else:
+        factor = [1.0 / float(critical_reynolds_schmidt(one.curvature_ratio)) for one in sections]
+    return chart.reynolds * np.array(factor)[:, None]
+
+
 def _pressure_drops(section: ChannelSection, coolant: object, chart: FilmMap) -> NDArray[np.float64]:
     properties = [coolant.properties(float(temperature)) for temperature in chart.temperature]
     found = np.empty(chart.value.shape)
     for row, (depth, flow) in enumerate(zip(chart.depth, chart.volume_flow, strict=True)):
-        one = ChannelSection(
-            section.inner_radius, float(depth), section.width, section.pitch, section.turns, section.starts
-        )
+        one = replace(section, depth=float(depth))
         critical = float(critical_reynolds_schmidt(one.curvature_ratio))
         found[row] = [channel_pressure_drop(one, float(flow), oil, critical).channel for oil in properties]
     return found

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from spindle_fem.design.film_study import MODELS, PAPER_DEPTH, PAPER_TEMPERATURE, FilmChart
@@ -22,26 +23,44 @@ def held_text(chart: FilmChart) -> str:
 
 @styled
 def film_maps(charts: Sequence[FilmChart]) -> Figure:
-    """Film coefficient over oil temperature and depth; white line: laminar to turbulent."""
+    """Film coefficient over oil temperature and depth, one scale a row; white line: laminar to turbulent."""
     figure = new_figure(1240.0)
     panels = figure.subplots(2, 2)
     figure.subplots_adjust(left=0.06, right=0.96, top=0.95, bottom=0.07, wspace=0.14, hspace=0.3)
-    for axes, item in zip(panels.ravel(), charts, strict=True):
-        chart = item.chart
-        x, y = chart.temperature - ZERO_CELSIUS_K, chart.depth * 1e3
-        filled = axes.contourf(x, y, chart.value, levels=16, cmap=FILM_MAP)
-        figure.colorbar(filled, ax=axes, pad=0.02).set_label("film coefficient / W/(m²·K)")
-        turbulent = np.array(chart.regime == "turbulent", dtype=float)
-        if 0.0 < turbulent.mean() < 1.0:
-            axes.contour(x, y, turbulent, levels=[0.5], colors="white", linewidths=2.2)
-        _mark(axes, item)
-        axes.set(
-            xlabel="oil temperature / °C",
-            ylabel="channel depth / mm",
-            title=f"{MODELS[item.model]}, {held_text(item)}",
-        )
-    panels[0, 0].legend(loc="upper left", frameon=True, framealpha=0.9)
+    for line, held in zip(panels, dict.fromkeys(item.held for item in charts), strict=True):
+        row = [item for item in charts if item.held == held]
+        values = np.stack([item.chart.value for item in row])
+        levels = MaxNLocator(16).tick_values(values.min(), values.max())
+        for axes, item in zip(line, row, strict=True):
+            x, y = item.chart.temperature - ZERO_CELSIUS_K, item.chart.depth * 1e3
+            filled = axes.contourf(x, y, item.chart.value, levels=levels, cmap=FILM_MAP)
+            figure.colorbar(filled, ax=axes, pad=0.02).set_label("film coefficient / W/(m²·K)")
+            _transition(axes, item, x, y)
+            _mark(axes, item)
+            axes.set(
+                xlabel="oil temperature / °C",
+                ylabel="channel depth / mm",
+                title=f"{MODELS[item.model]}, {held_text(item)}",
+            )
+    panels[0, 0].legend(loc="lower left", frameon=True, framealpha=0.9)
     return figure
+
+
+def _transition(axes: object, item: FilmChart, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+    """The laminar-turbulent line, or in words that there is none."""
+    share = item.laminar_share
+    if share.min() < 1.0 < share.max():
+        axes.contour(x, y, share, levels=[1.0], colors="white", linewidths=2.2)
+        return
+    words = (
+        f"laminar everywhere: Re at most {share.max():.0%} of critical"
+        if share.max() <= 1.0
+        else f"nowhere laminar: Re at least {share.min():.1f} times critical"
+    )
+    axes.text(
+        0.97, 0.95, words, transform=axes.transAxes, ha="right", va="top", fontsize=8.0,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+    )  # fmt: skip
 
 
 @styled

@@ -49,8 +49,10 @@ _CAPTIONS = {
     "parallel_coordinates": "Each line is a design; dotted ones break a limit, thick ones are the best.",
     "pareto_front": "Designs of the front are not beaten in every objective by any other.",
     "sensitivities": "Which parameter each output depends on, over the whole space of the study.",
-    "film_maps": "The paper's Figure 22 and the same by correlations of a helical duct. White line: "
-    "laminar to turbulent. The paper names neither velocity nor flow; what it would choose depends on it.",
+    "film_maps": "The paper's Figure 22 and the same by correlations of a helical duct, each row on one "
+    "scale. White line: laminar to turbulent, by the paper at Re 2300 on the depth, in a helical duct where "
+    "Schmidt puts it, some 8000 on the hydraulic diameter. The paper names neither velocity nor flow; what "
+    "it would choose depends on it.",
     "pump_maps": "What the pump must do for it, through the channel alone.",
 }
 

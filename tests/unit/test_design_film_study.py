@@ -54,5 +54,15 @@ def test_pump(charts):
     assert np.allclose(item.pumping_power, item.pressure_drop * item.chart.volume_flow[:, None])
 
 
+def test_the_line_is_where_each_model_leaves_laminar_flow(charts):
+    for item in charts.values():
+        turbulent = item.chart.regime != "laminar"
+        assert ((item.laminar_share > 1.0) == turbulent).all()
+    paper = charts["paper", "velocity"]
+    row = int(np.argmin(np.abs(paper.chart.depth - PAPER_DEPTH)))
+    share = np.interp(304.15, paper.chart.temperature, paper.laminar_share[row])
+    assert share == pytest.approx(1.0, rel=1e-3)
+
+
 def test_machine_without_a_channel_has_no_map():
     assert film_study(load_machine("uncooled")) == ()
