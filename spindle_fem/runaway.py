@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 
 from spindle_fem.conduction.steady import solve_steady
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
-from spindle_fem.loads.bearing_heat import BearingTemperatures
+from spindle_fem.loads.bearing_heat import BearingTemperatures, preload_runs_away
 from spindle_fem.loads.operating_point import OperatingPoint
 
 if TYPE_CHECKING:
     from spindle_fem.coupling import PreparedMachine
 
-# A preload this many times that of assembly ends a bearing, whatever the loop then does.
-LARGEST_PRELOAD_RATIO = 5.0
 RELAXATION = 0.3
 # The linear response has no film or oil loop to upset, so it may step further.
 RESPONSE_RELAXATION = 0.6
@@ -121,11 +119,6 @@ def highest_stable_speed(machine: PreparedMachine, point: OperatingPoint) -> flo
         if settled or limit == 0.0:
             break
     return limit
-
-
-def preload_runs_away(preload: dict[str, float], assembled: dict[str, float]) -> bool:
-    """Whether a preload has grown beyond what a bearing survives."""
-    return any(preload[name] > LARGEST_PRELOAD_RATIO * assembled[name] for name in preload)
 
 
 def _as_array(found: dict[str, BearingTemperatures], names: list[str]) -> NDArray[np.float64]:

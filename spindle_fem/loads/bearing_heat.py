@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from spindle_fem.errors import OutOfValidityError
 from spindle_fem.loads.model import BearingHeat
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.spec.model import BearingSet, MachineSpec
@@ -20,8 +22,8 @@ from spindle_fem.spec.seats import seat_diameter
 from spindle_fem.spec.solids import Material, SetBearing
 from spindle_fem.tribology import mounting
 from spindle_fem.tribology.bearing import STEEL_EXPANSION, BearingGeometry
-from spindle_fem.tribology.bearing_set import solve_bearing_set
-from spindle_fem.tribology.contact_heat import ball_conductance
+from spindle_fem.tribology.bearing_set import solve_bearing_set, solve_states
+from spindle_fem.tribology.contact_heat import BallConductance, ball_conductance
 from spindle_fem.tribology.fits import RingFits
 from spindle_fem.tribology.grease import Lubricant
 from spindle_fem.tribology.heat import HeatOptions
@@ -29,6 +31,8 @@ from spindle_fem.tribology.rings import SeatMaterial
 from spindle_fem.tribology.state import BearingState
 from spindle_fem.validity import CodedWarning
 
+# A preload this many times that of assembly ends a bearing, whatever the loop then does.
+LARGEST_PRELOAD_RATIO = 5.0
 _ORIENTATION = {"towards_rear": 1, "towards_nose": -1}
 
 
@@ -45,6 +49,24 @@ class BearingTemperatures:
     ball: float
     shaft: float
     housing: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FilmCurves:
+    """What one bearing does over the temperature of its film while nothing expands.
+
+    Attributes
+    ----------
+    temperature : (n,) ndarray, [K]
+    heat : (n,) ndarray, [W]
+    conductance_inner, conductance_outer : (n,) ndarray, [W/K]
+        Between raceway and balls.
+    """
+
+    temperature: NDArray[np.float64]
+    heat: NDArray[np.float64]
+    conductance_inner: NDArray[np.float64]
+    conductance_outer: NDArray[np.float64]
 
 
 HeatModel = Callable[
@@ -173,6 +195,64 @@ class BearingMechanics:
             found |= {state.name: state for state in states}
         return found
 
+    def knows(self, temperature: float) -> bool:
+        """Whether the grease's viscosity is known at a temperature (K)."""
+        try:
+            self.lubricant.kinematic_viscosity(temperature)
+        except OutOfValidityError:
+            return False
+        return True
+
+    def over_film_temperature(self, point: OperatingPoint, temperatures: ArrayLike) -> dict[str, FilmCurves]:
+        """Heat and contacts of every bearing over its film temperature, at the size of assembly.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        temperatures : (n,) array_like, [K]
+
+        Raises
+        ------
+        NoEquilibriumError, OutOfValidityError
+        """
+        kelvin = np.asarray(temperatures, dtype=float)
+        factors = {bearing.name: group.heat_factor.value for group, bearing in self.spec.bearings}
+        curves: dict[str, FilmCurves] = {}
+        for group in self.spec.bearing_set:
+            around = [
+                self._as_assembled([BearingTemperatures(*(value,) * 5)] * len(group.bearing))
+                for value in kelvin.tolist()
+            ]
+            found = solve_states(
+                self.sets[group.name].with_rigid_rings(),
+                point.speed,
+                mounting.ExternalLoad(point.thrust if group.carries_thrust else 0.0),
+                around,
+                lubricant=self.lubricant,
+                control=_control(self.options),
+                heat=self.options,
+            )
+            for states in zip(*found, strict=True):
+                paths = [self._ball_path(group, state) for state in states]
+                name = states[0].name
+                curves[name] = FilmCurves(
+                    kelvin,
+                    factors[name] * np.array([state.heat.total for state in states]),
+                    np.array([path.inner for path in paths]),
+                    np.array([path.outer for path in paths]),
+                )
+        return curves
+
+    def _ball_path(self, group: BearingSet, state: BearingState) -> BallConductance:
+        kind, grease = self.spec.bearing_types[group.bearing_type], self.spec.grease
+        return ball_conductance(
+            state,
+            self.lubricant,
+            ring_conductivity=self.spec.materials[kind.ring_material].thermal_conductivity,
+            ball_conductivity=self.spec.materials[kind.ball_material].thermal_conductivity,
+            wetted_share=grease.free_volume_fill if grease.wetted_share is None else grease.wetted_share,
+        )
+
     @staticmethod
     def _expanded(around: list[BearingTemperatures], assembly: float) -> mounting.SetTemperatures:
         return mounting.SetTemperatures(
@@ -207,21 +287,10 @@ class BearingMechanics:
         """Heat, contacts and films of every bearing; the heat model's interface."""
         states = self.states(point, temperatures, expand=self.spec.heat.thermal_preload)
         factors = {bearing.name: group.heat_factor.value for group, bearing in self.spec.bearings}
-        kinds = {
-            bearing.name: self.spec.bearing_types[group.bearing_type] for group, bearing in self.spec.bearings
-        }
-        grease = self.spec.grease
+        groups = {bearing.name: group for group, bearing in self.spec.bearings}
         heat, warnings = {}, []
         for name, state in states.items():
-            ring = self.spec.materials[kinds[name].ring_material].thermal_conductivity
-            ball = self.spec.materials[kinds[name].ball_material].thermal_conductivity
-            path = ball_conductance(
-                state,
-                self.lubricant,
-                ring_conductivity=ring,
-                ball_conductivity=ball,
-                wetted_share=grease.free_volume_fill if grease.wetted_share is None else grease.wetted_share,
-            )
+            path = self._ball_path(groups[name], state)
             balls = state.balls
             terms = {term: factors[name] * value for term, value in state.heat.terms.items()}
             heat[name] = BearingHeat(
@@ -238,6 +307,11 @@ class BearingMechanics:
             )
             warnings += state.warnings
         return heat, tuple(warnings)
+
+
+def preload_runs_away(preload: Mapping[str, float], assembled: Mapping[str, float]) -> bool:
+    """Whether a preload has grown beyond what a bearing survives."""
+    return any(preload[name] > LARGEST_PRELOAD_RATIO * assembled[name] for name in preload)
 
 
 def _control(options: HeatOptions) -> str:

@@ -8,11 +8,12 @@ splines over temperature, so value and derivative belong to one function.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, PchipInterpolator, RectBivariateSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, RectBivariateSpline
 
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.network.links import SurfacePatch
@@ -255,6 +256,8 @@ class FrictionLaw:
     breaks : (n_bearings, k + 1) ndarray, [K]
     coefficients : (4, k, n_bearings) ndarray
         Of the cubic pieces, highest power first, W.
+    pattern : bearing, row, column and spread times weight, each (p,)
+        Of the derivative.
     """
 
     names: tuple[str, ...]
@@ -263,23 +266,32 @@ class FrictionLaw:
     spread: Array
     breaks: Array
     coefficients: Array
+    pattern: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array]
 
     @classmethod
     def of(
-        cls, tables: dict[str, PchipInterpolator], weights: Array, feedback: Array, spread: Array
+        cls, tables: Mapping[str, CubicHermiteSpline], weights: Array, feedback: Array, spread: Array
     ) -> FrictionLaw:
         """Law of tables of heat over film temperature."""
-        pieces = []
-        for table, gain in zip(tables.values(), feedback, strict=True):
-            heat = table(table.x)
-            pieces.append(PchipInterpolator(table.x - gain * heat, heat))
+        kelvin = np.stack([table.x for table in tables.values()])
+        heat = np.stack([table(table.x) for table in tables.values()])
+        slope = np.stack([table(table.x, 1) for table in tables.values()])
+        gain = feedback[:, None]
+        breaks, slope = kelvin - gain * heat, slope / (1.0 - gain * slope)
+        width, before, after = np.diff(breaks, axis=1), slope[:, :-1], slope[:, 1:]
+        secant = np.diff(heat, axis=1) / width
+        cubic = (before + after - 2.0 * secant) / width**2
+        square = (3.0 * secant - 2.0 * before - after) / width
+        into, feels = (np.abs(spread.T) > 0.0)[:, :, None], (np.abs(weights) > 0.0)[:, None, :]
+        bearing, rows, columns = np.nonzero(into & feels)
         return cls(
             tuple(tables),
             weights,
             feedback,
             spread,
-            np.stack([piece.x for piece in pieces]),
-            np.stack([piece.c for piece in pieces], axis=-1),
+            breaks,
+            np.stack([cubic, square, before, heat[:, :-1]]).transpose(0, 2, 1),
+            (bearing, rows, columns, spread[rows, bearing] * weights[bearing, columns]),
         )
 
     def heat(self, temperature: Array) -> tuple[Array, Array]:
@@ -311,16 +323,5 @@ class FrictionLaw:
     def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
         """Heat into every node and its derivative."""
         heat, slope = self.heat(temperature)
-        rows, columns, values = [], [], []
-        for bearing in range(len(self.names)):
-            into = np.flatnonzero(self.spread[:, bearing])
-            feels = np.flatnonzero(self.weights[bearing])
-            rows.append(np.repeat(into, len(feels)))
-            columns.append(np.tile(feels, len(into)))
-            values.append(
-                slope[bearing] * np.outer(self.spread[into, bearing], self.weights[bearing, feels]).ravel()
-            )
-        return self.spread @ heat, (np.concatenate(rows), np.concatenate(columns), np.concatenate(values))
-
-
-Law = WallFilmLaw | CoolantLaw | FrictionLaw
+        bearing, rows, columns, product = self.pattern
+        return self.spread @ heat, (rows, columns, slope[bearing] * product)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +13,20 @@ from scipy.sparse.linalg import splu
 from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError
 from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel, heat_model_of
 from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.friction import tabulate_friction
 from spindle_fem.network.laws import CoolantLaw, WallFilmLaw
 from spindle_fem.network.machine import MachineNetwork
-from spindle_fem.network.operating import OperatingNetwork, operate, tabulate_friction
+from spindle_fem.network.operating import OperatingNetwork, coolant_law, operate
+from spindle_fem.network.preload import highest_settling_speed, settle, with_limit
+from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
 BALANCE_TOLERANCE = 1.0e-10
 NEWTON_STEPS = 40
 CONTACT_ROUNDS = 30
 CONTACT_TOLERANCE = 1.0e-7
+# K; a step beyond it comes from a matrix that is singular but for rounding.
+LARGEST_STEP = 1.0e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +57,7 @@ class MachineNetworkState:
 
     def bearing_temperatures(self) -> dict[str, BearingTemperatures]:
         """Raceways, balls and what the rings sit on."""
-        return _around(self.network, self.temperature)
+        return bearing_temperatures(self.network, self.temperature)
 
     def links(self) -> list[tuple[int, int, str, float]]:
         """Every flow as (first, second, kind, heat from first to second in W); boundaries follow nodes."""
@@ -88,8 +93,12 @@ class MachineNetworkState:
         return found
 
 
+# Up to this many nodes a full matrix is quicker than a sparse one.
+DENSE_UP_TO = 200
+
+
 class SparseBalance:
-    """Net heat into every node and its sparse derivative."""
+    """Net heat into every node and its derivative: sparse, full for a small network."""
 
     def __init__(self, network: OperatingNetwork) -> None:
         self.network = network
@@ -104,6 +113,7 @@ class SparseBalance:
         self.matrix = whole[:n, :n].tocsc()
         self.load = network.heat - whole[:n, n:] @ network.boundary_temperature
         self.n = n
+        self.full = self.matrix.toarray() if n <= DENSE_UP_TO else None
 
     def net_heat(self, temperature: Array) -> Array:
         """Net heat into every node, (n,) [W]."""
@@ -112,9 +122,11 @@ class SparseBalance:
             net = net + law.value(temperature)
         return net
 
-    def __call__(self, temperature: Array) -> tuple[Array, sparse.csc_array]:
+    def __call__(self, temperature: Array) -> tuple[Array, sparse.csc_array | Array]:
         """Net heat (n,) [W] and derivative (n, n) [W/K]."""
         net = self.load - self.matrix @ temperature
+        if self.full is not None:
+            return self._full(net, temperature)
         derivative = -self.matrix
         if self.network.laws:
             pieces = [law(temperature) for law in self.network.laws]
@@ -122,6 +134,31 @@ class SparseBalance:
             rows, columns, values = (np.concatenate([item[1][k] for item in pieces]) for k in range(3))
             derivative = derivative + sparse.csc_array((values, (rows, columns)), shape=(self.n, self.n))
         return net, derivative.tocsc()
+
+    def jacobian(self, temperature: Array) -> Array:
+        """Derivative of the net heat as a full matrix, (n, n) [W/K]."""
+        derivative = self(temperature)[1]
+        return derivative if isinstance(derivative, np.ndarray) else derivative.toarray()
+
+    def _full(self, net: Array, temperature: Array) -> tuple[Array, Array]:
+        derivative = -self.full
+        for law in self.network.laws:
+            heat, (rows, columns, values) = law(temperature)
+            net = net + heat
+            derivative = derivative + np.bincount(rows * self.n + columns, values, self.n * self.n).reshape(
+                self.n, self.n
+            )
+        return net, derivative
+
+
+def _solve(derivative: sparse.csc_array | Array, right: Array) -> Array:
+    """Newton's step; a singular full matrix is refused by its condition."""
+    if not isinstance(derivative, np.ndarray):
+        return splu(derivative).solve(right)
+    step = np.linalg.solve(derivative, right)
+    if not np.isfinite(step).all() or np.abs(step).max() > LARGEST_STEP:
+        raise np.linalg.LinAlgError("singular")
+    return step
 
 
 def newton(network: OperatingNetwork, start: Array) -> tuple[Array, int]:
@@ -139,8 +176,8 @@ def newton(network: OperatingNetwork, start: Array) -> tuple[Array, int]:
     norm = float(np.abs(net).max())
     for iteration in range(1, NEWTON_STEPS + 1):
         try:
-            step = splu(derivative).solve(-net)
-        except RuntimeError as error:
+            step = _solve(derivative, -net)
+        except (RuntimeError, np.linalg.LinAlgError) as error:
             raise NoSteadyStateError(
                 network.machine.spec.name, "the network's heat balance is singular.", "A body loses no heat."
             ) from error
@@ -194,14 +231,17 @@ def solve_machine_network(
     """
     point = OperatingPoint.of(machine.spec) if point is None else point
     heat_model = heat_model_of(machine.spec) if heat_model is None else heat_model
-    friction = tabulate_friction(machine, point, heat_model)
+    if follows_preload(machine.spec):
+        return _solve_following_preload(machine, point, heat_model, start)
+    friction = tabulate_friction(machine.spec, point, heat_model)
+    coolant = None if machine.coolant is None else coolant_law(machine, point)
     around, steps = None, 0
     temperature = np.full(machine.n_nodes, point.ambient_temperature) if start is None else start
     for _ in range(CONTACT_ROUNDS):
-        network = operate(machine, point, heat_model, around=around, friction=friction)
+        network = operate(machine, point, heat_model, around=around, friction=friction, coolant=coolant)
         temperature, used = newton(network, temperature)
         steps += used
-        found = _around(network, temperature)
+        found = bearing_temperatures(network, temperature)
         change = _change(around, found)
         if _is_settled(machine, change):
             return _state(network, temperature, steps)
@@ -213,10 +253,64 @@ def solve_machine_network(
     )
 
 
+def follows_preload(spec: MachineSpec) -> bool:
+    """Whether expansion changes the heat of a machine's bearings."""
+    return bool(spec.bearing_set) and spec.heat.thermal_preload and spec.heat.model != "table"
+
+
+def without_expansion(machine: MachineNetwork) -> MachineNetwork:
+    """The same network with bearings that keep the size of assembly."""
+    heat = machine.spec.heat.model_copy(update={"thermal_preload": False})
+    return replace(machine, spec=machine.spec.model_copy(update={"heat": heat}))
+
+
+def _solve_following_preload(
+    machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel, start: Array | None
+) -> MachineNetworkState:
+    steady = without_expansion(machine)
+    steady_model = heat_model_of(steady.spec)
+    temperature, steps = start, 0
+    coolant: dict[float, CoolantLaw | None] = {}
+
+    def solved(at: OperatingPoint, around: Mapping[str, BearingTemperatures]) -> OperatingNetwork:
+        nonlocal temperature, steps
+        if at.speed not in coolant:
+            coolant[at.speed] = None if machine.coolant is None else coolant_law(machine, at)
+        network = operate(machine, at, heat_model, around=around, coolant=coolant[at.speed])
+        begin = np.full(machine.n_nodes, at.ambient_temperature) if temperature is None else temperature
+        temperature, used = newton(network, begin)
+        steps += used
+        return network
+
+    def response(
+        at: OperatingPoint, around: Mapping[str, BearingTemperatures]
+    ) -> tuple[Mapping[str, BearingTemperatures], Mapping[str, float]]:
+        network = solved(at, around)
+        preload = {name: heat.preload for name, heat in network.bearing_heat.items()}
+        return bearing_temperatures(network, temperature), preload
+
+    def found(at: OperatingPoint) -> Mapping[str, BearingTemperatures]:
+        first = solve_machine_network(steady, at, heat_model=steady_model).bearing_temperatures()
+        return settle(at, heat_model, response, first, machine.spec.name)
+
+    def settles(speed: float) -> bool:
+        try:
+            found(replace(point, speed=speed))
+        except (NoSteadyStateError, ConvergenceError):
+            return False
+        return True
+
+    try:
+        around = found(point)
+    except NoSteadyStateError as error:
+        raise with_limit(error, highest_settling_speed(point.speed, settles)) from error
+    return _state(solved(point, around), temperature, steps)
+
+
 def _is_settled(machine: MachineNetwork, change: float) -> bool:
     spec = machine.spec
     contacts = any(group.ball_row.kind == "contact" for group in spec.bearing_set)
-    coupled = bool(spec.bearing_set) and (contacts or spec.heat.thermal_preload)
+    coupled = bool(spec.bearing_set) and contacts
     return not coupled or change < CONTACT_TOLERANCE
 
 
@@ -230,7 +324,8 @@ def _change(
     return max(changes, default=0.0)
 
 
-def _around(network: OperatingNetwork, temperature: Array) -> dict[str, BearingTemperatures]:
+def bearing_temperatures(network: OperatingNetwork, temperature: Array) -> dict[str, BearingTemperatures]:
+    """Raceways, balls and seats of every bearing at node temperatures (n,), K."""
     machine = network.machine
     found = {}
     for name, ball in machine.ball_nodes.items():

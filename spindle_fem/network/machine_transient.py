@@ -20,12 +20,17 @@ from numpy.typing import ArrayLike, NDArray
 from spindle_fem.errors import NoSteadyStateError, SpecError
 from spindle_fem.loads.bearing_heat import HeatModel, heat_model_of
 from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.friction import FrictionTables, tabulate_friction
 from spindle_fem.network.machine import MachineNetwork
-from spindle_fem.network.machine_steady import SparseBalance
-from spindle_fem.network.operating import OperatingNetwork, operate, tabulate_friction
+from spindle_fem.network.machine_steady import SparseBalance, bearing_temperatures, follows_preload
+from spindle_fem.network.operating import OperatingNetwork, coolant_law, operate
 
 Array = NDArray[np.float64]
 RELINEARISE_AFTER = 4.0
+# Bearings that have moved this far (K) have their heat and contacts taken anew where expansion is followed.
+PRELOAD_AFTER = 0.25
+# The same for bearings that only creep, after this many steps.
+CREEP_AFTER, CREEP_STEPS = 0.01, 20
 RUNAWAY_TEMPERATURE = 600.0
 # Steps between looks at whether films and friction are still inside their tables.
 CHECK_EVERY = 10
@@ -57,7 +62,7 @@ class _Propagator:
     """Exact solution of the linearised equations over one step length."""
 
     def __init__(self, balance: SparseBalance, network: OperatingNetwork, state: Array, step: float) -> None:
-        self.rate = (balance(state)[1].toarray()) / network.machine.capacity[:, None]
+        self.rate = balance.jacobian(state) / network.machine.capacity[:, None]
         self.inverse_capacity = 1.0 / network.machine.capacity
         self.state, self.step = state.copy(), step
         scaled = step * self.rate
@@ -100,8 +105,8 @@ def simulate_machine_network(
     OutOfValidityError
         Films or friction beyond the range they are known for.
 
-    Contacts of the balls conduct as at the ambient temperature; they hardly
-    change with it.
+    With ``heat.thermal_preload`` heat and contacts follow the bearings in steps
+    of 0.25 K.
     """
     instants = np.asarray(times, dtype=float)
     starts = np.array([start for start, _ in schedule])
@@ -127,9 +132,7 @@ def simulate_machine_network(
             segment = current
             linearisations += 0 if stepper is None else stepper.linearisations
             point = schedule[segment][1]
-            stepper = _Stepper(
-                operate(machine, point, heat_model, friction=tabulate_friction(machine, point, heat_model))
-            )
+            stepper = _Stepper(machine, point, heat_model, state)
         state = stepper.cross(state, float(step))
         if not np.all(np.isfinite(state)) or state.max() > RUNAWAY_TEMPERATURE:
             raise NoSteadyStateError(
@@ -149,13 +152,48 @@ def simulate_machine_network(
 class _Stepper:
     """Steps at one operating point, with the propagators made so far."""
 
-    def __init__(self, network: OperatingNetwork) -> None:
-        self.network, self.balance = network, SparseBalance(network)
-        self.propagators: dict[float, _Propagator] = {}
+    def __init__(
+        self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel, state: Array
+    ) -> None:
+        self.machine, self.point, self.heat_model = machine, point, heat_model
+        self.friction: FrictionTables | None = tabulate_friction(machine.spec, point, heat_model)
+        self.coolant = None if machine.coolant is None else coolant_law(machine, point)
         self.linearisations = 0
+        self.bearing_nodes = np.array(sorted(self._bearing_nodes()), dtype=np.int64)
+        self.follows = follows_preload(machine.spec)
+        self.network: OperatingNetwork | None = None
+        self._take_up(state)
+
+    def _bearing_nodes(self) -> set[int]:
+        nodes = set(self.machine.ball_nodes.values())
+        for name in self.machine.ball_nodes:
+            for side in ("inner", "outer"):
+                nodes |= set(self.machine.surfaces[f"{name}.{side}_raceway"].node.tolist())
+        return nodes
+
+    def _take_up(self, state: Array) -> None:
+        """Heat and contacts at a state; twice the first time, since raceways follow from the heat."""
+        for _ in range(2 if self.network is None else 1):
+            around = None if self.network is None else bearing_temperatures(self.network, state)
+            self.network = operate(
+                self.machine, self.point, self.heat_model, around=around, friction=self.friction,
+                coolant=self.coolant,
+            )  # fmt: skip
+        self.balance = SparseBalance(self.network)
+        self.propagators: dict[float, _Propagator] = {}
+        self.taken, self.steps = state[self.bearing_nodes].copy(), 0
+
+    def _keep_up(self, state: Array) -> None:
+        if not self.follows:
+            return
+        moved = float(np.abs(state[self.bearing_nodes] - self.taken).max(initial=0.0))
+        self.steps += 1
+        if moved > PRELOAD_AFTER or (self.steps >= CREEP_STEPS and moved > CREEP_AFTER):
+            self._take_up(state)
 
     def cross(self, state: Array, length: float) -> Array:
         """Over one interval, in halves where the equations bend too much within it."""
+        self._keep_up(state)
         after, correction = _advance(self._propagator(state, length), self.balance, state)
         if correction <= LARGEST_CORRECTION or length <= SHORTEST_STEP:
             return after

@@ -7,26 +7,25 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator, RectBivariateSpline
+from scipy.interpolate import RectBivariateSpline
 
 from spindle_fem.coolant.regimes import ChannelState, select_film
-from spindle_fem.errors import OutOfValidityError
 from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.loads.films import film_coefficient, gap_coefficient
 from spindle_fem.loads.model import BearingHeat
 from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.laws import CoolantLaw, FrictionLaw, Law, WallFilmLaw, faces_by_cell
+from spindle_fem.network.contacts import BallContactLaw, ContactFaces
+from spindle_fem.network.friction import FrictionTables, film_temperature
+from spindle_fem.network.laws import CoolantLaw, FrictionLaw, WallFilmLaw, faces_by_cell
 from spindle_fem.network.machine import MachineNetwork
 from spindle_fem.network.model import ThermalNetwork
 from spindle_fem.spec.model import NaturalFilm
 
 Array = NDArray[np.float64]
+Law = WallFilmLaw | CoolantLaw | FrictionLaw | BallContactLaw
 # Wall less fluid, K; the points lie close because the coefficient has a cusp where both are equal.
 FILM_RANGE = (-60.0, 140.0)
 FILM_POINTS = 801
-HEAT_RANGE = (-15.0, 120.0)
-HEAT_POINTS = 19
-FEWEST_HEAT_POINTS = 4
 TABLE_POINTS = 24
 
 
@@ -153,7 +152,8 @@ def operate(
     heat_model: HeatModel,
     *,
     around: Mapping[str, BearingTemperatures] | None = None,
-    friction: Mapping[str, PchipInterpolator] | None = None,
+    friction: FrictionTables | None = None,
+    coolant: CoolantLaw | None = None,
 ) -> OperatingNetwork:
     """Equations of a machine network at an operating point.
 
@@ -165,16 +165,21 @@ def operate(
     around : mapping of bearing to BearingTemperatures, optional
         State at which contacts conduct and heat without ``friction`` is made;
         the ambient temperature by default.
-    friction : mapping of bearing to PchipInterpolator, optional
-        Heat over film temperature (see :func:`tabulate_friction`); without it
-        the heat is that of ``around``.
+    friction : FrictionTables, optional
+        Heat and contacts over film temperature (see :func:`tabulate_friction`);
+        without it they are the heat model's at ``around``.
+    coolant : CoolantLaw, optional
+        Of the same machine and point, where it is at hand.
     """
     spec = machine.spec
     names = [bearing.name for _, bearing in spec.bearings]
     ambient = point.ambient_temperature
     if around is None:
         around = {name: BearingTemperatures(*(ambient,) * 5) for name in names}
-    heats, _ = heat_model(point, around)
+    if friction is None:
+        heats, _ = heat_model(point, around)
+    else:
+        heats = {name: friction.at(name, film_temperature(around[name])) for name in names}
     boundaries: dict[str, float] = {"ambient": ambient}
     links: list[tuple[NDArray, NDArray, Array, str]] = [
         (machine.links.first, machine.links.second, machine.links.conductance, "solid")
@@ -189,12 +194,16 @@ def operate(
         for name, spread in spreads.items():
             heat += heats[name].total * spread
     else:
-        laws.append(_friction_law(machine, friction, raceways, spreads))
+        law_of_friction = _friction_law(machine, friction, raceways, spreads)
+        laws.append(law_of_friction)
+        faces = _contact_faces(machine, friction, heats, heat_to)
+        if faces:
+            laws.append(BallContactLaw.of(faces, law_of_friction, machine.n_nodes))
     _air(machine, point, boundaries, links, laws)
     streams, rate, law = (np.empty(0, int), np.empty(0, int)), 0.0, None
     if machine.coolant is not None:
         boundaries["coolant_inlet"] = point.coolant_inlet_temperature
-        law = coolant_law(machine, point)
+        law = coolant_law(machine, point) if coolant is None else coolant
         rate = law.capacity_rate
         if isinstance(law.film, float):
             conductance = law.conductances(np.full(len(law.nodes), law.film))[0]
@@ -283,17 +292,41 @@ def _bearing(machine, group, name, heat: BearingHeat, links):
     return tuple(ways), shares, spread
 
 
-def _friction_law(machine, friction, raceways, spreads) -> FrictionLaw:
+def _friction_law(machine, friction: FrictionTables, raceways, spreads) -> FrictionLaw:
     """Heat over the film's temperature: a quarter of each raceway's, half of the balls'."""
-    weights = np.zeros((len(friction), machine.n_nodes))
-    feedback = np.zeros(len(friction))
-    for row, name in enumerate(friction):
+    weights = np.zeros((len(friction.heat), machine.n_nodes))
+    feedback = np.zeros(len(friction.heat))
+    for row, name in enumerate(friction.heat):
         weights[row, machine.ball_nodes[name]] += 0.5
         for way in raceways[name]:
             weights[row, way.nodes] += 0.25 * way.node_weights
             weights[row, machine.ball_nodes[name]] += 0.25 * way.ball_weight
             feedback[row] += 0.25 * way.per_heat
-    return FrictionLaw.of(friction, weights, feedback, np.column_stack([spreads[name] for name in friction]))
+    spread = np.column_stack([spreads[name] for name in friction.heat])
+    return FrictionLaw.of(friction.heat, weights, feedback, spread)
+
+
+def _contact_faces(machine, friction: FrictionTables, heats, heat_to) -> list[ContactFaces]:
+    """Raceways whose conductance to the balls is computed, and so follows the film."""
+    order = {name: row for row, name in enumerate(friction.heat)}
+    faces = []
+    for group, bearing in machine.spec.bearings:
+        if group.ball_row.kind != "contact":
+            continue
+        name = bearing.name
+        made_with = (heats[name].conductance_inner, heats[name].conductance_outer)
+        for side, conductance, table in zip(
+            ("inner", "outer"), made_with, friction.conductance[name], strict=True
+        ):
+            patch = machine.surfaces[f"{name}.{side}_raceway"]
+            part = patch.area / patch.area.sum()
+            faces.append(
+                ContactFaces(
+                    order[name], patch.node, machine.ball_nodes[name], part, patch.resistance,
+                    heat_to[name][side] * part, conductance, table,
+                )
+            )  # fmt: skip
+    return faces
 
 
 def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws) -> None:
@@ -371,8 +404,8 @@ def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
     if settings.properties_at == "bulk":
         bulk = np.linspace(*bulk_range, TABLE_POINTS)
         wall = np.linspace(*wall_range, 2 * TABLE_POINTS)
-        grid = np.array([coefficient(np.full(wall.shape, value), wall) for value in bulk])
-        film = RectBivariateSpline(bulk, wall, grid)
+        every = np.repeat(bulk, len(wall)), np.tile(wall, len(bulk))
+        film = RectBivariateSpline(bulk, wall, coefficient(*every).reshape(len(bulk), len(wall)))
     return CoolantLaw(
         patch=coolant.patch,
         cell=coolant.cell,
@@ -386,36 +419,3 @@ def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
         bulk_range=bulk_range,
         wall_range=wall_range,
     )
-
-
-def tabulate_friction(
-    machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel
-) -> dict[str, PchipInterpolator] | None:
-    """Friction heat of every bearing over its film temperature; None where heat is by table.
-
-    Valid while expansion does not change the preload: then a bearing's heat
-    depends on its own film temperature only.
-    """
-    spec = machine.spec
-    if spec.heat.model == "table" or spec.heat.thermal_preload or not spec.bearing_set:
-        return None
-    base = point.ambient_temperature
-    temperatures = np.linspace(base + HEAT_RANGE[0], base + HEAT_RANGE[1], HEAT_POINTS)
-    names = [bearing.name for _, bearing in spec.bearings]
-    known: list[float] = []
-    values: dict[str, list[float]] = {name: [] for name in names}
-    refused: OutOfValidityError | None = None
-    for temperature in temperatures.tolist():
-        around = {name: BearingTemperatures(*(temperature,) * 5) for name in names}
-        try:
-            heats, _ = heat_model(point, around)
-        except OutOfValidityError as error:
-            # beyond the grease's own range the law ends; a state out there is refused by name
-            refused = error
-            continue
-        known.append(temperature)
-        for name in names:
-            values[name].append(heats[name].total)
-    if len(known) < FEWEST_HEAT_POINTS:
-        raise refused
-    return {name: PchipInterpolator(known, heat) for name, heat in values.items()}

@@ -101,10 +101,13 @@ def build_states(
     control: str,
     film_temperatures: Sequence[float],
     roughness: tuple[float, float],
+    shaft_columns: NDArray[np.int64],
 ) -> tuple[BearingState, ...]:
-    """Records of every bearing of a solved system, in order."""
-    compliance = np.linalg.pinv(solved.tangent)[0, 0]
-    stiffness = 1.0 / compliance if compliance > 0.0 else 0.0
+    """Records of every bearing of a solved system, in order.
+
+    ``shaft_columns`` (n_bearings,) is where the displacements of each bearing's shaft begin.
+    """
+    compliance = np.diagonal(np.linalg.pinv(solved.tangent))
     patch = traction = drag = None
     if film is not None and speed > 0.0:
         patch = build_patch(system, solved.contacts, film, options)
@@ -159,7 +162,10 @@ def build_states(
         free = geometry.curvature_centre_distance * math.sin(geometry.contact_angle)
         radial_shift = 0.0
         if len(weight) > 1:
-            radial_shift = float(system.radial_map[part][0, :5] @ solved.displacement[:5])
+            own = slice(shaft_columns[index], shaft_columns[index] + 5)
+            radial_shift = float(system.radial_map[part][0, own] @ solved.displacement[own])
+        soft = float(compliance[shaft_columns[index]])
+        stiffness = 1.0 / soft if soft > 0.0 else 0.0
         states.append(
             BearingState(
                 bearing.name, geometry, speed, float(np.mean(distance[0][part])) - free, radial_shift,

@@ -113,6 +113,9 @@ def test_gross_sliding_is_said_and_its_onset_found() -> None:
     assert sliding.cage_slip > 0.3
     assert "gross_sliding" in codes([sliding])
     onset = gross_sliding_onset(single, turn(10_000), 50.0, one, GREASE)
+    (text,) = (note.text for note in sliding.warnings if note.code == "gross_sliding")
+    said = float(text.split("begins at about ")[1].split(" rpm")[0])
+    assert turn(said) == pytest.approx(onset, rel=0.05)
     assert turn(1000) < onset < turn(10_000)
     assert solve_bearing(heavy, 0.95 * onset, 50.0, lubricant=GREASE).cage_slip < 0.1
     assert solve_bearing(heavy, 1.05 * onset, 50.0, lubricant=GREASE).cage_slip > 0.1

@@ -1,0 +1,121 @@
+"""Friction, ball contacts and preload in a machine's network: tables, laws, and the loop that runs away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spindle_fem.errors import NoSteadyStateError
+from spindle_fem.loads.bearing_heat import BearingTemperatures, heat_model_of
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.contacts import BallContactLaw
+from spindle_fem.network.friction import film_temperature, tabulate_friction
+from spindle_fem.network.machine import build_machine_network
+from spindle_fem.network.machine_steady import SparseBalance, solve_machine_network
+from spindle_fem.network.machine_transient import simulate_machine_network
+from spindle_fem.network.operating import operate
+from spindle_fem.spec.load import load_machine
+
+
+@pytest.fixture(scope="module")
+def friction_machine():
+    spec = load_machine("wu_tan_2016")
+    return build_machine_network(spec), OperatingPoint.of(spec), heat_model_of(spec)
+
+
+def test_jacobian_of_friction_and_contacts_is_the_derivative(friction_machine):
+    network, point, model = friction_machine
+    state = solve_machine_network(network, point, heat_model=model)
+    around = {name: BearingTemperatures(*(300.0,) * 5) for name in network.ball_nodes}
+    tables = tabulate_friction(network.spec, point, model)
+    net = operate(network, point, model, around=around, friction=tables)
+    balance = SparseBalance(net)
+    analytic = balance.jacobian(state.temperature)
+    step = 1.0e-4
+    for node in network.ball_nodes.values():
+        shift = np.zeros(network.n_nodes)
+        shift[node] = step
+        numeric = (
+            balance.net_heat(state.temperature + shift) - balance.net_heat(state.temperature - shift)
+        ) / (2.0 * step)
+        assert analytic[:, node] == pytest.approx(numeric, abs=2e-5 * np.abs(analytic[:, node]).max())
+
+
+def test_contacts_made_anywhere_give_the_same_balance_once_they_follow(friction_machine):
+    """Links and shares of other film temperatures, with the law that corrects them."""
+    network, point, model = friction_machine
+    tables = tabulate_friction(network.spec, point, model)
+    state = solve_machine_network(network, point, heat_model=model)
+    net = [
+        SparseBalance(operate(network, point, model, around=around, friction=tables)).net_heat(
+            state.temperature
+        )
+        for around in (
+            {name: BearingTemperatures(*(kelvin,) * 5) for name in network.ball_nodes}
+            for kelvin in (295.0, 330.0)
+        )
+    ]
+    # what is left is the film temperature, taken with the raceways of the contacts as made
+    moved = np.abs(np.array(net)).max(axis=1)
+    assert moved.max() < 0.2
+    bare = [operate(network, point, model, around=None, friction=tables)]
+    fixed = replace(bare[0], laws=tuple(law for law in bare[0].laws if not isinstance(law, BallContactLaw)))
+    assert np.abs(SparseBalance(fixed).net_heat(state.temperature)).max() > 1.0
+
+
+def test_tables_stand_for_the_heat_model(friction_machine):
+    network, point, model = friction_machine
+    tables = tabulate_friction(network.spec, point, model)
+    state = solve_machine_network(network, point, heat_model=model)
+    exact, _ = model(point, state.bearing_temperatures())
+    for name, heat in exact.items():
+        kelvin = film_temperature(state.bearing_temperatures()[name])
+        assert tables.at(name, kelvin).total == pytest.approx(heat.total, rel=1e-4)
+        assert tables.at(name, kelvin).conductance_inner == pytest.approx(heat.conductance_inner, rel=1e-4)
+        assert state.network.friction_heat(state.temperature)[name] == pytest.approx(heat.total, rel=1e-4)
+    one_by_one = tabulate_friction(network.spec, point, lambda p, around: model(p, around))
+    for name in tables.heat:
+        assert tables.heat[name].c == pytest.approx(one_by_one.heat[name].c, rel=1e-6, abs=1e-9)
+
+
+def test_a_transient_with_friction_ends_in_its_steady_state(friction_machine):
+    network, point, model = friction_machine
+    steady = solve_machine_network(network, point, heat_model=model).temperature
+    run = simulate_machine_network(
+        network, np.arange(0.0, 40 * 3600.0, 600.0), [(0.0, point)], heat_model=model
+    )
+    assert run.temperature[-1] == pytest.approx(steady, abs=0.01)
+
+
+PRELOAD = ("heat.thermal_preload=true", "operation.speed=500 rpm")
+
+
+def test_network_follows_the_preload_to_its_fixed_point():
+    spec = load_machine("wu_tan_2016", PRELOAD)
+    network, point, model = build_machine_network(spec), OperatingPoint.of(spec), heat_model_of(spec)
+    state = solve_machine_network(network, point, heat_model=model)
+    exact, _ = model(point, state.bearing_temperatures())
+    heat = state.network.friction_heat(state.temperature)
+    for name in exact:
+        assert heat[name] == pytest.approx(exact[name].total, rel=1e-5)
+    cold = {name: BearingTemperatures(*(point.ambient_temperature,) * 5) for name in exact}
+    assert 1.5 < exact["F3"].preload / model(point, cold)[0]["F3"].preload < 5.0
+    assert state.imbalance_relative < 1e-10
+    run = simulate_machine_network(
+        network, np.arange(0.0, 30 * 3600.0, 600.0), [(0.0, point)], heat_model=model
+    )
+    assert run.temperature[-1] == pytest.approx(state.temperature, abs=0.05)
+
+
+def test_network_says_from_which_speed_on_the_preload_runs_away():
+    spec = load_machine("wu_tan_2016", ("heat.thermal_preload=true",))
+    network, point = build_machine_network(spec), OperatingPoint.of(spec)
+    with pytest.raises(NoSteadyStateError, match=r"no thermal equilibrium at 3000 rpm") as caught:
+        solve_machine_network(network, point)
+    limit = float(str(caught.value).split("exists up to about ")[1].split(" rpm")[0])
+    below = replace(point, speed=0.95 * limit * np.pi / 30.0)
+    assert solve_machine_network(network, below).imbalance_relative < 1e-10
+    with pytest.raises(NoSteadyStateError):
+        solve_machine_network(network, replace(point, speed=1.08 * limit * np.pi / 30.0))
