@@ -20,7 +20,7 @@ from spindle_fem.calibration.noise import SlowError
 from spindle_fem.calibration.plots import draw_channels
 from spindle_fem.calibration.predictor import MachinePredictor, NetworkPredictor, Predictor
 from spindle_fem.effect_entries import ActiveEffects, effects_on
-from spindle_fem.network.build import build_network
+from spindle_fem.network.build import build_network, value_in_definition
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.compare import ALL, Comparison, compare, simulation_summary, write_simulated
 from spindle_fem.reduced.build import ReductionOptions, reduced_model_of
@@ -227,7 +227,7 @@ def _simulate_network(
     if result is not None:
         own = {p.name for p in network.parameters}
         values = {
-            e.name: Uncertain(_in_definition(spec, network, e.name, e.factor), e.prior_sigma_log)
+            e.name: Uncertain(value_in_definition(spec, network, e.name, e.factor), e.prior_sigma_log)
             for e in result.estimates
             if e.name in own
         }
@@ -238,15 +238,6 @@ def _simulate_network(
 
 def _effect_notes(effects: ActiveEffects) -> list[str]:
     return [f"with {candidate.label}, as the definition says" for candidate in effects.candidates]
-
-
-def _in_definition(spec: Any, network: Any, name: str, factor: float) -> float:
-    """Value of a parameter in the definition's own unit."""
-    kind, _, label = name.partition(".")
-    if kind == "gain":
-        source = next(item for item in spec.network.source if item.label == label)
-        return source.gain.amount.value * factor
-    return next(p.value for p in network.parameters if p.name == name) * factor
 
 
 def _simulation(

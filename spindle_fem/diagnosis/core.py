@@ -5,34 +5,36 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.diagnosis.engine import Hypothesis, Search
 from spindle_fem.diagnosis.heldout import heldout_stamps
-from spindle_fem.diagnosis.inference import Fit, Problem
+from spindle_fem.diagnosis.inference import Coordinate, Fit, Problem
 from spindle_fem.diagnosis.locate import Explanation, Pattern, explain, onset_answers
+from spindle_fem.diagnosis.machines import DiagnosedMachine
 from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.diagnosis.prepare import (
     Calibrated,
     all_stamps,
     calibrate,
-    machine_coordinates,
     slow_error_of,
 )
 from spindle_fem.diagnosis.screening import variants_of
-from spindle_fem.diagnosis.verdict import Judgement, judge, rank
+from spindle_fem.diagnosis.verdict import Judgement, judge, rank, tempered
 from spindle_fem.effects.catalogue import candidates_for, catalogue, interval_effects
 from spindle_fem.effects.view import MachineView
-from spindle_fem.recordings.align import Recording
-from spindle_fem.reduced.fast_model import FastModel
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 # Hypotheses that are fitted again with the slow error that the best of them leaves, on the whole basis.
 REFITTED = 8
+ALWAYS_REFITTED = 2
+# Less likely than the best by so much (natural logarithm): of no account.
+NEGLIGIBLE = 8.0
 #: Prior weight of effects; the ways out for what no other fits count less.
 WEIGHTS = {"unrecorded_heat_source": 0.5, "unrecorded_cooling": 0.5}
 
@@ -74,37 +76,40 @@ class Diagnosis:
     candidates_tried: int
     seconds: Mapping[str, float]
 
+    @property
+    def plant_coordinates(self) -> tuple[Coordinate, ...]:
+        """The machine's own coordinates."""
+        return self.calibrated.belief.coordinates
+
+    def stamp(self, seconds: float, recording: int = 0) -> float | str:
+        """A time as the recording has them: seconds from its start, or an ISO 8601 stamp."""
+        start = self.plant.recordings[recording].start
+        if start is None:
+            return float(seconds)
+        moment = datetime.fromisoformat(start) + timedelta(seconds=float(seconds))
+        return moment.isoformat()
+
 
 def diagnose_recordings(
-    fast: FastModel,
-    recordings: Sequence[Recording],
-    calibration: Sequence[Recording],
-    view: MachineView,
-    *,
-    heldout: str = "blocks",
-    progress: Progress = lambda stage: None,
+    machine: DiagnosedMachine, *, heldout: str = "blocks", progress: Progress = lambda stage: None
 ) -> Diagnosis:
-    """Diagnose recordings with a machine's fast model.
+    """Diagnose a machine's recordings.
 
     Parameters
     ----------
-    fast : FastModel
-    recordings : sequence of Recording
-        To be explained.
-    calibration : sequence of Recording
-        Of the same machine when nothing was missing; may be empty.
-    view : MachineView
+    machine : DiagnosedMachine
     heldout : str
         As :func:`heldout_stamps` takes it.
     progress : callable
     """
     clock = _Clock()
+    fast, view = machine.fast, machine.view
+    recordings, calibration = machine.recordings, machine.calibration
     chosen = [heldout_stamps(item, heldout) for item in recordings]
-    plant = Plant(fast, recordings, [~mask for mask, _ in chosen])
-    coordinates = machine_coordinates(plant)
+    plant = Plant(fast, recordings, [~mask for mask, _ in chosen], machine.effects)
     progress("diagnosis: calibration" if calibration else "diagnosis: what is known")
-    earlier = Plant(fast, calibration, all_stamps(calibration)) if calibration else None
-    calibrated = calibrate(earlier, coordinates)
+    earlier = Plant(fast, calibration, all_stamps(calibration), machine.effects) if calibration else None
+    calibrated = calibrate(earlier, plant)
     clock.lap("calibration")
     candidates = candidates_for(view)
     effects = catalogue()
@@ -114,8 +119,7 @@ def diagnose_recordings(
         | {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)}
     )
     known = [p for p in places if p in fast.model.place_names]
-    names = [item.name for item, _ in plant.uncertain()]
-    small = plant.compressed(names, known)
+    small = plant if machine.is_network else plant.compressed([name for name, *_ in plant.uncertain()], known)
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress)
@@ -156,9 +160,14 @@ def diagnose_recordings(
 
 def _refit(problem: Problem, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The most probable hypotheses and the empty one, fitted on the whole basis."""
-    ranked = sorted(found, key=lambda h: -h.score)
-    chosen = ranked[:REFITTED]
-    chosen += [h for h in ranked[REFITTED:] if not h.fit.candidates]
+    ranked = sorted(found, key=tempered, reverse=True)
+    best = tempered(ranked[0])
+    chosen = [
+        item
+        for position, item in enumerate(ranked[:REFITTED])
+        if position < ALWAYS_REFITTED or tempered(item) > best - NEGLIGIBLE
+    ]
+    chosen += [h for h in ranked if not h.fit.candidates and h not in chosen]
     fitted = [
         Hypothesis(problem.fit(item.fit.candidates, item.fit.values, iterations=12), item.log_prior)
         for item in chosen

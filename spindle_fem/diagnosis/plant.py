@@ -9,20 +9,24 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.calibration.noise import ChannelBins, SlowError, channel_bins, whiten
+from spindle_fem.effect_entries import NO_EFFECTS, ActiveEffects
 from spindle_fem.effects.base import Candidate, Reading
 from spindle_fem.effects.term import Term
 from spindle_fem.recordings.align import Recording
 from spindle_fem.reduced.coefficients import INNER_SHARE
 from spindle_fem.reduced.drive import Drive, classes_of, drive_of_recording
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.network_model import NetworkFastModel
+from spindle_fem.reduced.start import Start
 from spindle_fem.reduced.transient import FastTransient, TransientRun, grid_weights
-from spindle_fem.spec.parameters import UncertainParameter, uncertain_parameters
+from spindle_fem.spec.parameters import uncertain_parameters
 
 Array = NDArray[np.float64]
 
@@ -31,6 +35,9 @@ STEP = 60.0
 EFFECT_PREFIX = "effect:"
 # Displacement of a probe from its nominal place, m: ``probe.<probe>.<direction>``.
 PROBE_PREFIX = "probe."
+# Temperature of a node at the start of one recording: ``start.<recording>.initial.<node>``.
+START_PREFIX = "start."
+NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")
 # Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
 INLET_BIN = 3.0
@@ -95,8 +102,10 @@ class Plant:
     recordings : sequence of Recording
     use : sequence of (N,) bool ndarray
         Stamps that may be fitted, per recording; the rest is held out.
+    effects : ActiveEffects
+        What the definition itself switches on.
     step : float, [s]
-        Longest step of the model.
+        Longest step of the model; a network takes that of its recording.
     """
 
     def __init__(
@@ -104,6 +113,7 @@ class Plant:
         fast: FastModel,
         recordings: Sequence[Recording],
         use: Sequence[NDArray[np.bool_]],
+        effects: ActiveEffects = NO_EFFECTS,
         *,
         step: float = STEP,
         drives: Sequence[Drive] | None = None,
@@ -111,8 +121,18 @@ class Plant:
         self.fast = fast
         self.recordings = tuple(recordings)
         self.use = tuple(use)
+        self.effects = effects
         self.step = step
-        self.drives = tuple(drives or (coarse_drive(fast.spec, item, step) for item in recordings))
+        self.is_network = isinstance(fast, NetworkFastModel)
+        if drives is None:
+            drives = [
+                fast.drive(item, largest_step=np.inf)
+                if self.is_network
+                else coarse_drive(fast.spec, item, step)
+                for item in recordings
+            ]
+        self.drives = tuple(replace(drive, times=drive.grid) for drive in drives)
+        self._initial = [fast.initial_parameters(item) if self.is_network else () for item in self.recordings]
         self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
         self.observations = self._observe(self.use)
         self.heldout = self._observe([~mask for mask in self.use])
@@ -128,21 +148,72 @@ class Plant:
 
     def with_model(self, fast: FastModel) -> Plant:
         """The same recordings on another reduction of the same machine."""
-        return Plant(fast, self.recordings, self.use, step=self.step, drives=self.drives)
+        return Plant(fast, self.recordings, self.use, self.effects, step=self.step, drives=self.drives)
 
-    def uncertain(self) -> list[tuple[UncertainParameter, float]]:
-        """The machine's uncertain parameters, each with the highest factor that it may have."""
+    def uncertain(self) -> list[tuple[str, float, float]]:
+        """The machine's uncertain parameters: name, 1 σ of the logarithm, highest factor."""
+        if self.is_network:
+            return [
+                (item.name, item.sigma_log, np.inf)
+                for item in self.fast.network.parameters
+                if item.sigma_log > 0.0
+            ]
         return [
-            (item, 0.999 / item.value if item.name == INNER_SHARE else np.inf)
+            (item.name, item.sigma_log, 0.999 / item.value if item.name == INNER_SHARE else np.inf)
             for item in uncertain_parameters(self.fast.spec)
         ]
 
+    def starts(self) -> list[tuple[str, float]]:
+        """Uncertain temperatures at the start of each recording: name, 1 σ of the logarithm."""
+        if not self.is_network or self.fast.spec.initial != "first_reading":
+            return []
+        return [
+            (f"{START_PREFIX}{number}.{item.name}", item.sigma_log)
+            for number, items in enumerate(self._initial)
+            for item in items
+        ]
+
     # ---------------------------------------------------------------- simulation
-    def initial_temperature(self, number: int) -> float:
-        """Uniform temperature at the start of a recording, K."""
+    def start(
+        self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
+    ) -> float | Start:
+        """Where a recording begins: a uniform temperature [K], or that of every node of a network."""
+        if self.is_network:
+            return self.fast.start(
+                self.recordings[number],
+                self.drives[number],
+                self._factors(number, values, {}, set()),
+                derivatives,
+                kind=self.fast.spec.initial,
+                initial=self._initial[number],
+            )
         if self.fast.spec.initial == "ambient":
             return self.drives[number].first("ambient")
         return float(np.mean(list(self.recordings[number].first_readings().values())))
+
+    def _run_name(self, number: int, name: str, readings: Mapping[str, object]) -> str | None:
+        """What a coordinate is called in the run of one recording; None where it does not enter."""
+        if name in readings or name.startswith(PROBE_PREFIX):
+            return None
+        if name.startswith(START_PREFIX):
+            owner, _, own = name.removeprefix(START_PREFIX).partition(".")
+            return own if int(owner) == number else None
+        return name.removeprefix(EFFECT_PREFIX)
+
+    def _factors(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        known: Mapping[str, float],
+        readings: set[str],
+    ) -> dict[str, float]:
+        """Factors of the machine's parameters in the run of one recording."""
+        factors: dict[str, float] = dict(self.effects.factors)
+        for name, value in values.items():
+            own = None if name in known else self._run_name(number, name, dict.fromkeys(readings))
+            if own is not None:
+                factors[own] = factors.get(own, 1.0) * value
+        return factors
 
     def transient(
         self,
@@ -165,24 +236,16 @@ class Plant:
             Names of the machine or of terms.
         """
         drive = self.drives[number]
-        terms: list[Term] = list(self.fast.own_terms(drive))
+        terms: list[Term] = [*self.fast.own_terms(drive), *self.effects.terms]
         known: dict[str, float] = {}
-        readings = set()
+        readings: set[str] = set()
         for candidate in candidates:
             terms += candidate.terms
             for term in candidate.terms:
                 known |= {name: values.get(name, item.value) for name, item in term.names().items()}
-            readings |= (
-                set()
-                if candidate.reading is None
-                else set(candidate.parameters) - {f.name for f in candidate.factors}
-            )
-        factors: dict[str, float] = {}
-        for name, value in values.items():
-            if name in known or name in readings or name.startswith(PROBE_PREFIX):
-                continue
-            own = name.removeprefix(EFFECT_PREFIX)
-            factors[own] = factors.get(own, 1.0) * value
+            if candidate.reading is not None:
+                readings |= {f"{candidate.reading.name}.{item.name}" for item in candidate.reading.parameters}
+        factors = self._factors(number, values, known, readings)
         return TransientRun(self.fast, drive, factors | known, tuple(derivatives), tuple(terms))
 
     def predict(
@@ -204,23 +267,19 @@ class Plant:
             if c.reading is not None
             for item in c.reading.parameters
         }
-        of_run = tuple(
-            dict.fromkeys(
-                name.removeprefix(EFFECT_PREFIX)
-                for name in derivatives
-                if name not in owners and not name.startswith(PROBE_PREFIX)
-            )
-        )
+        inner = {name: self._run_name(number, name, owners) for name in derivatives}
+        of_run = tuple(dict.fromkeys(own for own in inner.values() if own is not None))
         run = self.transient(number, values, candidates, of_run)
-        found: FastTransient = run.solve(self.initial_temperature(number))
+        found: FastTransient = run.solve(self.start(number, values, of_run))
         columns = self.columns[number]
         temperature = found.temperature[:, columns]
         sensitivity = np.zeros((*temperature.shape, len(derivatives)))
         for position, name in enumerate(derivatives):
-            if name not in owners and not name.startswith(PROBE_PREFIX):
-                source = of_run.index(name.removeprefix(EFFECT_PREFIX))
-                sensitivity[:, :, position] = found.sensitivity[:, columns, source]
+            if inner[name] is not None:
+                sensitivity[:, :, position] = found.sensitivity[:, columns, of_run.index(inner[name])]
         self._displace(number, found.states, values, derivatives, temperature, sensitivity)
+        for reading in self.effects.readings:
+            self._read(number, reading, {}, (), temperature, sensitivity)
         for candidate in candidates:
             if candidate.reading is not None:
                 self._read(number, candidate.reading, values, derivatives, temperature, sensitivity)
@@ -338,7 +397,7 @@ class Plant:
                     factors = {n: float(np.exp(s * priors[n])) for n, s in zip(names, signs, strict=True)}
                 wanted = tuple(names) if draw == 0 else ()
                 run = self.transient(number, factors, (), wanted)
-                initial = self.initial_temperature(number)
+                initial = self.start(number)
                 states, tracks = run.march(initial)
                 snapshots.append((states - initial * model.one).T)
                 if wanted:

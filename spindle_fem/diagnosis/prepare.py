@@ -43,21 +43,21 @@ class Calibrated:
 def machine_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
     """The machine's uncertain parameters, and the places of the probes."""
     found = [
-        Coordinate(
-            item.name,
-            1.0,
-            item.sigma_log,
-            True,
-            -THETA_BOUND,
-            min(THETA_BOUND, float(np.log(highest)) / item.sigma_log),
-        )
-        for item, highest in plant.uncertain()
+        Coordinate(name, 1.0, sigma, True, -THETA_BOUND, min(THETA_BOUND, float(np.log(highest)) / sigma))
+        for name, sigma, highest in plant.uncertain()
     ]
     found += [
         Coordinate(name, 0.0, PROBE_PLACE_SIGMA, False, -THETA_BOUND, THETA_BOUND, "m")
         for name in plant.displacements()
     ]
     return tuple(found)
+
+
+def start_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
+    """Temperatures at the start of each recording, where they are not given."""
+    return tuple(
+        Coordinate(name, 1.0, sigma, True, -THETA_BOUND, THETA_BOUND) for name, sigma in plant.starts()
+    )
 
 
 def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
@@ -73,20 +73,31 @@ def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
     return likely_slow_error(residuals, prior=EXPECTED_SLOW, sigmas=SLOW_SIGMAS, times=SLOW_TIMES)
 
 
-def calibrate(plant: Plant | None, coordinates: Sequence[Coordinate]) -> Calibrated:
-    """Fit calibration recordings; the prior where there are none."""
-    prior = Belief.prior(coordinates)
-    if plant is None:
-        return Calibrated(prior, EXPECTED_SLOW, None)
-    slow = EXPECTED_SLOW
-    fit = None
+def calibrate(earlier: Plant | None, plant: Plant) -> Calibrated:
+    """Fit calibration recordings; the prior where there are none.
+
+    Parameters
+    ----------
+    earlier : Plant or None
+        The machine on its calibration recordings.
+    plant : Plant
+        On those to be diagnosed.
+    """
+    shared, begun = machine_coordinates(plant), start_coordinates(plant)
+    if earlier is None:
+        return Calibrated(Belief.prior((*shared, *begun)), EXPECTED_SLOW, None)
+    slow, fit = EXPECTED_SLOW, None
+    prior = Belief.prior((*shared, *start_coordinates(earlier)))
     for _ in range(2):
-        problem = Problem(plant, prior, slow, plant.observations)
+        problem = Problem(earlier, prior, slow, earlier.observations)
         fit = problem.fit((), None if fit is None else fit.values)
         slow = slow_error_of(problem, fit)
-    precision = np.linalg.inv(fit.covariance)
-    root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
-    return Calibrated(Belief(tuple(coordinates), fit.position, root), slow, fit)
+    count, total = len(shared), len(shared) + len(begun)
+    precision = np.linalg.inv(fit.covariance[:count, :count])
+    root, mean = np.eye(total), np.zeros(total)
+    root[:count, :count] = np.linalg.cholesky(0.5 * (precision + precision.T)).T
+    mean[:count] = fit.position[:count]
+    return Calibrated(Belief((*shared, *begun), mean, root), slow, fit)
 
 
 def all_stamps(recordings: Sequence[Recording]) -> list[NDArray[np.bool_]]:

@@ -73,7 +73,7 @@ class BaseRun:
     ) -> None:
         self.plant, self.number, self.values, self.candidates = plant, number, dict(values), tuple(candidates)
         self.run: TransientRun = plant.transient(number, values, candidates)
-        self.states, self.tracks = self.run.march(plant.initial_temperature(number))
+        self.states, self.tracks = self.run.march(plant.start(number, values))
         drive = self.run.drive
         self.drive = drive
         self.start_inputs = {name: drive.start[:, i] for i, name in enumerate(drive.names)}

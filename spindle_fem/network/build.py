@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from spindle_fem.network.model import Parameter, ThermalNetwork
-from spindle_fem.spec.network import NetworkSpec
+from spindle_fem.spec.network import NetworkMachineSpec, NetworkSpec
 from spindle_fem.units import Uncertain
 
 
@@ -73,3 +73,22 @@ def build_network(spec: NetworkSpec) -> ThermalNetwork:
         source_names=tuple(source.label for source in spec.source),
         parameters=tuple(parameters),
     )
+
+
+def value_in_definition(spec: NetworkMachineSpec, network: ThermalNetwork, name: str, factor: float) -> float:
+    """Value of a parameter with a factor, in the definition's own unit.
+
+    Parameters
+    ----------
+    spec : NetworkMachineSpec
+    network : ThermalNetwork
+        Made of it.
+    name : str
+        As the network's parameters are named.
+    factor : float
+    """
+    kind, _, label = name.partition(".")
+    if kind == "gain":
+        source = next(item for item in spec.network.source if item.label == label)
+        return source.gain.amount.value * factor
+    return next(p.value for p in network.parameters if p.name == name) * factor

@@ -1,0 +1,48 @@
+"""The machine definition with the physics that was found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spindle_fem.diagnosis.core import Diagnosis
+from spindle_fem.diagnosis.findings import candidate_values
+from spindle_fem.diagnosis.machines import DiagnosedMachine
+from spindle_fem.diagnosis.plant import PROBE_PREFIX, START_PREFIX
+from spindle_fem.effects.catalogue import definition_entry
+from spindle_fem.network.build import value_in_definition
+from spindle_fem.spec import network as network_spec
+from spindle_fem.spec.effects import EffectEntry
+from spindle_fem.spec.load import write_machine
+from spindle_fem.spec.parameters import with_parameters
+from spindle_fem.units import Uncertain
+
+
+def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
+    """Text of the definition with the fitted parameters and an ``[[effect]]`` for each finding.
+
+    Parameters keep what is left of their uncertainty. Where a probe sits
+    within its hole is left as the definition has it.
+    """
+    fit = diagnosis.final
+    values = fit.values
+    entries = tuple(
+        EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))
+        for item in fit.candidates
+    )
+    own = {
+        coordinate.name: (values[coordinate.name], coordinate.sigma)
+        for coordinate in diagnosis.plant_coordinates
+        if not coordinate.name.startswith((PROBE_PREFIX, START_PREFIX))
+    }
+    if not machine.is_network:
+        spec = with_parameters(machine.spec, {name: value for name, (value, _) in own.items()})
+        return write_machine(spec.model_copy(update={"effects": (*machine.spec.effects, *entries)}))
+    moved = {}
+    for name, (factor, _) in own.items():
+        index = next(i for i, c in enumerate(fit.coordinates) if c.name == name)
+        sigma = fit.coordinates[index].sigma * float(np.sqrt(fit.covariance[index, index]))
+        moved[name] = Uncertain(value_in_definition(machine.spec, machine.fast.network, name, factor), sigma)
+    spec = network_spec.with_parameters(machine.spec, moved)
+    return network_spec.write_network_machine(
+        spec.model_copy(update={"effects": (*machine.spec.effects, *entries)})
+    )

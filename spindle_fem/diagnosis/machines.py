@@ -1,0 +1,140 @@
+"""A machine opened for diagnosis: its fast model on its recordings, with or without geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from spindle_fem.diagnosis.view import view_of, view_of_network
+from spindle_fem.effect_entries import ActiveEffects, active_effects
+from spindle_fem.effects.view import MachineView
+from spindle_fem.errors import RecordingError
+from spindle_fem.network.build import build_network
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.thin import thinned_recording
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.network_model import NetworkFastModel
+from spindle_fem.simulate import fast_model_for
+from spindle_fem.spec import network as network_spec
+from spindle_fem.spec.load import find_machine, load_machine, read_definition
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.spec.network import NetworkMachineSpec
+
+Progress = Callable[[str], None]
+
+# A network is stepped from stamp to stamp: so many suffice for what its nodes can follow.
+MOST_STAMPS = 12_000
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosedMachine:
+    """What a diagnosis works on.
+
+    Attributes
+    ----------
+    name : str
+    spec : MachineSpec or NetworkMachineSpec
+    fast : FastModel or NetworkFastModel
+    effects : ActiveEffects
+        Of the definition: nominal, not diagnosed.
+    view : MachineView
+        Of the first recording, ranges over all.
+    recordings, calibration : tuple of Recording
+    """
+
+    name: str
+    spec: MachineSpec | NetworkMachineSpec
+    fast: FastModel | NetworkFastModel
+    effects: ActiveEffects
+    view: MachineView
+    recordings: tuple[Recording, ...]
+    calibration: tuple[Recording, ...]
+
+    @property
+    def is_network(self) -> bool:
+        """Whether the machine has no geometry."""
+        return isinstance(self.fast, NetworkFastModel)
+
+
+def open_machine(
+    machine: str | Path,
+    overrides: Sequence[str],
+    recordings: Sequence[Recording],
+    calibration: Sequence[Recording],
+    *,
+    progress: Progress = lambda stage: None,
+) -> DiagnosedMachine:
+    """Read a machine and make or fetch its fast model.
+
+    Raises
+    ------
+    SpindleFemError
+        A broken definition, or a recording that does not fit it.
+    """
+    if not recordings:
+        raise RecordingError("recordings", "there are none.", "Give at least one to be diagnosed.")
+    if network_spec.is_network_machine(read_definition(find_machine(machine))):
+        return _open_network(machine, overrides, recordings, calibration)
+    spec = load_machine(machine, overrides)
+    fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
+    for recording in (*recordings, *calibration):
+        fast.require_channels(recording.probes, recording.source)
+    view = _widest([view_of(fast, recording) for recording in recordings])
+    return DiagnosedMachine(
+        spec.name,
+        spec,
+        fast,
+        active_effects(spec.effects, view),
+        view,
+        tuple(recordings),
+        tuple(calibration),
+    )
+
+
+def _open_network(
+    machine: str | Path,
+    overrides: Sequence[str],
+    recordings: Sequence[Recording],
+    calibration: Sequence[Recording],
+) -> DiagnosedMachine:
+    spec = network_spec.load_network_machine(machine, overrides)
+    network = build_network(spec.network)
+    fast = NetworkFastModel(network, spec)
+    exponents = {
+        name: float(power)
+        for name, power in zip(network.source_input, network.source_exponent, strict=True)
+        if name is not None
+    }
+
+    def thinned(recording: Recording) -> Recording:
+        count = recording.times.size
+        if count <= MOST_STAMPS:
+            return recording
+        # Gaps take no stamps: the step follows from the time that was recorded.
+        covered = sum(recording.times[end - 1] - recording.times[begin] for begin, end in recording.segments)
+        return thinned_recording(recording, float(covered) / MOST_STAMPS, exponents=exponents)
+
+    own = tuple(thinned(item) for item in recordings)
+    earlier = tuple(thinned(item) for item in calibration)
+    view = _widest([view_of_network(network, recording) for recording in own])
+    return DiagnosedMachine(spec.name, spec, fast, active_effects(spec.effects, view), view, own, earlier)
+
+
+def _widest(views: Sequence[MachineView]) -> MachineView:
+    """The first view with ranges over all recordings."""
+    first = views[0]
+    return replace(
+        first,
+        duration=max(view.duration for view in views),
+        highest_speed=max(view.highest_speed for view in views),
+        lowest_speed=min((view.lowest_speed for view in views if view.lowest_speed > 0.0), default=0.0),
+        channels=tuple(dict.fromkeys(name for view in views for name in view.channels)),
+        covariates=tuple(dict.fromkeys(name for view in views for name in view.covariates)),
+        reynolds=(
+            float(np.min([view.reynolds[0] for view in views])),
+            float(np.max([view.reynolds[1] for view in views])),
+        ),
+    )
