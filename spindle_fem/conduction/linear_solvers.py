@@ -58,11 +58,15 @@ class LinearSolution:
     residual : float, [-]
         2-norm of the true residual relative to the load's; not a number where
         an error tolerance ended the iteration.
+    digits : float
+        Decades by which the estimated error fell; only where an error
+        tolerance ended the iteration.
     """
 
     unknowns: NDArray[np.float64]
     iterations: int
     residual: float
+    digits: float = 0.0
 
 
 def build_preconditioner(system: ThermalSystem, method: Method | None = None) -> Preconditioner:
@@ -114,6 +118,7 @@ def solve_linear(
     *,
     relative_tolerance: float = RELATIVE_TOLERANCE,
     error_tolerance: float | None = None,
+    reduction: float = 0.0,
     max_iterations: int = MAX_ITERATIONS,
 ) -> LinearSolution:
     """Preconditioned conjugate gradients, checked on the true residual.
@@ -135,6 +140,9 @@ def solve_linear(
         Ends instead where the preconditioned residual, which estimates the
         error, is nowhere larger. The norm of the residual itself would let
         small elements go wrong in short time steps.
+    reduction : float, [-]
+        With an error tolerance: this share of the guess's own error is enough
+        even where it is larger, for use inside an outer iteration.
     max_iterations : int
 
     Raises
@@ -158,16 +166,22 @@ def solve_linear(
     target = relative_tolerance * scale
     if error_tolerance is not None:
         floor = ROUND_OFF * float(np.abs(unknowns).max(initial=0.0))
-        correction, iterations = _conjugate_gradients(
-            matrix, residual, preconditioner.apply, 0.0, max_iterations, max(error_tolerance, floor)
+        first = preconditioner.apply(residual).astype(float)
+        estimate = float(np.abs(first).max(initial=0.0))
+        wanted = max(error_tolerance, floor, reduction * estimate)
+        if estimate <= wanted:
+            return LinearSolution(unknowns + first, 0, np.nan)
+        correction, iterations, reached = _to_error(
+            matrix, residual, preconditioner.apply, first, wanted, max_iterations
         )
         if iterations >= max_iterations:
             raise ConvergenceError(
                 "linear solver",
-                f"error above {error_tolerance:.1e} after {iterations} iterations.",
+                f"error above {wanted:.1e} after {iterations} iterations.",
                 "Rebuild the preconditioner or allow more iterations.",
             )
-        return LinearSolution(unknowns + correction, iterations, np.nan)
+        digits = float(np.log10(estimate / max(reached, np.finfo(float).tiny)))
+        return LinearSolution(unknowns + correction, iterations, np.nan, digits)
     iterations = 0
     restarts = 0
     while (norm := float(np.linalg.norm(residual))) > target:
@@ -288,35 +302,69 @@ def _columnwise_gradients(
     )
 
 
+def _to_error(
+    matrix: sparse.csr_array,
+    residual: NDArray[np.float64],
+    precondition: Operator,
+    first: NDArray[np.float64],
+    wanted: float,
+    limit: int,
+) -> tuple[NDArray[np.float64], int, float]:
+    """Correction whose estimated error is nowhere above what is wanted, iterations, and that error."""
+    state = _Iteration(matrix, residual.copy(), first)
+    for iteration in range(1, limit + 1):
+        state.advance()
+        preconditioned = precondition(state.residual)
+        reached = float(np.abs(preconditioned).max())
+        if reached <= wanted:
+            return state.unknowns + preconditioned, iteration, reached
+        state.turn(preconditioned)
+    return state.unknowns, limit, reached
+
+
+class _Iteration:
+    """Conjugate gradients between two applications of the preconditioner."""
+
+    __slots__ = ("_energy", "_image", "_matrix", "_step", "direction", "residual", "unknowns")
+
+    def __init__(
+        self, matrix: sparse.csr_array, residual: NDArray[np.float64], preconditioned: NDArray[np.float64]
+    ) -> None:
+        self._matrix = matrix
+        self.unknowns = np.zeros_like(residual)
+        self.residual = residual
+        self.direction = preconditioned.copy()
+        self._energy = float(residual @ preconditioned)
+
+    def advance(self) -> None:
+        """Go as far along the direction as helps."""
+        self._image = self._matrix @ self.direction
+        curvature = float(self.direction @ self._image)
+        if not curvature > 0.0 or not np.isfinite(self._energy):
+            raise ConvergenceError("linear solver", f"the matrix is not positive definite ({curvature:.3g}).")
+        self._step = self._energy / curvature
+        self.unknowns += self._step * self.direction
+        self.residual -= self._step * self._image
+
+    def turn(self, preconditioned: NDArray[np.float64]) -> None:
+        """Next direction."""
+        # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
+        self.direction *= -self._step * float(preconditioned @ self._image) / self._energy
+        self.direction += preconditioned
+        self._energy = float(self.residual @ preconditioned)
+
+
 def _conjugate_gradients(
     matrix: sparse.csr_array,
     load: NDArray[np.float64],
     precondition: Operator,
     target: float,
     limit: int,
-    error_target: float = 0.0,
 ) -> tuple[NDArray[np.float64], int]:
-    unknowns = np.zeros_like(load)
-    residual = load.copy()
-    direction = precondition(residual).astype(float)
-    if float(np.abs(direction).max(initial=0.0)) <= error_target:
-        return direction if error_target else unknowns, 0
-    energy = float(residual @ direction)
+    state = _Iteration(matrix, load.copy(), precondition(load).astype(float))
     for iteration in range(1, limit + 1):
-        image = matrix @ direction
-        curvature = float(direction @ image)
-        if not curvature > 0.0 or not np.isfinite(energy):
-            raise ConvergenceError("linear solver", f"the matrix is not positive definite ({curvature:.3g}).")
-        step = energy / curvature
-        unknowns += step * direction
-        residual -= step * image
-        if np.linalg.norm(residual) <= target:
-            return unknowns, iteration
-        preconditioned = precondition(residual)
-        if float(np.abs(preconditioned).max()) <= error_target:
-            return unknowns + preconditioned, iteration
-        # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
-        direction *= -step * float(preconditioned @ image) / energy
-        direction += preconditioned
-        energy = float(residual @ preconditioned)
-    return unknowns, limit
+        state.advance()
+        if np.linalg.norm(state.residual) <= target:
+            return state.unknowns, iteration
+        state.turn(precondition(state.residual))
+    return state.unknowns, limit

@@ -12,6 +12,7 @@ from scipy import sparse
 
 from spindle_fem.conduction.assemble import assemble_capacity, assemble_load, assemble_system
 from spindle_fem.conduction.balance import BoundaryFlows, boundary_flows
+from spindle_fem.conduction.guesses import EARLIER_ITERATES, RecentCorrections, mixed
 from spindle_fem.conduction.linear_solvers import Preconditioner, build_preconditioner, solve_linear
 from spindle_fem.conduction.nonlinear import linearise_films
 from spindle_fem.conduction.problem import ConductionProblem, reference_temperature
@@ -31,8 +32,11 @@ EMBEDDED = np.array([(1.0 - OUTER_WEIGHT) / 3.0, (3.0 * OUTER_WEIGHT + 1.0) / 3.
 MAX_STAGE_ITERATIONS = 30
 # The error estimate itself is solved to this fraction of the tolerance.
 ERROR_SOLVE_FRACTION = 0.02
-# A preconditioner of other coefficients or steps serves until it costs this many iterations more.
-STALE_FACTOR, STALE_EXTRA = 1.5, 3
+# While a stage is iterated, each solve needs to be this much better than its guess only.
+REDUCTION = 0.02
+# A preconditioner of other coefficients or steps serves until it takes so many times the iterations
+# that it took when new for the same decades of error.
+STALE_FACTOR = 1.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +73,10 @@ class _Kept:
     matrix: sparse.csr_array | None = None
     row_sums: NDArray[np.float64] | None = None
     preconditioner: Preconditioner | None = None
-    fresh_iterations: int = -1
+    fresh_effort: float | None = None
     stale: bool = False
     slope: NDArray[np.float64] | None = None
+    before: tuple[float, NDArray[np.float64]] | None = None
 
 
 class StageSolver:
@@ -117,9 +122,12 @@ class StageSolver:
             else self._tied_storage
         )
         self._kept = _Kept()
+        self._recent = RecentCorrections()
+        self._shift = 0.0
         self._current: Stage | None = None
         self.linear_iterations = 0
         self.matrix_builds = 0
+        self.preconditioner_builds = 0
 
     # ------------------------------------------------------------ interface
     def output_rows(self, outputs: sparse.sparray | None) -> sparse.csr_array:
@@ -145,7 +153,7 @@ class StageSolver:
         middle = self._solve_stage(
             base + size * DIAGONAL * first.rate, state.time + GAMMA * size, size, guess, state
         )
-        guess = first.unknowns + (middle.unknowns - first.unknowns) / GAMMA
+        guess = self._extrapolated(first.unknowns, middle.unknowns, size)
         last = self._solve_stage(
             base + size * OUTER_WEIGHT * (first.rate + middle.rate),
             # inputs that jump at the end of the step are still the old ones there
@@ -181,10 +189,12 @@ class StageSolver:
     def accept(self, stages: list[Stage], size: float) -> None:
         """Remember the slope at the end of a step, for the next step's first guess."""
         self._kept.slope = (stages[2].unknowns - stages[1].unknowns) / ((1.0 - GAMMA) * size)
+        self._kept.before = (size, stages[0].unknowns)
 
     def forget_slope(self) -> None:
-        """Drop the slope: the inputs jump."""
+        """Drop what guesses are made of: the inputs jump."""
         self._kept.slope = None
+        self._kept.before = None
 
     def flows(self, stage: Stage) -> BoundaryFlows:
         """Heat across the boundary at a stage."""
@@ -193,6 +203,18 @@ class StageSolver:
         return boundary_flows(stage.problem, self._reference, rise[:n], rise[n:])
 
     # -------------------------------------------------------------- details
+    def _extrapolated(
+        self, first: NDArray[np.float64], middle: NDArray[np.float64], size: float
+    ) -> NDArray[np.float64]:
+        """End of a step from its two stages and the start of the step before, on a parabola."""
+        guess = first + (middle - first) / GAMMA
+        if self._kept.before is None:
+            return guess
+        back, earlier = self._kept.before
+        back /= size
+        curvature = ((middle - first) / GAMMA - (first - earlier) / back) / (GAMMA + back)
+        return guess + (1.0 - GAMMA) * curvature
+
     def _first_stage(self, state: ThermalState) -> Stage:
         problem = self._linear(self._inputs(state.time, state), state.temperature)
         tied = self._system(problem)
@@ -223,19 +245,29 @@ class StageSolver:
 
         n = self._operators.n_unknowns
         unknowns = guess
-        for _ in range(MAX_STAGE_ITERATIONS):
+        past: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        for attempt in range(MAX_STAGE_ITERATIONS):
             values = self._values(unknowns)
             asked = self._inputs(time, ThermalState(time, values[:n], values[n:], state.step))
             problem = self._linear(asked, values[:n])
             iterate = self._control.temperature_dependent or bool(asked.film_laws)
             self._system(problem)
             matrix = self._matrix(size)
+            self._shift = size * DIAGONAL
             load = self._load(problem)
-            following = self._solve(matrix, right + size * DIAGONAL * load, unknowns)
-            change = float(np.abs(following - unknowns).max())
-            unknowns = following
+            following = self._solve(
+                matrix,
+                right + size * DIAGONAL * load,
+                unknowns,
+                reduction=REDUCTION if iterate else 0.0,
+                judge=attempt == 0,
+            )
+            defect = following - unknowns
+            change = float(np.abs(defect).max())
             if not iterate or change <= self._control.nonlinear:
-                return self._stage(problem, unknowns, load)
+                return self._stage(problem, following, load)
+            past = [*past[-EARLIER_ITERATES:], (following, defect)]
+            unknowns = mixed(past)
         raise ConvergenceError(
             f"time {time:g} s",
             f"a stage still changes by {change:.3g} K after {MAX_STAGE_ITERATIONS} iterations.",
@@ -243,17 +275,34 @@ class StageSolver:
         )
 
     def _solve(
-        self, matrix: sparse.csr_array, right: NDArray[np.float64], guess: NDArray[np.float64]
+        self,
+        matrix: sparse.csr_array,
+        right: NDArray[np.float64],
+        guess: NDArray[np.float64],
+        *,
+        reduction: float,
+        judge: bool,
     ) -> NDArray[np.float64]:
         kept = self._kept
+        known = self._recent.combine(right - matrix @ guess, self._shift)
         solution = solve_linear(
-            matrix, right, kept.preconditioner, guess, error_tolerance=self._control.linear
+            matrix,
+            right,
+            kept.preconditioner,
+            guess + known,
+            error_tolerance=max(self._control.linear, reduction * float(np.abs(known).max())),
+            reduction=reduction,
         )
+        if solution.iterations and judge:
+            self._recent.add(solution.unknowns - guess, self._storage, kept.conduction)
         self.linear_iterations += solution.iterations
-        if kept.fresh_iterations < 0:
-            kept.fresh_iterations = max(solution.iterations, 1)
-        elif solution.iterations > STALE_FACTOR * kept.fresh_iterations + STALE_EXTRA:
-            kept.stale = True
+        # Later solves of a stage gain too few decades to tell.
+        if judge and solution.digits > 0.0:
+            effort = solution.iterations / solution.digits
+            if kept.fresh_effort is None:
+                kept.fresh_effort = effort
+            elif effort > STALE_FACTOR * kept.fresh_effort:
+                kept.stale = True
         return close_balance(matrix, right, solution.unknowns, kept.row_sums)
 
     def _linear(self, problem: ConductionProblem, temperature: NDArray[np.float64]) -> ConductionProblem:
@@ -296,7 +345,8 @@ class StageSolver:
                     tied.prolongation,
                 )
                 kept.preconditioner = build_preconditioner(stepped, self._control.method)
-                kept.fresh_iterations = -1
+                self.preconditioner_builds += 1
+                kept.fresh_effort = None
                 kept.stale = False
         return kept.matrix
 

@@ -144,6 +144,8 @@ class TransientResult:
     linear_iterations : int
     matrix_builds : int
     energy : EnergyAccount
+    preconditioner_builds : int
+        Factors or hierarchies; one serves many matrices.
     """
 
     state: ThermalState
@@ -155,6 +157,7 @@ class TransientResult:
     linear_iterations: int
     matrix_builds: int
     energy: EnergyAccount
+    preconditioner_builds: int = 0
 
 
 Inputs = Callable[[float, ThermalState], ConductionProblem]
@@ -337,18 +340,18 @@ def integrate(
         solver.linear_iterations,
         solver.matrix_builds,
         _close_account(ledger, solver.heat_content(state) - content_before),
+        solver.preconditioner_builds,
     )
 
 
 def _next_step(step: float, size: float, error: float, tolerance: float | None) -> float:
-    """Keep, double or quadruple: equal steps share their matrix."""
+    """Keep, or grow by powers of √2, four at most: equal steps share their matrix."""
     if tolerance is None:
         return step
     factor = SAFETY * (tolerance / max(error, 1e-12 * tolerance)) ** (1.0 / 3.0)
-    if factor >= 4.0:
-        return max(step, 4.0 * size)
-    if factor >= 2.0:
-        return max(step, 2.0 * size)
+    rungs = int(np.floor(2.0 * np.log2(min(factor, 4.0))))
+    if rungs > 0:
+        return max(step, 2.0 ** (0.5 * rungs) * size)
     return step if size < step else size
 
 

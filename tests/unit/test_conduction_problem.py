@@ -286,3 +286,22 @@ def test_several_loads_that_do_not_converge_are_refused(quadratic_system):
         solve_many(matrix, loads, preconditioner, relative_tolerance=1e-12, max_iterations=2)
     with pytest.raises(ConvergenceError, match="not positive definite"):
         solve_many((-1.0 * matrix).tocsr(), loads, preconditioner, relative_tolerance=1e-6)
+
+
+def test_a_share_of_the_guess_error_may_be_enough(quadratic_system):
+    matrix = sparse.csr_array(quadratic_system.full_matrix())
+    preconditioner = build_preconditioner(quadratic_system, "multigrid")
+    exact = np.random.default_rng(3).normal(size=matrix.shape[0])
+    load = matrix @ exact
+    errors, iterations = [], []
+    for reduction in (0.0, 1e-2, 1e-1):
+        solution = solve_linear(matrix, load, preconditioner, error_tolerance=1e-9, reduction=reduction)
+        errors.append(np.abs(solution.unknowns - exact).max())
+        iterations.append(solution.iterations)
+        assert solution.digits >= (9.0 if reduction == 0.0 else -np.log10(reduction)) - 0.5
+    assert errors[0] < 1e-8 < errors[1] < errors[2] < 0.5
+    assert errors[1] < 0.05
+    assert iterations[0] > iterations[1] > iterations[2] >= 1
+    # A guess that is good enough already costs no iteration.
+    again = solve_linear(matrix, load, preconditioner, exact + 1e-12, error_tolerance=1e-9)
+    assert (again.iterations, again.digits) == (0, 0.0)

@@ -232,3 +232,33 @@ def test_blocks_that_do_not_fit_are_refused():
         build_structured_mesh([Block("a", (1, 1, 1), lambda u: u, {"u0": "x", "u1": "x"})])
     with pytest.raises(GeometryError, match=r"counts \(1, 0, 1\)"):
         build_box((1.0, 1.0, 1.0), (1, 0, 1))
+
+
+def test_steps_grow_by_powers_of_the_root_of_two():
+    result = integrate(PROBLEM, START, 5e4, control=StepControl(tolerance=0.01, first_step=0.5))
+    # The last steps are cut to end in time.
+    sizes = np.diff(result.step_times)[:-2]
+    rungs = 2.0 * np.log2(sizes / 0.5)
+    assert np.abs(rungs - np.round(rungs)).max() < 1e-9
+    assert len(np.unique(np.round(rungs))) > 8
+    assert np.diff(rungs).max() <= 4.0 + 1e-9
+    assert result.step_errors.max() <= 0.01
+
+
+def test_one_preconditioner_serves_steps_of_many_sizes():
+    result = integrate(
+        PROBLEM, START, 5e4, control=StepControl(tolerance=0.01, first_step=0.5, method="multigrid")
+    )
+    assert result.matrix_builds > 10
+    assert 1 <= result.preconditioner_builds <= result.matrix_builds // 2
+
+
+def test_a_preconditioner_that_has_become_useless_is_renewed():
+    """The contact opens by four decades after a while: the old factor would need far more iterations."""
+
+    def inputs(time, state):
+        return replace(PROBLEM, joint_conductance={"inner|outer": 1e5 if time < 500.0 else 1.0})
+
+    control = StepControl(tolerance=None, first_step=50.0, method="direct")
+    result = integrate(inputs, START, 2000.0, breakpoints=(500.0,), control=control)
+    assert result.preconditioner_builds == 2
