@@ -235,6 +235,50 @@ def simulate(
 
 
 @app.command()
+def diagnose(
+    machine: Machine,
+    recordings: Annotated[
+        list[Path], typer.Argument(help="Folders or .toml files of the recordings to be explained.")
+    ],
+    output: Folder,
+    calibrate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--calibrate",
+            metavar="FILE",
+            help="Recording of the same machine with nothing missing; repeatable.",
+        ),
+    ] = None,
+    heldout: Annotated[
+        str,
+        typer.Option(
+            "--heldout",
+            metavar="CHOICE",
+            help='Readings that the fit does not see: "blocks" or "last:0.4" (the last 40 % of the time).',
+        ),
+    ] = "blocks",
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Where a recording and the model differ, which physics was left out, and how the fit improves."""
+    from spindle_fem.commands import stages
+    from spindle_fem.console import print_diagnosis
+    from spindle_fem.diagnosis.run import diagnose as diagnose_machine
+
+    with stages(not as_json) as tell:
+        content = diagnose_machine(
+            machine,
+            recordings,
+            output,
+            calibrate=calibrate or (),
+            overrides=set_ or (),
+            heldout=heldout,
+            progress=tell,
+        )
+    _print_json(content) if as_json else print_diagnosis(content, output)
+
+
+@app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier command.")],
 ) -> None:

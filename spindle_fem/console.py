@@ -178,6 +178,34 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
     console.print(f"Files: {folder}")
 
 
+def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
+    """Verdict, findings, alternatives and the fit before and after."""
+    console = _console()
+    mismatch, fit = content["mismatch"], content["fit"]
+    console.print(f"[bold]{content['verdict']}[/bold]  (p = {mismatch['p_value']:.2g})")
+    if content["reason"]:
+        console.print(content["reason"])
+    for finding in content["findings"]:
+        console.print(f"{finding['statement']}  (set: {content['set_probability']:.2f})")
+    if content["alternatives"]:
+        table = _table("Not ruled out", "set", "probability")
+        for item in content["alternatives"]:
+            names = " + ".join(f"{f['effect']} at {f['component']}" for f in item["findings"])
+            table.add_row(names or "nothing", _number(item["probability"], 3))
+        console.print(table)
+    if fit["noise_K"] is not None:
+        table = _table("Fit", "", "fitted K", "held out K")
+        for name in ("before", "after"):
+            table.add_row(
+                name, _number(fit[name]["train_rmse_K"], 3), _number(fit[name]["heldout_rmse_K"], 3)
+            )
+        table.add_row("noise", _number(fit["noise_K"], 3), _number(fit["noise_K"], 3))
+        console.print(table)
+    following = content["next_measurement"]
+    console.print(f"Next: {following['quantity']} at {following['where']}, {following['condition']}.")
+    console.print(f"Files: {folder}")
+
+
 def print_sweep(content: dict[str, Any], folder: Path) -> None:
     """How many designs were solved, and where the table is."""
     console = _console()

@@ -38,6 +38,8 @@ HOPELESS = 400.0
 ENOUGH_GAIN = 4.0
 # So many singles are fitted however little they promise.
 ALWAYS = 4
+# Of what the best addition promises; less is not worth a fit.
+PROMISING = 0.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +135,11 @@ class Search:
         if len(fit.candidates) + number > LARGEST_SET:
             return
         for tried, (members, gain) in enumerate(screened.best(number, count)):
-            if gain < ENOUGH_GAIN and tried >= always:
+            if tried == 0:
+                promised = gain
+            if tried >= always and (gain < ENOUGH_GAIN or gain < PROMISING * promised):
+                break
+            if number > 1 and gain < self.ranked()[0].score - self.found[_identity(())].score:
                 break
             amplitudes = screened.amplitudes(members)
             additions = [(screened.variants[i], amplitudes[i]) for i in members]
@@ -192,11 +198,15 @@ class Search:
         if key in self.found:
             return
         try:
-            fitted = self.problem.fit(candidates, start)
+            fitted = self.problem.fit(candidates, start, hopeless=self._hopeless())
         except (ConvergenceError, SpecError):
             # What cannot be simulated explains nothing; its neighbours are tried.
             return
         self._keep(Hypothesis(fitted, self.log_prior(candidates) - paid))
+
+    def _hopeless(self) -> float:
+        """Misfit beyond which a hypothesis does not matter."""
+        return self.ranked()[0].fit.misfit_with_prior + 2.0 * HOPELESS
 
     def _keep(self, hypothesis: Hypothesis) -> None:
         self.found[_identity(hypothesis.fit.candidates)] = hypothesis

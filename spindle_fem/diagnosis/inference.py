@@ -32,6 +32,8 @@ SMALLEST_GAIN = 0.02
 SMALLEST_SHARE = 3.0e-4
 LARGEST_MOVE = 2.0
 THETA_BOUND = 4.0
+# A fit is given up after so many steps when so many more like the last would not do.
+HOPELESS_AFTER, REACH = 3, 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +229,7 @@ class Problem:
         start: Mapping[str, float] | None = None,
         *,
         iterations: int = MOST_ITERATIONS,
+        hopeless: float = np.inf,
     ) -> Fit:
         """Most probable values of everything that is free.
 
@@ -237,6 +240,8 @@ class Problem:
             Values to begin from, by name; what is known of the machine, and the
             candidates' nominal values, where absent.
         iterations : int
+        hopeless : float
+            Misfit that must be within reach of the next steps; else the search ends where it is.
 
         Raises
         ------
@@ -267,7 +272,7 @@ class Problem:
 
         cost, residual, jacobian = evaluate(position)
         damping = 1e-3
-        for _ in range(iterations):
+        for iteration in range(iterations):
             weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
             hessian = jacobian.T @ (weight[:, None] * jacobian) + root.T @ root
             gradient = jacobian.T @ (weight * residual) - root.T @ (root @ (position - mean))
@@ -293,6 +298,8 @@ class Problem:
                     break
                 damping *= 10.0
             if not improved or gain < SMALLEST_GAIN + SMALLEST_SHARE * cost:
+                break
+            if iteration >= HOPELESS_AFTER and cost - REACH * gain > hopeless:
                 break
         if not np.isfinite(cost):
             raise ConvergenceError("diagnosis", "a hypothesis cannot be simulated at any of its parameters.")
