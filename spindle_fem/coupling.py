@@ -19,7 +19,7 @@ from spindle_fem.loads.bearing_heat import heat_model_of
 from spindle_fem.loads.build import FieldState, LoadsBuilder
 from spindle_fem.loads.coolant_loop import CoolantState
 from spindle_fem.loads.joints import group_of_contacts
-from spindle_fem.loads.model import Loads
+from spindle_fem.loads.model import NO_CHANGE, LoadChange, Loads
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.meshing.build import build_mesh
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
@@ -41,6 +41,7 @@ LINEAR_PER_KELVIN = 1.0e-4
 LOOSEST_LINEAR_TOLERANCE = 1.0e-5
 
 Progress = Callable[[str], None]
+Beyond = Callable[[OperatingPoint, NDArray[np.float64], Mapping[str, float]], LoadChange]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +87,21 @@ class PreparedMachine:
             LumpedNode(node.name, tuple(node.connections.items()), node.capacity, node.heat)
             for node in loads.lumped
         )
+        change = loads.change
         return ConductionProblem(
             self.operators,
-            self.conductivity,
+            {part: value * change.factor(f"conductivity.{part}") for part, value in self.conductivity.items()}
+            if change.coefficients
+            else self.conductivity,
             films=films,
-            joint_conductance=self.joint_conductance,
+            joint_conductance={
+                name: value * change.factor(f"joint.{name}") for name, value in self.joint_conductance.items()
+            }
+            if change.coefficients
+            else self.joint_conductance,
             surface_heat=loads.surface_heat,
+            nodal_heat=change.nodal_heat,
+            capacity_scale=change.capacity_scale,
             lumped_nodes=lumped,
             volumetric_capacity=self.volumetric_capacity,
             adiabatic="rest",
@@ -166,13 +176,26 @@ def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOpera
 
 
 def solve_coupled(
-    machine: PreparedMachine, point: OperatingPoint, start: NDArray[np.float64] | None = None
+    machine: PreparedMachine,
+    point: OperatingPoint,
+    start: NDArray[np.float64] | None = None,
+    *,
+    beyond: Beyond | None = None,
 ) -> CoupledState:
     """Steady field at which heat, films and coolant are those of the field itself.
 
     A fixed-point iteration with Anderson mixing over the whole field; the map
     is nearly affine, so the mixing finds the fixed point in a few solves even
     where friction heat falls steeply with temperature.
+
+    Parameters
+    ----------
+    machine : PreparedMachine
+    point : OperatingPoint
+    start : (n_unknowns,) ndarray, optional, [K]
+    beyond : callable, optional
+        Point, field and lumped temperatures to what physics beyond the
+        machine's own does to its loads.
 
     Raises
     ------
@@ -198,7 +221,8 @@ def solve_coupled(
     retreats = 0
     for iteration in range(1, MAXIMUM_ITERATIONS + 1):
         try:
-            loads, coolant = machine.builder.at(point, machine.field_state(unknowns, lumped))
+            physics = NO_CHANGE if beyond is None else beyond(point, unknowns, lumped)
+            loads, coolant = machine.builder.at(point, machine.field_state(unknowns, lumped), physics)
         except (NoEquilibriumError, OutOfValidityError) as error:
             if given is None or (not follows_preload and retreats == MAXIMUM_RETREATS):
                 raise

@@ -100,6 +100,8 @@ def assemble_load(
     for part, heat in problem.part_heat.items():
         own = operators.part_of_unknown == operators.part_index(part, "part_heat")
         load[own] += heat / operators.part_volume[part] * operators.part_load[own]
+    for heat in problem.nodal_heat.values():
+        load += heat
     lumped_load = np.array([node.heat for node in problem.lumped_nodes], dtype=float)
     for link in problem.lumped_links:
         if link.other is None:
@@ -122,6 +124,9 @@ def assemble_capacity(problem: ConductionProblem) -> tuple[sparse.csr_array, NDA
         raise SpecError("volumetric_capacity", f"no value for {', '.join(missing)}.", "Name every part.")
     capacity = np.array([problem.volumetric_capacity[part] for part in operators.mesh.part_names])
     matrix = operators.matrix(operators.sum_storage(capacity))
+    if problem.capacity_scale is not None:
+        root = sparse.diags_array(np.sqrt(problem.capacity_scale))
+        matrix = sparse.csr_array(root @ matrix @ root)
     return matrix, np.array([node.capacity for node in problem.lumped_nodes])
 
 

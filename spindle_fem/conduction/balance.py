@@ -106,6 +106,8 @@ def boundary_flows(
     }
     for part, heat in problem.part_heat.items():
         sources[part] = sources.get(part, 0.0) + float(heat)
+    for name, heat in problem.nodal_heat.items():
+        sources[name] = sources.get(name, 0.0) + float(heat.sum())
     for node in problem.lumped_nodes:
         if node.heat:
             sources[node.name] = float(node.heat)

@@ -136,6 +136,11 @@ class ConductionProblem:
         Total, spread evenly over the surface's area; or one for each facet.
     part_heat : mapping of str to float, [W]
         Total, spread evenly over the part's volume.
+    nodal_heat : mapping of str to (n_unknowns,) ndarray, [W]
+        What each unknown receives, by a name of its own; its sum is the heat.
+    capacity_scale : (n_unknowns,) ndarray or None, [-]
+        Above 0: entry (i, j) of the capacity matrix is scaled by the root of
+        both unknowns' values. For mass that the parts do not have.
     lumped_nodes : tuple of LumpedNode
     lumped_links : tuple of LumpedLink
     volumetric_capacity : mapping of str to float, [J/(m³·K)]
@@ -156,6 +161,8 @@ class ConductionProblem:
     joint_conductance: Mapping[str, ArrayLike] = field(default_factory=dict)
     surface_heat: Mapping[str, ArrayLike] = field(default_factory=dict)
     part_heat: Mapping[str, float] = field(default_factory=dict)
+    nodal_heat: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    capacity_scale: NDArray[np.float64] | None = None
     lumped_nodes: tuple[LumpedNode, ...] = ()
     lumped_links: tuple[LumpedLink, ...] = ()
     volumetric_capacity: Mapping[str, float] = field(default_factory=dict)
@@ -259,6 +266,13 @@ def _require_films(problem: ConductionProblem) -> None:
         operators.per_facet(surface, heat, f"heat on {surface}")
     for part, heat in problem.part_heat.items():
         _require(bool(np.isfinite(heat)), f"heat of {part}", heat, "finite")
+    for name, heat in problem.nodal_heat.items():
+        sound = np.shape(heat) == (operators.n_unknowns,) and bool(np.all(np.isfinite(heat)))
+        _require(sound, f"heat of {name}", heat, f"{operators.n_unknowns} finite values")
+    scale = problem.capacity_scale
+    if scale is not None:
+        sound = np.shape(scale) == (operators.n_unknowns,) and bool(np.all(scale > 0.0))
+        _require(sound, "capacity_scale", scale, f"{operators.n_unknowns} values above 0")
 
 
 def _require_joints(problem: ConductionProblem) -> None:

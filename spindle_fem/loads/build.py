@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from spindle_fem.loads.coolant_loop import CoolantLoop, CoolantState
 from spindle_fem.loads.facets import facet_centres
 from spindle_fem.loads.films import film_coefficient, gap_coefficient
 from spindle_fem.loads.gap_bands import GapBands, angle_of, build_gap_bands
-from spindle_fem.loads.model import BearingHeat, FilmLoad, Loads, LumpedLoad
+from spindle_fem.loads.model import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads, LumpedLoad
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.spec.model import BearingSet, MachineSpec
@@ -116,10 +116,21 @@ class LoadsBuilder:
         return tuple(f"{bearing}.balls[{sector}]" for sector in range(self.n_sectors))
 
     # ------------------------------------------------------------------ loads
-    def at(self, point: OperatingPoint, state: FieldState) -> tuple[Loads, CoolantState | None]:
-        """Loads at an operating point, with every coefficient at the given field."""
+    def at(
+        self, point: OperatingPoint, state: FieldState, change: LoadChange = NO_CHANGE
+    ) -> tuple[Loads, CoolantState | None]:
+        """Loads at an operating point, with every coefficient at the given field.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        state : FieldState
+        change : LoadChange
+            Physics beyond the machine's own.
+        """
         warnings: list[CodedWarning] = []
         heats, heat_warnings = self.heat_model(point, self.bearing_temperatures(state))
+        heats = {name: _scaled(heat, change.friction.get(name, 1.0)) for name, heat in heats.items()}
         warnings += heat_warnings
         surface_heat: dict[str, float] = {}
         heat_to: dict[str, dict[str, float]] = {}
@@ -130,16 +141,29 @@ class LoadsBuilder:
             heat_to[bearing.name] = shares
             surface_heat[f"{bearing.name}.inner_raceway"] = shares["inner"]
             surface_heat[f"{bearing.name}.outer_raceway"] = shares["outer"]
-            lumped += self._ball_row(group, bearing.name, heat, shares["balls"])
-        films = self._air_films(point, state, warnings)
-        lumped += self._gap_nodes(point, warnings)
+            lumped += self._ball_row(group, bearing.name, heat, shares["balls"], change)
+        films = self._air_films(point, state, warnings, change)
+        lumped += self._gap_nodes(point, warnings, change)
         coolant = None
         if self.coolant_loop is not None:
-            coolant = self.coolant_loop.at(point, self.wall_temperature(state))
+            flowing = replace(
+                point,
+                coolant_inlet_temperature=point.coolant_inlet_temperature + change.inlet,
+                coolant_flow=point.coolant_flow * change.flow,
+            )
+            coolant = self.coolant_loop.at(
+                flowing, self.wall_temperature(state), film_factor=change.factor("channel.film")
+            )
             films |= self._channel_films(coolant)
             warnings += [*coolant.march.film.warnings, *coolant.pressure.warnings]
         loads = Loads(
-            surface_heat, films, tuple(lumped), heats, heat_to, fold_warnings(warnings, tuple(heats))
+            surface_heat,
+            films,
+            tuple(lumped),
+            heats,
+            heat_to,
+            fold_warnings(warnings, tuple(heats)),
+            change,
         )
         return loads, coolant
 
@@ -151,7 +175,7 @@ class LoadsBuilder:
         return {"inner": inner * rings, "outer": (1.0 - inner) * rings, "balls": heat.ball_share * total}
 
     def _ball_row(
-        self, group: BearingSet, name: str, heat: BearingHeat, ball_heat: float
+        self, group: BearingSet, name: str, heat: BearingHeat, ball_heat: float, change: LoadChange
     ) -> list[LumpedLoad]:
         spec = self.spec
         kind = spec.bearing_types[group.bearing_type]
@@ -160,6 +184,10 @@ class LoadsBuilder:
             conductances = (row.conductance.value,) * 2
         else:
             conductances = (heat.conductance_inner, heat.conductance_outer)
+        conductances = [
+            value * change.factor(f"balls.{name}.{side}")
+            for value, side in zip(conductances, ("inner", "outer"), strict=True)
+        ]
         material = spec.materials[kind.ball_material]
         volume = kind.ball_count * np.pi / 6.0 * kind.ball_diameter**3
         capacity = row.capacity if row.capacity is not None else volume * material.volumetric_heat_capacity
@@ -179,11 +207,13 @@ class LoadsBuilder:
                 inside = sectors[surface] == sector
                 area = self.facet_area[surface][inside].sum()
                 connections[surface] = np.where(inside, conductance / self.n_sectors / area, 0.0)
-            nodes.append(LumpedLoad(node, capacity / self.n_sectors, ball_heat / self.n_sectors, connections))
+            own_capacity = capacity / self.n_sectors + change.lumped_capacity.get(node, 0.0)
+            own_heat = ball_heat / self.n_sectors + change.lumped_heat.get(node, 0.0)
+            nodes.append(LumpedLoad(node, own_capacity, own_heat, connections))
         return nodes
 
     def _air_films(
-        self, point: OperatingPoint, state: FieldState, warnings: list[CodedWarning]
+        self, point: OperatingPoint, state: FieldState, warnings: list[CodedWarning], change: LoadChange
     ) -> dict[str, FilmLoad]:
         films = {}
         for film in self.spec.film:
@@ -192,17 +222,23 @@ class LoadsBuilder:
                 wall = state.facets[surface]
                 coefficient, said = film_coefficient(film, point, wall, fluid)
                 warnings += said
-                films[surface] = FilmLoad(surface, coefficient, np.full(wall.shape, fluid))
+                films[surface] = FilmLoad(
+                    surface,
+                    coefficient * change.factor(f"film.{surface}"),
+                    np.full(wall.shape, fluid + change.fluids.get(surface, 0.0)),
+                )
         return films
 
-    def _gap_nodes(self, point: OperatingPoint, warnings: list[CodedWarning]) -> list[LumpedLoad]:
+    def _gap_nodes(
+        self, point: OperatingPoint, warnings: list[CodedWarning], change: LoadChange
+    ) -> list[LumpedLoad]:
         nodes = []
         for gap in self.spec.gap:
             bands = self.gaps[gap.name]
             coefficient, said = gap_coefficient(gap, point, *self._gap_radii(gap.rotating, gap.standing))
             warnings += said
             # Half the resistance on either side of the mixed air.
-            conductance = 2.0 * coefficient * bands.conductance_share
+            conductance = 2.0 * coefficient * change.factor(f"gap.{gap.name}") * bands.conductance_share
             on_rotating = (conductance / bands.rotating_area)[bands.rotating_cell]
             on_standing = {
                 name: (conductance / bands.standing_area)[cells]
@@ -232,3 +268,11 @@ class LoadsBuilder:
             surface: FilmLoad(surface, coefficient[index], bulk[index])
             for surface, index in cells.facet_cell.items()
         }
+
+
+def _scaled(heat: BearingHeat, factor: float) -> BearingHeat:
+    """Friction heat and its terms times a factor."""
+    if factor == 1.0:
+        return heat
+    terms = {name: value * factor for name, value in heat.terms.items()}
+    return replace(heat, total=heat.total * factor, terms=terms)

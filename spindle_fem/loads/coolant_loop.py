@@ -57,13 +57,17 @@ class CoolantLoop:
         )
         self.port_length = port_area / (np.pi * self.port_diameter) if self.port_diameter else 0.0
 
-    def at(self, point: OperatingPoint, wall_temperature: NDArray[np.float64]) -> CoolantState:
+    def at(
+        self, point: OperatingPoint, wall_temperature: NDArray[np.float64], *, film_factor: float = 1.0
+    ) -> CoolantState:
         """March at an operating point.
 
         Parameters
         ----------
         wall_temperature : (n_starts, n) ndarray, [K]
             Area mean of each cell.
+        film_factor : float
+            Beside that of the definition.
         """
         settings = self.spec.coolant
         inlet = point.coolant_inlet_temperature
@@ -75,7 +79,7 @@ class CoolantLoop:
             port_diameter=self.port_diameter,
             port_length=self.port_length,
         )
-        factor = settings.film_factor.value * self._port_factor(point, inlet)
+        factor = film_factor * settings.film_factor.value * self._port_factor(point, inlet)
         local = settings.properties_at == "bulk"
         march = march_channel(
             self.section,

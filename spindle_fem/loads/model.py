@@ -66,6 +66,46 @@ class BearingHeat:
 
 
 @dataclass(frozen=True, slots=True)
+class LoadChange:
+    """What physics beyond the machine's own does to its loads at one instant.
+
+    Attributes
+    ----------
+    friction : mapping of bearing to float
+        Factor on its friction heat.
+    coefficients : mapping of str to float
+        Factors on ``film.<surface>``, ``gap.<gap>``, ``balls.<bearing>.<side>``,
+        ``joint.<contact>``, ``conductivity.<part>`` and ``channel.film``.
+    fluids : mapping of surface to float, [K]
+        Added to what the fluid of its film has.
+    inlet : float, [K]
+        Added to the coolant's inlet temperature.
+    flow : float
+        Factor on the coolant's flow.
+    nodal_heat : mapping of str to (n_unknowns,) ndarray, [W]
+    lumped_heat, lumped_capacity : mapping of lumped node to float, [W], [J/K]
+    capacity_scale : (n_unknowns,) ndarray or None, [-]
+    """
+
+    friction: Mapping[str, float] = field(default_factory=dict)
+    coefficients: Mapping[str, float] = field(default_factory=dict)
+    fluids: Mapping[str, float] = field(default_factory=dict)
+    inlet: float = 0.0
+    flow: float = 1.0
+    nodal_heat: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    lumped_heat: Mapping[str, float] = field(default_factory=dict)
+    lumped_capacity: Mapping[str, float] = field(default_factory=dict)
+    capacity_scale: NDArray[np.float64] | None = None
+
+    def factor(self, name: str) -> float:
+        """Factor on a coefficient."""
+        return self.coefficients.get(name, 1.0)
+
+
+NO_CHANGE = LoadChange()
+
+
+@dataclass(frozen=True, slots=True)
 class Loads:
     """Everything that the conduction problem needs beside mesh and materials.
 
@@ -77,6 +117,9 @@ class Loads:
     lumped : tuple of LumpedLoad
     bearing_heat : mapping of bearing to BearingHeat
     heat_to : mapping of bearing to {"inner", "outer", "balls"} shares in W
+    change : LoadChange
+        What is in them already, but for joints, conductivities, nodal heat
+        and capacities, which are the conduction problem's.
     """
 
     surface_heat: Mapping[str, float]
@@ -85,8 +128,10 @@ class Loads:
     bearing_heat: Mapping[str, BearingHeat]
     heat_to: Mapping[str, Mapping[str, float]]
     warnings: tuple = field(default=())
+    change: LoadChange = NO_CHANGE
 
     @property
     def total_heat(self) -> float:
         """All heat put in, W."""
-        return sum(self.surface_heat.values()) + sum(node.heat for node in self.lumped)
+        nodal = sum(float(heat.sum()) for heat in self.change.nodal_heat.values())
+        return sum(self.surface_heat.values()) + sum(node.heat for node in self.lumped) + nodal

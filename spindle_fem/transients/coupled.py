@@ -25,9 +25,11 @@ from spindle_fem.coupling import PreparedMachine
 from spindle_fem.errors import NoEquilibriumError, NoSteadyStateError, OutOfValidityError
 from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.loads.coolant_loop import CoolantState
-from spindle_fem.loads.model import BearingHeat, FilmLoad, Loads
+from spindle_fem.loads.model import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads
 from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.reduced.coefficients import CHANNEL_FILM
 from spindle_fem.transients.history import OperatingHistory
+from spindle_fem.transients.terms import NO_PHYSICS, FieldTerms, Physics
 
 Array = NDArray[np.float64]
 
@@ -85,11 +87,20 @@ class CoupledInputs:
     coefficient_tolerance : float, [-]
         Relative change of a film or contact coefficient below which the
         matrix keeps the old one; 0 renews it at every stage.
+    physics : Physics, optional
+        Terms beyond the machine's own.
     """
 
     def __init__(
-        self, machine: PreparedMachine, history: OperatingHistory, coefficient_tolerance: float
+        self,
+        machine: PreparedMachine,
+        history: OperatingHistory,
+        coefficient_tolerance: float,
+        physics: Physics = NO_PHYSICS,
     ) -> None:
+        self._physics = physics
+        self._coolant_track: list[tuple[float, float, float, float]] = []
+        self.terms: FieldTerms | None = None
         builder = copy.copy(machine.builder)
         builder.heat_model = HeatInMemory(machine.builder.heat_model)
         self.machine = replace(machine, builder=builder)
@@ -114,12 +125,18 @@ class CoupledInputs:
             A bearing has no equilibrium at these temperatures.
         """
         if self._names is None:
-            self._names = self.lumped_names(state.temperature)
+            self._begin(time, state)
         lumped = dict(zip(self._names, state.lumped_temperature.tolist(), strict=True))
-        point, loads, coolant = self._loads(time, state.temperature, lumped)
+        change = NO_CHANGE
+        if self.terms is not None:
+            now = self.history.at(time)
+            change = self.terms.at(time, now, state.temperature, state.lumped_temperature)
+            change = replace(change, coefficients=self._factors(change))
+        point, loads, coolant = self._loads(time, state.temperature, lumped, change)
         loads = replace(loads, films=self._films(loads), lumped=self._lumped(loads))
         if coolant is not None:
-            coolant = self._coolant(point, coolant, state.temperature)
+            inlet = point.coolant_inlet_temperature + change.inlet
+            coolant = self._coolant(inlet, coolant, state.temperature)
             loads = replace(loads, films={**loads.films, **self._channel_films(coolant)})
         self.evaluations += 1
         self._asked.append(Evaluation(time, point, loads, coolant))
@@ -143,13 +160,43 @@ class CoupledInputs:
         last, middle, first = found
         return first, middle, last
 
+    def accept(self, state: ThermalState, last: Evaluation) -> None:
+        """Let the terms remember the end of an accepted step, whose last stage was this."""
+        if self.terms is not None:
+            change = last.loads.change
+            self._coolant_track.append((state.time, change.inlet, change.flow, change.factor(CHANNEL_FILM)))
+            before = self.history.at(float(np.nextafter(state.time, -np.inf)))
+            after = self.history.at(state.time)
+            self.terms.accept(state.time, before, after, state.temperature, state.lumped_temperature)
+
+    def coolant_at(self, time: float) -> tuple[OperatingPoint, float]:
+        """Operating point of the channel at a time that has passed, and factor on its film."""
+        point = self.history.at(time)
+        if not self._coolant_track:
+            return point, 1.0
+        times, *columns = np.array(self._coolant_track).T
+        inlet, flow, film = (float(np.interp(time, times, column)) for column in columns)
+        moved = replace(
+            point,
+            coolant_inlet_temperature=point.coolant_inlet_temperature + inlet,
+            coolant_flow=point.coolant_flow * flow,
+        )
+        return moved, film
+
     # -------------------------------------------------------------- details
+    def _begin(self, time: float, state: ThermalState) -> None:
+        self._names = self.lumped_names(state.temperature)
+        if self._physics.is_there:
+            self.terms = FieldTerms(self.machine, self._names, self._physics)
+            self.terms.begin(time, self.history.at(time), state.temperature, state.lumped_temperature)
+
     def _loads(
-        self, time: float, temperature: Array, lumped: Mapping[str, float]
+        self, time: float, temperature: Array, lumped: Mapping[str, float], change: LoadChange = NO_CHANGE
     ) -> tuple[OperatingPoint, Loads, CoolantState | None]:
         point = self.history.at(time)
         try:
-            loads, coolant = self.machine.builder.at(point, self.machine.field_state(temperature, lumped))
+            field = self.machine.field_state(temperature, lumped)
+            loads, coolant = self.machine.builder.at(point, field, change)
         except (NoEquilibriumError, OutOfValidityError) as error:
             raise NoSteadyStateError(
                 f"{self.machine.spec.name} after {time / 3600.0:.2f} h",
@@ -166,6 +213,15 @@ class CoupledInputs:
                 return kept
         self._kept[key] = fresh
         return fresh
+
+    def _factors(self, change: LoadChange) -> dict[str, float]:
+        """Factors of what no film or node keeps: joints and conductivities."""
+        return {
+            name: float(self._keep(("factor", name), np.array([value]))[0])
+            if name.startswith(("joint.", "conductivity."))
+            else value
+            for name, value in change.coefficients.items()
+        }
 
     def _films(self, loads: Loads) -> dict[str, FilmLoad]:
         cells = self.machine.builder.cells
@@ -188,14 +244,14 @@ class CoupledInputs:
             for node in loads.lumped
         )
 
-    def _coolant(self, point: OperatingPoint, fresh: CoolantState, temperature: Array) -> CoolantState:
+    def _coolant(self, inlet: float, fresh: CoolantState, temperature: Array) -> CoolantState:
         """The march with the coefficients that the matrix has, so that walls and coolant agree."""
         kept = self._keep(("channel",), fresh.film_coefficient)
         if kept is fresh.film_coefficient:
             return fresh
         builder = self.machine.builder
         march = march_enthalpy(
-            point.coolant_inlet_temperature,
+            inlet,
             fresh.march.mass_flow,
             fresh.march.march.specific_heat_capacity,
             builder.wall_temperature(self.machine.field_state(temperature, {})),

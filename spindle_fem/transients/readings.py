@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +11,10 @@ from scipy import sparse
 
 from spindle_fem.conduction.evaluate import mean_matrix, probe_matrix
 from spindle_fem.coupling import PreparedMachine
-from spindle_fem.transients.history import OperatingHistory
+from spindle_fem.loads.operating_point import OperatingPoint
 
 Array = NDArray[np.float64]
+CoolantAt = Callable[[float], tuple[OperatingPoint, float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,20 +64,20 @@ class ReadingRows:
         rows = sparse.csr_array(sparse.vstack(blocks)) if blocks else sparse.csr_array((0, width))
         return cls(machine, rows, tuple(p.name for p in spec.probe), bearings, tuple(p.name for p in points))
 
-    def probe_readings(self, outputs: Array, times: Array, history: OperatingHistory) -> Array:
+    def probe_readings(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
         """Temperature of every probe, (n_times, n_probes) [K].
 
         Parameters
         ----------
         outputs : (n_times, n_outputs) ndarray, [K]
         times : (n_times,) ndarray, [s]
-        history : OperatingHistory
-            For the coolant's inlet and flow.
+        coolant_at : callable
+            Time [s] to the operating point of the channel and a factor on its film.
         """
         readings = np.empty((len(times), len(self.probes)))
         for column, probe in enumerate(self.machine.spec.probe):
             if probe.kind == "coolant_outlet":
-                readings[:, column] = self._coolant_outlet(outputs, times, history)
+                readings[:, column] = self._coolant_outlet(outputs, times, coolant_at)
             else:
                 readings[:, column] = outputs[:, self._points.index(probe.name)]
         return readings
@@ -86,13 +88,14 @@ class ReadingRows:
         rings = outputs[:, first : first + 2 * number]
         return rings[:, 0::2], rings[:, 1::2], outputs[:, first + 2 * number : first + 3 * number]
 
-    def _coolant_outlet(self, outputs: Array, times: Array, history: OperatingHistory) -> Array:
+    def _coolant_outlet(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
         builder = self.machine.builder
         walls = outputs[:, outputs.shape[1] - builder.cells.cell_area.size :]
         found = np.empty(len(times))
         for index, time in enumerate(times):
             wall = walls[index].reshape(builder.cells.cell_area.shape)
-            state = builder.coolant_loop.at(history.at(float(time)), wall)
+            point, factor = coolant_at(float(time))
+            state = builder.coolant_loop.at(point, wall, film_factor=factor)
             found[index] = state.march.march.mixed_outlet_temperature
         return found
 

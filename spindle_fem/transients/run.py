@@ -16,6 +16,7 @@ from spindle_fem.network.history import InputHistory
 from spindle_fem.transients.coupled import CoupledInputs, coolant_heat
 from spindle_fem.transients.history import OperatingHistory
 from spindle_fem.transients.readings import ReadingRows
+from spindle_fem.transients.terms import NO_PHYSICS, Physics, with_factors
 from spindle_fem.units import kelvin_to_celsius
 
 Array = NDArray[np.float64]
@@ -215,6 +216,7 @@ def simulate_full(
     options: TransientOptions = DEFAULT_OPTIONS,
     stop: Callable[[ThermalState], bool] | None = None,
     breakpoints: Sequence[float] = (),
+    physics: Physics = NO_PHYSICS,
     progress: Callable[[str], None] = lambda text: None,
 ) -> MachineTransient:
     """Temperatures of a machine under inputs that change in time.
@@ -238,6 +240,8 @@ def simulate_full(
         Asked after every accepted step; True ends the run there.
     breakpoints : sequence of float, [s]
         Times at which a step has to end besides those of the inputs.
+    physics : Physics
+        Terms and factors beyond the machine's own.
     progress : callable
 
     Returns
@@ -253,6 +257,7 @@ def simulate_full(
         enthalpy included.
     """
     began = clock.process_time()
+    machine, physics = with_factors(machine, physics)
     history = OperatingHistory.of(machine.spec, inputs)
     if start is None:
         first = history.at(float(inputs.times[0]))
@@ -260,8 +265,10 @@ def simulate_full(
     require_state(machine, start)
     samples = np.asarray(inputs.times if sample_times is None else sample_times, dtype=float)
     end = float(max(inputs.times[-1], samples.max(initial=-np.inf), max(breakpoints, default=-np.inf)))
-    marks = np.concatenate((history.breakpoints(), np.asarray(breakpoints, dtype=float)))
-    source = CoupledInputs(machine, history, options.coefficient_tolerance)
+    marks = np.concatenate(
+        (history.breakpoints(), np.asarray(breakpoints, dtype=float), np.array(physics.breakpoints()))
+    )
+    source = CoupledInputs(machine, history, options.coefficient_tolerance, physics)
     names = source.lumped_names(start.temperature)
     if len(start.lumped_temperature) != len(names):
         raise SpecError(
@@ -284,7 +291,7 @@ def simulate_full(
         progress(f"{state.time / 3600.0:.2f} h, {kelvin_to_celsius(leg.hottest[-1]):.1f} °C")
         if leg.stopped:
             break
-    return _joined(machine, history, rows, legs, clock.process_time() - began, source.evaluations)
+    return _joined(source, rows, legs, clock.process_time() - began)
 
 
 class _Leg:
@@ -324,6 +331,7 @@ class _Leg:
 
     def _observe(self, state: ThermalState) -> bool:
         stages = self.source.stages_of_step(self._time)
+        self.source.accept(state, stages[-1])
         size = state.time - self._time
         self.coolant.append((*coolant_heat(stages, size), size))
         last = stages[-1]
@@ -354,14 +362,7 @@ class _Leg:
         return MachineEnergy(heat_in, out, account.stored)
 
 
-def _joined(
-    machine: PreparedMachine,
-    history: OperatingHistory,
-    rows: ReadingRows,
-    legs: list[_Leg],
-    seconds: float,
-    evaluations: int,
-) -> MachineTransient:
+def _joined(source: CoupledInputs, rows: ReadingRows, legs: list[_Leg], seconds: float) -> MachineTransient:
     reached = legs[-1].result.state.time
     times = np.concatenate([leg.sample_times for leg in legs])
     outputs = np.concatenate([leg.result.samples for leg in legs])
@@ -397,7 +398,7 @@ def _joined(
     return MachineTransient(
         times=times,
         probes=rows.probes,
-        readings=rows.probe_readings(outputs, times, history),
+        readings=rows.probe_readings(outputs, times, source.coolant_at),
         bearings=rows.bearings,
         inner=inner,
         outer=outer,
@@ -405,7 +406,7 @@ def _joined(
         steps=steps,
         energy=energy,
         state=legs[-1].result.state,
-        counts={**counts, "evaluations": evaluations},
+        counts={**counts, "evaluations": source.evaluations},
         cpu_seconds=seconds,
         stopped=legs[-1].stopped,
     )

@@ -222,7 +222,9 @@ class Settled:
 
     def _read(self, state: ThermalState) -> Array:
         outputs = (self.rows.rows @ state.vector())[None, :]
-        return self.rows.probe_readings(outputs, np.array([state.time]), self.history)[0]
+        return self.rows.probe_readings(
+            outputs, np.array([state.time]), lambda time: (self.history.at(time), 1.0)
+        )[0]
 
 
 def load_study(path: str | Path) -> TransientStudy:

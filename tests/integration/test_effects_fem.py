@@ -1,0 +1,208 @@
+"""Effects of the catalogue in the finite-element model: against the fast model, and in the steady state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spindle_fem.coolant.section import ChannelSection
+from spindle_fem.coupling import prepare_machine, solve_coupled
+from spindle_fem.effects.coolant_film import TransitionTerm, reynolds_number
+from spindle_fem.effects.term import Term, TermParameter
+from spindle_fem.effects.thermal_preload import ThermalPreloadTerm
+from spindle_fem.effects.unrecorded_heat_source import HeatSourceTerm
+from spindle_fem.effects.view import ChannelFlow
+from spindle_fem.errors import SpecError
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.history import InputHistory
+from spindle_fem.reduced.build import ReductionOptions, reduced_model_of
+from spindle_fem.reduced.drive import STANDARD, make_drive
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.transient import simulate_fast
+from spindle_fem.spec.load import load_machine
+from spindle_fem.transients.readings import ReadingRows
+from spindle_fem.transients.run import TransientOptions, simulate_full
+from spindle_fem.transients.terms import Physics, steady_physics, with_factors
+
+SMALL = ["mesh.preset=coarse", "mesh.order=1"]
+RPM = np.pi / 30.0
+HOUR = 3600.0
+LITRE_PER_MINUTE = 1e-3 / 60.0
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return prepare_machine(load_machine("recorded_spindle", SMALL))
+
+
+@pytest.fixture(scope="module")
+def fast(machine):
+    return FastModel(reduced_model_of(machine.spec, options=ReductionOptions()), machine.spec)
+
+
+def preload():
+    bearings = ("F1", "F2", "F3")
+    sides = (tuple(f"{name}.{side}_ring" for name in bearings) for side in ("inner", "outer"))
+    return ThermalPreloadTerm("preload", bearings, *sides)
+
+
+def of_size(term, size, **others):
+    """A term whose effect has a size, with other parameters."""
+    named = {f"{term.name}.{name}": value for name, value in others.items()}
+    return Physics((term,), {f"{term.name}.{term.parameters[0].name}": size} | named)
+
+
+def transition(machine):
+    channel = machine.spec.channel
+    section = ChannelSection(
+        channel.inner_radius, channel.depth, channel.width, channel.pitch, channel.turns, channel.starts
+    )
+    area = channel.depth * channel.width * channel.starts
+    flow = ChannelFlow(machine.spec.coolant.fluid, section.hydraulic_diameter, area)
+    low, high = (reynolds_number(flow, litres * LITRE_PER_MINUTE, 290.15) for litres in (12.0, 24.0))
+    return TransitionTerm("transition", flow, (low, high))
+
+
+def inputs_over(times, **changed):
+    flow = np.where(times < 0.4 * HOUR, 12.0, 24.0) * LITRE_PER_MINUTE
+    columns = {
+        "speed": np.where(times < 0.75 * HOUR, 3000.0, 1500.0) * RPM,
+        "thrust": 1750.0,
+        "ambient": 293.15 + np.sin(times / 3000.0),
+        "coolant_inlet": 290.15,
+        "coolant_flow": flow,
+    } | changed
+    values = np.column_stack([np.broadcast_to(columns[name], times.shape) for name in STANDARD])
+    return values, np.array([True, True, False, False, True])
+
+
+def by_full_model(machine, times, physics):
+    values, held = inputs_over(times)
+    inputs = InputHistory(times, STANDARD, values, held)
+    return simulate_full(machine, inputs, options=TransientOptions(error=0.02), physics=physics)
+
+
+def by_fast_model(fast, times, physics):
+    values, held = inputs_over(times)
+    drive = make_drive(times, STANDARD, values, held, largest_step=10.0)
+    given = {**physics.values, **physics.factors}
+    return simulate_fast(fast, drive, 293.15, terms=physics.terms, parameters=given).temperature
+
+
+TIMES = np.arange(0.0, HOUR + 1.0, 30.0)
+
+
+@pytest.mark.slow
+def test_catalogue_terms_agree_with_the_fast_model_at_every_probe(machine, fast):
+    source = HeatSourceTerm(
+        "source", ("housing.front_body",), 60.0, [(0.2 * HOUR, 0.5 * HOUR), (0.6 * HOUR, 0.9 * HOUR)]
+    )
+    each = {
+        "preload": of_size(preload(), 0.4),
+        "source": of_size(source, 80.0, lag=60.0),
+        "transition": of_size(transition(machine), 2.0),
+    }
+    without = by_fast_model(fast, TIMES, Physics())
+    for name, physics in each.items():
+        assert np.abs(by_fast_model(fast, TIMES, physics) - without).max() > 0.3, name
+    terms = tuple(term for physics in each.values() for term in physics.terms)
+    values = {name: value for physics in each.values() for name, value in physics.values.items()}
+    together = Physics(terms, values)
+    full = by_full_model(machine, TIMES, together)
+    assert np.abs(full.readings - by_fast_model(fast, TIMES, together)).max() < 0.05
+    assert full.energy.imbalance_relative < 1e-8
+
+
+class Everything(Term):
+    """Every way in which a term can act, each large enough to see."""
+
+    name = "everything"
+    parameters = (TermParameter("strength", 1.0, 1.0, logarithmic=False),)
+    heat_places = ("fluid.housing.outside", "fluid.coolant_inlet", "R1.balls")
+    reads = ("housing",)
+
+    def __init__(self, joint, gap):
+        self.coefficients = (joint, gap, "film.housing.outside", "balls.R1.outer", "conductivity.steel")
+        self.bearings = ("R1", "R2")
+
+    def heat(self, context):
+        one = np.ones(context.temperatures.shape[-1], dtype=complex)
+        strength = context.parameters["strength"]
+        return np.array([4.0 * one, 1.5 * np.sin(context.time / 900.0) * one, 20.0 * one]) * strength
+
+    def factor(self, context):
+        warm = 0.02 * (context.temperatures[0] - 293.15) * context.parameters["strength"]
+        return np.array([0.5 + warm, 2.0 + warm, 3.0 + warm, 0.6 + warm, 0.9 + 0.0 * warm])
+
+    def friction(self, context):
+        return np.full((2, context.temperatures.shape[-1]), 1.4 + 0.0j)
+
+    def operating_factor(self, point, parameters):
+        return {"coolant.flow": 0.8, "channel.film": 1.3, "joint." + self.coefficients[0][6:]: 1.2}
+
+    def place_capacity(self, parameters):
+        return {"housing.front_body": 9000.0, "R1.balls": 20.0}
+
+    def place_conductance(self, parameters):
+        return {"shaft": 3.0}
+
+
+def everything(machine):
+    joint = next(n for n in machine.mesh.joints if "housing" in n and "R1.outer_ring" in n)
+    return Everything(f"joint.{joint}", f"gap.{machine.spec.gap[0].name}")
+
+
+@pytest.mark.slow
+def test_every_way_of_acting_agrees_with_the_fast_model(machine, fast):
+    times = TIMES[: len(TIMES) // 2]
+    factors = {"heat.front": 1.2, "heat.inner_share": 0.9, "coolant.film_factor": 0.7}
+    physics = Physics((everything(machine),), {}, factors)
+    without = by_fast_model(fast, times, Physics())
+    quick = by_fast_model(fast, times, physics)
+    full = by_full_model(machine, times, physics).readings
+    assert np.all(np.abs(quick - without).max(axis=0) > 0.2)
+    assert np.abs(full - quick).max() < 0.05
+
+
+def test_the_steady_state_is_where_the_transient_ends(machine, fast):
+    physics = replace(of_size(preload(), 0.4), factors={"coolant.film_factor": 0.7})
+    point = OperatingPoint.of(machine.spec)
+    changed, rest = with_factors(machine, physics)
+    steady = solve_coupled(changed, point, beyond=steady_physics(changed, rest))
+    times = np.linspace(0.0, 400.0 * HOUR, 4001)
+    columns = {"speed": point.speed, "thrust": point.thrust, "ambient": point.ambient_temperature}
+    columns |= {"coolant_inlet": point.coolant_inlet_temperature, "coolant_flow": point.coolant_flow}
+    values, held = inputs_over(times, **columns)
+    drive = make_drive(times, STANDARD, values, held, largest_step=360.0)
+    given = {**physics.values, **physics.factors}
+    run = simulate_fast(fast, drive, point.ambient_temperature, terms=physics.terms, parameters=given)
+    rows = ReadingRows.of(machine, steady.solution.problem.lumped_names)
+    unknowns = np.concatenate((steady.solution.temperature, steady.solution.lumped_temperature))
+    readings = (rows.rows @ unknowns)[: len(fast.model.probe_names)]
+    expected = run.temperature[-1, [fast.channels.index(name) for name in fast.model.probe_names]]
+    np.testing.assert_allclose(readings, expected, atol=0.02)
+    plain = solve_coupled(machine, point).solution
+    assert np.abs(rows.rows @ np.concatenate((plain.temperature, plain.lumped_temperature)))[0] > 0.0
+    assert np.abs(plain.temperature - steady.solution.temperature).max() > 1.0
+
+
+def test_places_and_coefficients_that_do_not_exist_are_refused(machine):
+    inputs = InputHistory(TIMES, STANDARD, *inputs_over(TIMES))
+    for change, message in (
+        ({"reads": ("housinh",)}, 'names "housinh".*housing'),
+        ({"heat_places": ("fluid.nowhere",)}, r'shifts "fluid\.nowhere"'),
+        ({"coefficients": ("joint.nowhere",)}, r'scales "joint\.nowhere"'),
+        ({"bearings": ("F9",)}, 'scales "F9"'),
+    ):
+        term = Term()
+        term.name = "odd"
+        for name, value in change.items():
+            setattr(term, name, value)
+        with pytest.raises(SpecError, match=message):
+            simulate_full(machine, inputs, physics=Physics((term,)))
+    with pytest.raises(SpecError, match="same name"):
+        simulate_full(machine, inputs, physics=Physics((preload(), preload())))
+    with pytest.raises(SpecError, match=r"heat\.fromt"):
+        simulate_full(machine, inputs, physics=Physics((), {}, {"heat.fromt": 1.1}))
