@@ -135,21 +135,23 @@ def _sources(
     speeds: dict[str, tuple[str, ...]] = {}
     reported: dict[str, str] = {}
     n = network.n_nodes
+    heated = set(network.source_node.tolist())
     for name, node, source in zip(
         network.source_names, network.source_node, network.source_input, strict=True
     ):
         inner[name] = network.node_names[node]
         reported[name] = network.node_names[node]
         speeds[name] = (source,) if source in turning else ()
+        # What is not heated itself comes first: it is what holds the bearing, or stands for it.
         joined = [
-            (float(value), int(b if a == node else a))
+            (int(b if a == node else a) not in heated, float(value), int(b if a == node else a))
             for a, b, value in zip(
                 network.link_first, network.link_second, network.link_conductance, strict=True
             )
             if node in (a, b) and max(a, b) < n
         ]
         if joined:
-            outer[name] = network.node_names[max(joined)[1]]
+            outer[name] = network.node_names[max(joined)[2]]
     return inner, outer, speeds, reported
 
 

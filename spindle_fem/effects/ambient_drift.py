@@ -7,11 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported
-from spindle_fem.effects.laws import HOUR, Complex, amplitude, linear, repeated, shape, smooth_step
+from spindle_fem.effects.laws import HOUR, Complex, amplitude, linear, repeated, shape, smooth_step, softplus
 from spindle_fem.effects.term import Term, TermContext, TermParameter
 from spindle_fem.effects.view import MachineView, fluid_place
 
-RAMP, STEP, WAVE = "ramp", "step", "wave"
+STEADY, RAMP, STEP, WAVE = "steady drift", "ramp", "step", "wave"
+# Of a ramp's bends, s.
+BEND = 60.0
 
 
 class DriftTerm(Term):
@@ -23,7 +25,7 @@ class DriftTerm(Term):
     films : tuple of str
         Whose fluid it is.
     form : str
-        ramp, step or wave.
+        steady drift, ramp (from one instant to another), step or wave.
     parameters : tuple of TermParameter
     """
 
@@ -36,8 +38,12 @@ class DriftTerm(Term):
     def heat(self, context: TermContext) -> Complex:
         """The same shift for every film, (n, k) K."""
         own, time = context.parameters, context.time
-        if self._form == RAMP:
+        if self._form == STEADY:
             shift = own["rate"] * time
+        elif self._form == RAMP:
+            since = (time - own["start"]) / BEND
+            passed = softplus(since) - softplus(since - own["ramp_time"] / BEND)
+            shift = own["change"] * BEND * passed / own["ramp_time"]
         elif self._form == STEP:
             shift = own["change"] * smooth_step((time - own["time"]) / own["width"])
         else:
@@ -61,16 +67,29 @@ class AmbientDrift(Effect):
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """Ramp, step and slow wave of the ambient, or of every boundary of a network."""
+        """Drift, ramp, step and slow wave of the ambient, or of every boundary of a network."""
         found = []
         span = machine.duration
         for key, films in machine.surroundings.items():
             laws = {
-                RAMP: (
+                STEADY: (
                     (linear("rate", 0.0, max(2.0 / HOUR, 3.0 / span), "K/s"),),
                     "rate",
                     max(1.0 / HOUR, 2.0 / span),
                     ({},),
+                ),
+                RAMP: (
+                    (
+                        linear("change", 0.0, 5.0, "K", low=-40.0, high=40.0),
+                        linear("start", 0.3 * span, 0.4 * span, "s", low=-0.5 * span, high=span),
+                        shape("ramp_time", 0.4 * span, 0.7, "s", low=4.0 * BEND, high=5.0 * span),
+                    ),
+                    "change",
+                    3.0,
+                    [
+                        {"start": start * span, "ramp_time": max(5.0 * BEND, length * span)}
+                        for start, length in ((0.0, 0.25), (0.0, 0.6), (0.25, 0.25), (0.25, 0.6), (0.55, 0.3))
+                    ],
                 ),
                 STEP: (
                     (
@@ -118,10 +137,17 @@ class AmbientDrift(Effect):
             if candidate.component == "ambient"
             else f"The temperature of {candidate.component}"
         )
-        if candidate.form == RAMP:
+        if candidate.form == STEADY:
             rate = reported["rate"].value
             word = "warms" if rate >= 0.0 else "cools"
             return f"{subject} {word} by {abs(rate):.2g} K/h more than recorded."
+        if candidate.form == RAMP:
+            change, begin = reported["change"].value, reported["start"].value
+            word = "warms" if change >= 0.0 else "cools"
+            return (
+                f"{subject} {word} by {abs(change):.2g} K more than recorded from {begin / 60.0:.0f} min to "
+                f"{(begin + reported['ramp_time'].value) / 60.0:.0f} min after the start."
+            )
         if candidate.form == STEP:
             change = reported["change"].value
             word = "warmer" if change >= 0.0 else "colder"

@@ -65,7 +65,7 @@ class TransitionTerm(ReynoldsFilmTerm):
         super().__init__(name, channel)
         middle, span = 0.5 * (reynolds[0] + reynolds[1]), reynolds[1] - reynolds[0]
         self.parameters = (
-            amplitude("film_increase", 2.0, low=-0.9, high=20.0),
+            amplitude("film_increase", 3.0, low=-0.9, high=20.0),
             linear("onset_reynolds", middle, 0.5 * span, low=0.3 * reynolds[0], high=3.0 * reynolds[1]),
             shape("width", 80.0, 0.7, low=2.0, high=2000.0),
         )

@@ -35,8 +35,8 @@ class GapClosureTerm(Term):
         # The lagged excess; the temperature that it counts from, 0 until the first step knows it.
         self.n_states = 1 if around else 2
         self.parameters = (
-            amplitude("opening", 0.6, high=0.995),
-            linear("closing_difference", 8.0, 4.0, "K", low=-5.0, high=60.0),
+            amplitude("opening", 1.0, high=0.995),
+            linear("closing_difference", 8.0, 5.0, "K", low=-5.0, high=60.0),
             shape("width", 5.0, 0.5, "K", low=0.3, high=40.0),
             shape("lag", 600.0, 0.4, "s", low=5.0, high=10000.0),
         )

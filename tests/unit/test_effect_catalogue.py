@@ -531,16 +531,16 @@ def test_an_entry_of_a_definition_builds_the_same_effect_again(machines, kind):
 
 def test_building_says_what_is_wrong(machines):
     view = machines["geometry"][2]
-    good = {"load_per_kelvin": "0.08 1/K"}
+    good = {"friction_increase_at_10K": "0.1"}
     assert build("thermal_preload", "front_bearings", "", good, view).effect == "thermal_preload"
     for change, error, message in (
         ({"effect": "thermal_preloud"}, SpecError, 'Did you mean "thermal_preload"'),
         ({"component": "front_bearing"}, SpecError, 'cannot have thermal_preload.*"front_bearings"'),
         ({"form": "odd"}, SpecError, "form.*'odd'|\"odd\" is unknown"),
-        ({"values": {}}, SpecError, '"load_per_kelvin" is missing'),
+        ({"values": {}}, SpecError, '"friction_increase_at_10K" is missing'),
         ({"values": {**good, "lagg": "3 s"}}, SpecError, '"lagg" is unknown'),
-        ({"values": {"load_per_kelvin": "0.08 W"}}, UnitError, "wrong dimension"),
-        ({"values": {"load_per_kelvin": "-0.08 1/K"}}, SpecError, "Allowed: 0 to 1"),
+        ({"values": {"friction_increase_at_10K": "0.08 W"}}, UnitError, "wrong dimension"),
+        ({"values": {"friction_increase_at_10K": "-0.08"}}, SpecError, "Allowed: 0 to 20"),
         ({"intervals": [("0 s", "5 s")]}, SpecError, "takes none"),
     ):
         given = {"effect": "thermal_preload", "component": "front_bearings", "form": "", "values": good}
