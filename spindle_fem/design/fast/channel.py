@@ -131,7 +131,7 @@ class ChannelBatch:
         if before is None:
             capacity = self.coolant.properties(self.inlet).specific_heat_capacity
             return np.broadcast_to(capacity, wall.shape)
-        gained = np.cumsum(before.heat + self.pumping, axis=-1) / (self.mass_flow * before.capacity)
+        gained = np.cumsum((before.heat + self.pumping) / (self.mass_flow * before.capacity), axis=-1)
         end = self.inlet + gained
         start = np.concatenate((np.broadcast_to(self.inlet, (*end.shape[:-1], 1)), end[..., :-1]), axis=-1)
         values = [

@@ -1,0 +1,154 @@
+"""Pieces of the projected model of designs: heat tables, many channels at once, extremes of fields."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from spindle_fem.design.fast.channel import ChannelBatch
+from spindle_fem.design.fast.heat import (
+    QUANTITIES,
+    BearingTables,
+    chebyshev_points,
+    chebyshev_weights,
+    grease_temperature,
+    is_constant,
+    mechanical_keys,
+)
+from spindle_fem.design.fast.outputs import extreme_temperatures
+from spindle_fem.loads.bearing_heat import BearingTemperatures, heat_model_of
+from spindle_fem.loads.channel_cells import ChannelCells
+from spindle_fem.loads.coolant_loop import CoolantLoop
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.spec.load import load_machine
+
+
+@given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.floats(280.0, 340.0))
+def test_tables_are_exact_for_polynomials(coefficients, place):
+    nodes = chebyshev_points(280.0, 340.0, 6)
+    polynomial = np.polynomial.Polynomial(coefficients, domain=(280.0, 340.0))
+    found = chebyshev_weights(nodes, np.array([place])) @ polynomial(nodes)
+    assert found[0] == pytest.approx(polynomial(place), abs=1e-9)
+
+
+@pytest.mark.parametrize("model", ["palmgren", "full", "table"])
+def test_a_table_answers_as_the_heat_model_does(model):
+    """Bearings of a set at temperatures of their own: what each feels of the others is left out."""
+    spec = load_machine("wu_tan_2016", [f"heat.model={model}"])
+    point = OperatingPoint.of(spec)
+    tables = BearingTables(285.0, 345.0)
+    table = tables.of(spec, point, mechanical_keys([spec], [point])[0])
+    names = [bearing.name for _, bearing in spec.bearings]
+    inner, outer, ball = (
+        np.linspace(318.0, 305.0, 5),
+        np.linspace(308.0, 300.0, 5),
+        np.linspace(314.0, 303.0, 5),
+    )
+    exact, _ = heat_model_of(spec)(
+        point,
+        {
+            name: BearingTemperatures(*row)
+            for name, *row in zip(names, inner, outer, ball, inner, outer, strict=True)
+        },
+    )
+    found = table.at(grease_temperature(inner, outer, ball)[None])[0]
+    for name, row in zip(names, found, strict=True):
+        assert row[QUANTITIES.index("total")] == pytest.approx(exact[name].total, rel=2e-3)
+        conductance = row[QUANTITIES.index("conductance_inner")]
+        assert conductance == pytest.approx(exact[name].conductance_inner, rel=1e-3)
+        terms = dict(zip(table.terms, row[len(QUANTITIES) :], strict=True))
+        assert sum(terms.values()) == pytest.approx(row[0], rel=1e-6)
+
+
+def test_what_makes_heat_and_what_does_not_decides_which_designs_share_a_table():
+    changes = ([], ["coolant.flow=10 L/min"], ["operation.speed=500 rpm"], ["bearing_set.rear.preload=900 N"])
+    specs = [load_machine("recorded_spindle", change) for change in changes]
+    keys = mechanical_keys(specs, [OperatingPoint.of(spec) for spec in specs])
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 3
+    assert is_constant(specs[0])
+    assert not is_constant(load_machine("wu_tan_2016"))
+
+
+def test_tables_grow_only_to_what_is_read():
+    tables = BearingTables(290.0, 330.0)
+    assert not tables.widen(291.0, 329.0)
+    assert tables.widen(280.0, 325.0)
+    assert (tables.low, tables.high) == (274.0, 330.0)
+    assert tables.widen(300.0, 5000.0)  # a runaway is not followed
+    assert not tables.widen(300.0, 6000.0)
+
+
+CELLS = ChannelCells(
+    (), {}, {}, np.full((1, 14), 0.011), np.arange(14.0), np.arange(14.0), np.arange(14) % 13 == 0
+)
+
+
+@pytest.mark.parametrize("film_model", ["helical", "sieder_tate", "paper"])
+@pytest.mark.parametrize("properties_at", ["bulk", "inlet"])
+@pytest.mark.parametrize("pumping", ["true", "false"])
+def test_many_channels_are_what_each_is_alone(film_model, properties_at, pumping):
+    designs = [("12 degC", "8 L/min", 0.8), ("30 degC", "35 L/min", 1.3), ("38 degC", "60 L/min", 1.0)]
+    specs = [
+        load_machine(
+            "wu_tan_2016",
+            [
+                f"coolant.film_model={film_model}",
+                f"coolant.properties_at={properties_at}",
+                f"coolant.pumping_heat={pumping}",
+                f"coolant.inlet_temperature={inlet}",
+                f"coolant.flow={flow}",
+                f"coolant.film_factor={factor}",
+            ],
+        )
+        for inlet, flow, factor in designs
+    ]
+    points = [OperatingPoint.of(spec) for spec in specs]
+    inputs = SimpleNamespace(
+        specs=specs,
+        points=points,
+        inlet=np.array([point.coolant_inlet_temperature for point in points]),
+        flow=np.array([point.coolant_flow for point in points]),
+        film_factor=np.array([spec.coolant.film_factor.value for spec in specs]),
+    )
+
+    class Sized(SimpleNamespace):
+        def __len__(self):
+            return len(self.specs)
+
+    model = SimpleNamespace(cell_area=CELLS.cell_area, channel_cells=lambda: CELLS)
+    wall = inputs.inlet[:, None, None] + np.linspace(12.0, 3.0, 14)
+    batch = ChannelBatch(model, Sized(**vars(inputs)))
+    state = None
+    for _ in range(12):
+        state = batch.at(wall, state)
+    matrix, constant = batch.linear(state)
+    assert np.allclose(constant + np.einsum("nsij,nsj->nsi", matrix, wall), state.heat, rtol=1e-9, atol=1e-9)
+    for row, (spec, point) in enumerate(zip(specs, points, strict=True)):
+        alone = CoolantLoop(spec, CELLS).at(point, wall[row])
+        assert np.allclose(state.film[row], alone.film_coefficient, rtol=1e-9)
+        assert np.allclose(state.heat[row], alone.march.march.heat, rtol=1e-8, atol=1e-9)
+        assert np.allclose(state.bulk[row], alone.march.march.bulk_temperature, atol=1e-8)
+        assert state.outlet_edge[row].mean() == pytest.approx(
+            alone.march.march.mixed_outlet_temperature, abs=1e-7
+        )
+        assert state.enthalpy_rise[row] == pytest.approx(alone.march.march.enthalpy_rise, rel=1e-6)
+        assert batch.pressure[row].total == pytest.approx(alone.pressure.total, rel=1e-12)
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 2**31))
+def test_extremes_are_those_of_the_whole_field(seed):
+    random = np.random.default_rng(seed)
+    nodes = random.normal(size=(5, 300))
+    nodes[0] = 2.0
+    one = np.array([0.5, 0.0, 0.0, 0.0, 0.0])
+    reference = random.uniform(285.0, 300.0, 130)
+    unknowns = reference[:, None] * one + random.normal(scale=10.0, size=(130, 5))
+    model = SimpleNamespace(nodes=nodes.astype(np.float32), one=one)
+    low, high = extreme_temperatures(model, unknowns, reference)
+    field = unknowns @ nodes
+    assert np.allclose(low, field.min(axis=1), atol=2e-5)
+    assert np.allclose(high, field.max(axis=1), atol=2e-5)
