@@ -19,7 +19,10 @@ def smooth_step(argument: ArrayLike) -> Complex:
     >>> float(smooth_step(0.0).real)
     0.5
     """
-    return 0.5 * (1.0 + np.tanh(0.5 * np.asarray(argument, dtype=complex)))
+    value = np.asarray(argument, dtype=complex)
+    above = value.real > 0.0
+    small = np.exp(np.where(above, -value, value))
+    return np.where(above, 1.0, small) / (1.0 + small)
 
 
 def softplus(argument: ArrayLike) -> Complex:

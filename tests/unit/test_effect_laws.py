@@ -1,0 +1,260 @@
+"""Laws of single effects against values worked out by hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spindle_fem.effects.ambient_drift import RAMP, STEADY, DriftTerm
+from spindle_fem.effects.chiller_cycling import PEAK, SHARPNESS, ChillerCyclingTerm
+from spindle_fem.effects.coolant_film import TransitionTerm, reynolds_number
+from spindle_fem.effects.coolant_heating import CoolantHeatingTerm
+from spindle_fem.effects.gap_closure import GapClosureTerm
+from spindle_fem.effects.grease_churning import GreaseChurningTerm
+from spindle_fem.effects.heat_split import HeatSplitTerm
+from spindle_fem.effects.laws import power, relaxed, smooth_step, softplus, switched
+from spindle_fem.effects.natural_convection import NaturalConvectionTerm
+from spindle_fem.effects.radiation import RadiationTerm
+from spindle_fem.effects.speed_heat import SpeedHeatTerm
+from spindle_fem.effects.starvation import StarvationTerm
+from spindle_fem.effects.term import TermContext
+from spindle_fem.effects.thermal_preload import NAME, ThermalPreloadTerm
+from spindle_fem.effects.unrecorded_heat_source import HeatSourceTerm
+from spindle_fem.effects.view import ChannelFlow, FrictionTable
+from spindle_fem.effects.viscosity_heat import ViscosityHeatTerm, Walther
+from spindle_fem.surroundings.air import STEFAN_BOLTZMANN
+
+RPM = np.pi / 30.0
+
+
+def context(term, *, temperatures=(), state=(), time=0.0, inputs=None, **given):
+    own = {item.name: item.value for item in term.parameters} | given
+    return TermContext(
+        time,
+        {"speed": 100.0, "thrust": 1750.0, "ambient": 293.15} | (inputs or {}),
+        np.array(temperatures, dtype=complex).reshape(len(term.reads), 1),
+        np.array(state, dtype=complex).reshape(term.n_states, 1),
+        {name: np.array([value + 0j]) for name, value in own.items()},
+    )
+
+
+# ------------------------------------------------------------------ building blocks
+@given(st.floats(-2000.0, 2000.0))
+def test_smooth_laws_keep_their_bounds(x):
+    assert 0.0 <= smooth_step(x).real <= 1.0
+    assert softplus(x).real >= max(x, 0.0)
+    assert softplus(x).real - max(x, 0.0) <= np.log(2.0) + 1e-12
+
+
+def test_smooth_laws_are_right_in_complex_steps():
+    x = np.linspace(-40.0, 40.0, 9)
+    assert softplus(x + 1e-30j).imag / 1e-30 == pytest.approx(smooth_step(x).real, rel=1e-10, abs=0.0)
+    assert power(np.array([0.0, 2.0]), 3.0 + 1e-30j).imag / 1e-30 == pytest.approx([0.0, 8.0 * np.log(2.0)])
+
+
+@given(st.floats(0.1, 1e4), st.floats(0.1, 1e4), st.floats(1.0, 1e4))
+def test_two_short_relaxations_are_one_long_one(first, second, lag):
+    at_once = relaxed(3.0, 8.0, first + second, lag)
+    assert relaxed(relaxed(3.0, 8.0, first, lag), 8.0, second, lag) == pytest.approx(at_once)
+
+
+def test_switching_is_a_lag_with_soft_edges():
+    time = np.array([-500.0, 1000.0, 4000.0, 9000.0])
+    on = switched(time, 0.0, 5000.0, 300.0, 1e-3).real
+    expected = [0.0, 1 - np.exp(-1000 / 300), 1 - np.exp(-4000 / 300), np.exp(-4000 / 300)]
+    assert on == pytest.approx(expected, abs=1e-6)
+    # A lag as long as the edge's width makes the edge logistic.
+    early = np.array([-40.0, 0.0, 40.0])
+    assert switched(early, 0.0, 1e6, 20.0, 20.0).real == pytest.approx(smooth_step(early / 20.0).real)
+
+
+# ------------------------------------------------------------------ bearings
+def test_preload_follows_the_power_of_the_lagged_difference():
+    term = ThermalPreloadTerm("t", ("F1", "F2"), ("i1", "i2"), ("o1", "o2"))
+    own = {NAME: 0.2, "exponent": 1.5, "width": 0.1, "lag": 600.0}
+    factor = term.friction(context(term, temperatures=[0] * 4, state=[20.0], **own)).real
+    assert factor[:, 0] == pytest.approx(1.0 + 0.2 * 2.0**1.5)
+    slack = term.friction(context(term, temperatures=[0] * 4, state=[-20.0], **own)).real
+    assert slack == pytest.approx(1.0)
+    moved = term.advance(context(term, temperatures=[310, 312, 303, 305], state=[1.0], **own), 600.0)
+    assert moved[0, 0].real == pytest.approx(7.0 - 6.0 * np.exp(-1.0))
+
+
+def test_viscosity_is_that_of_the_data_sheet():
+    law = Walther(21.0e-6, 4.7e-6)
+    assert np.exp(law.log_viscosity(373.15).real) == pytest.approx(4.7)
+    # Rises steeply when cold: a factor of about 2.4 from 40 to 20 °C (ISO VG 22 charts: 2.3 to 2.6).
+    ratio = np.exp(law.log_viscosity(293.15).real - law.log_viscosity(313.15).real)
+    assert 2.2 < ratio < 2.7
+
+
+def test_friction_halves_where_viscosity_does_with_exponent_one():
+    term = ViscosityHeatTerm("t", ("F1",), (("i", "o"),), (20.0e-6, 5.0e-6))
+    own = {"viscosity_exponent": 1.0, "nominal_temperature": 313.15}
+    factor = term.friction(context(term, temperatures=[375.15, 371.15], **own)).real
+    assert factor[0, 0] == pytest.approx(0.25)
+
+
+def test_grease_counts_only_running_time_and_may_begin_anew():
+    once = GreaseChurningTerm("t", ("F1",), "speed", 0.1, restarts=False)
+    assert once.initial_state({}) == pytest.approx([1.0])
+    run = once.advance(context(once, state=[0.8], time_constant=500.0), 500.0)
+    assert run[0, 0].real == pytest.approx(0.8 * np.exp(-1.0))
+    still = {"inputs": {"speed": 0.0}}
+    assert once.advance(context(once, state=[0.3], **still), 1e4)[0, 0].real == pytest.approx(0.3)
+    again = GreaseChurningTerm("t", ("F1",), "speed", 0.1, restarts=True)
+    rested = again.advance(context(again, state=[0.3], settling_time=100.0, **still), 100.0)
+    assert rested[0, 0].real == pytest.approx(1.0 - 0.7 * np.exp(-1.0))
+
+
+def test_starvation_is_half_at_its_onset():
+    term = StarvationTerm("t", ("F1",), "speed", 400.0)
+    own = {"friction_change": 0.6, "onset_speed": 100.0, "width": 5.0}
+    assert term.friction(context(term, **own))[0, 0].real == pytest.approx(1.3)
+    assert term.friction(context(term, inputs={"speed": -400.0}, **own))[0, 0].real == pytest.approx(1.6)
+
+
+def test_a_moved_share_keeps_the_heat():
+    table = FrictionTable((0.0, 100.0, 200.0), (0.0, 50.0, 150.0), 0.1, 1750.0)
+    term = HeatSplitTerm("t", {"F1": table}, 0.8)
+    at = context(term, inputs={"speed": 150.0, "thrust": 3500.0}, inner_share_change=0.1)
+    heat = term.heat(at).real[:, 0]
+    assert term.heat_places == ("F1.inner_raceway", "F1.outer_raceway")
+    assert heat == pytest.approx([0.1 * 0.8 * 110.0, -0.1 * 0.8 * 110.0])
+
+
+# ------------------------------------------------------------------ heat by speed
+def test_heat_follows_its_power_of_speed():
+    seal = SpeedHeatTerm("t", ("nose",), "speed", ("heat_per_1000rpm", 30.0, 1000.0 * RPM), (1.0, 0.1))
+    at = context(seal, inputs={"speed": 2500.0 * RPM}, heat_per_1000rpm=20.0)
+    assert seal.heat(at)[0, 0].real == pytest.approx(50.0)
+    air = SpeedHeatTerm("t", ("a", "b"), "speed", ("heat_at_4500rpm", 90.0, 4500.0 * RPM), (3.0, 0.1))
+    at = context(air, inputs={"speed": 2250.0 * RPM}, heat_at_4500rpm=80.0)
+    assert air.heat(at).real[:, 0] == pytest.approx([5.0, 5.0])
+    late = SpeedHeatTerm("t", ("d",), "speed", ("heat_at_3000rpm", 90.0, 3000.0 * RPM), (1.0, 0.1), lag=900.0)
+    at = context(late, inputs={"speed": 3000.0 * RPM}, state=[0.2], lag=900.0, heat_at_3000rpm=50.0)
+    assert late.heat(at)[0, 0].real == pytest.approx(10.0)
+    assert late.advance(at, 900.0)[0, 0].real == pytest.approx(1.0 - 0.8 * np.exp(-1.0))
+
+
+# ------------------------------------------------------------------ surroundings
+def test_an_outside_film_is_nominal_at_ten_kelvin_where_it_carries_all():
+    term = NaturalConvectionTerm("t", ("film.a",), ("a",), ("ambient",), ())
+    term.parameters = parameters = _film_parameters("convective_share", exponent=0.25)
+    assert parameters
+    own = {"convective_share": 1.0, "carried_share": 1.0, "exponent": 0.25}
+    at_ten = term.factor(context(term, temperatures=[303.15], **own))[0, 0].real
+    assert at_ten == pytest.approx(1.0, abs=2e-3)
+    wider = term.factor(context(term, temperatures=[293.15 + 160.0], **own))[0, 0].real
+    assert wider == pytest.approx(0.5 * (1.0 + 2.0), rel=1e-3)
+    below = term.factor(context(term, temperatures=[293.15 - 160.0], **own))[0, 0].real
+    assert below == pytest.approx(wider)
+
+
+def test_radiation_on_top_is_stefan_and_boltzmann():
+    term = RadiationTerm("t", ("film.a",), ("a",), ("ambient",), ())
+    term.parameters = _film_parameters("radiative_share")
+    # A black wall beside a film of 10 W/(m²·K): the share is its film at 10 K over 10.
+    film = STEFAN_BOLTZMANN * (303.15**4 - 293.15**4) / 10.0
+    own = {"radiative_share": film / 10.0, "carried_share": 0.0}
+    factor = term.factor(context(term, temperatures=[353.15], **own))[0, 0].real
+    loss = 10.0 * (353.15 - 293.15) + STEFAN_BOLTZMANN * (353.15**4 - 293.15**4)
+    assert factor * 10.0 * 60.0 == pytest.approx(loss)
+
+
+def _film_parameters(name, **others):
+    from spindle_fem.effects.laws import amplitude, linear
+
+    extra = tuple(linear(key, value, 0.1) for key, value in others.items())
+    return (amplitude(name, 1.0), *extra, linear("carried_share", 1.0, 0.1))
+
+
+def test_a_seat_is_open_cold_and_closed_warm():
+    term = GapClosureTerm("t", ("joint.a", "joint.b"), ("ring",), ("bore",))
+    own = {"opening": 0.95, "closing_difference": 8.0, "width": 0.5, "lag": 600.0}
+
+    def factor(excess):
+        return term.factor(context(term, temperatures=[300, 300], state=[excess], **own)).real[:, 0]
+
+    assert factor(-10.0) == pytest.approx(0.05)
+    assert factor(8.0) == pytest.approx(1.0 - 0.95 / 2.0)
+    assert factor(30.0) == pytest.approx(1.0)
+
+
+def test_a_ring_remembers_where_it_began():
+    term = GapClosureTerm("t", ("joint.a",), ("r1", "r2"), ())
+    begun = term.advance(context(term, temperatures=[299.0, 301.0], state=[0.0, 0.0], lag=100.0), 10.0)
+    assert begun[:, 0].real == pytest.approx([0.0, 300.0])
+    later = context(term, temperatures=[309.0, 311.0], state=[0.0, 300.0], lag=100.0)
+    assert term.advance(later, 100.0)[:, 0].real == pytest.approx([10.0 * (1.0 - np.exp(-1.0)), 300.0])
+
+
+def test_a_room_drifts_from_one_instant_to_another():
+    term = DriftTerm("t", ("film.a", "film.b"), RAMP, ())
+    own = {"change": -6.0, "start": 3000.0, "ramp_time": 3000.0}
+    shifts = [term.heat(context(term, time=time, **own)).real[:, 0] for time in (0.0, 4500.0, 9000.0)]
+    assert term.heat_places == ("fluid.a", "fluid.b")
+    assert np.array(shifts)[:, 0] == pytest.approx([0.0, -3.0, -6.0], abs=1e-9)
+    steady = DriftTerm("t", ("link.x",), STEADY, ())
+    assert steady.heat(context(steady, time=3600.0, rate=1.0 / 3600.0))[0, 0].real == pytest.approx(1.0)
+
+
+# ------------------------------------------------------------------ coolant
+def test_the_channels_reynolds_number_is_the_reference_ones():
+    channel = ChannelFlow("iso_vg_32", 0.010909, 0.010 * 0.012)
+    # reference/spindle.md: about 292 at 15 °C and 20 L/min.
+    assert reynolds_number(channel, 20e-3 / 60, 288.15) == pytest.approx(292.0, rel=0.01)
+    term = TransitionTerm("t", channel, (290.0, 850.0))
+    assert term.law(2000.0, {"film_increase": 2.0, "onset_reynolds": 600.0, "width": 50.0}) == pytest.approx(
+        3.0
+    )
+    assert term.law(600.0, {"film_increase": 2.0, "onset_reynolds": 600.0, "width": 50.0}) == pytest.approx(
+        2.0
+    )
+
+
+def test_waves_have_their_amplitude_and_period():
+    for sawtooth in (False, True):
+        term = ChillerCyclingTerm("t", ("fluid.coolant_inlet",), sawtooth=sawtooth)
+        time = np.linspace(0.0, 600.0, 6001)
+        at = TermContext(
+            time,
+            {},
+            np.zeros((0, time.size), dtype=complex),
+            np.zeros((0, time.size), dtype=complex),
+            {"amplitude": 2.0 + 0j, "period": 600.0 + 0j, "phase": 0j},
+        )
+        wave = term.heat(at)[0].real
+        assert wave.max() == pytest.approx(2.0, rel=1e-5)
+        assert wave.min() == pytest.approx(-2.0, rel=1e-5)
+        assert wave[-1] == pytest.approx(wave[0], abs=1e-9)
+    # The sawtooth is its own Fourier series.
+    terms = np.arange(1, 400)[:, None]
+    series = (SHARPNESS**terms * np.sin(terms * 2.0 * np.pi * time / 600.0) / terms).sum(axis=0)
+    assert wave == pytest.approx(2.0 * series / PEAK, abs=1e-9)
+
+
+def test_coolant_warms_by_what_it_took_before():
+    term = CoolantHeatingTerm("t", ("link.a", "link.b", "link.c"), ("a", "b", "c"), 290.0, (2.0, 3.0, 1.0))
+    heat = term.heat(context(term, temperatures=[310.0, 330.0], warming_per_watt=0.01)).real[:, 0]
+    first = 0.01 * 2.0 * 20.0
+    second = first + 0.01 * 3.0 * (40.0 - first)
+    assert term.heat_places == ("fluid.b", "fluid.c")
+    assert heat == pytest.approx([first, second])
+
+
+# ------------------------------------------------------------------ intervals
+def test_an_unrecorded_source_gives_its_heat_while_on():
+    term = HeatSourceTerm("t", ("a", "b"), 50.0, ((1000.0, 3000.0), (6000.0, 9000.0)))
+    own = {"heat": 40.0, "factor_2": 0.9, "lag": 100.0}
+    total = [term.heat(context(term, time=t, **own)).real.sum() for t in (0.0, 2700.0, 5500.0, 8700.0, 2e4)]
+    assert total == pytest.approx([0.0, 40.0, 0.0, 36.0, 0.0], abs=1e-4)
+
+
+def test_edges_of_neighbouring_intervals_cannot_cross():
+    term = HeatSourceTerm("t", ("a",), 50.0, ((0.0, 100.0), (140.0, 900.0), (950.0, 1000.0)))
+    own = {item.name: item for item in term.parameters}
+    for number in (1, 2):
+        assert own[f"end_{number}"].high <= own[f"start_{number + 1}"].low
+    for number in (1, 2, 3):
+        assert own[f"start_{number}"].high < own[f"end_{number}"].low
