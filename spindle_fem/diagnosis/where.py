@@ -28,7 +28,9 @@ Array = NDArray[np.float64]
 # Places are listed until so much of the probability is told.
 CREDIBLE = 0.95
 SIGNIFICANT_SIGMAS = 3.0
-# Where nothing passes that although there is a mismatch: what comes near its largest departure.
+# Of a large mismatch the fit smears some over all times: what is small beside the largest does not count.
+SMALL_SHARE = 0.25
+# Where nothing passes although there is a mismatch: what comes near its largest departure.
 NEAR_LARGEST = 0.8
 SHORTEST_WINDOW = 600.0
 WINDOWS_A_RECORDING = 60
@@ -272,7 +274,9 @@ def significant_stretches(plant: Plant, fit: Fit) -> tuple[Stretch, ...]:
     """Times in which what a fit leaves is beyond three standard errors in some channel.
 
     Residuals are averaged over a window of at least 10 min; the standard error
-    holds white noise and the slow error. Stretches that nearly touch are one.
+    holds white noise and the slow error. Of a large mismatch, less than a
+    quarter of its largest departure does not count. Stretches that nearly
+    touch are one.
 
     Parameters
     ----------
@@ -284,7 +288,7 @@ def significant_stretches(plant: Plant, fit: Fit) -> tuple[Stretch, ...]:
     largest = max(
         (float(np.abs(score).max()) for track in tracks for _, score in track if score.size), default=0
     )
-    limit = min(SIGNIFICANT_SIGMAS, NEAR_LARGEST * largest)
+    limit = min(max(SIGNIFICANT_SIGMAS, SMALL_SHARE * largest), NEAR_LARGEST * largest)
     if limit <= 0.0:
         return ()
     found: list[Stretch] = []
