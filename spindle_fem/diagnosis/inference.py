@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from spindle_fem.calibration.noise import SlowError, whiten
+from spindle_fem.calibration.noise import SlowError, Whitener
 from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Observation, Plant, Prediction
 from spindle_fem.effects.base import Candidate
 from spindle_fem.errors import ConvergenceError, SpecError
@@ -192,21 +192,21 @@ class Problem:
     belief: Belief
     slow: SlowError
     observations: tuple[Observation, ...]
-    factors: list[Array] = field(init=False)
+    whiteners: list[Whitener] = field(init=False)
     data: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self.factors = [item.bins.factor(self.slow) for item in self.observations]
+        self.whiteners = [Whitener(item.bins, self.slow) for item in self.observations]
         self.data = np.concatenate(
-            [whiten(f, item.values) for item, f in zip(self.observations, self.factors, strict=True)]
+            [white(item.values) for item, white in zip(self.observations, self.whiteners, strict=True)]
         )
 
     def whitened(self, on_grid: Sequence[Array]) -> Array:
         """Values (G + 1, c, ...) of every recording at the data, whitened and stacked."""
         return np.concatenate(
             [
-                whiten(factor, item.at(on_grid[item.recording][:, item.channel]))
-                for item, factor in zip(self.observations, self.factors, strict=True)
+                white(item.at(on_grid[item.recording][:, item.channel]))
+                for item, white in zip(self.observations, self.whiteners, strict=True)
             ]
         )
 

@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.calibration.noise import ChannelBins, SlowError, channel_bins, whiten
+from spindle_fem.calibration.noise import ChannelBins, channel_bins
 from spindle_fem.effect_entries import NO_EFFECTS, ActiveEffects
 from spindle_fem.effects.base import Candidate, Reading
 from spindle_fem.effects.term import Term
@@ -31,6 +31,8 @@ from spindle_fem.spec.parameters import uncertain_parameters
 Array = NDArray[np.float64]
 
 STEP = 60.0
+# Of a network, whose recordings last minutes or months.
+LONGEST_BIN, BINS = 600.0, 300
 # Coordinates of a candidate's factors are not those of the machine's own parameters.
 EFFECT_PREFIX = "effect:"
 # Displacement of a probe from its nominal place, m: ``probe.<probe>.<direction>``.
@@ -140,7 +142,9 @@ class Plant:
     def _observe(self, masks: Sequence[NDArray[np.bool_]]) -> tuple[Observation, ...]:
         found = []
         for number, (recording, mask) in enumerate(zip(self.recordings, masks, strict=True)):
-            for bins in channel_bins(recording, mask):
+            duration = float(recording.times[-1] - recording.times[0])
+            width = None if not self.is_network else min(LONGEST_BIN, duration / BINS)
+            for bins in channel_bins(recording, mask, width=width):
                 values = bins.average(recording.temperature[:, bins.channel])
                 right, part = grid_weights(bins.times, self.drives[number].grid)
                 found.append(Observation(number, bins.channel, bins, values, right, part))
@@ -288,6 +292,8 @@ class Plant:
     def displacements(self) -> tuple[str, ...]:
         """Names of the displacements of every point probe that is read."""
         model = self.fast.model
+        if not model.probe_gradients.size:
+            return ()
         read = {probe for recording in self.recordings for probe in recording.probes}
         return tuple(
             f"{PROBE_PREFIX}{probe}.{direction}"
@@ -450,20 +456,3 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
         ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
     step_class, points = classes_of(0.5 * (start + end), INLET_BIN)
     return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
-
-
-def whitening(observations: Sequence[Observation], slow: SlowError) -> list[Array]:
-    """Cholesky factor of the noise of every observation."""
-    return [item.bins.factor(slow) for item in observations]
-
-
-def whitened(
-    observations: Sequence[Observation], factors: Sequence[Array], on_grid: Sequence[Array]
-) -> Array:
-    """Columns (G + 1, c, k) of every recording at the bins, whitened and stacked, (n, k)."""
-    return np.concatenate(
-        [
-            whiten(factor, item.at(on_grid[item.recording][:, item.channel]))
-            for item, factor in zip(observations, factors, strict=True)
-        ]
-    )

@@ -199,9 +199,9 @@ class BaseRun:
                     )
                     added += shift[:, None] * loads[self.drive.step_class]
                 elif place.startswith(FLUID_PREFIX) and place not in model.place_names:
-                    film = model.fluid_names[self._fluid(place)]
+                    film = self.plant.fast.fluid_places[place]
                     strength = self._strength(film) * heat[row]
-                    added += strength[:, None] * model.fluid_load[self._fluid(place)]
+                    added += strength[:, None] * model.fluid_load[model.fluid_names.index(film)]
                 else:
                     added += (heat[row] * np.ones(steps))[:, None] * model.place(place)
         if term.bearings:
@@ -217,11 +217,6 @@ class BaseRun:
                 excess = (factor[row] - 1.0) * self._strength(coefficient)
                 added -= excess[:, None] * self._flow(coefficient, before)
         return added, shift
-
-    def _fluid(self, place: str) -> int:
-        names = self.plant.fast.model.fluid_names
-        own = place.removeprefix(FLUID_PREFIX)
-        return names.index(own) if own in names else names.index(f"film.{own}")
 
     def _strength(self, coefficient: str) -> Array:
         """A coefficient in every step, (G,)."""
