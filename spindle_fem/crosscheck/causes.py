@@ -17,7 +17,7 @@ from spindle_fem.coupling import CoupledState, PreparedMachine, prepare_machine,
 from spindle_fem.crosscheck.axisymmetric import solve_axisymmetric
 from spindle_fem.crosscheck.gather import gather_axisymmetric, gather_network
 from spindle_fem.crosscheck.regions import build_regions, node_temperatures
-from spindle_fem.loads.bearing_heat import HeatModel
+from spindle_fem.loads.bearing_heat import BearingMechanics, BearingTemperatures, HeatModel
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.network.machine import MachineNetwork, build_machine_network
 from spindle_fem.network.machine_steady import MachineNetworkState, solve_machine_network
@@ -26,6 +26,9 @@ from spindle_fem.spec.model import MachineSpec
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 REFERENCE_REFINEMENT = 4
+# Distances from a narrow raceway, in half widths, at which cells end.
+BAND_CELLS = 8
+BAND_LINES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 
 CAUSES = {
     "few_columns": "few nodes along z: a column is one temperature",
@@ -39,6 +42,7 @@ CAUSES = {
 }
 CHECKS = {
     "perfect_fins": "lands between the turns without a drop along r (fin effect left out)",
+    "raceway_bands": "heat and balls on the width of the contact ellipse instead of the ring's whole face",
     "circumferential_averaging": "turning parts without averaging around the axis (elements)",
 }
 
@@ -147,7 +151,65 @@ def _checks(coarse: MachineNetwork, smeared: MachineNetworkState, heat_model: He
         perfect = _with_perfect_lands(machine)
         state = solve_machine_network(perfect, point, heat_model=heat_model)
         found["perfect_fins"] = gather_network(coarse, state) - base
+    if machine.spec.bearing_set and machine.spec.grease is not None:
+        found["raceway_bands"] = _narrow_raceways(coarse, smeared, heat_model)
     return found
+
+
+def _narrow_raceways(coarse: MachineNetwork, smeared: MachineNetworkState, heat_model: HeatModel) -> Array:
+    """Raceways as narrow as their contact ellipses, less raceways as wide as the rings, on one grid."""
+    machine, point = smeared.network.machine, smeared.network.point
+    spec = machine.spec
+    bands = contact_bands(spec, point, smeared.bearing_temperatures())
+    along_z, along_r = [], []
+    for group, bearing in spec.bearings:
+        kind = spec.bearing_types[group.bearing_type]
+        for side, face, inwards in (
+            ("inner", 0.5 * kind.inner_ring_outer_diameter, -1.0),
+            ("outer", 0.5 * kind.outer_ring_inner_diameter, 1.0),
+        ):
+            low, high = bands[f"{bearing.name}.{side}_raceway"]
+            own_z, depth = band_lines(low, high)
+            along_z += own_z.tolist()
+            along_r += (face + inwards * depth).tolist()
+    lines = (tuple(along_z), tuple(along_r))
+
+    def solved(narrow: Mapping[str, tuple[float, float]]) -> Array:
+        network = build_machine_network(
+            spec, refinement=machine.refinement, assembly=coarse.assembly, lines=lines, bands=narrow
+        )
+        return gather_network(coarse, solve_machine_network(network, point, heat_model=heat_model))
+
+    return solved(bands) - solved({})
+
+
+def band_lines(low: float, high: float) -> tuple[Array, Array]:
+    """Lines that resolve the heat spreading from a band (m): along z, and as depths below it."""
+    half = 0.5 * (high - low)
+    spread = half * np.array(BAND_LINES)
+    within = np.linspace(low, high, BAND_CELLS + 1)
+    return np.concatenate([low - spread, within, high + spread]), spread
+
+
+def contact_bands(
+    spec: MachineSpec, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+) -> dict[str, tuple[float, float]]:
+    """Where the balls touch each raceway: from and to along z of the mean contact ellipse, m."""
+    states = BearingMechanics(spec).states(point, temperatures, expand=False)
+    bands = {}
+    for group, bearing in spec.bearings:
+        state = states[bearing.name]
+        middle = 0.5 * (bearing.z[0] + bearing.z[1])
+        towards = 1.0 if bearing.takes_thrust == "towards_rear" else -1.0
+        radius = 0.5 * spec.bearing_types[group.bearing_type].ball_diameter
+        for index, side in enumerate(("inner", "outer")):
+            # the inner ring pushes the balls along the thrust, the outer one holds them
+            sign = towards * (-1.0 if side == "inner" else 1.0)
+            angle = state.mean("contact_angle", index)
+            place = middle + sign * radius * np.sin(angle)
+            half = state.mean("semi_major", index) * np.cos(angle)
+            bands[f"{bearing.name}.{side}_raceway"] = (float(place - half), float(place + half))
+    return bands
 
 
 def _with_perfect_lands(machine: MachineNetwork) -> MachineNetwork:

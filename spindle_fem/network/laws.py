@@ -282,8 +282,10 @@ class FrictionLaw:
         secant = np.diff(heat, axis=1) / width
         cubic = (before + after - 2.0 * secant) / width**2
         square = (3.0 * secant - 2.0 * before - after) / width
-        into, feels = (np.abs(spread.T) > 0.0)[:, :, None], (np.abs(weights) > 0.0)[:, None, :]
-        bearing, rows, columns = np.nonzero(into & feels)
+        ends = [(np.flatnonzero(spread[:, b]), np.flatnonzero(weights[b])) for b in range(len(feedback))]
+        bearing = np.repeat(np.arange(len(ends)), [len(into) * len(feels) for into, feels in ends])
+        rows = np.concatenate([np.repeat(into, len(feels)) for into, feels in ends])
+        columns = np.concatenate([np.tile(feels, len(into)) for into, feels in ends])
         return cls(
             tuple(tables),
             weights,

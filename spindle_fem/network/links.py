@@ -57,6 +57,11 @@ class SurfacePatch:
     area: Array
     z: Array
 
+    def between(self, low: float, high: float) -> SurfacePatch:
+        """The faces whose middle lies between two places along z, m."""
+        inside = (self.z > low) & (self.z < high)
+        return SurfacePatch(*(getattr(self, name)[inside] for name in SurfacePatch.__slots__))
+
     @classmethod
     def joined(cls, patches: list[SurfacePatch]) -> SurfacePatch:
         """Several patches as one."""

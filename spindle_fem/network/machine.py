@@ -151,6 +151,8 @@ def build_machine_network(
     channelling: Channelling = "smeared",
     lumped_along_r: bool = False,
     assembly: AssemblyGeometry | None = None,
+    lines: tuple[tuple[float, ...], tuple[float, ...]] = ((), ()),
+    bands: Mapping[str, tuple[float, float]] | None = None,
 ) -> MachineNetwork:
     """Network of a machine definition.
 
@@ -167,6 +169,10 @@ def build_machine_network(
         Refine along z only; radially the paper's lumps stay.
     assembly : AssemblyGeometry, optional
         Of the same machine, where it is at hand.
+    lines : (along z, along r), [m]
+        More lines that a refined network is cut along.
+    bands : mapping of surface to (from, to), [m]
+        Surfaces that exchange heat on a part of their length only; lines must end it.
 
     Raises
     ------
@@ -185,22 +191,23 @@ def build_machine_network(
         raise SpecError("refinement", f"{refinement!r}.", "Allowed: a whole number from 1.")
     assembly = build_assembly(spec) if assembly is None else assembly
     spans = _gap_spans(spec, assembly)
-    lines = _column_lines(spec, assembly)
-    cuts = plan_nodes(spec, assembly, build_cells(assembly, extra_z=lines), spans)[2]
+    columns = _column_lines(spec, assembly)
+    cuts = plan_nodes(spec, assembly, build_cells(assembly, extra_z=columns), spans)[2]
     if refinement == 1:
         if channelling != "smeared":
             raise SpecError(
                 "channelling", f'"{channelling}" needs refinement above 1.', 'Allowed: "smeared".'
             )
-        cells = build_cells(assembly, extra_z=lines, extra_r=cuts)
+        cells = build_cells(assembly, extra_z=columns, extra_r=cuts)
         partition = coarse_partition(spec, assembly, cells, spans)
     else:
         widths = [bearing.z[1] - bearing.z[0] for _, bearing in spec.bearings]
         base = min(widths) if widths else 0.02
         # the lumps' own borders stay lines, so that cells gather into lumps
         cells = build_cells(
-            assembly, spacing=base / refinement, channelling=channelling, extra_z=lines, extra_r=cuts
-        )
+            assembly, spacing=base / refinement, channelling=channelling,
+            extra_z=(*columns, *lines[0]), extra_r=(*cuts, *lines[1]),
+        )  # fmt: skip
         partition = (
             sliced_partition(spec, assembly, cells, spans)
             if lumped_along_r
@@ -220,6 +227,7 @@ def build_machine_network(
         name: surface_patch(faces, cells, partition, centres, conductivity)
         for name, faces in exposed_surfaces(cells).items()
     }
+    surfaces |= {name: surfaces[name].between(*span) for name, span in (bands or {}).items()}
     gaps = {gap.name: _air_bands(spec, gap, surfaces, cells, partition, spans[gap.name]) for gap in spec.gap}
     coolant = None
     if spec.channel is not None:
