@@ -5,7 +5,7 @@ import pytest
 
 from spindle_fem.design.designs import Design
 from spindle_fem.design.evaluate import Question, TaskBuilder, row_of, solve_checked
-from spindle_fem.design.fast.backend import LARGEST_ERROR, GroupTask, answer_group, answer_tasks
+from spindle_fem.design.fast.backend import LARGEST_ERROR, GroupTask, answer_group, answer_tasks, model_of
 from spindle_fem.design.fast.build import FIRST_TABLES
 from spindle_fem.design.fast.heat import BearingTables
 from spindle_fem.design.fast.inputs import refusal
@@ -114,17 +114,15 @@ def by_table(tmp_path_factory):
     return prepared, rows, others
 
 
-def model_of(prepared):
-    from spindle_fem.design.fast.backend import _model_of
-
-    model, rows, tables = _model_of(group_of(prepared), prepared.question)
+def cached_model(prepared):
+    model, rows, tables = model_of(group_of(prepared), prepared.question)
     assert rows == []  # from the cache
     return model, tables
 
 
 def test_every_temperature_of_designs_not_used_to_build_is_within_20_mk(by_table):
     prepared, _, others = by_table
-    model, tables = model_of(prepared)
+    model, tables = cached_model(prepared)
     rows = answer_tasks(model, tables, others.tasks, others.question)
     assert len(rows) == 20
     temperature, other = worst_temperature(rows, others.tasks, others.question)
@@ -136,7 +134,7 @@ def test_each_row_says_what_answered_it_and_three_were_solved_in_full(by_table):
     prepared, rows, _ = by_table
     backends = [row["backend"] for row in rows]
     assert (len(rows), backends.count("full"), backends.count("reduced")) == (40, 3, 37)
-    model, _ = model_of(prepared)
+    model, _ = cached_model(prepared)
     assert {row["key"] for row in rows if row["backend"] == "full"} == set(model.checked)
     for row in rows:
         if row["backend"] == "full":
@@ -147,7 +145,7 @@ def test_each_row_says_what_answered_it_and_three_were_solved_in_full(by_table):
 
 def test_an_estimate_is_no_smaller_than_the_error(by_table):
     prepared, _, others = by_table
-    model, tables = model_of(prepared)
+    model, tables = cached_model(prepared)
     for row in answer_tasks(model, tables, others.tasks[:5], others.question):
         temperature, _ = worst_temperature([row], others.tasks, others.question)
         assert temperature <= row["error_estimate_K"]
@@ -155,7 +153,7 @@ def test_an_estimate_is_no_smaller_than_the_error(by_table):
 
 def test_a_design_outside_the_range_gets_no_answer(by_table, tmp_path):
     prepared, _, _ = by_table
-    model, tables = model_of(prepared)
+    model, tables = cached_model(prepared)
     outside = {"inlet": (15, 32), "flow": (120, 130), "seat": (2500, 7000)}
     far = prepare_study(
         "recorded_spindle",
@@ -218,7 +216,7 @@ def test_machines_that_no_projected_model_can_answer(tmp_path):
 
 
 def test_a_model_comes_back_from_disk(by_table, tmp_path):
-    model, _ = model_of(by_table[0])
+    model, _ = cached_model(by_table[0])
     model.save(tmp_path / "model.npz")
     again = SteadyModel.load(tmp_path / "model.npz")
     assert again.checked == model.checked
@@ -255,7 +253,7 @@ def test_a_structure_is_what_the_mesh_and_the_operators_depend_on(by_table):
 
 def test_tables_of_heat_are_made_wider_where_they_end(by_table):
     prepared, _, others = by_table
-    model, _ = model_of(prepared)
+    model, _ = cached_model(prepared)
     narrow = BearingTables(FIRST_TABLES[0], FIRST_TABLES[0] + 5.0)
     rows = answer_tasks(model, narrow, others.tasks[:2], others.question)
     assert len(rows) == 2

@@ -72,7 +72,7 @@ def answer_group(group: GroupTask, question: Question) -> list[Row]:
     """
     with threadpool_limits(1):
         try:
-            model, rows, tables = _model_of(group, question)
+            model, rows, tables = model_of(group, question)
         except SpindleFemError:
             return []  # the full solves will say what is wrong, design by design
         if not model.checked_error <= LARGEST_ERROR:
@@ -166,7 +166,21 @@ def _inputs(model: SteadyModel, specs: Sequence[object]) -> DesignInputs:
     return design_inputs(specs, model.coefficient_names, model.fluid_names, model.contacts, model.gap_radii)
 
 
-def _model_of(group: GroupTask, question: Question) -> tuple[SteadyModel, list[Row], BearingTables]:
+def model_of(group: GroupTask, question: Question) -> tuple[SteadyModel, list[Row], BearingTables]:
+    """Checked model of the planned designs, from the cache where it was made before.
+
+    Returns
+    -------
+    SteadyModel
+    list of Row
+        Of the designs that were solved in full to check it; none from the cache.
+    BearingTables
+
+    Raises
+    ------
+    SpindleFemError
+        The machine cannot be meshed, solved or projected.
+    """
     """Model of the planned designs, and the rows of those that were solved in full to check it."""
     first = group.plan[0]
     path = model_path(_digest(group, question))
