@@ -11,6 +11,8 @@ from spindle_fem.effects.laws import Complex, amplitude, linear, relaxed, repeat
 from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 
+OVER_HOUSING, OVER_START = "ring over housing", "ring over start"
+
 
 class GapClosureTerm(Term):
     """Factor ``1 - a (1 - S((x - x0)/w))`` on the seats; x lags behind the ring's excess.
@@ -79,7 +81,7 @@ class GapClosure(Effect):
         """Outer seats of a set, against the housing or the start; node to node in a network."""
         found = []
         for key, rings, around, seats in self._seats(machine):
-            for form, reads in (("ring over housing", around), ("ring over start", ())):
+            for form, reads in ((OVER_HOUSING, around), (OVER_START, ())):
                 term = GapClosureTerm(self.term_name(key, form), seats, rings, reads)
                 found.append(
                     self.candidate(
@@ -116,7 +118,7 @@ class GapClosure(Effect):
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How open, and when it closes."""
-        over = "the housing" if "housing" in candidate.form else "its temperature at the start"
+        over = "the housing" if OVER_HOUSING in candidate.form else "their temperature at the start"
         return (
             f"{capital(place_words(candidate.component))}: cold, the outer seats conduct down to "
             f"{1.0 - reported['opening'].value:.2f} of nominal; they close where the outer rings are "

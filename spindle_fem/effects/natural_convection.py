@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from spindle_fem.effects.base import Candidate, Effect, Reported, place_words
+from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.laws import Complex, amplitude, linear, power
 from spindle_fem.effects.outside_film import REFERENCE_DIFFERENCE, OutsideFilmTerm, of_films, outside_films
 from spindle_fem.effects.term import TermContext
@@ -55,7 +55,7 @@ class NaturalConvection(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How strongly the film follows."""
         return (
-            f"{place_words(candidate.component).capitalize()}: the film to the air is not constant but "
+            f"{capital(place_words(candidate.component))}: the film to the air is not constant but "
             f"grows with the power {reported['exponent'].value:.2f} of the temperature difference (natural "
             "convection); that "
             f"part is {reported['convective_share'].value:.2f} of the constant film at 10 K."

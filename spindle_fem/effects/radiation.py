@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from spindle_fem.effects.base import Candidate, Effect, Reported, place_words
+from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.laws import Complex, amplitude, linear
 from spindle_fem.effects.outside_film import (
     REFERENCE_DIFFERENCE,
@@ -65,7 +65,7 @@ class Radiation(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How large the part is."""
         return (
-            f"{place_words(candidate.component).capitalize()}: heat is lost by radiation besides the "
+            f"{capital(place_words(candidate.component))}: heat is lost by radiation besides the "
             "constant film; "
             f"at 10 K it is {reported['radiative_share'].value:.2f} of that film and grows with the "
             "fourth power of the absolute temperature."

@@ -88,6 +88,6 @@ class UnrecordedCooling(UnrecordedEffect):
         size = reported.get("conductance") or reported["heat"]
         way = " to the surroundings" if size.unit == "W/K" else ""
         return (
-            f"In {interval_words(candidate)}, {place_words(candidate.component)} loses a further "
-            f"{quantity(size)}{way} that no recorded input explains."
+            f"A further {quantity(size)}{way} is lost from {place_words(candidate.component)} in "
+            f"{interval_words(candidate)} that no recorded input explains."
         )

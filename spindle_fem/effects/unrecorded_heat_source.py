@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from spindle_fem.effects.base import Candidate, Intervals, Reported, place_words, quantity
+from spindle_fem.effects.base import Candidate, Intervals, Reported, capital, place_words, quantity
 from spindle_fem.effects.laws import Complex, amplitude, repeated
 from spindle_fem.effects.term import TermContext
 from spindle_fem.effects.unrecorded import IntervalTerm, UnrecordedEffect, interval_words
@@ -57,6 +57,6 @@ class UnrecordedHeatSource(UnrecordedEffect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and how often."""
         return (
-            f"In {interval_words(candidate)}, {place_words(candidate.component)} receives "
-            f"{quantity(reported['heat'])} that no recorded input explains."
+            f"{capital(quantity(reported['heat']))} of heat enters {place_words(candidate.component)} in "
+            f"{interval_words(candidate)} that no recorded input explains."
         )
