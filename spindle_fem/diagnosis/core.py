@@ -160,12 +160,14 @@ def diagnose_recordings(
 
 def _refit(problem: Problem, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The most probable hypotheses and the empty one, fitted on the whole basis."""
-    ranked = sorted(found, key=tempered, reverse=True)
-    best = tempered(ranked[0])
+    null = next(h for h in found if not h.fit.candidates)
+    score = {id(h): tempered(h, null) for h in found}
+    ranked = sorted(found, key=lambda h: -score[id(h)])
+    best = score[id(ranked[0])]
     chosen = [
         item
         for position, item in enumerate(ranked[:REFITTED])
-        if position < ALWAYS_REFITTED or tempered(item) > best - NEGLIGIBLE
+        if position < ALWAYS_REFITTED or score[id(item)] > best - NEGLIGIBLE
     ]
     chosen += [h for h in ranked if not h.fit.candidates and h not in chosen]
     fitted = [

@@ -9,7 +9,7 @@ screening.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ LARGEST_SET = 3
 EXPLAINED = 1.03
 #: Prior probability of 0, 1, 2 and 3 effects.
 NUMBER_PRIOR = (0.4, 0.35, 0.2, 0.05)
+# Sets that are tried without each of their members.
+REDUCED = 3
 SINGLES, PAIRS, TRIPLES = 8, 6, 3
 BEAM, ADDITIONS = 3, 4
 # A hypothesis this much less likely (natural logarithm) than the best is not extended.
@@ -91,6 +93,7 @@ class Search:
     weights: Mapping[str, float]
     progress: Progress = lambda stage: None
     found: dict[frozenset, Hypothesis] | None = None
+    _paid: dict[frozenset, float] = field(default_factory=dict)
 
     def run(self) -> list[Hypothesis]:
         """All fitted hypotheses, the most probable first."""
@@ -111,7 +114,22 @@ class Search:
             for hypothesis in ranked[: 1 if self._explained(best) else BEAM]:
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
+        self._reduce()
         return self.ranked()
+
+    def _reduce(self) -> None:
+        """Leave out what came first: each of the best sets without each of its members."""
+        for hypothesis in [h for h in self.ranked() if len(h.fit.candidates) > 1][:REDUCED]:
+            for left_out in hypothesis.fit.candidates:
+                rest = tuple(c for c in hypothesis.fit.candidates if c is not left_out)
+                if _identity(rest) in self.found:
+                    continue
+                paid = sum(self._paid.get(_identity((c,)), 0.0) for c in rest)
+                try:
+                    fitted = self.problem.fit(rest, hypothesis.fit.values, hopeless=self._hopeless())
+                except (ConvergenceError, SpecError):
+                    continue
+                self._keep(Hypothesis(fitted, self.log_prior(rest) - paid))
 
     def ranked(self) -> list[Hypothesis]:
         """Hypotheses, the most probable first."""
@@ -188,13 +206,14 @@ class Search:
         candidates = (*fit.candidates, *(variant.candidate for variant, _ in additions))
         key = _identity(candidates)
         start = fit.values
-        paid = 0.0
         for variant, scaled in additions:
             factors = {item.name for item in variant.candidate.factors}
             values = dict(variant.shape) | {variant.candidate.amplitude: amplitude_value(variant, scaled)}
             start |= {EFFECT_PREFIX + n if n in factors else n: v for n, v in values.items()}
             if id(variant.candidate) in intervals:
-                paid += intervals_cost(intervals[id(variant.candidate)])
+                cost = intervals_cost(intervals[id(variant.candidate)])
+                self._paid[_identity((variant.candidate,))] = cost
+        paid = sum(self._paid.get(_identity((c,)), 0.0) for c in candidates)
         if key in self.found:
             return
         try:

@@ -21,6 +21,11 @@ PROBE_PLACE_SIGMA = 1.0e-3
 EXPECTED_SLOW = SlowError(0.045, 1500.0)
 SLOW_SIGMAS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13)
 SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
+# A network of a few nodes is a coarse picture of its machine: its error is of the order of the
+# noise or of some per cent of what the temperatures move, and lasts for a share of the recording.
+NETWORK_SIGMAS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+NETWORK_SHARES = (0.01, 0.03, 0.1)
+NETWORK_SHARE_OF_RISE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,17 +65,48 @@ def start_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
     )
 
 
+def expected_slow_error(plant: Plant) -> SlowError:
+    """Slow error before any fit."""
+    if not plant.is_network:
+        return EXPECTED_SLOW
+    unit, duration = _network_scales(plant)
+    return SlowError(unit, NETWORK_SHARES[1] * duration)
+
+
 def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
     """Most probable slow error of what a fit leaves."""
+    plant = problem.plant
     predicted = [
-        problem.plant.predict(number, fit.values, fit.candidates).temperature
-        for number in range(len(problem.plant.recordings))
+        plant.predict(number, fit.values, fit.candidates).temperature
+        for number in range(len(plant.recordings))
     ]
     residuals = [
         (item.bins, item.at(predicted[item.recording][:, item.channel]) - item.values)
         for item in problem.observations
     ]
-    return likely_slow_error(residuals, prior=EXPECTED_SLOW, sigmas=SLOW_SIGMAS, times=SLOW_TIMES)
+    if not plant.is_network:
+        return likely_slow_error(residuals, prior=EXPECTED_SLOW, sigmas=SLOW_SIGMAS, times=SLOW_TIMES)
+    unit, duration = _network_scales(plant)
+    return likely_slow_error(
+        residuals,
+        prior=expected_slow_error(plant),
+        prior_width=1.0,
+        sigmas=[share * unit for share in NETWORK_SIGMAS],
+        times=[share * duration for share in NETWORK_SHARES],
+    )
+
+
+def _network_scales(plant: Plant) -> tuple[float, float]:
+    """Usual error of a network [K] and length of its recordings [s]."""
+    moved = [
+        float(np.ptp(np.quantile(recording.temperature[usable, channel], [0.05, 0.95])))
+        for recording in plant.recordings
+        for channel, usable in enumerate(recording.usable.T)
+        if usable.any()
+    ]
+    duration = float(np.median([r.times[-1] - r.times[0] for r in plant.recordings]))
+    noise = float(np.median([sigma for r in plant.recordings for sigma in r.sigma]))
+    return max(noise, NETWORK_SHARE_OF_RISE * float(np.median(moved))), duration
 
 
 def calibrate(earlier: Plant | None, plant: Plant) -> Calibrated:
@@ -85,8 +121,8 @@ def calibrate(earlier: Plant | None, plant: Plant) -> Calibrated:
     """
     shared, begun = machine_coordinates(plant), start_coordinates(plant)
     if earlier is None:
-        return Calibrated(Belief.prior((*shared, *begun)), EXPECTED_SLOW, None)
-    slow, fit = EXPECTED_SLOW, None
+        return Calibrated(Belief.prior((*shared, *begun)), expected_slow_error(plant), None)
+    slow, fit = expected_slow_error(earlier), None
     prior = Belief.prior((*shared, *start_coordinates(earlier)))
     for _ in range(2):
         problem = Problem(earlier, prior, slow, earlier.observations)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.special import comb
 from scipy.stats import chi2, norm
 
 from spindle_fem.diagnosis.engine import Hypothesis
@@ -15,8 +16,11 @@ from spindle_fem.effects.base import Candidate
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
 
-# Laws of the catalogue are simpler than nature: differences of evidence count a share of what they say.
-TEMPERATURE = 4.0
+# Laws of the catalogue are simpler than nature. Differences of likelihood count half of what they say,
+# and less the more a set explains already: an inexact law of a strong effect leaves a residual that
+# grows with the effect, and which any other effect may fit a little.
+TEMPERATURE = 2.0
+INEXACT_BEYOND = 1000.0
 # Below this the most probable set is named together with what else may be.
 DECIDED = 0.75
 LISTED = 0.02
@@ -72,16 +76,12 @@ class Judgement:
     reason: str
 
 
-def rank(hypotheses: Sequence[Hypothesis], temperature: float = TEMPERATURE) -> list[Ranked]:
-    """Probabilities of sets of effects at places, forms added up, the most probable first.
-
-    What the data gain (not what complexity costs) is divided by
-    ``temperature``: the catalogue's laws never hold exactly, so that a
-    difference in the tail of a misfit is no proof of a different cause.
-    """
+def rank(hypotheses: Sequence[Hypothesis]) -> list[Ranked]:
+    """Probabilities of sets of effects at places, forms added up, the most probable first."""
+    null = next(h for h in hypotheses if not h.fit.candidates)
     groups: dict[frozenset, list[tuple[float, Hypothesis]]] = {}
     for item in hypotheses:
-        groups.setdefault(item.keys, []).append((tempered(item, temperature), item))
+        groups.setdefault(item.keys, []).append((tempered(item, null), item))
     highest = max(score for group in groups.values() for score, _ in group)
     weights = {
         key: float(sum(np.exp(score - highest) for score, _ in group)) for key, group in groups.items()
@@ -93,28 +93,36 @@ def rank(hypotheses: Sequence[Hypothesis], temperature: float = TEMPERATURE) -> 
     return sorted(found, key=lambda item: -item.probability)
 
 
-def tempered(hypothesis: Hypothesis, temperature: float = TEMPERATURE) -> float:
-    """Logarithm of prior, complexity and a share of the likelihood."""
+def tempered(hypothesis: Hypothesis, null: Hypothesis) -> float:
+    """Logarithm of prior, complexity and likelihood over nothing missing, the last as far as it counts.
+
+    Complexity (the determinants of Laplace's evidence) counts in full.
+    """
     fit = hypothesis.fit
     complexity = fit.log_evidence + 0.5 * fit.misfit_with_prior
-    return hypothesis.log_prior + complexity - 0.5 * fit.misfit_with_prior / temperature
+    gain = 0.5 * (null.fit.misfit_with_prior - fit.misfit_with_prior)
+    counted = INEXACT_BEYOND * np.log1p(max(gain, 0.0) / INEXACT_BEYOND) + min(gain, 0.0)
+    return float(hypothesis.log_prior + complexity + counted / TEMPERATURE)
 
 
 def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
-    """Probability that some single effect would improve a consistent recording as much.
+    """Probability that some set of effects would improve a consistent recording as much.
 
-    Wilks' theorem for each candidate with its free parameters, Šidák's
-    correction for the number of candidates. The slow error, which carries a
-    small structural difference between model and machine, is in the noise.
+    Wilks' theorem for each set with its free parameters, Šidák's correction for
+    the number of sets of its size. The slow error, which carries a small
+    structural difference between model and machine, is in the noise.
     """
     null = next(h for h in hypotheses if not h.fit.candidates)
     smallest = 1.0
     for item in hypotheses:
-        if len(item.fit.candidates) == 1:
-            gain = null.fit.misfit_with_prior - item.fit.misfit_with_prior
-            freedom = len(item.fit.coordinates) - len(null.fit.coordinates)
-            smallest = min(smallest, float(chi2.sf(max(gain, 0.0) / np.sqrt(TEMPERATURE), freedom)))
-    return float(-np.expm1(trials * np.log1p(-min(smallest, 1.0 - 1e-16))))
+        size = len(item.fit.candidates)
+        if size == 0:
+            continue
+        gain = max(null.fit.misfit_with_prior - item.fit.misfit_with_prior, 0.0)
+        freedom = len(item.fit.coordinates) - len(null.fit.coordinates)
+        single = min(float(chi2.sf(gain / np.sqrt(TEMPERATURE), freedom)), 1.0 - 1e-16)
+        smallest = min(smallest, float(-np.expm1(comb(trials, size) * np.log1p(-single))))
+    return smallest
 
 
 def within_prior(fit: Fit, calibrated: bool) -> bool:
