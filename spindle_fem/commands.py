@@ -202,13 +202,17 @@ def rebuild(folder: Path) -> Path:
 
 def _load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:
     """Machine whose parts fit together; faults of its tables and of its geometry at once."""
+    from spindle_fem.effect_entries import require_known_effects
     from spindle_fem.geometry.assembly import build_assembly
     from spindle_fem.loads.joints import group_of_contacts
 
     def fits_together(spec: MachineSpec) -> None:
         group_of_contacts(spec, build_assembly(spec).joint_names)
 
-    return load_machine(machine, overrides, checks=(fits_together,))
+    def knows_its_effects(spec: MachineSpec) -> None:
+        require_known_effects(spec.effects)
+
+    return load_machine(machine, overrides, checks=(fits_together, knows_its_effects))
 
 
 @contextlib.contextmanager
