@@ -175,8 +175,14 @@ class Effect(ABC):
     def candidates(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Every form at every place of a machine; none where the definition already has it."""
         return tuple(
-            item for item in self.forms(machine) if not machine.switched_on(self.name, item.component)
+            item
+            for item in self.forms(machine)
+            if not machine.switched_on(self.name, item.component) and self.can_show(machine, item)
         )
+
+    def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
+        """Whether a recording of this range and length could show it at all."""
+        return True
 
     @abstractmethod
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

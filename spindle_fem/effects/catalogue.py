@@ -11,6 +11,8 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import Any, TypeVar
 
+import numpy as np
+
 import spindle_fem.effects as package
 from spindle_fem.effects.base import Candidate, Effect, IntervalEffect, Intervals, Reading
 from spindle_fem.effects.term import Term, TermParameter
@@ -118,13 +120,21 @@ def build(
     for name, value in values.items():
         item = by_inner[name][1]
         given[name] = _read(item, value, f"{where}.parameters.{name}")
-        if not item.low <= given[name] <= item.high:
-            raise SpecError(
-                f"{where}.parameters.{name}",
-                f"is {given[name]:g} {item.unit}".rstrip() + ".",
-                f"Allowed: {item.low:g} to {item.high:g} {item.unit}".rstrip() + ".",
-            )
+        _require_possible(item, given[name], name == amplitude, f"{where}.parameters.{name}")
     return fixed(candidate, given)
+
+
+def _require_possible(item: TermParameter, value: float, is_amplitude: bool, where: str) -> None:
+    """Refuse a wrong sign, and a pure amplitude beyond its limits; other limits are those of a search."""
+    low = item.low if item.low == 0.0 or (is_amplitude and not item.unit) else -np.inf
+    high = item.high if is_amplitude and not item.unit else np.inf
+    if not low <= value <= high:
+        allowed = f"{low:g} to {high:g}" if np.isfinite(high) else f"{low:g} or more"
+        raise SpecError(
+            where,
+            f"is {value:g} {item.unit}".rstrip() + ".",
+            f"Allowed: {allowed} {item.unit}".rstrip() + ".",
+        )
 
 
 def fixed(candidate: Candidate, values: Mapping[str, float]) -> Candidate:

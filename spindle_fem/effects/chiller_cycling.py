@@ -75,9 +75,7 @@ class ChillerCycling(Effect):
             places["channel"] = (COOLANT_INLET,)
         for boundary, links in machine.coolant_links.items():
             places[boundary] = tuple(fluid_place(link) for link in links)
-        longest = min(PERIODS[1], 0.5 * machine.duration)
-        if longest <= PERIODS[0]:
-            return ()
+        longest = max(2.0 * PERIODS[0], min(PERIODS[1], 0.5 * machine.duration))
         periods = np.geomspace(PERIODS[0], longest, 6)
         found = []
         for key, fluids in places.items():
@@ -94,6 +92,10 @@ class ChillerCycling(Effect):
                     )
                 )
         return tuple(found)
+
+    def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
+        """A swing needs two periods to be told from a drift."""
+        return machine.duration > 2.0 * PERIODS[0]
 
     def starts_from(
         self, candidate: Candidate, times: Array, residual: Array

@@ -63,7 +63,7 @@ class TransitionTerm(ReynoldsFilmTerm):
 
     def __init__(self, name: str, channel: ChannelFlow, reynolds: tuple[float, float]) -> None:
         super().__init__(name, channel)
-        middle, span = 0.5 * (reynolds[0] + reynolds[1]), reynolds[1] - reynolds[0]
+        middle, span = 0.5 * (reynolds[0] + reynolds[1]), max(reynolds[1] - reynolds[0], 0.1 * reynolds[1])
         self.parameters = (
             amplitude("film_increase", 3.0, low=-0.9, high=20.0),
             linear("onset_reynolds", middle, 0.5 * span, low=0.3 * reynolds[0], high=3.0 * reynolds[1]),
@@ -119,7 +119,7 @@ class CoolantFilm(Effect):
             )
         ]
         low, high = machine.reynolds
-        if low > 0.0 and high > LEAST_RANGE * low:
+        if low > 0.0:
             term = TransitionTerm(self.term_name("channel", TRANSITION), machine.channel, machine.reynolds)
             onsets = np.linspace(low, high, ONSETS + 1)
             found.append(
@@ -142,6 +142,11 @@ class CoolantFilm(Effect):
                 self.candidate("channel", curved, amplitude="further_exponent", reference=0.3, form=CURVATURE)
             )
         return tuple(found)
+
+    def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
+        """A law of the Reynolds number needs a range of it."""
+        low, high = machine.reynolds
+        return candidate.form == FOULING or high > LEAST_RANGE * low
 
     def report(self, candidate: Candidate, values: Mapping[str, float]) -> dict[str, Reported]:
         """``factor`` where it is constant; above the onset where it is not."""

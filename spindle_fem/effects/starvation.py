@@ -10,6 +10,8 @@ from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 
 ONSETS = 8
+# Where a recording is all standstill.
+USUAL_SPEED = 3000.0 * RPM
 
 
 class StarvationTerm(Term):
@@ -61,7 +63,7 @@ class Starvation(Effect):
         found = []
         for key, bearings in machine.sets.items():
             for speed in machine.speeds(key)[:1]:
-                highest = machine.highest(speed)
+                highest = machine.highest(speed) or USUAL_SPEED
                 lowest = min(max(machine.lowest_speed, 0.15 * highest), 0.8 * highest)
                 term = StarvationTerm(self.term_name(key), bearings, speed, highest)
                 onsets = np.linspace(lowest, highest, ONSETS + 1)

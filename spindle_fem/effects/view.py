@@ -215,14 +215,14 @@ class MachineView:
         return sets or tuple(self.sets)
 
     def speeds(self, component: str) -> tuple[str, ...]:
-        """Inputs that tell how fast the machine turns there, those that the recording moves."""
-        return tuple(n for n in self.speed_inputs.get(component, ()) if self.highest(n) > 0.0)
+        """Inputs that tell how fast the machine turns there."""
+        return self.speed_inputs.get(component, ())
 
     def running(self, component: str) -> tuple[str, ...]:
         """Input that tells whether there is friction or other heat there, if any does."""
         own = self.source_inputs.get(component)
         found = self.speeds(component) or (() if own is None else (own,))
-        return tuple(name for name in found if self.highest(name) > 0.0)[:1]
+        return found[:1]
 
     def highest(self, name: str) -> float:
         """Largest magnitude of an input in the recording; the highest speed where it is not known."""

@@ -555,6 +555,34 @@ def test_building_says_what_is_wrong(machines):
     assert catalogue()["unrecorded_heat_source"].intervals(two, {}) == [(5.0, 9.0), (20.0, 30.0)]
 
 
+def test_an_entry_holds_on_recordings_that_could_not_have_shown_it(machines):
+    view = machines["geometry"][2]
+    quiet = replace(
+        view,
+        duration=100.0,
+        highest_speed=0.0,
+        lowest_speed=0.0,
+        reynolds=(290.0, 290.0),
+        input_scale={**view.input_scale, "speed": 0.0},
+    )
+    offered = {(c.effect, c.form) for c in candidates_for(quiet)}
+    assert ("coolant_film", "transition") not in offered
+    assert "chiller_cycling" not in {effect for effect, _ in offered}
+    for candidate in everything(view):
+        values = amplitude_at(candidate, candidate.reference)
+        entry = definition_entry(candidate, values)
+        again = build(
+            entry["effect"],
+            entry["component"],
+            entry.get("form", ""),
+            entry["parameters"],
+            quiet,
+            entry.get("intervals", ()),
+        )
+        for outer, item in again.parameters.items():
+            assert item.value == pytest.approx(values[outer], rel=1e-9, abs=1e-9), (candidate.label, outer)
+
+
 def test_fixing_leaves_the_candidate_itself_free(machines):
     candidate = next(c for c in candidates_for(machines["geometry"][2]) if c.effect == "windage")
     held = fixed(candidate, {"heat_at_4500rpm": 12.0})
@@ -592,6 +620,7 @@ def test_a_network_is_seen_by_its_nodes_links_and_sources(machines):
     }
     assert view.speeds("body.speed") == ("speed",)
     assert view.speeds("winding.power") == ()
+    assert view.running("winding.power") == ("power",)
     assert view.fluids["link.body|ambient"] == "ambient"
     assert view.fluids["link.jacket|coolant"] == pytest.approx(291.15)
     assert view.coolant_links == {"coolant": ("link.jacket|coolant", "link.body|coolant")}
