@@ -265,7 +265,7 @@ def solve_coupled(
         found = np.concatenate([solution.temperature, solution.lumped_temperature])
         given = np.concatenate([unknowns, [lumped.get(name, point.ambient_temperature) for name in names]])
         # Far from the fixed point, heat that grows with temperature must be followed as the machine warms.
-        if follows_preload and change > MIXING_BELOW:
+        if (follows_preload or beyond is not None) and change > MIXING_BELOW:
             mixed = given + RELAXATION * (found - given)
         else:
             mixed = mixing.next(given, found)

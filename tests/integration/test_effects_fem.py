@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from spindle_fem.conduction.assemble import assemble_capacity
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.coupling import prepare_machine, solve_coupled
 from spindle_fem.effects.coolant_film import TransitionTerm, reynolds_number
@@ -24,7 +25,7 @@ from spindle_fem.reduced.transient import simulate_fast
 from spindle_fem.spec.load import load_machine
 from spindle_fem.transients.readings import ReadingRows
 from spindle_fem.transients.run import TransientOptions, simulate_full
-from spindle_fem.transients.terms import Physics, steady_physics, with_factors
+from spindle_fem.transients.terms import Physics, steady_physics, with_capacity, with_factors
 
 SMALL = ["mesh.preset=coarse", "mesh.order=1"]
 RPM = np.pi / 30.0
@@ -124,7 +125,13 @@ class Everything(Term):
     reads = ("housing",)
 
     def __init__(self, joint, gap):
-        self.coefficients = (joint, gap, "film.housing.outside", "balls.R1.outer", "conductivity.steel")
+        self.coefficients = (
+            joint,
+            gap,
+            "film.housing.flange_back",
+            "balls.R1.outer",
+            "conductivity.steel_42CrMo4",
+        )
         self.bearings = ("R1", "R2")
 
     def heat(self, context):
@@ -143,7 +150,7 @@ class Everything(Term):
         return {"coolant.flow": 0.8, "channel.film": 1.3, "joint." + self.coefficients[0][6:]: 1.2}
 
     def place_capacity(self, parameters):
-        return {"housing.front_body": 9000.0, "R1.balls": 20.0}
+        return {"R1.balls": 20.0}
 
     def place_conductance(self, parameters):
         return {"shaft": 3.0}
@@ -166,8 +173,26 @@ def test_every_way_of_acting_agrees_with_the_fast_model(machine, fast):
     assert np.abs(full - quick).max() < 0.05
 
 
+def test_added_mass_adds_exactly_its_capacity(machine):
+    storage = assemble_capacity(machine.problem(machine.builder.at(*uniform_point(machine))[0]))[0]
+    ones = np.ones(storage.shape[0])
+    inside = machine.operators.mesh.points[: len(ones), 2] < 0.1
+    scale = with_capacity(storage, ones, inside, 5000.0)
+    scale = with_capacity(storage, scale, ~inside, 700.0)
+    root = np.sqrt(scale)
+    assert root @ (storage @ root) == pytest.approx(ones @ (storage @ ones) + 5700.0, rel=1e-12)
+    assert np.ptp(scale[inside]) == 0.0
+    assert scale.min() >= 1.0
+
+
+def uniform_point(machine):
+    point = OperatingPoint.of(machine.spec)
+    field = np.full(machine.operators.n_unknowns, point.ambient_temperature)
+    return point, machine.field_state(field, {})
+
+
 def test_the_steady_state_is_where_the_transient_ends(machine, fast):
-    physics = replace(of_size(preload(), 0.4), factors={"coolant.film_factor": 0.7})
+    physics = replace(of_size(preload(), 0.1), factors={"coolant.film_factor": 0.7})
     point = OperatingPoint.of(machine.spec)
     changed, rest = with_factors(machine, physics)
     steady = solve_coupled(changed, point, beyond=steady_physics(changed, rest))
