@@ -42,7 +42,8 @@ def moved(mesh: TaggedMesh, spec: MachineSpec, depth: float) -> TaggedMesh:
     floor, roof = channel.inner_radius, channel.inner_radius + channel.depth
     body = next(part for part in spec.part if part.name == channel.part)
     end = channel.z_start + channel.pitch * channel.turns + channel.width
-    outside = 0.5 * min(s.outer_diameter for s in body.segment if s.z[0] < end and s.z[1] > channel.z_start)
+    beside = [s for s in body.segment if s.z[0] < end and s.z[1] > channel.z_start]
+    outside = min(s.outer_diameter / 2.0 for s in beside if s.outer_diameter / 2.0 > roof)
     x, y, z = mesh.points.T
     radius = np.hypot(x, y)
     share = np.interp(radius, [floor, roof, outside], [0.0, 1.0, 0.0])

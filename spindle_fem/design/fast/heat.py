@@ -150,6 +150,9 @@ def mechanical_keys(specs: Sequence[MachineSpec], points: Sequence[OperatingPoin
     texts: dict[int, str] = {}
     keys = []
     for spec, point in zip(specs, points, strict=True):
+        if is_constant(spec):
+            keys.append(repr(tuple(table_heat(spec, point)[0].items())))
+            continue
         parts = []
         for name in names:
             item = getattr(spec, name)
