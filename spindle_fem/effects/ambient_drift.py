@@ -7,11 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported
-from spindle_fem.effects.laws import HOUR, Complex, amplitude, linear, repeated, shape, smooth_step, softplus
+from spindle_fem.effects.laws import Complex, amplitude, linear, repeated, shape, smooth_step, softplus
 from spindle_fem.effects.term import Term, TermContext, TermParameter
 from spindle_fem.effects.view import MachineView, fluid_place
 
 STEADY, RAMP, STEP, WAVE = "steady drift", "ramp", "step", "wave"
+DAILY, YEARLY = "daily", "yearly"
+CYCLES = {DAILY: 86400.0, YEARLY: 365.25 * 86400.0}
 # Of a ramp's bends, s.
 BEND = 60.0
 
@@ -73,9 +75,9 @@ class AmbientDrift(Effect):
         for key, films in machine.surroundings.items():
             laws = {
                 STEADY: (
-                    (linear("rate", 0.0, max(2.0 / HOUR, 3.0 / span), "K/s"),),
+                    (linear("rate", 0.0, 8.0 / span, "K/s"),),
                     "rate",
-                    max(1.0 / HOUR, 2.0 / span),
+                    4.0 / span,
                     ({},),
                 ),
                 RAMP: (
@@ -116,6 +118,17 @@ class AmbientDrift(Effect):
                     ],
                 ),
             }
+            for form, period in CYCLES.items():
+                laws[form] = (
+                    (
+                        amplitude("amplitude", 3.0, "K", high=40.0),
+                        linear("period", period, 0.0, "s"),
+                        linear("phase", 0.0, np.pi, "rad", low=-3.0 * np.pi, high=3.0 * np.pi),
+                    ),
+                    "amplitude",
+                    2.0,
+                    [{"phase": phase} for phase in (0.0, np.pi / 2.0, np.pi, -np.pi / 2.0)],
+                )
             for form, (parameters, size, reference, starts) in laws.items():
                 term = DriftTerm(self.term_name(key, form), films, form, parameters)
                 found.append(
@@ -129,6 +142,10 @@ class AmbientDrift(Effect):
                     )
                 )
         return tuple(found)
+
+    def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
+        """A day's or a year's swing needs half of it at least."""
+        return machine.duration > 0.5 * CYCLES.get(candidate.form, 0.0)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How fast, how much, when."""
@@ -155,6 +172,9 @@ class AmbientDrift(Effect):
                 f"{subject} becomes {abs(change):.2g} K {word} than recorded about "
                 f"{reported['time'].value / 60.0:.0f} min after the start."
             )
+        if candidate.form in CYCLES:
+            size = reported["amplitude"].value
+            return f"{subject} swings {candidate.form} by ±{size:.2g} K without being recorded."
         return (
             f"{subject} swings by ±{reported['amplitude'].value:.2g} K with a period of "
             f"{reported['period'].value / 3600.0:.1f} h without being recorded."

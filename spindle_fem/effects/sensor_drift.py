@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.base import Array, Candidate, Reading, Reported
-from spindle_fem.effects.laws import HOUR, Complex, linear, softplus
+from spindle_fem.effects.laws import Complex, linear, softplus
 from spindle_fem.effects.sensor import Form, SensorEffect
 from spindle_fem.effects.term import TermParameter
 from spindle_fem.effects.view import MachineView
@@ -48,9 +48,9 @@ class SensorDrift(SensorEffect):
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """From the first stamp, or from an instant on."""
         span = machine.duration
-        rate = linear("rate", 0.0, max(0.5 / HOUR, 0.5 / span), "K/s")
+        rate = linear("rate", 0.0, 2.0 / span, "K/s")
         start = linear("start", 0.5 * span, 0.3 * span, "s", low=0.0, high=span)
-        reference = max(0.3 / HOUR, 0.5 / span)
+        reference = 1.0 / span
         return {
             "": ((rate,), reference, ({},)),
             LATER: ((rate, start), reference, [{"start": share * span} for share in (0.2, 0.4, 0.6, 0.8)]),
