@@ -191,6 +191,10 @@ def rebuild(folder: Path) -> Path:
         from spindle_fem.crosscheck.report import write_report
 
         return write_report(place)
+    if (place / "diagnosis.json").is_file():
+        from spindle_fem.reporting.diagnosis_report import write_diagnosis_report
+
+        return write_diagnosis_report(place)
     if (place / "sweep.json").is_file():
         from spindle_fem.reporting.sweep_report import rebuild_sweep_report
 

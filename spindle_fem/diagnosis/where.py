@@ -15,7 +15,8 @@ from spindle_fem.diagnosis.locate import Explanation, shares, stretches
 from spindle_fem.diagnosis.machine_places import centre_of
 from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.diagnosis.verdict import TEMPERATURE
-from spindle_fem.effects.base import Candidate
+from spindle_fem.effects.base import Candidate, IntervalEffect
+from spindle_fem.effects.catalogue import effect_of
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import Conditions, operating_conditions
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -93,6 +94,11 @@ class Where:
     missing_heat : mapping of component to MissingHeat
         Of the credible components that heat can come from.
     when : tuple of Stretch
+    stamps : tuple of (start, end, recording)
+        Of ``when``, as the recordings have them; the recording only where there are several.
+    condition : str
+        What the machine does while heat is missing; while the difference is
+        significant where it is no heat.
     """
 
     component: str
@@ -104,6 +110,7 @@ class Where:
     missing_heat: Mapping[str, MissingHeat]
     when: tuple[Stretch, ...]
     stamps: tuple[tuple[float | str, float | str, str | None], ...] = ()
+    condition: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """``where``, ``when`` and ``missing_heat_W`` as plain data; null where there is no number."""
@@ -117,6 +124,7 @@ class Where:
                 "r_mm": _millimetres(self.radius),
                 "z_mm": _millimetres(self.axial),
                 "credible": list(self.credible),
+                "condition": self.condition or None,
                 "shares": dict(self.shares),
             },
             "when": found,
@@ -174,12 +182,24 @@ def where_of(diagnosis: Diagnosis) -> Where:
         )
         for item in when
     )
-    return Where(component, radius, axial, tuple(credible), told, spots, heat, when, stamps)
+    longest = max(when, key=lambda item: item.end - item.start, default=None)
+    condition = heat_condition(diagnosis.explanations, spots.get(component, ""), diagnosis.plant) or (
+        longest.condition if longest else ""
+    )
+    return Where(component, radius, axial, tuple(credible), told, spots, heat, when, stamps, condition)
 
 
 def _centre(diagnosis: Diagnosis, component: str) -> tuple[float, float]:
-    found = centre_of(diagnosis.plant.fast.spec, component) if diagnosis.view.kind == "geometry" else None
-    return found or (np.nan, np.nan)
+    """Of the component; of the very spot where something unrecorded was found."""
+    if diagnosis.view.kind != "geometry":
+        return np.nan, np.nan
+    spec = diagnosis.plant.fast.spec
+    found = None
+    for candidate in diagnosis.final.candidates:
+        if candidate.component == component and isinstance(effect_of(candidate.effect), IntervalEffect):
+            spot = next((s for s in diagnosis.view.spots if s in candidate.form.split()), component)
+            found = centre_of(spec, spot)
+    return found or centre_of(spec, component) or (np.nan, np.nan)
 
 
 # ---------------------------------------------------------------------- place
@@ -236,6 +256,32 @@ def missing_heat(explanations: Sequence[Explanation], spot: str, plant: Plant) -
         largest = float(item.heat[np.argmax(np.abs(item.heat))])
         peak = largest if abs(largest) > abs(peak) else peak
     return MissingHeat(total / duration if duration else 0.0, peak)
+
+
+def heat_condition(explanations: Sequence[Explanation], spot: str, plant: Plant) -> str:
+    """What the machine does while heat is missing at a spot; empty where it never clearly is.
+
+    Of several recordings the one in which it is missing for longest. Heat
+    counts beyond three standard errors and a quarter of its peak.
+    """
+    words, longest = "", 0.0
+    for item in explanations:
+        if item.spot != spot:
+            continue
+        level = np.maximum(SIGNIFICANT_SIGMAS * item.sigma, SMALL_SHARE * np.abs(item.heat).max())
+        edges = np.append(item.times, plant.drives[item.recording].grid[-1])
+        active = np.abs(item.heat) > level
+        duration = float(np.diff(edges)[active].sum())
+        if duration > longest:
+            recording = plant.recordings[item.recording]
+            owner = np.clip(np.searchsorted(edges, recording.times, side="right") - 1, 0, len(active) - 1)
+            mask = active[owner]
+            if mask.any():
+                longest = duration
+                limit = separating_temperature(recording, mask)
+                told = _words(operating_conditions(recording), mask)
+                words = ", ".join(part for part in (told, limit) if part)
+    return words
 
 
 def main_component(diagnosis: Diagnosis) -> str:

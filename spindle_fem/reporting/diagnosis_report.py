@@ -87,9 +87,9 @@ def write_diagnosis_report(folder: str | Path) -> Path:
     place.mkdir(exist_ok=True)
     pictures: dict[str, list[Any]] = {}
     for name, figure in _figures(content, data, folder):
-        save_png(figure, place / f"{name}.png")
+        path = save_png(figure, place / f"{name}.png")
         kind = name.rpartition("_recording_")[0] or name
-        pictures.setdefault(kind, []).append(illustration_of(figure, CAPTIONS[kind]))
+        pictures.setdefault(kind, []).append(illustration_of(path, CAPTIONS[kind]))
     return replace_text(folder / "report.html", render(content, pictures))
 
 

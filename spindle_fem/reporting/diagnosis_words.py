@@ -17,7 +17,6 @@ VERDICTS = {
     "ambiguous": "the data cannot decide",
     "unexplained": "no explanation",
 }
-MOST_CONDITIONS = 2
 
 
 def verdict_sentence(content: Mapping[str, Any]) -> str:
@@ -97,8 +96,13 @@ def moment(value: float | str) -> str:
 
 
 def _when(content: Mapping[str, Any]) -> str:
-    words = list(dict.fromkeys(item["condition"] for item in content["mismatch"]["when"]))
-    return f"At {_or(words, 'and')} " if 0 < len(words) <= MOST_CONDITIONS else ""
+    condition = content["mismatch"]["where"].get("condition")
+    if not condition:
+        return ""
+    # "At 0-500 rpm", "During cooling".
+    return (
+        f"{'At' if condition[0].isdigit() or condition.startswith('standstill') else 'During'} {condition} "
+    )
 
 
 def _heat_words(content: Mapping[str, Any]) -> str:
@@ -127,8 +131,8 @@ def _improvement(fit: Mapping[str, Any]) -> str:
     )
 
 
-def _or(items: Sequence[str], word: str = "or") -> str:
-    return f" {word} ".join(filter(None, [", ".join(items[:-1]), items[-1] if items else ""]))
+def _or(items: Sequence[str]) -> str:
+    return " or ".join(filter(None, [", ".join(items[:-1]), items[-1] if items else ""]))
 
 
 def checks(content: Mapping[str, Any]) -> list[str]:
