@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.coupling import PreparedMachine
 from spindle_fem.diagnosis.view import view_of, view_of_network
 from spindle_fem.effects.base import Candidate, Reading
 from spindle_fem.effects.catalogue import build, effect_of
@@ -15,9 +16,17 @@ from spindle_fem.effects.term import Term
 from spindle_fem.effects.view import MachineView
 from spindle_fem.errors import FaultsError, SpecError, SpindleFemError
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.checks import ChannelNoise
+from spindle_fem.recordings.defects import DefectReport
+from spindle_fem.reduced.affine import build_affine_system
+from spindle_fem.reduced.coefficients import gap_radii_of
+from spindle_fem.reduced.drive import standard_inputs
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.model import project
 from spindle_fem.reduced.network_model import NetworkFastModel
 from spindle_fem.spec.effects import EffectEntry
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.transients.terms import NO_PHYSICS, Physics
 
 Array = NDArray[np.float64]
 
@@ -178,3 +187,87 @@ def effects_on(
     if isinstance(fast, NetworkFastModel):
         return active_effects(entries, view_of_network(fast.network, recording))
     return active_effects(entries, view_of(fast, recording))
+
+
+def physics_of(machine: PreparedMachine) -> Physics:
+    """Effects of a definition as physics of its finite-element model.
+
+    Sizes that a recording would give, such as the range of the Reynolds
+    number, are those of the definition's own operating point.
+
+    Raises
+    ------
+    FaultsError
+    """
+    entries = machine.spec.effects
+    if not entries:
+        return NO_PHYSICS
+    effects = active_effects(entries, view_of(_names_of(machine), _at_the_defined_point(machine.spec)))
+    return Physics(effects.terms, {}, effects.factors)
+
+
+def _names_of(machine: PreparedMachine) -> FastModel:
+    """A fast model of one unknown: its names are those of the machine."""
+    affine = build_affine_system(machine)
+    model = project(
+        affine,
+        np.ones((affine.size, 1)),
+        np.ones(1),
+        cells=machine.builder.cells,
+        contacts=tuple(machine.mesh.joints),
+        gap_radii=gap_radii_of(machine),
+        ranges={},
+        digest="names",
+    )
+    return FastModel(model, machine.spec)
+
+
+def _at_the_defined_point(spec: MachineSpec) -> Recording:
+    """A day about the operating point of a definition, all of it at the ambient temperature."""
+    inputs = standard_inputs(spec)
+    # Flow and speed have a range, as laws of the Reynolds number ask for one.
+    low = {**inputs, **{name: 0.5 * inputs[name] for name in ("speed", "coolant_flow")}}
+    high = {**inputs, **{name: 1.5 * inputs[name] for name in ("speed", "coolant_flow")}}
+    probes = tuple(probe.name for probe in spec.probe)
+    times = np.array([0.0, 86400.0])
+    noise = ChannelNoise(0.0, 0.0, 0.0, 0.0)
+    return Recording(
+        name="defined operating point",
+        source=spec.name,
+        start=None,
+        times=times,
+        temperature_names=probes,
+        probes=probes,
+        temperature=np.full((2, len(probes)), inputs["ambient"]),
+        flags=np.zeros((2, len(probes)), dtype=np.uint8),
+        sigma=np.ones(len(probes)),
+        noise=(noise,) * len(probes),
+        input_names=tuple(inputs),
+        input_columns=tuple(inputs),
+        inputs=np.array([list(low.values()), list(high.values())]),
+        held=np.ones(len(inputs), dtype=bool),
+        input_units=("",) * len(inputs),
+        covariate_names=(),
+        covariates=np.empty((2, 0)),
+        segments=np.array([[0, 2]]),
+        defects=DefectReport(
+            name=spec.name,
+            rows=2,
+            stamps=2,
+            duration_s=float(times[-1]),
+            rows_without_time=0,
+            blank_rows=0,
+            short_rows=0,
+            truncated_last_row=False,
+            unordered_rows=0,
+            repeated_rows=0,
+            conflicting_stamps=0,
+            median_step_s=float(times[-1]),
+            non_uniform_steps=0,
+            gaps=(),
+            long_gap_s=float(times[-1]),
+            segments=1,
+            unused_columns=(),
+            channels=(),
+        ),
+    )

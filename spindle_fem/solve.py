@@ -19,6 +19,7 @@ from spindle_fem.coupling import (
     prepare_machine,
     solve_coupled,
 )
+from spindle_fem.effect_entries import physics_of
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.heat_study import heat_study
 from spindle_fem.loads.bearing_heat import BearingMechanics, BearingTemperatures
@@ -30,6 +31,7 @@ from spindle_fem.results.thermal_result import (
     ThermalResult,
 )
 from spindle_fem.spec.model import MachineSpec
+from spindle_fem.transients.terms import steady_physics, with_factors
 from spindle_fem.validity import CodedWarning
 
 LINEAR_RESIDUAL_LIMIT = 1.0e-9
@@ -67,7 +69,8 @@ def solve_prepared(
     clock = Clock(progress)
     clock.begin("solve")
     point = point or OperatingPoint.of(machine.spec)
-    coupled = solve_coupled(machine, point)
+    machine, physics = with_factors(machine, physics_of(machine))
+    coupled = solve_coupled(machine, point, beyond=steady_physics(machine, physics))
     clock.begin("evaluate")
     result = _build_result(machine, point, coupled)
     clock.end()
