@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.linalg.lapack import dgesv
 
 from spindle_fem.effects.term import COOLANT_INLET, Term, TermContext
 from spindle_fem.errors import ConvergenceError, SpecError, did_you_mean
@@ -312,10 +313,13 @@ class DynamicTerms:
             if term.heat_places:
                 answers = np.asarray(term.heat(context), dtype=complex)
                 rows = self._heat[number]
-                scale = np.ones((len(answers), 1))
-                for i, film in self._shifted[number]:
-                    scale[i] = coefficients[film]
-                value[rows] = scale[:, 0] * answers[:, 0].real
+                value[rows] = answers[:, 0].real
+                scale: Array | float = 1.0
+                if self._shifted[number]:
+                    scale = np.ones((len(answers), 1))
+                    for i, film in self._shifted[number]:
+                        scale[i] = coefficients[film]
+                    value[rows] *= scale[:, 0]
                 layout.spread(answers, rows, scale, slopes)
                 for i, film in self._shifted[number]:
                     for target in touched.get(film, ()):
@@ -385,10 +389,15 @@ def solve_added(
     ConvergenceError
     """
     added = guess
-    identity = np.eye(len(guess))
+    diagonal = slice(None, None, len(guess) + 1)
     for _ in range(MOST_ITERATIONS):
         found = evaluate(base + response @ added)
-        change = np.linalg.solve(identity - found.by_sensed @ response, found.value - added)
+        matrix = -(found.by_sensed @ response)
+        matrix.flat[diagonal] += 1.0
+        # Straight to the factorisation: numpy's checks would cost more than these few unknowns.
+        *_, change, singular = dgesv(matrix, found.value - added, overwrite_a=True)
+        if singular:
+            break
         added = added + change
         moved = float(np.abs(response @ change).max()) if response.size else 0.0
         if not np.isfinite(moved):

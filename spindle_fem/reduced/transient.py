@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -209,16 +209,20 @@ class TransientRun:
         from_start = [self.propagators[k].from_start @ c for k, c in zip(keys, columns, strict=True)]
         from_end = [self.propagators[k].from_end @ c for k, c in zip(keys, columns, strict=True)]
         answer = [dynamic.sense @ matrix for matrix in from_end]
-        steps = len(drive.steps)
-        tracks = Tracks(columns, from_start, from_end, answer, dynamic, steps)
+        lengths, goes_on = drive.steps, self._goes_on()
+        tracks = Tracks(columns, from_start, from_end, answer, dynamic, len(lengths))
+        advance = [self.propagators[key].advance for key in keys]
         memory = dynamic.initial_states()
         for step, group in enumerate(self.group_of_step):
             if step in given:
                 states[step] = start.states[given[step]]
             sensed = dynamic.sense @ states[step]
-            if step > 0 and step not in given and self._goes_on(step):
+            if goes_on[step] and step not in given:
                 # Nothing jumps between the steps: what held at the end of the last still does.
-                begin = replace(tracks.end[-1], value=tracks.added_end[step - 1])
+                last = tracks.end[-1]
+                begin = Evaluation(
+                    tracks.added_end[step - 1], last.by_sensed, last.by_state, last.by_parameter
+                )
                 guess = 2.0 * begin.value - tracks.added_start[step - 1]
             else:
                 begin = self._evaluator(step, at_end=False, memory=memory)(sensed)
@@ -230,12 +234,10 @@ class TransientRun:
                 continue
             if dynamic.n_states:
                 inputs = self._term_inputs(drive.start[step])
-                moved = dynamic.advance(
-                    float(drive.grid[step]), float(drive.steps[step]), inputs, sensed, memory
-                )
+                moved = dynamic.advance(float(drive.grid[step]), float(lengths[step]), inputs, sensed, memory)
                 memory = moved[0]
                 tracks.moved.append(moved)
-            base = self.propagators[keys[group]].advance @ states[step] + response[step]
+            base = advance[group] @ states[step] + response[step]
             base += from_start[group] @ begin.value
             added, end = solve_added(
                 self._evaluator(step, at_end=True, memory=memory),
@@ -249,11 +251,14 @@ class TransientRun:
             states[step + 1] = base + from_end[group] @ added
         return tracks
 
-    def _goes_on(self, step: int) -> bool:
-        """Whether inputs and class are the same on both sides of a step's start."""
+    def _goes_on(self) -> NDArray[np.bool_]:
+        """Whether inputs and class are the same on both sides of each step's start, (G,)."""
         drive = self.drive
-        same_class = drive.step_class[step] == drive.step_class[step - 1]
-        return bool(same_class and np.array_equal(drive.start[step], drive.end[step - 1]))
+        same = np.zeros(len(drive.step_class), dtype=bool)
+        same[1:] = (drive.step_class[1:] == drive.step_class[:-1]) & np.all(
+            drive.start[1:] == drive.end[:-1], axis=1
+        )
+        return same
 
     def _inlet_load(self, number: int) -> Array:
         column = self.fast.inlet_column
