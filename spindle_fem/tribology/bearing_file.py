@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,113 +18,33 @@ from spindle_fem.errors import (
     UnknownKeyError,
     did_you_mean,
 )
-from spindle_fem.tribology.bearing import BearingGeometry, bearing_faults, select_orientations
+from spindle_fem.tribology.bearing import BearingGeometry, bearing_faults
+from spindle_fem.tribology.bearing_keys import (
+    FIT,
+    GEOMETRY,
+    HEAT_FIELDS,
+    HOUSING_FIELDS,
+    REQUIRED,
+    TABLES,
+)
 from spindle_fem.tribology.bearing_report import report_of_states
 from spindle_fem.tribology.bearing_set import solve_bearing_set
+from spindle_fem.tribology.fits import RingFits, fit_faults
 from spindle_fem.tribology.grease import Lubricant
-from spindle_fem.tribology.heat import HEAT_LEVELS, HeatOptions
-from spindle_fem.tribology.mounting import BearingSet, ExternalLoad, MountedBearing, uniform_temperatures
-from spindle_fem.units import to_si
+from spindle_fem.tribology.heat import HeatOptions
+from spindle_fem.tribology.mounting import (
+    BearingSet,
+    BearingTemperatures,
+    ExternalLoad,
+    MountedBearing,
+    SetTemperatures,
+    uniform_temperatures,
+)
+from spindle_fem.tribology.rings import STEEL
 from spindle_fem.validity import CodedWarning
 
 SCHEMA = "spindle-fem/bearing/1"
 _SPACING_OVER_BALL = 1.7
-
-Reader = Callable[[Any, str], Any]
-
-
-def _quantity(unit: str, kind: str = "quantity") -> Reader:
-    return lambda value, where: to_si(value, unit, where=where, kind=kind)
-
-
-def _text(*allowed: str) -> Reader:
-    def read(value: Any, where: str) -> str:
-        if not isinstance(value, str) or (allowed and value not in allowed):
-            raise SpecError(where, f"{value!r} is not allowed.", did_you_mean(str(value), allowed))
-        return value
-
-    return read
-
-
-def _count(value: Any, where: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise SpecError(where, f"{value!r} is not a whole number.", "Allowed: a whole number from 3.")
-    return value
-
-
-def _row(value: Any, where: str) -> tuple[int, ...]:
-    if not isinstance(value, str | list):
-        raise SpecError(
-            where, f"{value!r} is no arrangement.", 'Write a name such as "TBT" or a list of 1 and -1.'
-        )
-    return select_orientations(value, where)
-
-
-_LENGTH, _FORCE, _PRESSURE, _NUMBER = _quantity("m"), _quantity("N"), _quantity("Pa"), _quantity("")
-_TEMPERATURE = _quantity("K", "temperature")
-_GEOMETRY: dict[str, Reader] = {
-    "ball_diameter": _LENGTH,
-    "ball_count": _count,
-    "pitch_diameter": _LENGTH,
-    "contact_angle": _quantity("rad"),
-    "groove_curvature_inner": _NUMBER,
-    "groove_curvature_outer": _NUMBER,
-    "young_modulus": _PRESSURE,
-    "poisson_ratio": _NUMBER,
-    "density": _quantity("kg/m**3"),
-    "ball_young_modulus": _PRESSURE,
-    "ball_poisson_ratio": _NUMBER,
-    "bore_diameter": _LENGTH,
-    "outer_diameter": _LENGTH,
-    "width": _LENGTH,
-    "shoulder_angle": _quantity("rad"),
-    "static_load_rating": _FORCE,
-}
-_MOUNTING: dict[str, Reader] = {
-    "arrangement": _row,
-    "preload": _FORCE,
-    "preload_kind": _text("rigid", "spring"),
-    "spacing": _LENGTH,
-    "roughness_raceway": _LENGTH,
-    "roughness_ball": _LENGTH,
-}
-_OPERATION: dict[str, Reader] = {
-    "speed": _quantity("rad/s"),
-    "axial_load": _FORCE,
-    "radial_load": _FORCE,
-    "moment": _quantity("N*m"),
-    "temperature": _TEMPERATURE,
-    "raceway_control": _text("outer", "inner", "equilibrium"),
-}
-_LUBRICANT: dict[str, Reader] = {
-    "name": _text(),
-    "kinematic_viscosity_40": _quantity("m**2/s"),
-    "kinematic_viscosity_100": _quantity("m**2/s"),
-    "base_oil_density": _quantity("kg/m**3"),
-    "density_slope": _quantity("1/K"),
-    "viscosity_law": _text("walther", "roelands"),
-    "pressure_viscosity": _quantity("1/Pa"),
-    "limiting_shear_ratio": _NUMBER,
-    "asperity_friction": _NUMBER,
-    "thermal_conductivity": _quantity("W/(m*K)"),
-    "film_starvation": _NUMBER,
-    "path_fill": _NUMBER,
-    "temperature_limit": _TEMPERATURE,
-}
-_HEAT: dict[str, Reader] = {
-    "model": _text(*HEAT_LEVELS),
-    "palmgren_f0": _NUMBER,
-    "skf_mu_ehl": _NUMBER,
-    "hysteresis_loss": _NUMBER,
-}
-_REQUIRED = {
-    "bearing": tuple(_GEOMETRY)[:6],
-    "operation": ("speed", "axial_load"),
-    "lubricant": ("kinematic_viscosity_40", "kinematic_viscosity_100"),
-    "heat": (),
-}
-_TABLES = {"bearing": _GEOMETRY | _MOUNTING, "operation": _OPERATION, "lubricant": _LUBRICANT, "heat": _HEAT}
-_HEAT_FIELDS = {"model": "level", "skf_mu_ehl": "skf_friction_ehl"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +58,9 @@ class BearingCase:
     load : ExternalLoad
         Thrust turned so that a positive axial load of the file loads the
         first bearing of the row.
-    temperature : float, [K]
+    temperatures : SetTemperatures
+        All at the operation's temperature, which is also that of assembly,
+        unless ``[temperatures]`` says otherwise.
     raceway_control : str
     lubricant : Lubricant or None
     heat : HeatOptions
@@ -148,7 +70,7 @@ class BearingCase:
     bearing_set: BearingSet
     speed: float
     load: ExternalLoad
-    temperature: float
+    temperatures: SetTemperatures
     raceway_control: str
     lubricant: Lubricant | None
     heat: HeatOptions
@@ -181,7 +103,7 @@ def bearing_report(path: str | Path) -> dict[str, Any]:
             case.bearing_set,
             case.speed,
             case.load,
-            uniform_temperatures(len(case.bearing_set.bearings), case.temperature),
+            case.temperatures,
             lubricant=case.lubricant,
             control=case.raceway_control,
             heat=case.heat,
@@ -225,9 +147,9 @@ def _read_tables(
         faults.append(SpecError(f"{file}: schema", f"{schema!r} is unknown.", f'Allowed: "{SCHEMA}".'))
     tables: dict[str, dict[str, Any]] = {}
     for name in document:
-        if name != "schema" and name not in _TABLES:
-            faults.append(UnknownKeyError(f"{file}: {name}", "unknown table.", did_you_mean(name, _TABLES)))
-    for name, readers in _TABLES.items():
+        if name != "schema" and name not in TABLES:
+            faults.append(UnknownKeyError(f"{file}: {name}", "unknown table.", did_you_mean(name, TABLES)))
+    for name, readers in TABLES.items():
         table = document.get(name)
         if table is None:
             if name in ("bearing", "operation"):
@@ -246,7 +168,7 @@ def _read_tables(
                 values[key] = readers[key](value, where)
             except BadInputError as error:
                 faults.append(error)
-        for key in _REQUIRED[name]:
+        for key in REQUIRED[name]:
             if key not in table:
                 faults.append(SpecError(f"{file}: {name}.{key}", "the key is missing.", "It is required."))
         tables[name] = values
@@ -258,7 +180,7 @@ def _build_case(
 ) -> BearingCase | None:
     bearing, operation = tables["bearing"], tables["operation"]
     orientations = bearing.get("arrangement", (1,))
-    geometry_values = {key: value for key, value in bearing.items() if key in _GEOMETRY}
+    geometry_values = {key: value for key, value in bearing.items() if key in GEOMETRY}
     probe = _Unchecked(**geometry_values)
     for key, what, how_to_fix in bearing_faults(probe):
         faults.append(SpecError(f"{file}: bearing.{key}", what, how_to_fix))
@@ -281,7 +203,7 @@ def _build_case(
     heat_values = tables.get("heat", {})
     heat = HeatOptions()
     try:
-        heat = HeatOptions(**{_HEAT_FIELDS.get(key, key): value for key, value in heat_values.items()})
+        heat = HeatOptions(**{HEAT_FIELDS.get(key, key): value for key, value in heat_values.items()})
     except SpecError as error:
         faults.append(SpecError(f"{file}: {error.where}", error.what, error.how_to_fix))
     if faults:
@@ -300,9 +222,12 @@ def _build_case(
                     "or bearing.width.",
                 )
             )
+    fits = _fits(tables.get("fit"), geometry, file, faults)
+    if faults:
+        return None
     mounted = tuple(
         MountedBearing(
-            f"B{index + 1}" if len(orientations) > 1 else "bearing", geometry, side, index * spacing
+            f"B{index + 1}" if len(orientations) > 1 else "bearing", geometry, side, index * spacing, fits
         )
         for index, side in enumerate(orientations)
     )
@@ -320,11 +245,37 @@ def _build_case(
         bearing_set,
         operation["speed"],
         ExternalLoad(operation["axial_load"] * orientations[0], radial, moment),
-        operation.get("temperature", 313.15),
+        _temperatures(tables, len(mounted)),
         control,
         lubricant,
         heat,
         tuple(warnings),
+    )
+
+
+def _fits(
+    values: dict[str, Any] | None, geometry: BearingGeometry, file: str, faults: list[SpindleFemError]
+) -> RingFits | None:
+    """Seats of the rings; the housing is of steel where nothing else is said."""
+    if values is None:
+        return None
+    housing = {name: values[key] for key, name in HOUSING_FIELDS.items() if key in values}
+    own = {key: value for key, value in values.items() if key not in HOUSING_FIELDS}
+    fits = RingFits(**own, housing=replace(STEEL, **housing))
+    for key, what, how_to_fix in fit_faults(geometry, fits):
+        table = "fit" if key in FIT else "bearing"
+        faults.append(SpecError(f"{file}: {table}.{key}", what, how_to_fix))
+    return fits
+
+
+def _temperatures(tables: Mapping[str, dict[str, Any]], number: int) -> SetTemperatures:
+    common = tables["operation"].get("temperature", 313.15)
+    given = tables.get("temperatures")
+    if given is None:
+        return uniform_temperatures(number, common)
+    rings = BearingTemperatures(*(given.get(key, common) for key in ("inner_ring", "outer_ring", "ball")))
+    return SetTemperatures(
+        (rings,) * number, given.get("shaft", common), given.get("housing", common), given["assembly"]
     )
 
 

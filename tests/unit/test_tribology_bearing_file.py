@@ -229,3 +229,47 @@ def test_no_equilibrium_is_no_bad_input(tmp_path: Path) -> None:
     with pytest.raises(NoEquilibriumError) as caught:
         bearing_report(file)
     assert caught.value.exit_status == 1
+
+
+REFERENCE = {
+    "ball_diameter": '"14.2875 mm"', "ball_count": "30", "pitch_diameter": '"165 mm"',
+    "contact_angle": '"15 deg"', "groove_curvature_inner": "0.52", "groove_curvature_outer": "0.52",
+    "young_modulus": '"206 GPa"', "poisson_ratio": "0.3", "bore_diameter": '"140 mm"',
+    "outer_diameter": '"190 mm"', "width": '"24 mm"', "arrangement": '"TBT"', "preload": '"1137.2 N"',
+}  # fmt: skip
+SEATS = {
+    "inner_interference": '"8 um"', "outer_clearance": '"5 um"', "housing_outer_diameter": '"300 mm"',
+    "shaft_bore_diameter": '"60 mm"', "housing_young_modulus": '"110 GPa"',
+    "housing_thermal_expansion": '"10.5e-6 1/K"',
+}  # fmt: skip
+REST = {"speed": '"0 rpm"', "axial_load": '"0 N"'}
+
+
+def test_fits_and_ring_temperatures_of_a_set(tmp_path: Path) -> None:
+    def forces(**tables: dict) -> list[float]:
+        report = bearing_report(write(tmp_path, bearing=REFERENCE, operation=REST, **tables))
+        return [bearing["axial_load_N"] for bearing in report["bearings"]]
+
+    assert forces(fit=SEATS) == pytest.approx([568.6, 568.6, 1137.2], rel=1e-6)
+    warm = {"assembly": '"20 degC"', "inner_ring": '"32 degC"', "outer_ring": '"26 degC"',
+            "ball": '"30 degC"', "shaft": '"31 degC"', "housing": '"24 degC"'}  # fmt: skip
+    rigid, seated = forces(temperatures=warm)[2], forces(temperatures=warm, fit=SEATS)[2]
+    assert 1137.2 < seated < rigid
+    case = read_bearing_file(write(tmp_path, bearing=REFERENCE, operation=REST, fit=SEATS, temperatures=warm))
+    assert case.bearing_set.bearings[0].fits.housing.thermal_expansion == pytest.approx(10.5e-6)
+    assert case.bearing_set.bearings[0].fits.housing.poisson_ratio == 0.3
+    assert (case.temperatures.assembly, case.temperatures.housing) == pytest.approx((293.15, 297.15))
+
+
+def test_bad_fits_in_a_file(tmp_path: Path) -> None:
+    for tables, message in (
+        ({"fit": {**SEATS, "outer_clearance": None}}, "fit.outer_clearance: the key is missing"),
+        ({"fit": {**SEATS, "inner_interference": '"1 mm"'}}, "fit.inner_interference: 1000 µm on 140 mm"),
+        ({"fit": {**SEATS, "housing_outer_diameter": '"150 mm"'}}, "150 mm does not exceed outer_diameter"),
+        ({"fit": {**SEATS, "clearance": '"1 um"'}}, "fit.clearance: unknown key"),
+        ({"fit": SEATS, "bearing": {**REFERENCE, "width": None}}, "bearing.width: it is missing, but a fit"),
+        ({"temperatures": {"ball": '"30 degC"'}}, "temperatures.assembly: the key is missing"),
+    ):
+        with pytest.raises((SpecError, FaultsError, UnknownKeyError)) as caught:
+            read_bearing_file(write(tmp_path, **({"bearing": REFERENCE, "operation": REST} | tables)))
+        assert message in str(caught.value)
