@@ -98,4 +98,6 @@ def draw_drive(rng: np.random.Generator, *, cycle: str | None = None, oil: str |
         value = set_point[k] + (value - set_point[k]) * keep
         coolant[k] = value
     expand = np.repeat
-    return Plan(cycle, oil, Drive(time, expand(speed, per_block), expand(thrust, per_block), ambient, coolant))
+    return Plan(
+        cycle, oil, Drive(time, expand(speed, per_block), expand(thrust, per_block), ambient, coolant)
+    )

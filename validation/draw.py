@@ -81,7 +81,12 @@ def _heat_scale(s: Scene) -> Concealed:
     where, component, fine = _bearings(s, single=True)
     factor = s.factor(0.15, 0.32)
     return Concealed(
-        "heat_scale", component, fine, factor, laws.HeatScale(where, factor), parameters={"factor": (factor, "")}
+        "heat_scale",
+        component,
+        fine,
+        factor,
+        laws.HeatScale(where, factor),
+        parameters={"factor": (factor, "")},
     )
 
 
@@ -104,14 +109,23 @@ def _joint(s: Scene) -> Concealed:
         component = _PRIMARY.get(where, where)
         fine = list(_SET_NAMES.get(where, [where, _PRIMARY[where[0]]]))
     return Concealed(
-        "joint_conductance", component, fine, factor, laws.GroupFactor(names, factor), parameters={"factor": (factor, "")}
+        "joint_conductance",
+        component,
+        fine,
+        factor,
+        laws.GroupFactor(names, factor),
+        parameters={"factor": (factor, "")},
     )
 
 
 def _thermal_preload(s: Scene) -> Concealed:
     where, component, fine = _bearings(s)
     amplitude = s.log(0.02, 0.1) * s.strength
-    form = {"width": s.rng.uniform(0.8, 2.0), "exponent": s.rng.uniform(1.0, 1.6), "delay": s.rng.uniform(120, 700)}
+    form = {
+        "width": s.rng.uniform(0.8, 2.0),
+        "exponent": s.rng.uniform(1.0, 1.6),
+        "delay": s.rng.uniform(120, 700),
+    }
     law = laws.ThermalPreload(where, amplitude, **form)
     return Concealed("thermal_preload", component, fine, amplitude, law, form=form)
 
@@ -119,8 +133,14 @@ def _thermal_preload(s: Scene) -> Concealed:
 def _viscosity(s: Scene) -> Concealed:
     where, component, fine = _bearings(s)
     amplitude = s.log(0.01, 0.03) * s.strength
-    form = {"reference": s.rng.uniform(20, 32), "curvature": s.rng.uniform(0, 0.008), "floor": s.rng.uniform(0, 0.3)}
-    return Concealed("viscosity_heat", component, fine, amplitude, laws.ViscosityHeat(where, amplitude, **form), form=form)
+    form = {
+        "reference": s.rng.uniform(20, 32),
+        "curvature": s.rng.uniform(0, 0.008),
+        "floor": s.rng.uniform(0, 0.3),
+    }
+    return Concealed(
+        "viscosity_heat", component, fine, amplitude, laws.ViscosityHeat(where, amplitude, **form), form=form
+    )
 
 
 def _churning(s: Scene) -> Concealed:
@@ -130,7 +150,9 @@ def _churning(s: Scene) -> Concealed:
         "decay": s.log(900, 4500), "stretch": s.rng.uniform(0.75, 1.3),
         "recovery": float(s.rng.choice([0.0, 0.0, 9000.0])),
     }  # fmt: skip
-    return Concealed("grease_churning", component, fine, amplitude, laws.Churning(where, amplitude, **form), form=form)
+    return Concealed(
+        "grease_churning", component, fine, amplitude, laws.Churning(where, amplitude, **form), form=form
+    )
 
 
 def _starvation(s: Scene) -> Concealed:
@@ -172,7 +194,11 @@ def _windage(s: Scene) -> Concealed:
 
 def _drive(s: Scene) -> Concealed:
     heat = s.log(30, 130) * s.strength
-    form = {"exponent": s.rng.uniform(0.9, 1.5), "delay": s.rng.uniform(100, 900), "load_share": s.rng.uniform(0, 0.15)}
+    form = {
+        "exponent": s.rng.uniform(0.9, 1.5),
+        "delay": s.rng.uniform(100, 900),
+        "load_share": s.rng.uniform(0, 0.15),
+    }
     return Concealed(
         "drive_heat", "drive_end", ["drive_end"], heat, laws.SpeedHeat((("drive_end", 1.0),), heat, 3000.0, **form),
         parameters={"heat_at_3000rpm": (heat, "W")}, form=form,
@@ -203,7 +229,14 @@ def _shaft_convection(s: Scene) -> Concealed:
     amplitude = s.log(1.2, 4.0) * s.strength
     exponent = s.rng.uniform(0.7, 1.4)
     law = laws.ShaftConvection(amplitude, exponent)
-    return Concealed("shaft_convection", "shaft", ["shaft", "nose", "drive_end"], amplitude, law, form={"exponent": exponent})
+    return Concealed(
+        "shaft_convection",
+        "shaft",
+        ["shaft", "nose", "drive_end"],
+        amplitude,
+        law,
+        form={"exponent": exponent},
+    )
 
 
 def _radiation(s: Scene) -> Concealed:
@@ -215,7 +248,9 @@ def _natural(s: Scene) -> Concealed:
     amplitude = s.rng.uniform(3.0, 9.0) * s.strength
     exponent = s.rng.uniform(0.25, 0.4)
     law = laws.OutsideFilm(amplitude, "natural", exponent)
-    return Concealed("natural_convection", "housing", ["housing"], amplitude, law, form={"exponent": exponent})
+    return Concealed(
+        "natural_convection", "housing", ["housing"], amplitude, law, form={"exponent": exponent}
+    )
 
 
 def _coolant_film(s: Scene) -> Concealed:
@@ -223,7 +258,10 @@ def _coolant_film(s: Scene) -> Concealed:
         from .oil import channel_film
 
         span = channel_film(np.array([s.plan.drive.coolant_in.min(), s.plan.drive.coolant_in.max()]))[2]
-        form = {"reynolds": float(np.interp(s.rng.uniform(0.3, 0.8), [0, 1], span)), "width": s.rng.uniform(25, 90)}
+        form = {
+            "reynolds": float(np.interp(s.rng.uniform(0.3, 0.8), [0, 1], span)),
+            "width": s.rng.uniform(25, 90),
+        }
         amplitude = s.log(0.8, 3.0) * s.strength
         return Concealed(
             "coolant_film", "channel", ["channel"], amplitude, laws.FilmTransition(amplitude, **form),
@@ -240,13 +278,22 @@ def _coolant_film(s: Scene) -> Concealed:
 def _bypass(s: Scene) -> Concealed:
     fraction = s.rng.uniform(0.4, 0.8) * min(1.0, s.strength * 1.2)
     return Concealed(
-        "coolant_bypass", "channel", ["channel"], fraction, laws.Bypass(fraction), parameters={"fraction": (fraction, "")}
+        "coolant_bypass",
+        "channel",
+        ["channel"],
+        fraction,
+        laws.Bypass(fraction),
+        parameters={"fraction": (fraction, "")},
     )
 
 
 def _chiller(s: Scene) -> Concealed:
     amplitude, period = s.rng.uniform(0.6, 2.0) * s.strength, s.log(420, 2400)
-    form = {"phase": s.rng.uniform(), "skew": s.rng.uniform(0.35, 0.65), "wander": tuple(s.rng.normal(0, 0.05, 8))}
+    form = {
+        "phase": s.rng.uniform(),
+        "skew": s.rng.uniform(0.35, 0.65),
+        "wander": tuple(s.rng.normal(0, 0.05, 8)),
+    }
     return Concealed(
         "chiller_cycling", "channel", ["channel"], amplitude, laws.Wave(amplitude, period, **form),
         parameters={"period": (period, "s"), "amplitude": (amplitude, "K")},
@@ -293,7 +340,9 @@ def _intervals(s: Scene) -> tuple[tuple[float, float, float], ...]:
         end = min(total, max(end, start + 0.12 * total))
         if spans and start < spans[-1][1] + 900.0:
             continue
-        spans.append((round(start / 60) * 60.0, round(end / 60) * 60.0, float(np.exp(0.12 * s.rng.standard_normal()))))
+        spans.append(
+            (round(start / 60) * 60.0, round(end / 60) * 60.0, float(np.exp(0.12 * s.rng.standard_normal())))
+        )
     return tuple(spans)
 
 
@@ -384,7 +433,17 @@ MACHINE_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {
 }  # fmt: skip
 SENSOR_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {
     name: _sensor(name)
-    for name in ("sensor_offset", "sensor_gain", "sensor_lag", "sensor_drift", "sensor_detached", "clock_shift")
+    for name in (
+        "sensor_offset",
+        "sensor_gain",
+        "sensor_lag",
+        "sensor_drift",
+        "sensor_detached",
+        "clock_shift",
+    )
 }
-FOREIGN_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {"thrust_heat": _thrust_heat, "brake_heat": _brake_heat}
+FOREIGN_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {
+    "thrust_heat": _thrust_heat,
+    "brake_heat": _brake_heat,
+}
 EVERY_EFFECT = MACHINE_EFFECTS | SENSOR_EFFECTS | FOREIGN_EFFECTS

@@ -113,7 +113,9 @@ class _Builder:
             for a, b in np.unique(pairs, axis=0):
                 chosen = apart & (p[ok] == a) & (q[ok] == b)
                 name = f"{kind}:{m.PARTS[a]}|{m.PARTS[b]}"
-                joints.setdefault(name, []).append((i[chosen], j[chosen], area[ok][chosen], resistance[chosen]))
+                joints.setdefault(name, []).append(
+                    (i[chosen], j[chosen], area[ok][chosen], resistance[chosen])
+                )
         joined = (np.concatenate(x) for x in zip(*bulk, strict=True))
         self.conduction = _laplacian(*joined, self.size)
         self.joints = {name: [np.concatenate(x) for x in zip(*v, strict=True)] for name, v in joints.items()}
@@ -198,7 +200,7 @@ def assemble(grid: m.Grid) -> FiniteVolumes:
     return FiniteVolumes(grid, b.conduction, capacity, pairs, films, series, _wall(b), sources, readings)
 
 
-def _film_faces(boundary) -> dict[str, tuple]:  # noqa: ANN001 - the builder's bound method
+def _film_faces(boundary) -> dict[str, tuple]:
     r, z = "r", "z"
     return {
         "outside:cover": (boundary(z, 0.025, 0.091, 0.150, -1), boundary(r, 0.150, 0.025, 0.040, +1)),
@@ -270,7 +272,12 @@ def _wall(b: _Builder) -> sparse.csr_matrix:
     total = sum(exact.values()) * stations
     wet = station >= 0
     radius = np.where(wet.any(axis=(1, 2)))[0]
-    moves = {"inner": (radius[0], -1, 0), "outer": (radius[-1], +1, 0), "before": (None, 0, -1), "behind": (None, 0, 1)}
+    moves = {
+        "inner": (radius[0], -1, 0),
+        "outer": (radius[-1], +1, 0),
+        "before": (None, 0, -1),
+        "behind": (None, 0, 1),
+    }
     for wall, (only, dr, dz) in moves.items():
         i, t, k = np.nonzero(wet)
         chosen = (i == only) if only is not None else ~wet[i, t, k + dz]

@@ -43,7 +43,9 @@ def choose_effects(number: int, rng: np.random.Generator) -> list[str]:
     return [names[order[(4 * turn + {1: 0, 2: 1, 5: 2, 6: 3}[slot]) % len(names)]]]
 
 
-def _apply(model: ReducedSpindle, plan: Plan, as_built: dict[str, float], effects: list[Concealed]) -> np.ndarray:
+def _apply(
+    model: ReducedSpindle, plan: Plan, as_built: dict[str, float], effects: list[Concealed]
+) -> np.ndarray:
     laws = tuple(e.machine for e in effects if e.machine is not None)
     readings = run(model, plan.drive, as_built, laws).readings
     for effect in effects:
@@ -73,7 +75,8 @@ def _identify(study: Study, effects: list[Concealed]) -> dict[str, object]:
         left = study.fit_linear(change, column[:, None])
         table.append([mimic, column, *left])
     table.sort(key=lambda row: row[3])
-    for row in table[:6]:
+    # Far from an explanation already in the linear fit, a mimic is not worth runs of the model.
+    for row in [row for row in table[:5] if row[2] < 2.5]:
         through = study.fit_through_model(truth, row[0], row[1])
         if through[1] < row[3]:
             row[2:] = through
@@ -98,7 +101,7 @@ def _identify(study: Study, effects: list[Concealed]) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _pair_twins(study, effects, parts, change, mimics, columns) -> list[dict[str, object]]:  # noqa: ANN001
+def _pair_twins(study, effects, parts, change, mimics, columns) -> list[dict[str, object]]:
     out = []
     for (effect, rest), kept in zip(zip(effects, parts, strict=True), effects[::-1], strict=True):
         direction = study.diagnosed_only(study.simulate(rest))
@@ -119,7 +122,9 @@ def _unseen(ratio: float, chi2: float) -> bool:
 
 
 def _twin(left: dict[str, float], total_chi2: float) -> bool:
-    return left["ratio"] < TWIN_RATIO or left["chi2"] < max(TWIN_CHI2, 0.01 * total_chi2 if left["ratio"] < 0.6 else 0)
+    return left["ratio"] < TWIN_RATIO or left["chi2"] < max(
+        TWIN_CHI2, 0.01 * total_chi2 if left["ratio"] < 0.6 else 0
+    )
 
 
 def _draw_effects(
@@ -140,7 +145,9 @@ def _draw_effects(
             ratio = study.fit_linear(change, np.empty((change.size, 0)))[0]
             if 0.85 < ratio / target < 1.2 or (ratio < target and strength >= 1.5):
                 break
-            strength = float(np.clip(strength * target / max(ratio, 1e-3), 0.25 * strength, min(1.5, 3.0 * strength)))
+            strength = float(
+                np.clip(strength * target / max(ratio, 1e-3), 0.25 * strength, min(1.5, 3.0 * strength))
+            )
         effects.append(drawn)
         # The second of a pair has to be seen, or the pair is none.
         low, high = max(low, 1.5), max(high, 8.0)
@@ -196,6 +203,13 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
         out["clear"] = False
         verdicts.append("ambiguous")
         out["indistinguishable"] = twins
+    own, best = known["own_simple_form"], known["best_mimics"]
+    out["simple_form_loses"] = bool(
+        own and best and len(effects) == 1 and best[0]["chi2"] < own["chi2"] + 10.0
+    )
+    if out["simple_form_loses"]:
+        # The truth's law is so rich that another effect's plain law comes as close as its own.
+        out["clear"] = False
     if any(e.outside_catalogue for e in effects):
         out["clear"] = False
         verdicts += ["unexplained", "ambiguous"]
@@ -215,7 +229,9 @@ def _effect_answer(effect: Concealed) -> dict[str, object]:
     }  # fmt: skip
 
 
-def make_case(model: ReducedSpindle, folder: FilePath, seed: int, number: int, *, identify: bool = True) -> dict[str, object]:
+def make_case(
+    model: ReducedSpindle, folder: FilePath, seed: int, number: int, *, identify: bool = True
+) -> dict[str, object]:
     """Draw, simulate, write one case; returns its answer."""
     rng = np.random.default_rng([seed, number])
     name = f"case_{number:04d}"
@@ -232,7 +248,9 @@ def make_case(model: ReducedSpindle, folder: FilePath, seed: int, number: int, *
     rows = {"recording": record(inputs, "recording", name, plan, readings, noise, rng)}
     if calibration is not None:
         clean = run(model, calibration.drive, as_built).readings
-        rows["calibration"] = record(inputs, "calibration", f"{name} calibration", calibration, clean, noise, rng)
+        rows["calibration"] = record(
+            inputs, "calibration", f"{name} calibration", calibration, clean, noise, rng
+        )
     known = None
     if effects and identify:
         known = _identify(study, effects)
@@ -266,7 +284,9 @@ def _plan_for(wanted: list[str], rng: np.random.Generator) -> Plan:
 
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m validation.generate", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.generate", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--cases", type=int, default=200)
     parser.add_argument("--first", type=int, default=1, help="number of the first case")
     parser.add_argument("--seed", type=int, default=7)

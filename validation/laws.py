@@ -102,7 +102,9 @@ class ThermalPreload(Law):
         for i in SETS[self.where]:
             b = m.BEARINGS[i]
             excess = moment.read(f"mean:{b}.inner") - moment.read(f"mean:{b}.outer") - self.onset
-            push = self.amplitude * (_soft(excess, self.width) ** self.exponent) * 5.0 ** (1.0 - self.exponent)
+            push = (
+                self.amplitude * (_soft(excess, self.width) ** self.exponent) * 5.0 ** (1.0 - self.exponent)
+            )
             push = self.lag(b, self.delay).follow(push, moment.step)
             moment.bearing[i] *= 1.0 + 2.5 * np.tanh(push / 2.5)
 
@@ -467,7 +469,7 @@ class Sensor:
             changed = first_order(time, y, self.size)
         elif self.kind == "sensor_drift":
             hours = time / 3600.0
-            changed = y + self.size * hours * (hours / hours[-1]) ** (self.shape - 1.0)
+            changed = y + self.size * hours[-1] * (hours / hours[-1]) ** self.shape
         elif self.kind == "sensor_detached":
             loose = 1.0 / (1.0 + np.exp(-(time - self.onset) / 60.0)) if self.onset > 0 else 1.0
             changed = y - self.size * loose * (y - ambient)
@@ -479,7 +481,9 @@ class Sensor:
         return out
 
 
-def first_order(time: NDArray[np.float64], value: NDArray[np.float64], constant: float) -> NDArray[np.float64]:
+def first_order(
+    time: NDArray[np.float64], value: NDArray[np.float64], constant: float
+) -> NDArray[np.float64]:
     """Response of a first-order sensor on a uniform step, exact for linear segments.
 
     >>> first_order(np.arange(3.0), np.array([0.0, 0.0, 0.0]), 5.0).tolist()

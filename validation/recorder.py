@@ -41,7 +41,9 @@ def draw_noise(rng: np.random.Generator) -> Noise:
     )  # fmt: skip
 
 
-def slow_error(rng: np.random.Generator, time: NDArray[np.float64], size: float, constant: float) -> NDArray[np.float64]:
+def slow_error(
+    rng: np.random.Generator, time: NDArray[np.float64], size: float, constant: float
+) -> NDArray[np.float64]:
     """One stationary first-order Gauss-Markov path."""
     keep = np.exp(-np.diff(time, prepend=time[0] - 1e9) / constant)
     kicks = rng.standard_normal(time.size) * np.sqrt(1.0 - keep**2)
@@ -54,7 +56,13 @@ def slow_error(rng: np.random.Generator, time: NDArray[np.float64], size: float,
 
 
 def record(
-    folder: FilePath, stem: str, name: str, plan: Plan, readings: NDArray[np.float64], noise: Noise, rng: np.random.Generator
+    folder: FilePath,
+    stem: str,
+    name: str,
+    plan: Plan,
+    readings: NDArray[np.float64],
+    noise: Noise,
+    rng: np.random.Generator,
 ) -> dict[str, int]:
     """Write ``stem.toml`` and ``stem.csv.gz``; returns what was done to the rows."""
     step = float(rng.choice([15.0, 20.0, 30.0]))
@@ -64,7 +72,9 @@ def record(
     columns = []
     for channel in range(6):
         y = np.interp(time, drive.time, readings[:, channel])
-        y += noise.white_K * rng.standard_normal(time.size) + slow_error(rng, time, noise.slow_K, noise.slow_s)
+        y += noise.white_K * rng.standard_normal(time.size) + slow_error(
+            rng, time, noise.slow_K, noise.slow_s
+        )
         columns.append(y)
     values = np.stack(columns, axis=1)
     if rng.random() < 0.25:
@@ -86,7 +96,9 @@ def record(
     ambient[0] = drive.ambient[0] + 0.02 * rng.standard_normal()
     inlet = np.interp(time, drive.time, drive.coolant_in) + 0.05 * rng.standard_normal(time.size)
     rows = [
-        f"{t:g}," + ",".join(cells[k]) + f",{ambient[k]:.2f},{inlet[k]:.2f},{drive.speed[i]:g},{drive.thrust[i]:g}"
+        f"{t:g},"
+        + ",".join(cells[k])
+        + f",{ambient[k]:.2f},{inlet[k]:.2f},{drive.speed[i]:g},{drive.thrust[i]:g}"
         for k, (t, i) in enumerate(zip(time, held, strict=True))
     ]
     keep = np.ones(time.size, dtype=bool)
@@ -119,5 +131,7 @@ def _manifest(name: str, data: str, sigma: float) -> str:
     ]
     for column, drives, unit in _INPUTS:
         hold = 'hold = "previous"\n' if column in ("speed", "thrust") else ""
-        blocks.append(f'\n[[channel]]\ncolumn = "{column}"\nrole = "input"\ndrives = "{drives}"\n{hold}unit = "{unit}"\n')
+        blocks.append(
+            f'\n[[channel]]\ncolumn = "{column}"\nrole = "input"\ndrives = "{drives}"\n{hold}unit = "{unit}"\n'
+        )
     return head + "".join(blocks)

@@ -41,14 +41,16 @@ def nominal_coefficients(fv_groups: dict[str, object]) -> dict[str, float]:
     return values
 
 
-def conductance(coefficient: NDArray[np.float64] | float, series: NDArray[np.float64] | float):  # noqa: ANN201
+def conductance(coefficient: NDArray[np.float64] | float, series: NDArray[np.float64] | float):
     """Coefficient in series with the half cells beside the face, W/(m² K)."""
     return coefficient / (1.0 + coefficient * series)
 
 
 def channel_series(fv: FiniteVolumes) -> float:
     """Resistance of the half cells behind the channel's walls, m² K/W."""
-    return 0.0015 / m.material_of("housing")[0] if fv.grid.r.size < 50 else 0.00075 / m.material_of("housing")[0]
+    return (
+        0.0015 / m.material_of("housing")[0] if fv.grid.r.size < 50 else 0.00075 / m.material_of("housing")[0]
+    )
 
 
 def full_operator(
@@ -66,7 +68,7 @@ def full_operator(
     return (operator + sparse.diags(diagonal)).tocsc(), used
 
 
-def factorise(operator: sparse.csc_matrix):  # noqa: ANN201 - scipy's factor object
+def factorise(operator: sparse.csc_matrix):
     """Sparse factors of a symmetric positive definite operator."""
     return splu(operator, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
@@ -182,7 +184,7 @@ def project(fv: FiniteVolumes, basis: NDArray[np.float64]) -> ReducedSpindle:
         outlet.append(left.sum(axis=0) @ wall.T)
         outlet_load.append(left.sum(axis=0) @ area)
         left = (area[:, None] * lower) @ left
-    nominal = nominal_coefficients({name: None for name in groups})
+    nominal = nominal_coefficients(dict.fromkeys(groups))
     return ReducedSpindle(
         conduction=basis.T @ (fv.conduction @ basis),
         groups=groups,

@@ -164,7 +164,9 @@ class Stepper:
         h[i["drive_end"]] = built["shaft_end"] * shaft_end_film(moment.speed, 0.11)
         return h if moment.group is None else h * moment.group
 
-    def load(self, moment: Moment, used: NDArray[np.float64], coolant_load: NDArray[np.float64]) -> NDArray[np.float64]:
+    def load(
+        self, moment: Moment, used: NDArray[np.float64], coolant_load: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         """Right-hand side of the reduced balance."""
         surrounding = np.full(used.size, moment.ambient)
         surrounding[self.index["flange_back"]] = moment.frame
@@ -201,7 +203,11 @@ class _Solver:
         """Bring matrix, factors and coolant terms to these coefficients."""
         # Steps of 0.3 % in film and flow, so that equal oil gives equal factors.
         level = (round(np.log(film) / 3e-3), round(np.log(capacity) / 3e-3))
-        if self.used is not None and level == self.level and not (np.abs(used - self.used) > REBUILD * self.used).any():
+        if (
+            self.used is not None
+            and level == self.level
+            and not (np.abs(used - self.used) > REBUILD * self.used).any()
+        ):
             return
         self.used, self.level = used.copy(), level
         key = used.tobytes() + repr(level).encode()

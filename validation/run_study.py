@@ -1,0 +1,86 @@
+"""Diagnose every case of a study; reads inputs only, never answers.
+
+``python -m validation.run_study DIR RESULTS --jobs 2 --mesh coarse`` leaves
+``RESULTS/case_0001/diagnosis.json`` and ``timing.json``. What is there is not done again, so an
+interrupted study goes on where it stopped; a case that raised leaves ``failed.json`` and is tried
+again next time.
+"""
+
+import argparse
+import json
+import os
+import time
+import traceback
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+MACHINE = "recorded_spindle"
+
+
+def diagnose_case(inputs: Path, result: Path, machine: str, overrides: tuple[str, ...], report: bool) -> str:
+    """Diagnose one case, in this process; returns the verdict or what went wrong."""
+    from spindle_fem.diagnosis.run import diagnose
+
+    result.mkdir(parents=True, exist_ok=True)
+    calibration = inputs / "calibration.toml"
+    began, cpu = time.perf_counter(), time.process_time()
+    try:
+        found = diagnose(
+            machine,
+            [inputs / "recording.toml"],
+            result,
+            calibrate=[calibration] if calibration.exists() else [],
+            overrides=overrides,
+            report=report,
+        )
+    except Exception as error:  # noqa: BLE001 - a study goes on and counts its failures
+        text = {"error": type(error).__name__, "message": str(error), "trace": traceback.format_exc()}
+        (result / "failed.json").write_text(json.dumps(text, indent=1), encoding="utf-8")
+        return f"FAILED {type(error).__name__}: {str(error)[:120]}"
+    (result / "failed.json").unlink(missing_ok=True)
+    timing = {"wall_s": time.perf_counter() - began, "cpu_s": time.process_time() - cpu}
+    (result / "timing.json").write_text(json.dumps(timing), encoding="utf-8")
+    names = ", ".join(f"{f['effect']}@{f['component']}" for f in found["findings"])
+    return f"{found['verdict']} {names}"
+
+
+def outstanding(inputs: Path, results: Path, only: list[str] | None) -> list[str]:
+    """Cases without a diagnosis yet, in order."""
+    names = sorted(p.name for p in inputs.iterdir() if (p / "recording.toml").exists())
+    wanted = [n for n in names if not only or n in only]
+    return [n for n in wanted if not (results / n / "timing.json").exists()]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.run_study", description=__doc__.splitlines()[0]
+    )
+    parser.add_argument("study", type=Path, help="folder written by validation.generate")
+    parser.add_argument("results", type=Path)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--mesh", default="coarse", choices=["coarse", "normal", "fine"])
+    parser.add_argument("--machine", default=MACHINE)
+    parser.add_argument("--report", action="store_true", help="pictures and reports too")
+    parser.add_argument("--case", action="append", help="only this case; may be repeated")
+    given = parser.parse_args(arguments)
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    inputs = given.study / "inputs"
+    names = outstanding(inputs, given.results, given.case)
+    overrides = (f"mesh.preset={given.mesh}",)
+    print(f"{len(names)} cases to diagnose", flush=True)
+    if not names:
+        return
+    # The first case alone: it builds the fast model that all others then read from the cache.
+    first, *rest = names
+    common = (given.machine, overrides, given.report)
+    print(first, diagnose_case(inputs / first, given.results / first, *common), flush=True)
+    with ProcessPoolExecutor(given.jobs) as pool:
+        running = {pool.submit(diagnose_case, inputs / n, given.results / n, *common): n for n in rest}
+        for done in as_completed(running):
+            print(running[done], done.result(), flush=True)
+
+
+if __name__ == "__main__":
+    main()
