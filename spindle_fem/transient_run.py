@@ -8,6 +8,7 @@ from typing import Any
 
 from spindle_fem.conduction.transient import ThermalState
 from spindle_fem.coupling import prepare_machine
+from spindle_fem.effect_entries import physics_of
 from spindle_fem.reporting.output import output_folder
 from spindle_fem.reporting.transient_report import write_transient
 from spindle_fem.spec.load import load_machine
@@ -51,5 +52,6 @@ def run_transient_study(
     spec = load_machine(asked.machine if machine is None else machine, overrides)
     with output_folder(folder) as place:
         prepared = prepare_machine(spec, progress=progress)
-        result = run_study(prepared, asked, start=start, progress=progress)
+        physics = physics_of(prepared)
+        result = run_study(prepared, asked, start=start, physics=physics, progress=progress)
         return write_transient(prepared, result, place)

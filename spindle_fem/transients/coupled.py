@@ -10,6 +10,7 @@ temperatures are always those of the temperatures themselves.
 
 from __future__ import annotations
 
+import bisect
 import copy
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass, replace
@@ -77,6 +78,27 @@ class Evaluation:
     coolant: CoolantState | None
 
 
+@dataclass(frozen=True, slots=True)
+class _ChannelStep:
+    """What the terms did to the channel in one step: inlet [K], factors on flow and film, at both ends."""
+
+    begin: float
+    end: float
+    first: tuple[float, float, float]
+    last: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, begin: float, end: float, first: Loads, last: Loads) -> _ChannelStep:
+        def channel(change: LoadChange) -> tuple[float, float, float]:
+            return change.inlet, change.flow, change.factor(CHANNEL_FILM)
+
+        return cls(begin, end, channel(first.change), channel(last.change))
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        part = min(max((time - self.begin) / (self.end - self.begin), 0.0), 1.0)
+        return tuple(a + part * (b - a) for a, b in zip(self.first, self.last, strict=True))
+
+
 class CoupledInputs:
     """Callable ``(time, state) -> ConductionProblem`` of a machine.
 
@@ -89,6 +111,8 @@ class CoupledInputs:
         matrix keeps the old one; 0 renews it at every stage.
     physics : Physics, optional
         Terms beyond the machine's own.
+    memory : ndarray, optional
+        What they remember of an earlier run.
     """
 
     def __init__(
@@ -97,9 +121,10 @@ class CoupledInputs:
         history: OperatingHistory,
         coefficient_tolerance: float,
         physics: Physics = NO_PHYSICS,
+        memory: Array | None = None,
     ) -> None:
-        self._physics = physics
-        self._coolant_track: list[tuple[float, float, float, float]] = []
+        self._physics, self._memory = physics, memory
+        self._steps: list[_ChannelStep] = []
         self.terms: FieldTerms | None = None
         builder = copy.copy(machine.builder)
         builder.heat_model = HeatInMemory(machine.builder.heat_model)
@@ -160,11 +185,10 @@ class CoupledInputs:
         last, middle, first = found
         return first, middle, last
 
-    def accept(self, state: ThermalState, last: Evaluation) -> None:
-        """Let the terms remember the end of an accepted step, whose last stage was this."""
+    def accept(self, state: ThermalState, stages: tuple[Evaluation, Evaluation, Evaluation]) -> None:
+        """Let the terms remember the end of an accepted step with these stages."""
         if self.terms is not None:
-            change = last.loads.change
-            self._coolant_track.append((state.time, change.inlet, change.flow, change.factor(CHANNEL_FILM)))
+            self._steps.append(_ChannelStep.of(stages[0].time, state.time, stages[0].loads, stages[-1].loads))
             before = self.history.at(float(np.nextafter(state.time, -np.inf)))
             after = self.history.at(state.time)
             self.terms.accept(state.time, before, after, state.temperature, state.lumped_temperature)
@@ -172,10 +196,11 @@ class CoupledInputs:
     def coolant_at(self, time: float) -> tuple[OperatingPoint, float]:
         """Operating point of the channel at a time that has passed, and factor on its film."""
         point = self.history.at(time)
-        if not self._coolant_track:
+        if not self._steps:
             return point, 1.0
-        times, *columns = np.array(self._coolant_track).T
-        inlet, flow, film = (float(np.interp(time, times, column)) for column in columns)
+        # Of two steps that meet there the later one: inputs jump at the start of a step.
+        later = bisect.bisect_right(self._steps, time, key=lambda step: step.begin)
+        inlet, flow, film = self._steps[max(later - 1, 0)].at(time)
         moved = replace(
             point,
             coolant_inlet_temperature=point.coolant_inlet_temperature + inlet,
@@ -188,7 +213,8 @@ class CoupledInputs:
         self._names = self.lumped_names(state.temperature)
         if self._physics.is_there:
             self.terms = FieldTerms(self.machine, self._names, self._physics)
-            self.terms.begin(time, self.history.at(time), state.temperature, state.lumped_temperature)
+            now = self.history.at(time)
+            self.terms.begin(time, now, state.temperature, state.lumped_temperature, self._memory)
 
     def _loads(
         self, time: float, temperature: Array, lumped: Mapping[str, float], change: LoadChange = NO_CHANGE

@@ -157,6 +157,8 @@ class MachineTransient:
     cpu_seconds : float
     stopped : bool
         Whether the stop condition ended it, not the end time.
+    memory : ndarray or None
+        What terms remember at the end.
     """
 
     times: Array
@@ -172,6 +174,7 @@ class MachineTransient:
     counts: Mapping[str, int]
     cpu_seconds: float
     stopped: bool = False
+    memory: Array | None = None
 
     def reading(self, probe: str) -> Array:
         """Readings of one probe, (n,) [K]."""
@@ -217,6 +220,7 @@ def simulate_full(
     stop: Callable[[ThermalState], bool] | None = None,
     breakpoints: Sequence[float] = (),
     physics: Physics = NO_PHYSICS,
+    memory: Array | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> MachineTransient:
     """Temperatures of a machine under inputs that change in time.
@@ -242,6 +246,8 @@ def simulate_full(
         Times at which a step has to end besides those of the inputs.
     physics : Physics
         Terms and factors beyond the machine's own.
+    memory : ndarray, optional
+        What the terms remember where ``start`` goes on from an earlier run.
     progress : callable
 
     Returns
@@ -268,7 +274,7 @@ def simulate_full(
     marks = np.concatenate(
         (history.breakpoints(), np.asarray(breakpoints, dtype=float), np.array(physics.breakpoints()))
     )
-    source = CoupledInputs(machine, history, options.coefficient_tolerance, physics)
+    source = CoupledInputs(machine, history, options.coefficient_tolerance, physics, memory)
     names = source.lumped_names(start.temperature)
     if len(start.lumped_temperature) != len(names):
         raise SpecError(
@@ -331,7 +337,7 @@ class _Leg:
 
     def _observe(self, state: ThermalState) -> bool:
         stages = self.source.stages_of_step(self._time)
-        self.source.accept(state, stages[-1])
+        self.source.accept(state, stages)
         size = state.time - self._time
         self.coolant.append((*coolant_heat(stages, size), size))
         last = stages[-1]
@@ -409,4 +415,5 @@ def _joined(source: CoupledInputs, rows: ReadingRows, legs: list[_Leg], seconds:
         counts={**counts, "evaluations": source.evaluations},
         cpu_seconds=seconds,
         stopped=legs[-1].stopped,
+        memory=None if source.terms is None else source.terms.memory,
     )

@@ -39,6 +39,7 @@ from spindle_fem.transients.run import (
     start_at,
     start_from,
 )
+from spindle_fem.transients.terms import NO_PHYSICS, Physics, steady_physics, with_factors
 
 Array = NDArray[np.float64]
 
@@ -254,6 +255,7 @@ def run_study(
     study: TransientStudy,
     *,
     start: ThermalState | None = None,
+    physics: Physics = NO_PHYSICS,
     progress: Callable[[str], None] = lambda text: None,
 ) -> StudyResult:
     """Run every phase of a study, one after the other.
@@ -264,22 +266,27 @@ def run_study(
     study : TransientStudy
     start : ThermalState, optional
         A saved state to go on from, in place of the study's own start.
+    physics : Physics
+        Terms and factors beyond the machine's own; their memory goes on from phase to phase.
     progress : callable
     """
+    machine, physics = with_factors(machine, physics)
     point = OperatingPoint.of(machine.spec)
     if start is None and study.start == "steady":
         progress("steady start")
-        start = start_from(solve_coupled(machine, point))
+        start = start_from(solve_coupled(machine, point, beyond=steady_physics(machine, physics)))
     if start is not None:
         require_state(machine, start)
     options = TransientOptions(error=study.error)
     values = {name: getattr(point, field) for name, field in FIELD_OF.items()}
-    state, results = start, []
+    state, memory, results = start, None, []
     for phase in study.phase:
         given = {name: getattr(phase, field) for name, field in FIELD_OF.items()}
         values |= {name: value for name, value in given.items() if value is not None}
-        result = _run_phase(machine, study, phase, values, state, options, progress)
+        beyond = (physics, memory)
+        result = _run_phase(machine, study, phase, values, state, options, beyond, progress)
         results.append(result)
+        memory = result.transient.memory
         # the step's size says nothing after the inputs jump
         last = result.transient.state
         state = ThermalState(last.time, last.temperature, last.lumped_temperature)
@@ -293,6 +300,7 @@ def _run_phase(
     values: Mapping[str, float],
     state: ThermalState | None,
     options: TransientOptions,
+    beyond: tuple[Physics, Array | None],
     progress: Callable[[str], None],
 ) -> PhaseResult:
     until = study.end_of(phase)
@@ -318,6 +326,8 @@ def _run_phase(
         options=options,
         stop=stop,
         breakpoints=looks,
+        physics=beyond[0],
+        memory=beyond[1],
         progress=progress,
     )
     settled = None if until is None else transient.stopped

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from spindle_fem.coupling import PreparedMachine, machine_on_mesh
 from spindle_fem.effects.term import COOLANT_INLET, FLOW, FLUID_PREFIX, Term, TermContext
@@ -187,14 +188,37 @@ class FieldTerms:
                     each = np.array([own_capacity[part] for part in operators.mesh.part_names])
                     storage = operators.matrix(operators.sum_storage(each))
                     scale = np.ones(self._n)
-                scale = _with_capacity(storage, scale, mean[: self._n] != 0.0, capacity)
+                scale = with_capacity(storage, scale, mean[: self._n] != 0.0, capacity)
         return scale, lumped
 
     # --------------------------------------------------------------- in time
-    def begin(self, time: float, point: OperatingPoint, temperature: Array, lumped: Array) -> None:
-        """Start a run, with nothing remembered."""
+    @property
+    def memory(self) -> Array:
+        """What the terms remember at the end of the last step."""
+        return self._begin.memory
+
+    def begin(
+        self,
+        time: float,
+        point: OperatingPoint,
+        temperature: Array,
+        lumped: Array,
+        memory: Array | None = None,
+    ) -> None:
+        """Start a run, with nothing remembered or what an earlier run left.
+
+        Raises
+        ------
+        SpecError
+            A memory of other terms.
+        """
+        if memory is not None and memory.shape != self._initial.shape:
+            raise SpecError(
+                "memory", f"{memory.size} numbers.", f"These terms remember {self._initial.size}."
+            )
         sensed = self._sensed(temperature, lumped)
-        self._begin = _Begin(time, sensed, self._initial, inputs_of(point))
+        remembered = self._initial if memory is None else memory
+        self._begin = _Begin(time, sensed, remembered, inputs_of(point))
 
     def accept(
         self,
@@ -374,8 +398,16 @@ def inputs_of(point: OperatingPoint) -> dict[str, float]:
     }
 
 
-def _with_capacity(storage: object, scale: Array, inside: NDArray[np.bool_], capacity: float) -> Array:
+def with_capacity(storage: sparse.sparray, scale: Array, inside: NDArray[np.bool_], capacity: float) -> Array:
     """Scale of the unknowns' capacity that adds so many J/K over some of them.
+
+    Parameters
+    ----------
+    storage : (n, n) sparse array, [J/K]
+    scale : (n,) ndarray
+        So far.
+    inside : (n,) bool ndarray
+    capacity : float, [J/K]
 
     With g² the further scale inside, the content is ``D g² + 2 B g + A``: a
     quadratic equation.

@@ -231,3 +231,22 @@ def test_places_and_coefficients_that_do_not_exist_are_refused(machine):
         simulate_full(machine, inputs, physics=Physics((preload(), preload())))
     with pytest.raises(SpecError, match=r"heat\.fromt"):
         simulate_full(machine, inputs, physics=Physics((), {}, {"heat.fromt": 1.1}))
+
+
+@pytest.mark.slow
+def test_what_terms_remember_goes_on_into_a_second_run(machine):
+    times, middle = np.arange(0.0, 301.0, 30.0), 5
+    values, held = inputs_over(times)
+    physics, options = of_size(preload(), 1.5), TransientOptions(error=0.1)
+
+    def run(part, **more):
+        history = InputHistory(times[part], STANDARD, values[part], held)
+        return simulate_full(machine, history, options=options, physics=physics, **more)
+
+    whole, first = run(slice(None)), run(slice(None, middle + 1))
+    second = run(slice(middle, None), start=first.state, memory=first.memory)
+    forgetful = run(slice(middle, None), start=first.state)
+    assert np.abs(second.readings[-1] - whole.readings[-1]).max() < 1e-3
+    assert np.abs(forgetful.readings[-1] - whole.readings[-1]).max() > 1e-2
+    with pytest.raises(SpecError, match="These terms remember 1"):
+        run(slice(middle, None), start=first.state, memory=np.zeros(3))
