@@ -27,6 +27,7 @@ from spindle_fem.diagnosis.trials import (
     Place,
     Trial,
     answer,
+    beside_probes,
     network_places,
     reachable_places,
     trials_of,
@@ -46,6 +47,8 @@ SPACING = 300.0
 MOST_INSTANTS = 48
 # Options that tell nearly as much as the best are worth as much; the simplest of them is proposed.
 AS_GOOD = 0.9
+# Below so many bits a test is not worth calling a decision.
+HARDLY = 0.3
 EXISTING = "the sensors that are there"
 
 
@@ -165,6 +168,8 @@ def rivals_of(diagnosis: Diagnosis) -> tuple[list[Ranked], Array, bool]:
     decided = len(found) < 2
     if decided:
         others = [item for item in rank(diagnosis.hypotheses) if item.fit.keys != found[0].fit.keys]
+        # The same set with one effect more is no other explanation.
+        others.sort(key=lambda item: item.fit.keys > found[0].fit.keys)
         found += others[:1]
     weights = np.ones(len(found)) if decided else np.array([item.probability for item in found])
     return found, weights / weights.sum(), decided
@@ -193,7 +198,11 @@ def evaluate(
     if diagnosis.view.kind == "network":
         places = network_places(plant.fast.model.place_names, recording.probes)
     else:
-        places = reachable_places(plant.fast.spec, plant.fast.model.place_names)
+        doubted = dict.fromkeys(c.component for fit in fits for c in fit.candidates if c.reading is not None)
+        places = (
+            *beside_probes(tuple(doubted), plant.fast.model.probe_names),
+            *reachable_places(plant.fast.spec, plant.fast.model.place_names),
+        )
     white = np.append(recording.sigma, np.full(len(places), float(np.median(recording.sigma))))
     step = float(np.median(np.diff(recording.times)))
     names = (*recording.temperature_names, *(place.words for place in places))
@@ -336,7 +345,8 @@ def _merit(option: Option) -> tuple[float, float]:
 
 def why(option: Option, between: Sequence[str], decided: bool) -> str:
     """The reason in a sentence or two with numbers."""
-    levels = [f"{value - ZERO_CELSIUS_K:.1f} °C" for value in option.levels]
+    digits = 1 if abs(option.difference) >= 0.2 else 2
+    levels = [f"{value - ZERO_CELSIUS_K:.{digits}f} °C" for value in option.levels]
     at = option.channel if option.place is None else "the new sensor"
     text = (
         f"If it is {between[0]}, {at} reads {levels[0]} after {option.time / 60.0:.0f} min; "
@@ -345,5 +355,7 @@ def why(option: Option, between: Sequence[str], decided: bool) -> str:
         f"({option.spread:.2g} K)."
     )
     lead = "The data have decided; this would confirm it. " if decided else ""
+    if option.information < HARDLY:
+        lead += "No single test tells these apart well; this one does it best. "
     tail = f" Expected to tell {option.information:.2f} of {np.log2(len(between)):.2f} bits."
     return lead + text + tail

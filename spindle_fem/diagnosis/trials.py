@@ -55,14 +55,16 @@ class Place:
     Attributes
     ----------
     name : str
-        Of the reduced model.
+        Of the reduced model; of a probe, where ``is_probe``.
     words : str
     component : str
+    is_probe : bool
     """
 
     name: str
     words: str
     component: str
+    is_probe: bool = False
 
 
 class TrialPlant(Plant):
@@ -140,7 +142,7 @@ def answer(plant: Plant, fit: Fit, trial: Trial, places: Sequence[Place], spacin
         run = own.transient(0, values, fit.candidates, run_names)
         states, tracks = run.march(own.start(0))
         tangent = run.tangents(run.forcing_of(states, tracks), tracks, explicit=True)
-        means = np.array([plant.fast.model.place(place.name) for place in places]).T
+        means = np.array([_weights(plant, place) for place in places]).T
         readings.append(states @ means)
         by_place = np.zeros((len(states), len(places), len(names)))
         moved = np.einsum("nrp,rc->ncp", tangent, means)
@@ -157,6 +159,11 @@ def answer(plant: Plant, fit: Fit, trial: Trial, places: Sequence[Place], spacin
     full = np.zeros((len(times), whole.shape[1], len(fit.coordinates)))
     full[:, :, [i for _, i in chosen]] = _at(times, grid, by)
     return Answer(times, _at(times, grid, whole), full)
+
+
+def _weights(plant: Plant, place: Place) -> Array:
+    model = plant.fast.model
+    return model.probes[model.probe_names.index(place.name)] if place.is_probe else model.place(place.name)
 
 
 def _at(times: Array, grid: Array, values: Array) -> Array:
@@ -205,6 +212,13 @@ def reachable_places(spec: MachineSpec, names: Sequence[str]) -> tuple[Place, ..
         if place in known:
             found.append(Place(place, f"shaft, {words} (infrared)", key))
     return tuple(found)
+
+
+def beside_probes(names: Sequence[str], probes: Sequence[str]) -> tuple[Place, ...]:
+    """A second sensor beside each of some probes, those of ``names`` that a model has as points."""
+    return tuple(
+        Place(name, f"a second sensor beside {name}", name, True) for name in names if name in probes
+    )
 
 
 def network_places(names: Sequence[str], read: Sequence[str]) -> tuple[Place, ...]:

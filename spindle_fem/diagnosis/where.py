@@ -166,10 +166,12 @@ def where_of(diagnosis: Diagnosis) -> Where:
         covered += told[name]
         if name not in credible:
             credible.append(name)
+    # A sensor's reading is wrong without any heat.
+    sensors = {c.component for c in candidates if c.kind == "sensor"}
     heat = {
         name: missing_heat(diagnosis.explanations, spots[name], diagnosis.plant)
         for name in credible
-        if name in spots
+        if name in spots and name not in sensors
     }
     radius, axial = _centre(diagnosis, component)
     when = significant_stretches(diagnosis.plant, diagnosis.null)
@@ -183,7 +185,8 @@ def where_of(diagnosis: Diagnosis) -> Where:
         for item in when
     )
     longest = max(when, key=lambda item: item.end - item.start, default=None)
-    condition = heat_condition(diagnosis.explanations, spots.get(component, ""), diagnosis.plant) or (
+    spot = "" if component in sensors else spots.get(component, "")
+    condition = heat_condition(diagnosis.explanations, spot, diagnosis.plant) or (
         longest.condition if longest else ""
     )
     return Where(component, radius, axial, tuple(credible), told, spots, heat, when, stamps, condition)
