@@ -167,7 +167,10 @@ class Search:
         """Candidates, and intervals at every spot, against what a fit leaves."""
         present = fit.keys
         allowed = [c for c in self.candidates if (c.effect, c.component) not in present]
-        variants = variants_of(allowed)
+        times, residual = self._residual(fit)
+        variants = variants_of(
+            [replace(c, starts=self.effects[c.effect].starts_from(c, times, residual)) for c in allowed]
+        )
         intervals = {}
         if not any(isinstance(self.effects[c.effect], IntervalEffect) for c in fit.candidates):
             for found, candidate in self._interval_candidates(fit):
@@ -175,6 +178,16 @@ class Search:
                 intervals[id(candidate)] = found
                 variants.append(variant)
         return screen(self.problem, fit, variants, self.weights), intervals
+
+    def _residual(self, fit: Fit) -> tuple[Array, Array]:
+        """What a fit leaves of the readings of the first recording that may be used, NaN elsewhere."""
+        plant = self.problem.plant
+        recording = plant.recordings[0]
+        predicted = plant.predict(0, fit.values, fit.candidates).temperature
+        grid = plant.drives[0].grid
+        at_stamps = np.column_stack([np.interp(recording.times, grid, column) for column in predicted.T])
+        known = recording.usable & plant.use[0][:, None]
+        return recording.times, np.where(known, recording.temperature - at_stamps, np.nan)
 
     def _interval_candidates(self, fit: Fit) -> Iterable[tuple[OnOff, Candidate]]:
         patterns = [

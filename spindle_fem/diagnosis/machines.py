@@ -14,6 +14,7 @@ from spindle_fem.effects.view import MachineView
 from spindle_fem.errors import RecordingError
 from spindle_fem.network.build import build_network
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.smooth import without_input_noise
 from spindle_fem.recordings.thin import thinned_recording
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.network_model import NetworkFastModel
@@ -79,6 +80,8 @@ def open_machine(
     if network_spec.is_network_machine(read_definition(find_machine(machine))):
         return _open_network(machine, overrides, recordings, calibration)
     spec = load_machine(machine, overrides)
+    recordings = [without_input_noise(item)[0] for item in recordings]
+    calibration = [without_input_noise(item)[0] for item in calibration]
     fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
     for recording in (*recordings, *calibration):
         fast.require_channels(recording.probes, recording.source)
@@ -110,6 +113,7 @@ def _open_network(
     }
 
     def thinned(recording: Recording) -> Recording:
+        recording, _ = without_input_noise(recording)
         count = recording.times.size
         if count <= MOST_STAMPS:
             return recording

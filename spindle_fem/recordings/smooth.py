@@ -1,0 +1,115 @@
+"""Measured inputs without their own noise.
+
+A room or oil temperature that drives a model is itself a reading. Fed in as it
+is, its noise passes straight into what follows it closely (the coolant's
+outlet), where a lag or a filter would seem to be missing. The temperature is
+taken as a random walk that is read with white noise, both estimated from the
+reading itself, and replaced by the smoother's estimate.
+
+Source of the model: Harvey (1989), Forecasting, Structural Time Series Models
+and the Kalman Filter, section 4.3 (local level; its smoother is a two-sided
+exponential).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+LAGS = 20
+FEWEST = 60
+# A walk slower than this share of the noise in each reading cannot be told from none.
+SLOWEST = 1.0e-3
+TEMPERATURE_UNIT = "kelvin"
+
+
+def walk_and_noise(values: Array) -> tuple[float, float]:
+    """Variance of a random walk's step and of the white noise on it.
+
+    From the mean squares of differences over 1 to 20 readings, which are
+    ``lag * step + 2 * noise``.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Evenly read, finite.
+
+    Returns
+    -------
+    float, float
+        Both in the square of the unit, none below zero.
+
+    Examples
+    --------
+    >>> generator = np.random.default_rng(0)
+    >>> walk = np.cumsum(0.01 * generator.standard_normal(20_000))
+    >>> step, noise = walk_and_noise(walk + 0.05 * generator.standard_normal(20_000))
+    >>> bool(abs(step**0.5 - 0.01) < 2e-3 and abs(noise**0.5 - 0.05) < 2e-3)
+    True
+    """
+    lags = np.arange(1, min(LAGS, len(values) // 3) + 1)
+    squares = np.array([np.mean((values[lag:] - values[:-lag]) ** 2) for lag in lags])
+    # A difference of one reading has the most independent samples.
+    slope, offset = np.polyfit(lags, squares, 1, w=1.0 / lags)
+    noise = max(0.5 * float(offset), 0.0)
+    return max(float(slope), 0.0), noise
+
+
+def smoothed(values: Array, step: float, noise: float) -> Array:
+    """Most probable random walk behind noisy readings, away from the ends exactly.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+    step, noise : float
+        As :func:`walk_and_noise` gives them; ``noise`` positive.
+
+    Examples
+    --------
+    >>> smoothed(np.full(50, 293.0), 1e-4, 1e-2).round(9).tolist() == [293.0] * 50
+    True
+    """
+    ratio = max(step / noise, SLOWEST)
+    # Steady gain of the filter: K² = ratio (1 - K).
+    gain = 0.5 * (np.sqrt(ratio**2 + 4.0 * ratio) - ratio)
+    kept = 1.0 - gain
+
+    def both_ways(series: Array) -> Array:
+        forward = lfilter([1.0], [1.0, -kept], series)
+        backward = lfilter([1.0], [1.0, -kept], series[::-1])[::-1]
+        return forward + backward - series
+
+    # Less a mean, so that the sums do not lose the digits of 293 K.
+    mean = float(np.mean(values))
+    return mean + both_ways(values - mean) / both_ways(np.ones_like(values))
+
+
+def without_input_noise(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+    """The recording with its measured input temperatures smoothed, and what was done in words.
+
+    Inputs that are held between readings (speeds, set points) stay as they are.
+    """
+    inputs = recording.inputs.copy()
+    notes = []
+    for column, name in enumerate(recording.input_names):
+        if recording.held[column] or recording.input_units[column] != TEMPERATURE_UNIT:
+            continue
+        done = []
+        for begin, end in recording.segments:
+            rows = begin + np.flatnonzero(np.isfinite(inputs[begin:end, column]))
+            if rows.size < FEWEST:
+                continue
+            step, noise = walk_and_noise(inputs[rows, column])
+            if noise > 0.0 and step < noise:
+                inputs[rows, column] = smoothed(inputs[rows, column], step, noise)
+                done.append(noise)
+        if done:
+            notes.append(f'input "{name}": noise of {np.sqrt(np.mean(done)):.2g} K smoothed away')
+    return replace(recording, inputs=inputs), tuple(notes)

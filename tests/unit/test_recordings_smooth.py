@@ -1,0 +1,57 @@
+"""Smoothing of measured inputs."""
+
+from dataclasses import make_dataclass
+
+import numpy as np
+import pytest
+
+from spindle_fem.recordings.smooth import smoothed, walk_and_noise, without_input_noise
+
+
+@pytest.fixture
+def walk():
+    generator = np.random.default_rng(3)
+    true = 293.0 + np.cumsum(0.004 * generator.standard_normal(4000))
+    return true, true + 0.05 * generator.standard_normal(4000)
+
+
+def test_step_and_noise_are_found(walk):
+    step, noise = walk_and_noise(walk[1])
+    assert np.sqrt(noise) == pytest.approx(0.05, rel=0.05)
+    assert np.sqrt(step) == pytest.approx(0.004, rel=0.35)
+
+
+def test_the_smoother_is_that_of_the_random_walk(walk):
+    # Against the normal equations of the same model, away from the ends.
+    read = walk[1][:300]
+    step, noise = 0.004**2, 0.05**2
+    difference = np.diff(np.eye(300), axis=0)
+    exact = np.linalg.solve(np.eye(300) / noise + difference.T @ difference / step, read / noise)
+    assert smoothed(read, step, noise)[80:220] == pytest.approx(exact[80:220], abs=2e-4)
+
+
+def test_noise_shrinks_and_a_clean_series_stays(walk):
+    true, read = walk
+    step, noise = walk_and_noise(read)
+    left = smoothed(read, step, noise) - true
+    assert left.std() < 0.35 * (read - true).std()
+    clean_step, clean_noise = walk_and_noise(true)
+    assert clean_noise < 0.1 * clean_step
+
+
+def test_held_inputs_and_other_units_stay():
+    generator = np.random.default_rng(0)
+    inputs = 290.0 + 0.05 * generator.standard_normal((400, 3))
+    kind = make_dataclass("R", ["inputs", "input_names", "held", "input_units", "segments"])
+    recording = kind(
+        inputs,
+        ("ambient", "set_point", "load"),
+        np.array([False, True, False]),
+        ("kelvin", "kelvin", "watt"),
+        np.array([[0, 400]]),
+    )
+    found, notes = without_input_noise(recording)
+    assert np.ptp(found.inputs[:, 0]) < 0.3 * np.ptp(inputs[:, 0])
+    assert np.array_equal(found.inputs[:, 1:], inputs[:, 1:])
+    assert len(notes) == 1
+    assert "ambient" in notes[0]
