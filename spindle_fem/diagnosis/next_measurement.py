@@ -33,7 +33,8 @@ from spindle_fem.diagnosis.trials import (
     trials_of,
 )
 from spindle_fem.diagnosis.verdict import TEMPERATURE, Ranked, rank
-from spindle_fem.effects.base import place_words
+from spindle_fem.effects.base import IntervalEffect, place_words
+from spindle_fem.effects.catalogue import effect_of
 from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -142,7 +143,7 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
         "where": best.sensor if best.place is not None else f"{EXISTING}, above all {best.channel}",
         "quantity": "temperature",
         "condition": best.trial.name,
-        "why": why(best, between, decided),
+        "why": why(best, between, decided) + timed_words([item.fit for item in rivals]),
         "expected_information": best.information,
         "between": between,
         "options": [
@@ -168,8 +169,8 @@ def rivals_of(diagnosis: Diagnosis) -> tuple[list[Ranked], Array, bool]:
     decided = len(found) < 2
     if decided:
         others = [item for item in rank(diagnosis.hypotheses) if item.fit.keys != found[0].fit.keys]
-        # The same set with one effect more is no other explanation.
-        others.sort(key=lambda item: item.fit.keys > found[0].fit.keys)
+        # The same set with one effect more is no other explanation, and that nothing is missing is out.
+        others.sort(key=lambda item: (item.fit.keys > found[0].fit.keys, not item.fit.candidates))
         found += others[:1]
     weights = np.ones(len(found)) if decided else np.array([item.probability for item in found])
     return found, weights / weights.sum(), decided
@@ -341,6 +342,12 @@ def shortlist(options: Sequence[Option], best: Option) -> list[Option]:
 
 def _merit(option: Option) -> tuple[float, float]:
     return round(option.information, 3), option.distance
+
+
+def timed_words(fits: Sequence[Fit]) -> str:
+    """What is taken for granted of effects that come and go; empty where there are none."""
+    timed = any(isinstance(effect_of(c.effect), IntervalEffect) for fit in fits for c in fit.candidates)
+    return " Unrecorded heat or cooling is taken to come and go as it did in the recording." if timed else ""
 
 
 def why(option: Option, between: Sequence[str], decided: bool) -> str:

@@ -128,9 +128,7 @@ class Plant:
         self.is_network = isinstance(fast, NetworkFastModel)
         if drives is None:
             drives = [
-                fast.drive(item, largest_step=np.inf)
-                if self.is_network
-                else coarse_drive(fast.spec, item, step)
+                even_drive(fast, item) if self.is_network else coarse_drive(fast.spec, item, step)
                 for item in recordings
             ]
         self.drives = tuple(replace(drive, times=drive.grid) for drive in drives)
@@ -456,3 +454,45 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
         ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
     step_class, points = classes_of(0.5 * (start + end), INLET_BIN)
     return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
+
+
+def even_drive(fast: NetworkFastModel, recording: Recording) -> Drive:
+    """Inputs of a network on equal steps of the recording's usual spacing, means over each step.
+
+    The means keep the integral of every input; one length of step makes one
+    matrix of the model.
+    """
+    fine = fast.drive(recording, largest_step=np.inf)
+    begins = np.array([0, *fine.restarts])
+    ends = np.array([*(begins[1:] - 1), len(fine.grid) - 1])
+    inside = np.ones(len(fine.steps), dtype=bool)
+    inside[begins[1:] - 1] = False
+    step = float(np.median(fine.steps[inside])) if inside.any() else float(fine.steps[0])
+    pieces, restarts, count = [], [], 0
+    for number, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        first, last = fine.grid[begin], fine.grid[end]
+        whole = max(1, int(np.ceil((last - first) / step - 1e-6)))
+        edges = first + step * np.arange(whole + 1)
+        if number + 1 < len(begins) and edges[-1] >= fine.grid[begins[number + 1]]:
+            edges[-1] = 0.5 * (last + fine.grid[begins[number + 1]])
+        if number:
+            restarts.append(count)
+        pieces.append(edges)
+        count += len(edges)
+    grid = np.concatenate(pieces)
+    total = np.vstack(
+        (
+            np.zeros(fine.start.shape[1]),
+            np.cumsum(0.5 * (fine.start + fine.end) * fine.steps[:, None], axis=0),
+        )
+    )
+    integral = np.column_stack([np.interp(grid, fine.grid, column) for column in total.T])
+    # Beyond the last reading of a segment the last input goes on; the gap that follows counts for nothing.
+    covered = np.diff(np.minimum(grid, fine.grid[-1]))
+    means = np.diff(integral, axis=0) / np.maximum(covered, 1e-9)[:, None]
+    lost = covered <= 1e-9
+    means[lost] = fine.end[-1]
+    classes = np.zeros(len(means), dtype=np.int64)
+    return replace(
+        fine, times=grid, grid=grid, start=means, end=means, step_class=classes, restarts=tuple(restarts)
+    )

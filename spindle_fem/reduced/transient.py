@@ -115,7 +115,7 @@ class TransientRun:
         self.fast, self.drive, self.derivatives = fast, drive, derivatives
         self.built: RunOperators = run_operators(fast, drive.points, parameters, derivatives, terms)
         self.operators = self.built.classes
-        self.groups = group_steps(drive.step_class, drive.steps)
+        self.groups = group_steps(drive.step_class, _stepped(drive))
         self.propagators: dict[tuple[int, float], Propagator | ExactPropagator] = {
             key: fast.propagator(self.built.storage, self.operators[key[0]].conduction, key[1])
             for key in self.groups
@@ -422,6 +422,14 @@ class TransientRun:
         values = np.vstack((tracks.added_start, tracks.added_end[-1:]))
         inputs[:, self.fast.load_names.index("coolant_inlet")] += values[:, shift].sum(axis=1)
         return np.concatenate((tracks.start_by, tracks.end_by[-1:]))[:, shift].sum(axis=1)
+
+
+def _stepped(drive: Drive) -> Array:
+    """Lengths of the steps; those that lead to given states, which nothing uses, are as the usual ones."""
+    lengths = drive.steps.copy()
+    if drive.restarts:
+        lengths[np.array(drive.restarts) - 1] = np.median(lengths)
+    return lengths
 
 
 class Tracks:
