@@ -1,0 +1,283 @@
+"""Analytical friction in the fast model: a map over speed, thrust and film temperature.
+
+While expansion is not followed, the mechanics of a bearing depend on speed,
+thrust and the temperature of its film alone (a quarter of each raceway and half
+of the balls). The map is solved once by the definition's own heat model; the
+fast model then takes a heat table and constant ball rows, and a term that makes
+both those of the film temperature of the moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebval, chebvander
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from spindle_fem.effects.term import Operating, Term, TermContext
+from spindle_fem.errors import OutOfValidityError, SpecError
+from spindle_fem.loads.bearing_heat import BearingMechanics
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.spec.model import HeatTable, MachineSpec
+from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
+
+Array = NDArray[np.float64]
+
+# Of the highest speed; friction moments bend most where films are thin.
+SPEED_SHARES = (0.02, 0.04, 0.08, 0.14, 0.22, 0.32, 0.44, 0.58, 0.72, 0.86, 1.0)
+FILM_TEMPERATURES = (ZERO_CELSIUS_K + 5.0, ZERO_CELSIUS_K + 95.0)
+TEMPERATURE_POINTS = 8
+NOMINAL_FILM_TEMPERATURE = ZERO_CELSIUS_K + 30.0
+TABLE_POINTS = 61
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrictionMap:
+    """Friction moment and ball conductance of every bearing.
+
+    Attributes
+    ----------
+    bearings : tuple of str
+    speed : (n_speeds,) ndarray, [rad/s]
+    thrust : (n_thrusts,) ndarray, [N]
+    moments : CubicSpline
+        Over the logarithm of the speed, (n_thrusts, n_bearings, n_t): Chebyshev
+        coefficients, over the film temperature, of the logarithm of the moment.
+    conductances : CubicSpline
+        Over the same, (n_thrusts, 2 n_bearings, n_t): of the conductance between
+        the balls and the inner and the outer raceway of each bearing in turn.
+    """
+
+    bearings: tuple[str, ...]
+    speed: Array
+    thrust: Array
+    moments: CubicSpline
+    conductances: CubicSpline
+
+    def log_moment(self, speed: float, thrust: float, film_temperature: NDArray) -> NDArray:
+        """Natural logarithm of the friction moment in N·m.
+
+        Below the first speed of the map the moment is that of the first; beyond
+        its temperatures the logarithm goes on along its tangent.
+
+        Parameters
+        ----------
+        speed : float, [rad/s]
+        thrust : float, [N]
+        film_temperature : (n_bearings, k) ndarray, [K]
+            May be complex, for derivatives.
+        """
+        return _series(self._at(self.moments, speed, thrust), film_temperature)
+
+    def log_conductance(self, speed: float, thrust: float, film_temperature: NDArray) -> NDArray:
+        """Logarithm of the conductance in W/K between balls and raceways, (n_bearings, 2, k).
+
+        Parameters as for :meth:`log_moment`.
+        """
+        twice = np.repeat(film_temperature, 2, axis=0)
+        found = _series(self._at(self.conductances, speed, thrust), twice)
+        return found.reshape(len(self.bearings), 2, -1)
+
+    def heat(self, speed: float, thrust: float, film_temperature: Array) -> Array:
+        """Friction heat of every bearing before its factors, (n_bearings,) [W].
+
+        Parameters
+        ----------
+        film_temperature : (n_bearings,) ndarray, [K]
+        """
+        return speed * np.exp(self.log_moment(speed, thrust, film_temperature[:, None])[:, 0])
+
+    def nominal_conductance(self, speed: float, thrust: float) -> Array:
+        """Between balls and inner and outer raceway with films at 30 °C, (n_bearings, 2) [W/K]."""
+        film = np.full((len(self.bearings), 1), NOMINAL_FILM_TEMPERATURE)
+        return np.exp(self.log_conductance(speed, thrust, film)[:, :, 0])
+
+    def _at(self, curves: CubicSpline, speed: float, thrust: float) -> Array:
+        self._require(speed, thrust)
+        values = curves(np.log(max(speed, self.speed[0])))
+        if len(self.thrust) == 1:
+            return values[0]
+        after = int(np.clip(np.searchsorted(self.thrust, thrust), 1, len(self.thrust) - 1))
+        low, high = self.thrust[after - 1 : after + 1]
+        part = (thrust - low) / (high - low)
+        return (1.0 - part) * values[after - 1] + part * values[after]
+
+    def _require(self, speed: float, thrust: float) -> None:
+        for name, value, known in (("speed", speed, self.speed), ("thrust", thrust, self.thrust)):
+            lowest = 0.0 if name == "speed" else known[0]
+            slack = 1e-6 * max(known[-1], 1.0)
+            if not lowest - slack <= value <= known[-1] + slack:
+                raise OutOfValidityError(
+                    f"friction map: {name}",
+                    f"{value:.6g} is outside {lowest:.6g} to {known[-1]:.6g}.",
+                    "Tabulate the friction over a range that holds it.",
+                )
+
+
+def _series(coefficients: Array, film_temperature: NDArray) -> NDArray:
+    """Chebyshev series of each row at its temperatures, (rows, k)."""
+    low, high = FILM_TEMPERATURES
+    scaled = (2.0 * film_temperature - low - high) / (high - low)
+    ends = np.clip(scaled.real, -1.0, 1.0)
+    inside = np.where(np.abs(scaled.real) <= 1.0, scaled, ends)
+    order = coefficients.T[:, :, None]
+    slope = chebder(coefficients, axis=1).T[:, :, None]
+    found = chebval(inside, order, tensor=False)
+    return found + chebval(ends, slope, tensor=False) * (scaled - inside)
+
+
+def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence[float]) -> FrictionMap:
+    """Solve a machine's bearings over speed, thrust and film temperature.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+        With an analytical or empirical heat model.
+    highest_speed : float, [rad/s]
+    thrusts : sequence of float, [N]
+        That occur; linear between them.
+
+    Raises
+    ------
+    SpecError
+        Heat by table, or heat that follows expansion.
+    NoEquilibriumError, OutOfValidityError
+    """
+    if spec.heat.model == "table":
+        raise SpecError("heat.model", "the heat is given by table already.", "Use the machine as it is.")
+    if spec.heat.thermal_preload:
+        raise SpecError(
+            "heat.thermal_preload",
+            "with it heat follows every ring, and no table over one film temperature holds.",
+            "Switch it off for the fast model, or run the full model.",
+        )
+    mechanics = BearingMechanics(spec)
+    names = tuple(bearing.name for _, bearing in spec.bearings)
+    factors = np.array([group.heat_factor.value for group, _ in spec.bearings])[:, None]
+    speeds = highest_speed * np.array(SPEED_SHARES)
+    loads = np.unique(np.asarray(thrusts, dtype=float))
+    low, high = FILM_TEMPERATURES
+    nodes = np.cos(np.pi * (np.arange(TEMPERATURE_POINTS) + 0.5) / TEMPERATURE_POINTS)
+    kelvin = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+    moments = np.empty((len(speeds), len(loads), len(names), TEMPERATURE_POINTS))
+    conductances = np.empty((len(speeds), len(loads), len(names), 2, TEMPERATURE_POINTS))
+    fit = chebvander(nodes, TEMPERATURE_POINTS - 1)
+    for i, speed in enumerate(speeds):
+        for j, thrust in enumerate(loads):
+            curves = mechanics.over_film_temperature(_point(spec, speed, thrust), kelvin)
+            heat = np.array([curves[name].heat for name in names]) / factors
+            moments[i, j] = np.linalg.solve(fit, np.log(heat / speed).T).T
+            for side, word in enumerate(("inner", "outer")):
+                values = np.array([getattr(curves[name], f"conductance_{word}") for name in names])
+                conductances[i, j, :, side] = np.linalg.solve(fit, np.log(values).T).T
+    conductances = conductances.reshape(len(speeds), len(loads), -1, TEMPERATURE_POINTS)
+    at = np.log(speeds)
+    return FrictionMap(names, speeds, loads, CubicSpline(at, moments), CubicSpline(at, conductances))
+
+
+def _point(spec: MachineSpec, speed: float, thrust: float) -> OperatingPoint:
+    given = OperatingPoint.of(spec)
+    return OperatingPoint(
+        float(speed),
+        float(thrust),
+        given.ambient_temperature,
+        given.coolant_inlet_temperature,
+        given.coolant_flow,
+    )
+
+
+class FilmHeat(Term):
+    """Friction and ball rows of a map at the film temperature of the moment.
+
+    Parameters
+    ----------
+    friction_map : FrictionMap
+    machine : MachineSpec
+    table : MachineSpec
+        As :func:`tabulated_machine` makes it of the machine and the map.
+    """
+
+    name = "film_heat"
+
+    def __init__(self, friction_map: FrictionMap, machine: MachineSpec, table: MachineSpec) -> None:
+        self._map = friction_map
+        self.bearings = friction_map.bearings
+        sides = ("inner_raceway", "outer_raceway", "balls")
+        self.reads = tuple(f"{name}.{side}" for name in self.bearings for side in sides)
+        self._grid = np.asarray(table.heat.table.speed)
+        self._table = np.array([table.heat.table.heat[name] for name in self.bearings])
+        self._conductance = np.array([group.ball_row.conductance.value for group, _ in table.bearings])
+        # Ball rows of constant conductance stay as they are.
+        self._follow = np.flatnonzero([group.ball_row.kind == "contact" for group, _ in machine.bearings])
+        self.heat_places = tuple(self.reads[3 * row + side] for row in self._follow for side in range(3))
+
+    def _film(self, context: TermContext) -> tuple[NDArray, NDArray]:
+        """Temperatures by bearing and side, and of the film."""
+        by_bearing = context.temperatures.reshape(len(self.bearings), 3, -1)
+        return by_bearing, 0.25 * (by_bearing[:, 0] + by_bearing[:, 1]) + 0.5 * by_bearing[:, 2]
+
+    def friction(self, context: TermContext) -> NDArray[np.complex128]:
+        """Heat of the map over that of the table; 1 at standstill."""
+        speed, thrust = float(context.inputs["speed"]), float(context.inputs["thrust"])
+        _, film = self._film(context)
+        if speed == 0.0:
+            return np.ones_like(film)
+        tabulated = np.array([np.interp(speed, self._grid, row) for row in self._table])
+        moment = self._map.log_moment(speed, thrust, film)
+        return np.exp(moment + np.log(speed / tabulated)[:, None])
+
+    def heat(self, context: TermContext) -> NDArray[np.complex128]:
+        """What flows between balls and raceways beside what flows with a film at 30 °C."""
+        speed, thrust = float(context.inputs["speed"]), float(context.inputs["thrust"])
+        temperatures, film = self._film(context)
+        nominal = np.full((len(film), 1), NOMINAL_FILM_TEMPERATURE)
+        more = np.exp(self._map.log_conductance(speed, thrust, film)) - np.exp(
+            self._map.log_conductance(speed, thrust, nominal)
+        )
+        flow = more * (temperatures[:, 2:] - temperatures[:, :2])
+        found = np.concatenate((flow, -flow.sum(axis=1, keepdims=True)), axis=1)
+        return found[self._follow].reshape(len(self.heat_places), -1)
+
+    def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Conductances between balls and raceways at a speed and thrust, over the constant ones."""
+        found = self._map.nominal_conductance(point.speed, point.thrust) / self._conductance[:, None]
+        return {
+            f"balls.{self.bearings[row]}.{side}": float(found[row, column])
+            for row in self._follow
+            for column, side in enumerate(("inner", "outer"))
+        }
+
+
+def tabulated_machine(spec: MachineSpec, friction_map: FrictionMap) -> MachineSpec:
+    """A machine with a heat table and constant ball rows in place of its analytical friction.
+
+    The table holds at the definition's thrust and a film of 30 °C, the ball
+    rows at the definition's speed (two thirds of the highest where it stands
+    still); :class:`FilmHeat` makes both right elsewhere.
+    """
+    operation = spec.operation
+    thrust = float(np.clip(operation.thrust, friction_map.thrust[0], friction_map.thrust[-1]))
+    grid = np.linspace(0.0, friction_map.speed[-1], TABLE_POINTS)
+    nominal = np.full(len(friction_map.bearings), NOMINAL_FILM_TEMPERATURE)
+    heat = np.array([friction_map.heat(speed, thrust, nominal) for speed in grid])
+    turning = operation.speed or 2.0 / 3.0 * friction_map.speed[-1]
+    conductance = friction_map.nominal_conductance(min(turning, friction_map.speed[-1]), thrust).mean(axis=1)
+    by_name = dict(zip(friction_map.bearings, conductance.tolist(), strict=True))
+    table = HeatTable.model_construct(
+        speed=tuple(grid.tolist()),
+        heat={name: tuple(heat[:, i].tolist()) for i, name in enumerate(friction_map.bearings)},
+        thrust_coefficient={},
+        reference_thrust=max(thrust, 1.0),
+    )
+    sets = []
+    for group in spec.bearing_set:
+        row = group.ball_row
+        if row.kind == "contact":
+            mean = float(np.mean([by_name[bearing.name] for bearing in group.bearing]))
+            row = row.model_copy(update={"kind": "constant", "conductance": Uncertain(mean)})
+        sets.append(group.model_copy(update={"ball_row": row}))
+    heat_model = spec.heat.model_copy(update={"model": "table", "table": table})
+    return spec.model_copy(update={"heat": heat_model, "bearing_set": tuple(sets)})
