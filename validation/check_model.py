@@ -17,16 +17,26 @@ from .reduction import (
     load_reduced,
     nominal_coefficients,
 )
-from .stepping import bearing_heat
+from .stepping import bearing_heat, shaft_end_film
 
 COLUMNS = (*m.PROBES, "COOLANT_OUT")
+
+
+def coefficients_at(speed: float, groups: dict[str, object]) -> dict[str, float]:
+    """Nominal coefficients of every group at a speed."""
+    air = {
+        "gap": 8.0 + 12.0 * (speed / 3000.0) ** 0.75,
+        "nose_end": shaft_end_film(speed, 0.18),
+        "drive_end": shaft_end_film(speed, 0.11),
+    }
+    return nominal_coefficients(groups) | air
 
 
 def steady_full(
     fv: FiniteVolumes, speed: float = 3000.0, inlet: float = 15.0, ambient: float = 17.6, rate: float = 0.0
 ) -> tuple[np.ndarray, float]:
     """Readings of the unreduced model, and heat out over heat in; ``rate`` > 0 answers at 1/s instead."""
-    coefficients = nominal_coefficients(fv.pair_groups | fv.film_groups)
+    coefficients = coefficients_at(speed, fv.pair_groups | fv.film_groups)
     film, capacity, _ = (float(x) for x in channel_film(inlet))
     operator, used = full_operator(fv, coefficients, film)
     factors = factorise((operator + rate * sparse.diags(fv.capacity)).tocsc())
@@ -51,7 +61,8 @@ def steady_full(
 def steady_reduced(model, speed: float = 3000.0, inlet: float = 15.0, ambient: float = 17.6) -> np.ndarray:
     """The same readings by the reduced model."""
     film, capacity, _ = (float(x) for x in channel_film(inlet))
-    used = conductance(model.nominal, model.series)
+    nominal = coefficients_at(speed, dict.fromkeys(model.groups))
+    used = conductance(np.array([nominal[name] for name in model.groups]), model.series)
     matrix, load, row, factor = model.coolant_terms(film, capacity)
     force = (used * ambient) @ model.loads + load * inlet
     for bearing, watts in zip(m.BEARINGS, bearing_heat(speed, 1750.0), strict=True):

@@ -22,7 +22,7 @@ def volumes():
 
 @pytest.fixture(scope="module")
 def reduced(volumes):
-    return project(volumes, build_basis(volumes, size=90, draws=2, seed=3))
+    return project(volumes, build_basis(volumes, size=150, draws=2, seed=3))
 
 
 def test_shares_nothing_with_the_program_it_tries_to_fool():
@@ -111,9 +111,9 @@ def test_long_run_ends_at_the_steady_state(reduced, volumes):
     )
     path = run(reduced, drive, nominal_machine())
     steady = steady_reduced(reduced)
-    # The nominal films of the steady check are those of rounded 3000 rpm values; ends and gap follow speed here.
+    # Factors are kept for steps of 0.3 % in the oil's film and flow.
     assert np.abs(path.readings[-1] - path.readings[-60]).max() < 1e-3
-    assert np.abs(path.readings[-1] - steady).max() < 0.6
+    assert np.abs(path.readings[-1] - steady).max() < 0.02
 
 
 def test_step_is_of_second_order(reduced):
@@ -145,7 +145,8 @@ def test_cycles_last_hours_and_stay_within_the_table(cycle):
     for seed in range(6):
         drive = draw_drive(np.random.default_rng(seed), cycle=cycle).drive
         assert 4 * 3600 < drive.time[-1] < 6.1 * 3600
-        assert drive.speed.max() <= 4500 and drive.speed.min() == 0
+        assert drive.speed.max() <= 4500
+        assert drive.speed.min() == 0
         assert (drive.thrust[drive.speed == 0] <= 1750).all()
 
 
