@@ -90,8 +90,12 @@ def main(arguments: list[str] | None = None) -> None:
         began = time.perf_counter()
         fv = assemble(m.build_grid(sectors, refine))
         values, balance = steady_full(fv)
-        print(f"{f'{sectors} x {refine}':18s}{fv.size:9d}" + "".join(f"{v:13.3f}" for v in values)
-              + f"{balance:12.8f}{time.perf_counter() - began:7.1f}", flush=True)  # fmt: skip
+        print(
+            f"{f'{sectors} x {refine}':18s}{fv.size:9d}"
+            + "".join(f"{v:13.3f}" for v in values)
+            + f"{balance:12.8f}{time.perf_counter() - began:7.1f}",
+            flush=True,
+        )
     values = steady_reduced(load_reduced())
     print(f"{'32 x 1 reduced':18s}{load_reduced().size:9d}" + "".join(f"{v:13.3f}" for v in values))
 

@@ -12,10 +12,17 @@ from .reduction import ReducedSpindle
 from .stepping import Path
 
 KINDS = {
-    "joint_conductance": "parameter", "heat_split": "parameter", "heat_scale": "parameter",
-    "heat_capacity": "parameter", "sensor_offset": "sensor", "sensor_gain": "sensor", "sensor_lag": "sensor",
-    "sensor_drift": "sensor", "sensor_detached": "sensor", "clock_shift": "sensor",
-}  # fmt: skip
+    "joint_conductance": "parameter",
+    "heat_split": "parameter",
+    "heat_scale": "parameter",
+    "heat_capacity": "parameter",
+    "sensor_offset": "sensor",
+    "sensor_gain": "sensor",
+    "sensor_lag": "sensor",
+    "sensor_drift": "sensor",
+    "sensor_detached": "sensor",
+    "clock_shift": "sensor",
+}
 _SET_NAMES = {"F": ["F1", "F2", "F3", "front_bearings"], "R": ["R1", "R2", "rear_bearings"]}
 _PRIMARY = {"F": "front_bearings", "R": "rear_bearings"}
 
@@ -94,9 +101,13 @@ def _heat_split(s: Scene) -> Concealed:
     where, component, fine = _bearings(s)
     change = s.sign() * s.rng.uniform(0.12, 0.3) * s.strength
     return Concealed(
-        "heat_split", component, fine, change, laws.HeatSplit(where, change),
+        "heat_split",
+        component,
+        fine,
+        change,
+        laws.HeatSplit(where, change),
         parameters={"inner_share_change": (change, "")},
-    )  # fmt: skip
+    )
 
 
 def _joint(s: Scene) -> Concealed:
@@ -147,9 +158,10 @@ def _churning(s: Scene) -> Concealed:
     where, component, fine = _bearings(s)
     amplitude = s.log(0.35, 1.0) * s.strength
     form = {
-        "decay": s.log(900, 4500), "stretch": s.rng.uniform(0.75, 1.3),
+        "decay": s.log(900, 4500),
+        "stretch": s.rng.uniform(0.75, 1.3),
         "recovery": float(s.rng.choice([0.0, 0.0, 9000.0])),
-    }  # fmt: skip
+    }
     return Concealed(
         "grease_churning", component, fine, amplitude, laws.Churning(where, amplitude, **form), form=form
     )
@@ -165,9 +177,14 @@ def _starvation(s: Scene) -> Concealed:
         onset = float(s.rng.uniform(low, high))
     form = {"width": s.rng.uniform(40, 200), "delay": s.rng.uniform(0, 500), "growth": s.rng.uniform(0, 0.4)}
     return Concealed(
-        "starvation", component, fine, amplitude, laws.Starvation(where, amplitude, onset, **form),
-        parameters={"onset_speed": (onset, "rpm")}, form=form,
-    )  # fmt: skip
+        "starvation",
+        component,
+        fine,
+        amplitude,
+        laws.Starvation(where, amplitude, onset, **form),
+        parameters={"onset_speed": (onset, "rpm")},
+        form=form,
+    )
 
 
 def _seal(s: Scene) -> Concealed:
@@ -176,9 +193,14 @@ def _seal(s: Scene) -> Concealed:
     places = (("nose", 0.7), ("nose_cover", 0.3)) if place == "nose" else (("drive_lip", 1.0),)
     form = {"exponent": s.rng.uniform(0.85, 1.15), "wear": float(s.rng.choice([0.0, 4000.0]))}
     return Concealed(
-        "seal_friction", place, [place, *(["shaft"] if place == "drive_end" else [])], heat,
-        laws.SpeedHeat(places, heat, 1000.0, **form), parameters={"heat_per_1000rpm": (heat, "W")}, form=form,
-    )  # fmt: skip
+        "seal_friction",
+        place,
+        [place, *(["shaft"] if place == "drive_end" else [])],
+        heat,
+        laws.SpeedHeat(places, heat, 1000.0, **form),
+        parameters={"heat_per_1000rpm": (heat, "W")},
+        form=form,
+    )
 
 
 def _windage(s: Scene) -> Concealed:
@@ -187,9 +209,14 @@ def _windage(s: Scene) -> Concealed:
     shared = s.rng.uniform(0.0, 0.3)
     law = laws.SpeedHeat((("shaft_gap", 1.0 - shared), ("housing_bore", shared)), heat, 4500.0, **form)
     return Concealed(
-        "windage", "shaft", ["shaft"], heat, law, parameters={"heat_at_4500rpm": (heat, "W")},
+        "windage",
+        "shaft",
+        ["shaft"],
+        heat,
+        law,
+        parameters={"heat_at_4500rpm": (heat, "W")},
         form=form | {"housing_share": shared},
-    )  # fmt: skip
+    )
 
 
 def _drive(s: Scene) -> Concealed:
@@ -200,9 +227,14 @@ def _drive(s: Scene) -> Concealed:
         "load_share": s.rng.uniform(0, 0.15),
     }
     return Concealed(
-        "drive_heat", "drive_end", ["drive_end"], heat, laws.SpeedHeat((("drive_end", 1.0),), heat, 3000.0, **form),
-        parameters={"heat_at_3000rpm": (heat, "W")}, form=form,
-    )  # fmt: skip
+        "drive_heat",
+        "drive_end",
+        ["drive_end"],
+        heat,
+        laws.SpeedHeat((("drive_end", 1.0),), heat, 3000.0, **form),
+        parameters={"heat_at_3000rpm": (heat, "W")},
+        form=form,
+    )
 
 
 def _gap_closure(s: Scene) -> Concealed:
@@ -220,9 +252,14 @@ def _mount(s: Scene) -> Concealed:
     difference = s.sign() * s.rng.uniform(4, 14) * s.strength
     form = {"build_up": s.rng.uniform(2000, 9000), "constant": s.rng.uniform(0.6, 1.0)}
     return Concealed(
-        "mount_sink", "flange", ["flange"], difference, laws.MountSink(difference, **form),
-        parameters={"temperature_above_ambient": (difference, "K")}, form=form,
-    )  # fmt: skip
+        "mount_sink",
+        "flange",
+        ["flange"],
+        difference,
+        laws.MountSink(difference, **form),
+        parameters={"temperature_above_ambient": (difference, "K")},
+        form=form,
+    )
 
 
 def _shaft_convection(s: Scene) -> Concealed:
@@ -264,15 +301,24 @@ def _coolant_film(s: Scene) -> Concealed:
         }
         amplitude = s.log(0.8, 3.0) * s.strength
         return Concealed(
-            "coolant_film", "channel", ["channel"], amplitude, laws.FilmTransition(amplitude, **form),
+            "coolant_film",
+            "channel",
+            ["channel"],
+            amplitude,
+            laws.FilmTransition(amplitude, **form),
             form=form | {"form": "transition"},
-        )  # fmt: skip
+        )
     factor = float(np.exp(-s.rng.uniform(0.4, 1.1) * s.strength))
     growth = s.rng.uniform(0.0, 0.1)
     return Concealed(
-        "coolant_film", "channel", ["channel"], factor, laws.Fouling(factor, growth),
-        parameters={"factor": (factor, "")}, form={"form": "fouling", "growth": growth},
-    )  # fmt: skip
+        "coolant_film",
+        "channel",
+        ["channel"],
+        factor,
+        laws.Fouling(factor, growth),
+        parameters={"factor": (factor, "")},
+        form={"form": "fouling", "growth": growth},
+    )
 
 
 def _bypass(s: Scene) -> Concealed:
@@ -295,40 +341,60 @@ def _chiller(s: Scene) -> Concealed:
         "wander": tuple(s.rng.normal(0, 0.05, 8)),
     }
     return Concealed(
-        "chiller_cycling", "channel", ["channel"], amplitude, laws.Wave(amplitude, period, **form),
+        "chiller_cycling",
+        "channel",
+        ["channel"],
+        amplitude,
+        laws.Wave(amplitude, period, **form),
         parameters={"period": (period, "s"), "amplitude": (amplitude, "K")},
         form=form | {"wander": list(form["wander"])},
-    )  # fmt: skip
+    )
 
 
 def _room(s: Scene) -> Concealed:
     amplitude = s.sign() * s.rng.uniform(4, 9) * s.strength
     form = {
-        "shape": str(s.rng.choice(["ramp", "jump", "hump"])), "at": s.rng.uniform(0.3, 0.6),
+        "shape": str(s.rng.choice(["ramp", "jump", "hump"])),
+        "at": s.rng.uniform(0.3, 0.6),
         "total": float(s.plan.drive.time[-1]),
-    }  # fmt: skip
+    }
     law = laws.RoomDrift(amplitude, **form)
     return Concealed("ambient_drift", "ambient", ["ambient", "flange", "housing"], amplitude, law, form=form)
 
 
 def _capacity(s: Scene) -> Concealed:
-    place, component = [("flange", "flange"), ("housing_rear_top", "housing"), ("nose", "nose"), ("drive_end", "drive_end"),
-                        ("housing_front_top", "housing")][s.rng.integers(5)]  # fmt: skip
+    place, component = [
+        ("flange", "flange"),
+        ("housing_rear_top", "housing"),
+        ("nose", "nose"),
+        ("drive_end", "drive_end"),
+        ("housing_front_top", "housing"),
+    ][s.rng.integers(5)]
     capacity = s.log(5000, 20000) * s.strength
     form = {"conductance": s.log(8, 30)}
     return Concealed(
-        "heat_capacity", component, [component, *(["shaft"] if place in ("nose", "drive_end") else [])], capacity,
-        laws.ExtraMass(place, capacity, **form), parameters={"capacity": (capacity, "J/K")}, form=form | {"place": place},
-    )  # fmt: skip
+        "heat_capacity",
+        component,
+        [component, *(["shaft"] if place in ("nose", "drive_end") else [])],
+        capacity,
+        laws.ExtraMass(place, capacity, **form),
+        parameters={"capacity": (capacity, "J/K")},
+        form=form | {"place": place},
+    )
 
 
 _PLACES = {
-    "housing_middle_top": ("housing", ["SP04", "housing"]), "housing_front_top": ("housing", ["housing", "front_bearings"]),
-    "housing_rear_top": ("housing", ["housing", "SP05", "rear_bearings"]), "flange_rim": ("flange", ["flange"]),
-    "nose": ("nose", ["nose", "shaft"]), "drive_end": ("drive_end", ["drive_end", "shaft"]),
-    "shaft_middle": ("shaft", ["shaft"]), "housing_middle_bottom": ("housing", ["housing"]),
-    "housing_bore": ("housing", ["SP04", "housing"]), "F2.outer": ("F2", ["F1", "F2", "F3", "front_bearings"]),
-}  # fmt: skip
+    "housing_middle_top": ("housing", ["SP04", "housing"]),
+    "housing_front_top": ("housing", ["housing", "front_bearings"]),
+    "housing_rear_top": ("housing", ["housing", "SP05", "rear_bearings"]),
+    "flange_rim": ("flange", ["flange"]),
+    "nose": ("nose", ["nose", "shaft"]),
+    "drive_end": ("drive_end", ["drive_end", "shaft"]),
+    "shaft_middle": ("shaft", ["shaft"]),
+    "housing_middle_bottom": ("housing", ["housing"]),
+    "housing_bore": ("housing", ["SP04", "housing"]),
+    "F2.outer": ("F2", ["F1", "F2", "F3", "front_bearings"]),
+}
 
 
 def _intervals(s: Scene) -> tuple[tuple[float, float, float], ...]:
@@ -354,24 +420,44 @@ def _source(s: Scene) -> Concealed:
     form = {"delay": s.rng.uniform(30, 500)}
     mean = watts * sum(v * (b - a) for a, b, v in spans) / sum(b - a for a, b, _ in spans)
     return Concealed(
-        "unrecorded_heat_source", component, list(fine), watts, laws.Intervals(place, watts, spans, **form),
-        parameters={"heat": (mean, "W")}, intervals=[[a, b] for a, b, _ in spans], form=form | {"place": place},
-    )  # fmt: skip
+        "unrecorded_heat_source",
+        component,
+        list(fine),
+        watts,
+        laws.Intervals(place, watts, spans, **form),
+        parameters={"heat": (mean, "W")},
+        intervals=[[a, b] for a, b, _ in spans],
+        form=form | {"place": place},
+    )
 
 
 def _cooling(s: Scene) -> Concealed:
-    place = str(s.rng.choice(["housing_middle_top", "housing_rear_top", "housing_all", "housing_rear_all", "flange_rim",
-                              "drive_end"]))  # fmt: skip
+    place = str(
+        s.rng.choice(
+            [
+                "housing_middle_top",
+                "housing_rear_top",
+                "housing_all",
+                "housing_rear_all",
+                "flange_rim",
+                "drive_end",
+            ]
+        )
+    )
     component, fine = _PLACES.get(place, ("housing", ["housing"]))
     conductance = s.log(4, 12) * s.strength
     spans = _intervals(s)
     form = {"delay": s.rng.uniform(30, 500)}
     return Concealed(
-        "unrecorded_cooling", component, list(fine), conductance,
+        "unrecorded_cooling",
+        component,
+        list(fine),
+        conductance,
         laws.Intervals(place, 0.0, spans, conductance=conductance, **form),
-        parameters={"conductance": (conductance, "W/K")}, intervals=[[a, b] for a, b, _ in spans],
+        parameters={"conductance": (conductance, "W/K")},
+        intervals=[[a, b] for a, b, _ in spans],
         form=form | {"place": place},
-    )  # fmt: skip
+    )
 
 
 def _sensor(kind: str) -> Callable[[Scene], Concealed]:
@@ -395,9 +481,14 @@ def _sensor(kind: str) -> Callable[[Scene], Concealed]:
             size, names = s.sign() * s.log(120, 600) * s.strength, ("shift", "s")
         name = machine.CHANNELS[channel]
         return Concealed(
-            kind, name, [name], size, sensor=Sensor(kind, channel, size, onset, shape),
-            parameters={names[0]: (size, names[1])} if names else {}, form={"onset": onset, "shape": shape},
-        )  # fmt: skip
+            kind,
+            name,
+            [name],
+            size,
+            sensor=Sensor(kind, channel, size, onset, shape),
+            parameters={names[0]: (size, names[1])} if names else {},
+            form={"onset": onset, "shape": shape},
+        )
 
     return draw
 
@@ -408,29 +499,55 @@ def _thrust_heat(s: Scene) -> Concealed:
     watts = s.log(40, 120) * s.strength
     exponent = s.rng.uniform(0.8, 1.4)
     return Concealed(
-        "unrecorded_heat_source", component, [component, "front_bearings", "shaft", "housing"], watts,
-        laws.LoadHeat(place, watts, exponent), follows="thrust", outside_catalogue=True,
+        "unrecorded_heat_source",
+        component,
+        [component, "front_bearings", "shaft", "housing"],
+        watts,
+        laws.LoadHeat(place, watts, exponent),
+        follows="thrust",
+        outside_catalogue=True,
         form={"place": place, "exponent": exponent, "law": "heat follows the thrust"},
-    )  # fmt: skip
+    )
 
 
 def _brake_heat(s: Scene) -> Concealed:
     watts = s.log(1500, 5000) / 60.0 * s.strength
     return Concealed(
-        "unrecorded_heat_source", "drive_end", ["drive_end", "shaft"], watts, laws.BrakeHeat("drive_end", watts),
-        follows="change of speed", outside_catalogue=True, form={"law": "heat from every change of speed"},
-    )  # fmt: skip
+        "unrecorded_heat_source",
+        "drive_end",
+        ["drive_end", "shaft"],
+        watts,
+        laws.BrakeHeat("drive_end", watts),
+        follows="change of speed",
+        outside_catalogue=True,
+        form={"law": "heat from every change of speed"},
+    )
 
 
 MACHINE_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {
-    "heat_scale": _heat_scale, "heat_split": _heat_split, "joint_conductance": _joint,
-    "thermal_preload": _thermal_preload, "viscosity_heat": _viscosity, "grease_churning": _churning,
-    "starvation": _starvation, "seal_friction": _seal, "windage": _windage, "drive_heat": _drive,
-    "gap_closure": _gap_closure, "mount_sink": _mount, "shaft_convection": _shaft_convection,
-    "radiation": _radiation, "natural_convection": _natural, "coolant_film": _coolant_film,
-    "coolant_bypass": _bypass, "chiller_cycling": _chiller, "ambient_drift": _room, "heat_capacity": _capacity,
-    "unrecorded_heat_source": _source, "unrecorded_cooling": _cooling,
-}  # fmt: skip
+    "heat_scale": _heat_scale,
+    "heat_split": _heat_split,
+    "joint_conductance": _joint,
+    "thermal_preload": _thermal_preload,
+    "viscosity_heat": _viscosity,
+    "grease_churning": _churning,
+    "starvation": _starvation,
+    "seal_friction": _seal,
+    "windage": _windage,
+    "drive_heat": _drive,
+    "gap_closure": _gap_closure,
+    "mount_sink": _mount,
+    "shaft_convection": _shaft_convection,
+    "radiation": _radiation,
+    "natural_convection": _natural,
+    "coolant_film": _coolant_film,
+    "coolant_bypass": _bypass,
+    "chiller_cycling": _chiller,
+    "ambient_drift": _room,
+    "heat_capacity": _capacity,
+    "unrecorded_heat_source": _source,
+    "unrecorded_cooling": _cooling,
+}
 SENSOR_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {
     name: _sensor(name)
     for name in (

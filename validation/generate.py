@@ -88,17 +88,27 @@ def _identify(study: Study, effects: list[Concealed]) -> dict[str, object]:
         if mimic.effect in own or key in seen:
             continue
         seen.add(key)
-        best.append({"effect": mimic.effect, "component": mimic.component, "form": mimic.form,
-                     "ratio": round(left_ratio, 3), "chi2": round(left_chi2, 1)})  # fmt: skip
+        best.append(
+            {
+                "effect": mimic.effect,
+                "component": mimic.component,
+                "form": mimic.form,
+                "ratio": round(left_ratio, 3),
+                "chi2": round(left_chi2, 1),
+            }
+        )
     same = [row for row in table if row[0].effect in own]
     twins = []
     if len(effects) == 2:
         twins = _pair_twins(study, effects, parts, change, mimics, columns)
     return {
-        "ratio": round(ratio, 3), "chi2": round(chi2, 1), "each": each,
+        "ratio": round(ratio, 3),
+        "chi2": round(chi2, 1),
+        "each": each,
         "own_simple_form": {"ratio": round(same[0][2], 3), "chi2": round(same[0][3], 1)} if same else None,
-        "best_mimics": best[:6], "pair_mimics": twins,
-    }  # fmt: skip
+        "best_mimics": best[:6],
+        "pair_mimics": twins,
+    }
 
 
 def _pair_twins(study, effects, parts, change, mimics, columns) -> list[dict[str, object]]:
@@ -112,8 +122,16 @@ def _pair_twins(study, effects, parts, change, mimics, columns) -> list[dict[str
             left = study.fit_linear(change, np.column_stack([direction, column]))
             rows.append((left[1], left[0], mimic))
         chi2, ratio, mimic = min(rows, key=lambda row: row[0])
-        out.append({"kept": kept.effect, "instead_of": effect.effect, "effect": mimic.effect,
-                    "component": mimic.component, "ratio": round(ratio, 3), "chi2": round(chi2, 1)})  # fmt: skip
+        out.append(
+            {
+                "kept": kept.effect,
+                "instead_of": effect.effect,
+                "effect": mimic.effect,
+                "component": mimic.component,
+                "ratio": round(ratio, 3),
+                "chi2": round(chi2, 1),
+            }
+        )
     return out
 
 
@@ -170,9 +188,14 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
     """Verdict, what else counts as right, and how clear the case is."""
     verdict = _verdict_of(effects)
     out: dict[str, object] = {
-        "verdict": verdict, "true_verdict": verdict, "acceptable_verdicts": [verdict], "detectable": True,
-        "clear": bool(effects), "acceptable_sets": [_set_of(effects)], "indistinguishable": [],
-    }  # fmt: skip
+        "verdict": verdict,
+        "true_verdict": verdict,
+        "acceptable_verdicts": [verdict],
+        "detectable": True,
+        "clear": bool(effects),
+        "acceptable_sets": [_set_of(effects)],
+        "indistinguishable": [],
+    }
     if not effects or known is None:
         return out
     verdicts = out["acceptable_verdicts"]
@@ -221,12 +244,17 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
 
 def _effect_answer(effect: Concealed) -> dict[str, object]:
     return {
-        "effect": effect.effect, "kind": effect.kind, "component": effect.component,
-        "acceptable_components": effect.acceptable, "amplitude": float(f"{effect.amplitude:.4g}"),
+        "effect": effect.effect,
+        "kind": effect.kind,
+        "component": effect.component,
+        "acceptable_components": effect.acceptable,
+        "amplitude": float(f"{effect.amplitude:.4g}"),
         "parameters": {n: {"value": float(v), "unit": u} for n, (v, u) in effect.parameters.items()},
-        "intervals": effect.intervals, "follows": effect.follows, "outside_catalogue": effect.outside_catalogue,
+        "intervals": effect.intervals,
+        "follows": effect.follows,
+        "outside_catalogue": effect.outside_catalogue,
         "truth_form": effect.form,
-    }  # fmt: skip
+    }
 
 
 def make_case(
@@ -255,12 +283,20 @@ def make_case(
     if effects and identify:
         known = _identify(study, effects)
     answer = {
-        "schema": "spindle-fem/answer/1", "case": name, "two_recordings": calibration is not None,
-        "noise": noise.answer(), "as_built": {k: round(v, 4) for k, v in as_built.items()},
-        "identifiability": known, **judge(effects, known, calibration is not None),
-        "effects": [_effect_answer(e) for e in effects], "primary_component": [e.component for e in effects],
-        "target_ratio": round(target, 3), "cycle": plan.cycle, "oil": plan.oil, "rows": rows,
-    }  # fmt: skip
+        "schema": "spindle-fem/answer/1",
+        "case": name,
+        "two_recordings": calibration is not None,
+        "noise": noise.answer(),
+        "as_built": {k: round(v, 4) for k, v in as_built.items()},
+        "identifiability": known,
+        **judge(effects, known, calibration is not None),
+        "effects": [_effect_answer(e) for e in effects],
+        "primary_component": [e.component for e in effects],
+        "target_ratio": round(target, 3),
+        "cycle": plan.cycle,
+        "oil": plan.oil,
+        "rows": rows,
+    }
     answers = folder / "answers"
     answers.mkdir(parents=True, exist_ok=True)
     (answers / f"{name}.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")
@@ -301,8 +337,11 @@ def main(arguments: list[str] | None = None) -> None:
         effects = ", ".join(e["effect"] for e in answer["effects"]) or "none"
         known = answer["identifiability"]
         seen = f"ratio {known['ratio']:.2f}" if known else ""
-        print(f"{answer['case']} {effects:45s} {seen:12s} {'clear' if answer['clear'] else ''} "
-              f"{clock.perf_counter() - began:.1f} s", flush=True)  # fmt: skip
+        print(
+            f"{answer['case']} {effects:45s} {seen:12s} {'clear' if answer['clear'] else ''} "
+            f"{clock.perf_counter() - began:.1f} s",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

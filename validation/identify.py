@@ -44,19 +44,40 @@ def _bearing_mimics() -> list[Mimic]:
     for w, place in names.items():
         out.append(Mimic("heat_split", place, "", lambda a, w=w: laws.HeatSplit(w, a), 0.02))
         for delay in (0.0, 600.0):
-            out.append(Mimic("thermal_preload", place, f"lag{delay:.0f}",
-                             lambda a, w=w, d=delay: laws.ThermalPreload(w, a, delay=d), 0.004))  # fmt: skip
+            out.append(
+                Mimic(
+                    "thermal_preload",
+                    place,
+                    f"lag{delay:.0f}",
+                    lambda a, w=w, d=delay: laws.ThermalPreload(w, a, delay=d),
+                    0.004,
+                )
+            )
         out.append(Mimic("viscosity_heat", place, "", lambda a, w=w: laws.ViscosityHeat(w, a), 0.001))
         for tau in (600.0, 1500.0, 4000.0):
-            out.append(Mimic("grease_churning", place, f"tau{tau:.0f}",
-                             lambda a, w=w, t=tau: laws.Churning(w, a, t), 0.03))  # fmt: skip
+            out.append(
+                Mimic(
+                    "grease_churning",
+                    place,
+                    f"tau{tau:.0f}",
+                    lambda a, w=w, t=tau: laws.Churning(w, a, t),
+                    0.03,
+                )
+            )
         for n in (1400.0, 2000.0, 2600.0, 3300.0):
             out.append(
                 Mimic("starvation", place, f"n{n:.0f}", lambda a, w=w, n=n: laws.Starvation(w, a, n), 0.03)
             )
         for onset in (3.0, 8.0):
-            out.append(Mimic("gap_closure", place, f"on{onset:.0f}",
-                             lambda a, w=w, o=onset: laws.GapClosure(w, float(np.exp(-abs(a))), o, 0.3 * o), 0.05))  # fmt: skip
+            out.append(
+                Mimic(
+                    "gap_closure",
+                    place,
+                    f"on{onset:.0f}",
+                    lambda a, w=w, o=onset: laws.GapClosure(w, float(np.exp(-abs(a))), o, 0.3 * o),
+                    0.05,
+                )
+            )
     return out
 
 
@@ -85,8 +106,13 @@ def machine_mimics(model: ReducedSpindle, plan: Plan) -> list[Mimic]:
     )
     add("windage", "shaft", "", lambda a: laws.SpeedHeat((("shaft_gap", 1.0),), a, 4500.0, 3.0), 10.0)
     for delay in (0.0, 600.0):
-        add("drive_heat", "drive_end", f"lag{delay:.0f}",
-            lambda a, d=delay: laws.SpeedHeat((("drive_end", 1.0),), a, 3000.0, 1.2, d), 5.0)  # fmt: skip
+        add(
+            "drive_heat",
+            "drive_end",
+            f"lag{delay:.0f}",
+            lambda a, d=delay: laws.SpeedHeat((("drive_end", 1.0),), a, 3000.0, 1.2, d),
+            5.0,
+        )
     add("mount_sink", "flange", "", lambda a: laws.MountSink(a), 1.0)
     add("shaft_convection", "shaft", "", lambda a: laws.ShaftConvection(a), 0.1)
     add("radiation", "housing", "", lambda a: laws.OutsideFilm(a, "radiation"), 0.1)
@@ -107,22 +133,47 @@ def machine_mimics(model: ReducedSpindle, plan: Plan) -> list[Mimic]:
         add("ambient_drift", "ambient", f"jump{at}", lambda a, x=at: laws.RoomDrift(a, "jump", x, total), 1.0)
         add("ambient_drift", "ambient", f"hump{at}", lambda a, x=at: laws.RoomDrift(a, "hump", x, total), 1.0)
     for place in ("flange", "housing_front_top", "housing_rear_top", "nose", "drive_end"):
-        add("heat_capacity", place.split("_")[0] if place != "drive_end" else place, "",
-            lambda a, p=place: laws.ExtraMass(p, max(a, 1.0), 0.02 * max(a, 1.0)), 500.0)  # fmt: skip
-    for place, (start, end) in ((p, s) for p in ("housing_middle_top", "housing_rear_top", "housing_front_top", "flange",
-                                                  "drive_end", "nose", "shaft_middle")
-                                 for s in ((0.0, 1.1), (0.5, 1.1))):  # fmt: skip
+        add(
+            "heat_capacity",
+            place.split("_")[0] if place != "drive_end" else place,
+            "",
+            lambda a, p=place: laws.ExtraMass(p, max(a, 1.0), 0.02 * max(a, 1.0)),
+            500.0,
+        )
+    for place, (start, end) in (
+        (p, s)
+        for p in (
+            "housing_middle_top",
+            "housing_rear_top",
+            "housing_front_top",
+            "flange",
+            "drive_end",
+            "nose",
+            "shaft_middle",
+        )
+        for s in ((0.0, 1.1), (0.5, 1.1))
+    ):
         span = ((start * total, end * total, 1.0),)
-        add("unrecorded_heat_source", place, f"{start}-{end}",
-            lambda a, p=place, s=span: laws.Intervals(p, a, s, 200.0), 5.0)  # fmt: skip
+        add(
+            "unrecorded_heat_source",
+            place,
+            f"{start}-{end}",
+            lambda a, p=place, s=span: laws.Intervals(p, a, s, 200.0),
+            5.0,
+        )
     return out
 
 
 def sensor_mimics() -> list[Mimic]:
     """Simple lies of every channel."""
-    sizes = {"sensor_offset": (0.1, lambda a: a), "sensor_gain": (0.01, lambda a: 1.0 + a),
-             "sensor_lag": (60.0, lambda a: max(a, 1.0)), "sensor_drift": (0.03, lambda a: a),
-             "sensor_detached": (0.02, lambda a: a), "clock_shift": (60.0, lambda a: a)}  # fmt: skip
+    sizes = {
+        "sensor_offset": (0.1, lambda a: a),
+        "sensor_gain": (0.01, lambda a: 1.0 + a),
+        "sensor_lag": (60.0, lambda a: max(a, 1.0)),
+        "sensor_drift": (0.03, lambda a: a),
+        "sensor_detached": (0.02, lambda a: a),
+        "clock_shift": (60.0, lambda a: a),
+    }
     return [
         Mimic(kind, name, "", lambda a, k=kind, c=c, f=f: Sensor(k, c, f(a)), small)
         for kind, (small, f) in sizes.items()
@@ -246,8 +297,12 @@ class Study:
     def mimic_column(self, mimic: Mimic, beside: list[Law | Sensor]) -> NDArray[np.float64]:
         """Change by a small amplitude of a mimic, per unit of amplitude."""
         without = self.simulate(beside) if beside else self.plain[0]
-        return self._stack([(self.simulate([*beside, mimic.make(mimic.small)]) - without) / mimic.small,
-                            *[np.zeros_like(p) for p in self.plain[1:]]])  # fmt: skip
+        return self._stack(
+            [
+                (self.simulate([*beside, mimic.make(mimic.small)]) - without) / mimic.small,
+                *[np.zeros_like(p) for p in self.plain[1:]],
+            ]
+        )
 
     def fit_through_model(
         self, truth: NDArray[np.float64], mimic: Mimic | None, column: NDArray[np.float64], rounds: int = 4

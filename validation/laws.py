@@ -298,9 +298,12 @@ class ShaftConvection(Law):
 
 
 _ZONES = {
-    "outside:cover": "mean:cover", "outside:flange": "mean:housing", "outside:front": "mean:housing",
-    "outside:middle": "mean:housing", "outside:rear": "mean:housing",
-}  # fmt: skip
+    "outside:cover": "mean:cover",
+    "outside:flange": "mean:housing",
+    "outside:front": "mean:housing",
+    "outside:middle": "mean:housing",
+    "outside:rear": "mean:housing",
+}
 
 
 @dataclass(slots=True)

@@ -10,8 +10,12 @@ from numpy.typing import NDArray
 from .cycles import Plan
 from .machine import CHANNELS
 
-_INPUTS = (("ambient", "ambient", "degC"), ("coolant_in", "coolant_inlet", "degC"), ("speed", "speed", "rpm"),
-           ("thrust", "thrust", "N"))  # fmt: skip
+_INPUTS = (
+    ("ambient", "ambient", "degC"),
+    ("coolant_in", "coolant_inlet", "degC"),
+    ("speed", "speed", "rpm"),
+    ("thrust", "thrust", "N"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +40,11 @@ class Noise:
 def draw_noise(rng: np.random.Generator) -> Noise:
     """Draw the noise of one machine's sensors."""
     return Noise(
-        float(rng.choice([0.08, 0.10, 0.15])), float(rng.uniform(0.02, 0.05)), float(rng.uniform(600, 2400)),
+        float(rng.choice([0.08, 0.10, 0.15])),
+        float(rng.uniform(0.02, 0.05)),
+        float(rng.uniform(600, 2400)),
         float(rng.choice([0.0, 0.05, 0.1])),
-    )  # fmt: skip
+    )
 
 
 def slow_error(

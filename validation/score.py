@@ -74,21 +74,31 @@ def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | 
         "alternatives": [
             {"set": [f"{f['effect']}@{f['component']}" for f in s], "probability": p} for s, p in sets[1:4]
         ],
-        "verdict": diagnosis["verdict"], "true_verdict": answer["true_verdict"],
+        "verdict": diagnosis["verdict"],
+        "true_verdict": answer["true_verdict"],
         "verdict_right": diagnosis["verdict"] in answer["acceptable_verdicts"],
         "detected": bool(diagnosis["mismatch"]["detected"]),
         "p_value": diagnosis["mismatch"].get("p_value"),
-        "consistent": not truth, "clear": answer["clear"], "detectable": answer["detectable"],
+        "consistent": not truth,
+        "clear": answer["clear"],
+        "detectable": answer["detectable"],
         "ambiguous": bool(answer.get("indistinguishable")),
         "foreign": any(e.get("outside_catalogue") for e in answer["effects"]),
-        "ratio": (answer["identifiability"] or {}).get("ratio"), "calibrated": answer["two_recordings"],
-        "first": first_right(answer, found), "exact": matches(found, truth), "rank": within,
-        "first_effect": named is not None, "place": all(places) if places else None, "located": located,
+        "ratio": (answer["identifiability"] or {}).get("ratio"),
+        "calibrated": answer["two_recordings"],
+        "first": first_right(answer, found),
+        "exact": matches(found, truth),
+        "rank": within,
+        "first_effect": named is not None,
+        "place": all(places) if places else None,
+        "located": located,
         "coverage": coverage(answer, found),
         "after_over_noise": after / noise if noise and after is not None else None,
-        "before_over_noise": fit["before"]["heldout_rmse_K"] / noise if noise and fit["before"]["heldout_rmse_K"] else None,
+        "before_over_noise": fit["before"]["heldout_rmse_K"] / noise
+        if noise and fit["before"]["heldout_rmse_K"]
+        else None,
         "wall_s": wall,
-    }  # fmt: skip
+    }
 
 
 def coverage(answer: dict[str, Any], found: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -101,10 +111,17 @@ def coverage(answer: dict[str, Any], found: list[dict[str, Any]]) -> list[dict[s
                 got = stated.get(name)
                 if got is None or got.get("low") is None or got.get("high") is None:
                     continue
-                rows.append({
-                    "effect": effect["effect"], "parameter": name, "true": true["value"], "value": got["value"],
-                    "low": got["low"], "high": got["high"], "inside": got["low"] <= true["value"] <= got["high"],
-                })  # fmt: skip
+                rows.append(
+                    {
+                        "effect": effect["effect"],
+                        "parameter": name,
+                        "true": true["value"],
+                        "value": got["value"],
+                        "low": got["low"],
+                        "high": got["high"],
+                        "inside": got["low"] <= true["value"] <= got["high"],
+                    }
+                )
     return rows
 
 
@@ -121,11 +138,15 @@ def reliability(
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         here = [r for r in rows if low <= r["probability"] < high]
         if here:
-            out.append({
-                "from": low, "to": min(high, 1.0), "cases": len(here),
-                "stated": round(float(np.mean([r["probability"] for r in here])), 3),
-                "right": round(float(np.mean([r["first"] or r["exact"] for r in here])), 3),
-            })  # fmt: skip
+            out.append(
+                {
+                    "from": low,
+                    "to": min(high, 1.0),
+                    "cases": len(here),
+                    "stated": round(float(np.mean([r["probability"] for r in here])), 3),
+                    "right": round(float(np.mean([r["first"] or r["exact"] for r in here])), 3),
+                }
+            )
     return out
 
 
@@ -146,9 +167,12 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
     for row in rows:
         row["false_alarm"] = row["consistent"] and row["verdict"] != "consistent"
         row["confident_wrong"] = (
-            bool(row["found"]) and row["probability"] > FAULTY_ABOVE and not row["first"] and not row["foreign"]
+            bool(row["found"])
+            and row["probability"] > FAULTY_ABOVE
+            and not row["first"]
+            and not row["foreign"]
             and row["verdict"] != "ambiguous"
-        )  # fmt: skip
+        )
     covered = [c for r in rows for c in r["coverage"]]
     after = [
         r["after_over_noise"]
@@ -162,34 +186,57 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
         confusion[row["true_verdict"]][row["verdict"]] += 1
     wrong = [r for r in rows if not r["verdict_right"] or not (r["first"] or r["exact"] or r["foreign"])]
     return {
-        "cases": len(rows), "failed": failed,
+        "cases": len(rows),
+        "failed": failed,
         "false_alarms": _share(null, "false_alarm"),
         "verdict_acceptable": _share(rows, "verdict_right"),
-        "clear_single_first": _share(clear, "exact"), "clear_single_within_three": _share(clear, "within_three"),
+        "clear_single_first": _share(clear, "exact"),
+        "clear_single_within_three": _share(clear, "within_three"),
         "every_single_acceptable": _share(single, "first"),
-        "clear_pair_exact": _share(clear_pairs, "exact"), "clear_pair_within_three": _share(clear_pairs, "within_three"),
+        "clear_pair_exact": _share(clear_pairs, "exact"),
+        "clear_pair_within_three": _share(clear_pairs, "within_three"),
         "every_pair_acceptable": _share(pairs, "first"),
         "pair_one_effect_named": _share(pairs, "first_effect"),
-        "place_of_named": _share([r for r in rows if r["detectable"]], "place"), "located": _share(visible, "located"),
-        "ambiguous_truth_kept": _share(twins, "truth_kept"), "ambiguous_called": _share(twins, "called_ambiguous"),
+        "place_of_named": _share([r for r in rows if r["detectable"]], "place"),
+        "located": _share(visible, "located"),
+        "ambiguous_truth_kept": _share(twins, "truth_kept"),
+        "ambiguous_called": _share(twins, "called_ambiguous"),
         "confident_wrong": _share(rows, "confident_wrong"),
         "reliability": reliability(rows),
-        "interval_coverage": _share(covered, "inside") | {
+        "interval_coverage": _share(covered, "inside")
+        | {
             "by_parameter": {
                 name: _share([c for c in covered if c["effect"] + "." + c["parameter"] == name], "inside")
                 for name in sorted({c["effect"] + "." + c["parameter"] for c in covered})
             }
         },
-        "heldout_after_over_noise": _quantiles(after), "heldout_after_over_noise_every_visible": _quantiles(after_all),
+        "heldout_after_over_noise": _quantiles(after),
+        "heldout_after_over_noise_every_visible": _quantiles(after_all),
         "wall_s": _quantiles(walls),
         "confusion": confusion,
         "wrong": [
-            {k: r[k] for k in ("case", "truth", "found", "probability", "alternatives", "verdict", "true_verdict", "ratio",
-                               "clear", "calibrated", "p_value", "after_over_noise", "rank")}
+            {
+                k: r[k]
+                for k in (
+                    "case",
+                    "truth",
+                    "found",
+                    "probability",
+                    "alternatives",
+                    "verdict",
+                    "true_verdict",
+                    "ratio",
+                    "clear",
+                    "calibrated",
+                    "p_value",
+                    "after_over_noise",
+                    "rank",
+                )
+            }
             for r in wrong
         ],
         "wrong_by_truth": dict(Counter(e.split("@")[0] for r in wrong for e in (r["truth"] or ["none@"]))),
-    }  # fmt: skip
+    }
 
 
 def _quantiles(values: list[float]) -> dict[str, Any]:
@@ -240,8 +287,10 @@ def _print(summary: dict[str, Any]) -> None:
         rest = "; ".join(
             f"{'+'.join(a['set']) or 'nothing'} {a['probability']:.2f}" for a in row["alternatives"]
         )
-        print(f"  {row['case']} {'+'.join(row['truth']) or 'nothing'} (ratio {row['ratio']}, {'clear' if row['clear'] else 'hard'})"
-              f" -> {row['verdict']}: {'+'.join(row['found']) or 'nothing'} {row['probability']:.2f} | {rest}")  # fmt: skip
+        print(
+            f"  {row['case']} {'+'.join(row['truth']) or 'nothing'} (ratio {row['ratio']}, {'clear' if row['clear'] else 'hard'})"
+            f" -> {row['verdict']}: {'+'.join(row['found']) or 'nothing'} {row['probability']:.2f} | {rest}"
+        )
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -22,9 +22,21 @@ REBUILD = 0.01
 
 # 1 sigma of the logarithm; the split's is of the share itself.
 PRIORS = {
-    "heat_F": 0.10, "heat_R": 0.10, "film": 0.15, "ji": 0.30, "jo_F": 0.40, "jo_R": 0.40, "jax": 0.30,
-    "out": 0.30, "flg": 0.50, "shaft_end": 0.30, "gap": 0.30, "ball": 0.30, "split": 0.05, "cap": 0.03,
-}  # fmt: skip
+    "heat_F": 0.10,
+    "heat_R": 0.10,
+    "film": 0.15,
+    "ji": 0.30,
+    "jo_F": 0.40,
+    "jo_R": 0.40,
+    "jax": 0.30,
+    "out": 0.30,
+    "flg": 0.50,
+    "shaft_end": 0.30,
+    "gap": 0.30,
+    "ball": 0.30,
+    "split": 0.05,
+    "cap": 0.03,
+}
 
 
 def draw_as_built(rng: np.random.Generator) -> dict[str, float]:
@@ -113,9 +125,15 @@ def group_parameter(name: str) -> str | None:
     if kind == "seat":
         return "ji" if rest.startswith("shaft|") else ("jo_F" if rest[0] in "Ff" else "jo_R")
     return {
-        "axial": "jax", "outside": "out", "flange_back": "flg", "nose_end": "shaft_end", "drive_end": "shaft_end",
-        "gap": "gap", "balls": "ball", "labyrinth": None,
-    }[kind]  # fmt: skip
+        "axial": "jax",
+        "outside": "out",
+        "flange_back": "flg",
+        "nose_end": "shaft_end",
+        "drive_end": "shaft_end",
+        "gap": "gap",
+        "balls": "ball",
+        "labyrinth": None,
+    }[kind]
 
 
 def shaft_end_film(speed: float, diameter: float) -> float:
@@ -262,9 +280,16 @@ def run(
         effect.start(model)
     for k in range(n):
         moment = Moment(
-            model, state, drive.time[k], drive.step, drive.speed[k], drive.thrust[k],
-            drive.ambient[k], drive.coolant_in[k], drive.ambient[k],
-        )  # fmt: skip
+            model,
+            state,
+            drive.time[k],
+            drive.step,
+            drive.speed[k],
+            drive.thrust[k],
+            drive.ambient[k],
+            drive.coolant_in[k],
+            drive.ambient[k],
+        )
         for effect in effects:
             effect.act(moment)
         film, capacity, _ = channel_film(moment.coolant_in, moment.flow)

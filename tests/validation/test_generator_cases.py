@@ -103,32 +103,49 @@ def test_inputs_tell_nothing_of_the_answer(reduced, tmp_path, number):
 
 def _answer(effects, **known):
     listed = [
-        {"effect": e, "component": c, "acceptable_components": [c], "outside_catalogue": False,
-         "parameters": {"factor": {"value": 1.2, "unit": ""}}}
+        {
+            "effect": e,
+            "component": c,
+            "acceptable_components": [c],
+            "outside_catalogue": False,
+            "parameters": {"factor": {"value": 1.2, "unit": ""}},
+        }
         for e, c in effects
-    ]  # fmt: skip
+    ]
     return {
-        "case": "case_0001", "effects": listed, "true_verdict": "parameter" if effects else "consistent",
-        "acceptable_verdicts": ["parameter" if effects else "consistent"], "clear": bool(effects), "detectable": True,
-        "acceptable_sets": [[{"effect": e, "components": [c]} for e, c in effects]], "indistinguishable": [],
-        "identifiability": {"ratio": 5.0} if effects else None, "two_recordings": True,
-    } | known  # fmt: skip
+        "case": "case_0001",
+        "effects": listed,
+        "true_verdict": "parameter" if effects else "consistent",
+        "acceptable_verdicts": ["parameter" if effects else "consistent"],
+        "clear": bool(effects),
+        "detectable": True,
+        "acceptable_sets": [[{"effect": e, "components": [c]} for e, c in effects]],
+        "indistinguishable": [],
+        "identifiability": {"ratio": 5.0} if effects else None,
+        "two_recordings": True,
+    } | known
 
 
 def _diagnosis(verdict, effects, probability=0.95, alternatives=()):
     findings = [
-        {"effect": e, "component": c, "probability": probability,
-         "parameters": {"factor": {"value": 1.19, "low": 1.1, "high": 1.3, "unit": ""}}}
+        {
+            "effect": e,
+            "component": c,
+            "probability": probability,
+            "parameters": {"factor": {"value": 1.19, "low": 1.1, "high": 1.3, "unit": ""}},
+        }
         for e, c in effects
-    ]  # fmt: skip
+    ]
     return {
-        "verdict": verdict, "findings": findings, "mismatch": {"detected": bool(effects), "where": {}},
+        "verdict": verdict,
+        "findings": findings,
+        "mismatch": {"detected": bool(effects), "where": {}},
         "alternatives": [
             {"findings": [{"effect": e, "component": c, "parameters": {}} for e, c in s], "probability": p}
             for s, p in alternatives
         ],
         "fit": {"noise_K": 0.1, "before": {"heldout_rmse_K": 1.0}, "after": {"heldout_rmse_K": 0.103}},
-    }  # fmt: skip
+    }
 
 
 def test_score_of_a_right_and_a_wrong_case():
