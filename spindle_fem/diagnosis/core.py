@@ -133,7 +133,10 @@ def diagnose_recordings(
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
     judgement = judge(
-        refitted, trials=len({(c.effect, c.component) for c in candidates}), calibrated=bool(calibration)
+        refitted,
+        trials=len({(c.effect, c.component) for c in candidates}),
+        calibrated=bool(calibration),
+        overlapping=_overlapping(view),
     )
     null = next(h.fit for h in refitted if not h.fit.candidates)
     progress("diagnosis: where and when")
@@ -156,6 +159,15 @@ def diagnose_recordings(
         tried,
         clock.laps,
     )
+
+
+def _overlapping(view: MachineView) -> dict[str, frozenset[str]]:
+    """Components that share a bearing with each component: a set and its members."""
+    members = {name: frozenset(own) for name, own in view.sets.items()}
+    return {
+        name: frozenset(other for other, theirs in members.items() if own & theirs)
+        for name, own in members.items()
+    }
 
 
 def _refit(problem: Problem, found: Sequence[Hypothesis]) -> list[Hypothesis]:

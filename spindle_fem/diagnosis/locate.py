@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from spindle_fem.diagnosis.inference import Fit, LinearProblem, Problem
 from spindle_fem.diagnosis.screening import BaseRun
-from spindle_fem.reduced.stepping import group_steps
 
 Array = NDArray[np.float64]
 
@@ -165,7 +164,7 @@ def _march(base: BaseRun, patterns: Sequence[Pattern], onsets: Array) -> Array:
     on = np.clip((drive.grid[1:, None] - onsets) / drive.steps[:, None], 0.0, 1.0)
     steps, size = len(drive.steps), model.size
     forcing = np.zeros((steps, size, len(patterns), len(onsets)))
-    for key, rows in group_steps(drive.step_class, drive.steps).items():
+    for key, rows in run.groups.items():
         propagator = run.propagators[key]
         start, end = propagator.from_start @ loads, propagator.from_end @ loads
         answer = start[None] * strength[rows, None, :] + end[None] * strength[rows + 1, None, :]

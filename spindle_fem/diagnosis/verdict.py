@@ -157,7 +157,7 @@ def judge(
     *,
     trials: int,
     calibrated: bool,
-    same_place: Mapping[tuple[str, str], frozenset[str]] | None = None,
+    overlapping: Mapping[str, frozenset[str]] | None = None,
 ) -> Judgement:
     """Conclude from fitted hypotheses.
 
@@ -169,9 +169,8 @@ def judge(
         Candidates that were tried.
     calibrated : bool
         Whether a calibration recording fixed the parameters before.
-    same_place : mapping, optional
-        Places that count as one for a decision (a bearing and its set), by
-        effect and place.
+    overlapping : mapping, optional
+        Components that count as one for a decision (a bearing and its set), by component.
     """
     ranked = rank(hypotheses)
     p_value = detection_p_value(hypotheses, trials)
@@ -190,13 +189,13 @@ def judge(
     scaled = [Ranked(item.best, item.probability * (1.0 - other)) for item in ranked]
     chosen = scaled[0]
     alternatives = tuple(item for item in scaled[1:] if item.probability >= LISTED and item.fit.candidates)
-    similar = sum(item.probability for item in scaled if _alike(item, chosen, same_place or {}))
+    similar = sum(item.probability for item in scaled if _alike(item, chosen, overlapping or {}))
     if similar < DECIDED * (1.0 - other):
         return Judgement("ambiguous", p_value, chosen, alternatives, other, "several sets explain the data")
     return Judgement(kind_of(chosen.fit.candidates), p_value, chosen, alternatives, other, "")
 
 
-def _alike(item: Ranked, chosen: Ranked, same_place: Mapping[tuple[str, str], frozenset[str]]) -> bool:
+def _alike(item: Ranked, chosen: Ranked, overlapping: Mapping[str, frozenset[str]]) -> bool:
     """Whether two sets name the same effects at the same or overlapping places."""
     if len(item.fit.candidates) != len(chosen.fit.candidates):
         return False
@@ -207,7 +206,10 @@ def _alike(item: Ranked, chosen: Ranked, same_place: Mapping[tuple[str, str], fr
                 key
                 for key in left
                 if key[0] == candidate.effect
-                and (key[1] == candidate.component or candidate.component in same_place.get(key, frozenset()))
+                and (
+                    key[1] == candidate.component
+                    or candidate.component in overlapping.get(key[1], frozenset())
+                )
             ),
             None,
         )
