@@ -14,7 +14,7 @@ from spindle_fem.diagnosis.inference import Fit, candidate_coordinates
 from spindle_fem.diagnosis.locate import Explanation, shares, stretches
 from spindle_fem.diagnosis.machine_places import centre_of
 from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.diagnosis.verdict import TEMPERATURE
+from spindle_fem.diagnosis.verdict import INEXACT_BEYOND, TEMPERATURE
 from spindle_fem.effects.base import Candidate, IntervalEffect
 from spindle_fem.effects.catalogue import effect_of
 from spindle_fem.recordings.align import Recording
@@ -211,8 +211,8 @@ def component_shares(
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Probability of every component that heat is missing there, and its best spot.
 
-    Every spot counts the same beforehand. As for sets of effects, differences
-    of evidence count a share of what they say.
+    Every spot counts the same beforehand. As for sets of effects, evidence
+    counts a share of what it says, and less the more a spot explains.
 
     Parameters
     ----------
@@ -229,16 +229,20 @@ def component_shares(
     ...          (("left", 4.0), ("right", 0.0), ("top", 0.0))]
     >>> told, spots = component_shares(items, {"right": "rest", "top": "rest"})
     >>> {name: round(value, 2) for name, value in told.items()}, spots["rest"]
-    ({'left': 0.58, 'rest': 0.42}, 'right')
+    ({'left': 0.79, 'rest': 0.21}, 'right')
     """
     evidence: dict[str, float] = {}
     for item in explanations:
-        evidence[item.spot] = evidence.get(item.spot, 0.0) + item.log_evidence / TEMPERATURE
+        evidence[item.spot] = evidence.get(item.spot, 0.0) + item.log_evidence
     if not evidence:
         return {}, {}
+    counted = {
+        spot: (INEXACT_BEYOND * np.log1p(max(gain, 0.0) / INEXACT_BEYOND) + min(gain, 0.0)) / TEMPERATURE
+        for spot, gain in evidence.items()
+    }
     told: dict[str, float] = {}
     spots: dict[str, str] = {}
-    for spot, share in shares(evidence).items():
+    for spot, share in shares(counted).items():
         component = reported.get(spot, spot)
         told[component] = told.get(component, 0.0) + share
         if component not in spots or evidence[spot] > evidence[spots[component]]:

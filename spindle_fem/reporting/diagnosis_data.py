@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.diagnosis.inference import Coordinate, Fit
 from spindle_fem.diagnosis.next_measurement import hypothesis_words
-from spindle_fem.diagnosis.verdict import TEMPERATURE, rank
+from spindle_fem.diagnosis.verdict import rank
 from spindle_fem.diagnosis.where import component_shares
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import operating_conditions
@@ -186,7 +186,7 @@ def _heat(diagnosis: Diagnosis) -> dict[str, Any]:
         "spot_share": (
             "spot",
             np.array([told[spot] for spot in spots]),
-            {"long_name": f"probability, differences of evidence divided by {TEMPERATURE:g}"},
+            {"long_name": "probability that heat is missing here, if at one place"},
         ),
     }
 

@@ -26,6 +26,7 @@ from spindle_fem.reporting.diagnosis_words import (
     checks,
     confidence_words,
     kelvin,
+    level,
     moment,
     set_words,
     verdict_sentence,
@@ -227,7 +228,7 @@ def _cards(content: Mapping[str, Any]) -> Cards:
     fit, mismatch = content["fit"], content["mismatch"]
     items = [
         {"value": content["verdict"].replace("_", " "), "name": "verdict"},
-        {"value": significant(mismatch["p_value"], 2), "name": "p, if nothing were missing"},
+        {"value": level(mismatch["p_value"]).removeprefix("= "), "name": "p, if nothing were missing"},
     ]
     if content["findings"]:
         items.append(
@@ -395,7 +396,7 @@ def _next_blocks(content: Mapping[str, Any]) -> list[Any]:
             option["where"],
             option["condition"],
             number(option["expected_information"], 2),
-            option["channel"],
+            option["channel"] if option["where"] != option["channel"] else "the new sensor",
             number(option["difference_K"], 2),
             number(option["sigma_K"], 2),
             number(option["after_s"] / 60.0, 0),

@@ -35,7 +35,7 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         return (
             f"The recording agrees with the machine: what differs, {kelvin(fit['after']['heldout_rmse_K'])} "
             f"on held-out readings, is noise ({kelvin(fit['noise_K'])}) and what the uncertain parameters "
-            f"absorb within their priors (p = {significant(content['mismatch']['p_value'], 2)})."
+            f"absorb within their priors (p {level(content['mismatch']['p_value'])})."
         )
     if verdict == "ambiguous":
         sets = [(content["findings"], content.get("set_probability"))]
@@ -73,6 +73,15 @@ def chance(value: float | None) -> str:
     if value is None:
         return "not known"
     return "above 0.99" if value > 0.99 else f"{value:.2f}"
+
+
+def level(p_value: float) -> str:
+    """A p-value with its sign of relation.
+
+    >>> level(0.0312), level(0.0)
+    ('= 0.031', '< 10⁻¹⁰')
+    """
+    return f"= {significant(p_value, 2)}" if p_value >= 1.0e-10 else "< 10⁻¹⁰"
 
 
 def kelvin(value: float | None) -> str:
@@ -176,6 +185,6 @@ def confidence_words(content: Mapping[str, Any]) -> list[str]:
         )
     found.append(
         "Probabilities are tempered: the catalogue's laws never hold exactly, so a difference of evidence "
-        "counts for a quarter of what it says. Intervals are 90 %."
+        "counts for a share of what it says. Intervals are 90 %."
     )
     return found
