@@ -33,7 +33,7 @@ NUMBER_PRIOR = (0.4, 0.35, 0.2, 0.05)
 # Sets that are tried without each of their members.
 REDUCED = 3
 SINGLES, PAIRS, TRIPLES = 8, 6, 3
-BEAM, ADDITIONS = 3, 4
+BEAM, ADDITIONS = 3, 6
 # A hypothesis this much less likely (natural logarithm) than the best is not extended.
 HOPELESS = 400.0
 # An addition must promise to make the data this much likelier, its prior paid.

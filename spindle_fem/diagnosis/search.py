@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 # An effect more must make the data so much likelier (natural logarithm) to be looked at.
 SMALLEST_GAIN = 3.0
 KEPT_FOR_TRIPLES = 40
+# Places of one effect (of one combination of effects) that are looked at together.
+MOST_PLACES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,13 +100,17 @@ class Screened:
             return []
         gain = np.concatenate([self._gain(chunk) for chunk in np.array_split(sets, 1 + len(sets) // 100_000)])
         found: dict[frozenset[tuple[str, str]], tuple[tuple[int, ...], float]] = {}
-        for index in np.argsort(-gain)[: 60 * number]:
+        places: dict[tuple[str, ...], int] = {}
+        for index in np.argsort(-gain):
             if not np.isfinite(gain[index]):
                 break
             members = tuple(int(i) for i in sets[index])
             key = frozenset(self.variants[i].key for i in members)
-            if key not in found:
+            effects = tuple(sorted(self.variants[i].candidate.effect for i in members))
+            # One effect at many places must not crowd out the others.
+            if key not in found and places.get(effects, 0) < MOST_PLACES:
                 found[key] = (members, float(gain[index]))
+                places[effects] = places.get(effects, 0) + 1
             if len(found) == number:
                 break
         return list(found.values())
