@@ -94,11 +94,11 @@ def main() -> None:
     for change in [sign * value for value in options.changes for sign in (1.0, -1.0)]:
         depth = base.channel.depth + 1e-3 * change
         spec = load_machine(options.machine, [f"mesh.preset={options.preset}", f"channel.depth={depth} m"])
+        fresh = build_mesh(build_assembly(spec), options.preset)
         begin = time.process_time()
-        other = moved(mesh, base, depth)
+        other = replace(moved(mesh, base, depth), cad_area=fresh.cad_area, cad_volume=fresh.cad_volume)
         worst = float(sampled_quality(other.points[other.tetrahedra]).min())
         spent = time.process_time() - begin
-        fresh = build_mesh(build_assembly(spec), options.preset)
         results = []
         for one in (other, fresh):
             machine = machine_on_mesh(spec, one, build_operators(one, spec.mesh.order))

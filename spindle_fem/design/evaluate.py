@@ -18,6 +18,7 @@ from spindle_fem.checks import require_checks
 from spindle_fem.conduction.operators import ThermalOperators, build_operators
 from spindle_fem.coupling import machine_on_mesh
 from spindle_fem.design.designs import Design
+from spindle_fem.design.fast.heat import mechanical_key
 from spindle_fem.design.fast.inputs import refusal, structure_digest
 from spindle_fem.design.outputs import derived_values, value_of
 from spindle_fem.design.table import FAILED, FULL, IMPOSSIBLE, OK, Row
@@ -90,6 +91,8 @@ class DesignTask:
     structure : str
         Hash of the mesh and of all that a projected model is made for: designs
         that agree in it can share one. Empty where none can answer the design.
+    mechanics : str
+        Key of what makes heat, for designs that have a structure.
     """
 
     design: Design
@@ -98,6 +101,7 @@ class DesignTask:
     geometry: str
     reason: str = ""
     structure: str = ""
+    mechanics: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,10 +145,11 @@ class TaskBuilder:
             group_of_contacts(spec, found.joints)
         except SpindleFemError as error:
             return DesignTask(design, key, None, "", reason_of(error))
-        structure = ""
+        structure = mechanics = ""
         if self._question.backend != "full" and not refusal(spec):
             structure = _digest([found.geometry, structure_digest(dump)])
-        return DesignTask(design, key, spec, found.geometry, structure=structure)
+            mechanics = mechanical_key(spec, OperatingPoint.of(spec), machine)
+        return DesignTask(design, key, spec, found.geometry, structure=structure, mechanics=mechanics)
 
     def _impossible(self, design: Design, error: SpindleFemError) -> DesignTask:
         # Without a machine to hash, the key is that of the definition and what the design changes.

@@ -90,7 +90,7 @@ def answer_tasks(
 ) -> list[Row]:
     """Rows of designs inside the model's range."""
     specs = [task.spec for task in tasks]
-    inputs = _inputs(model, specs)
+    inputs = _inputs(model, tasks)
     solver = SteadySolver(model, tables, [bearing.name for _, bearing in specs[0].bearings])
     rows: list[Row] = []
     for first in range(0, len(tasks), AT_ONCE):
@@ -162,8 +162,15 @@ def inside_range(model: SteadyModel, batch: SteadyBatch) -> NDArray[np.bool_]:
     return np.all((values >= low - slack) & (values <= high + slack), axis=1)
 
 
-def _inputs(model: SteadyModel, specs: Sequence[object]) -> DesignInputs:
-    return design_inputs(specs, model.coefficient_names, model.fluid_names, model.contacts, model.gap_radii)
+def _inputs(model: SteadyModel, tasks: Sequence[DesignTask]) -> DesignInputs:
+    return design_inputs(
+        [task.spec for task in tasks],
+        model.coefficient_names,
+        model.fluid_names,
+        model.contacts,
+        model.gap_radii,
+        [task.mechanics for task in tasks],
+    )
 
 
 def model_of(group: GroupTask, question: Question) -> tuple[SteadyModel, list[Row], BearingTables]:
@@ -218,7 +225,7 @@ def checked_model(
     list of Row
         Of these designs, from the full solves.
     """
-    inputs = _inputs(model, [task.spec for task in plan])
+    inputs = _inputs(model, plan)
     chosen = _designs_to_check(model, solver, inputs)
     own = inputs.take(chosen)
     batch = solver.solve(own)

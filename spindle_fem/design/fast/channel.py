@@ -71,10 +71,10 @@ class ChannelBatch:
         factor = inputs.film_factor[:, None] * self._port_factor(inputs)
         self.factor = (factor if band is None else factor * band)[:, None, :]
         self.local = self.settings.properties_at == "bulk"
-        self.pressure = pressure_drops(self.loop, inputs)
         self.pumping: Array = np.zeros((len(inputs), *self.area.shape))
         if self.settings.pumping_heat:
-            power = np.array([item.pumping_power for item in self.pressure])[:, None, None]
+            drops = pressure_drops(self.loop, inputs)
+            power = np.array([item.pumping_power for item in drops])[:, None, None]
             share = self.area / self.area.sum(axis=1, keepdims=True) / self.section.starts
             self.pumping = power * share
         self._fixed: tuple[FilmCoefficient, Array] | None = None

@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ TABLE_POINTS = 9
 # Grease temperatures beyond which no table goes, K; a design there is left to the full solve.
 COLDEST, HOTTEST = 243.15, 473.15
 MARGIN = 6.0
+# Tables of a definition that heat and contacts depend on.
+_MECHANICAL = ("heat", "bearing_set", "bearing_types", "grease", "materials")
 # Quantities of a bearing besides the terms of its heat.
 QUANTITIES = (
     "total",
@@ -146,26 +149,24 @@ def is_constant(spec: MachineSpec) -> bool:
 
 def mechanical_keys(specs: Sequence[MachineSpec], points: Sequence[OperatingPoint]) -> tuple[str, ...]:
     """Key of the mechanical state of every design: the same key, the same table."""
-    names = ("heat", "bearing_set", "bearing_types", "grease")
-    texts: dict[int, str] = {}
-    keys = []
-    for spec, point in zip(specs, points, strict=True):
-        if is_constant(spec):
-            keys.append(repr(tuple(table_heat(spec, point)[0].items())))
-            continue
-        parts = []
-        for name in names:
-            item = getattr(spec, name)
-            found = item if isinstance(item, tuple | dict) else (item,)
-            for one in found.values() if isinstance(found, dict) else found:
-                if id(one) not in texts:
-                    texts[id(one)] = json.dumps(
-                        one.model_dump(mode="json") if one is not None else None, sort_keys=True, default=str
-                    )
-                parts.append(texts[id(one)])
-        parts.append(json.dumps([point.speed, point.thrust]))
-        keys.append(hashlib.sha256("|".join(parts).encode()).hexdigest())
-    return tuple(keys)
+    return tuple(mechanical_key(spec, point) for spec, point in zip(specs, points, strict=True))
+
+
+def mechanical_key(spec: MachineSpec, point: OperatingPoint, dump: Mapping[str, Any] | None = None) -> str:
+    """Key of one design's mechanical state.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    point : OperatingPoint
+    dump : mapping, optional
+        The dumped definition, where there is one already.
+    """
+    if is_constant(spec):
+        return repr(tuple(table_heat(spec, point)[0].items()))
+    kept = dump if dump is not None else spec.model_dump(mode="json", include=set(_MECHANICAL))
+    text = json.dumps([point.speed, point.thrust, *(kept.get(name) for name in _MECHANICAL)], default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _make_table(spec: MachineSpec, point: OperatingPoint, low: float, high: float) -> HeatTable:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.design.fast.heat import mechanical_keys
 from spindle_fem.loads.films import film_coefficient, gap_coefficient
 from spindle_fem.loads.joints import group_of_contacts
 from spindle_fem.loads.operating_point import OperatingPoint
@@ -91,6 +92,9 @@ class DesignInputs:
     film_factor : (n,) ndarray
     shares : (n, 3) ndarray
         Of a bearing's heat: inner raceway, outer raceway, balls.
+    mechanics : tuple of str
+        Key of the mechanical state of each design: the same key, the same heat
+        at the same temperatures.
     """
 
     specs: tuple[MachineSpec, ...]
@@ -102,6 +106,7 @@ class DesignInputs:
     flow: Array
     film_factor: Array
     shares: Array
+    mechanics: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.specs)
@@ -116,6 +121,7 @@ class DesignInputs:
                 getattr(self, name)[index]
                 for name in ("coefficients", "fluid", "ambient", "inlet", "flow", "film_factor", "shares")
             ),
+            mechanics=tuple(self.mechanics[i] for i in index),
         )
 
 
@@ -125,6 +131,7 @@ def design_inputs(
     fluid_names: Sequence[str],
     contacts: Sequence[str],
     gap_radii: Mapping[str, tuple[float, float]],
+    mechanics: Sequence[str] | None = None,
 ) -> DesignInputs:
     """Arrays of designs of one structure.
 
@@ -136,6 +143,8 @@ def design_inputs(
     contacts : sequence of str
         Joints of the mesh.
     gap_radii : mapping of gap to (float, float), [m]
+    mechanics : sequence of str, optional
+        Keys where they are known.
     """
     points = tuple(OperatingPoint.of(spec) for spec in specs)
     groups = {name: group.name for name, group in group_of_contacts(specs[0], contacts).items()}
@@ -157,6 +166,7 @@ def design_inputs(
         np.array([point.coolant_flow for point in points]),
         np.array([spec.coolant.film_factor.value if has_channel else 1.0 for spec in specs]),
         np.column_stack(((1.0 - balls) * inner, (1.0 - balls) * (1.0 - inner), balls)),
+        tuple(mechanics) if mechanics is not None else mechanical_keys(specs, points),
     )
 
 

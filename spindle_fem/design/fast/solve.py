@@ -14,7 +14,6 @@ from spindle_fem.design.fast.heat import (
     BearingTables,
     HeatTable,
     grease_temperature,
-    mechanical_keys,
 )
 from spindle_fem.design.fast.inputs import DesignInputs
 from spindle_fem.design.fast.model import SteadyModel
@@ -27,6 +26,7 @@ MOST_ITERATIONS = 60
 # The matrix is made anew at the films of the moment where it does not settle by then.
 RENEWED_AFTER = 8
 FIRST_RISE = 15.0
+SLOPE_STEP = 1.0
 # Share of the basis, the leading vectors, that the estimate compares with.
 COARSE_SHARE = 2.0 / 3.0
 _TOTAL, _INNER, _OUTER = (QUANTITIES.index(n) for n in ("total", "conductance_inner", "conductance_outer"))
@@ -134,7 +134,7 @@ class _Run:
         self.fluid_load = (given[:, solver.fluids] * inputs.fluid) @ self.model.fluid_load
         self._tables: list[tuple[HeatTable, NDArray[np.int64]]] = []
         owners: dict[str, list[int]] = {}
-        for row, key in enumerate(mechanical_keys(inputs.specs, inputs.points)):
+        for row, key in enumerate(inputs.mechanics):
             owners.setdefault(key, []).append(row)
         for key, rows in owners.items():
             table = solver.tables.of(inputs.specs[rows[0]], inputs.points[rows[0]], key)
@@ -206,6 +206,20 @@ class _Run:
             residual -= self.field.heat.reshape(self.number, -1) @ self.model.cell_mean
         return residual
 
+    def _heat_slope(self, grease: Array) -> Array:
+        """How much less each bearing heats for each kelvin of its grease, (n, n_bearings, r) W/K."""
+        step = 0.5 * SLOPE_STEP
+        change = (self._quantities(grease - step) - self._quantities(grease + step))[
+            :, :, _TOTAL
+        ] / SLOPE_STEP
+        places = self.solver.heat_places.reshape(-1, 3, self.size)
+        return change[:, :, None] * np.einsum("ns,bsi->nbi", self.inputs.shares, places, optimize=True)
+
+    def _grease_readings(self) -> Array:
+        """The grease's temperature of every bearing from the unknowns, (n_bearings, r)."""
+        places = self.solver.heat_places.reshape(-1, 3, self.size)
+        return grease_temperature(*np.moveaxis(places, 1, 0))
+
     def settle(self) -> tuple[SteadyBatch, Array]:
         """The steady states and the grease temperatures at which the tables were read."""
         first = np.broadcast_to(self.inputs.ambient[:, None], (self.number, len(self.solver.bearings)))
@@ -213,7 +227,11 @@ class _Run:
             wall = np.broadcast_to(self.channel.inlet, (self.number, *self.model.cell_area.shape))
             self.field = self.channel.at(wall + 0.2 * FIRST_RISE)
         matrix, load = self._system(self._quantities(first + FIRST_RISE))
+        slope = self._heat_slope(first + FIRST_RISE)
+        readings = self._grease_readings()
+        matrix += np.einsum("nbi,bj->nij", slope, readings, optimize=True)
         inverse = np.linalg.inv(matrix)
+        load += np.einsum("nbi,nb->ni", slope, first + FIRST_RISE)
         unknowns = np.einsum("nij,nj->ni", inverse, load)
         settled = np.zeros(self.number, dtype=bool)
         for iteration in range(1, MOST_ITERATIONS + 1):
@@ -225,7 +243,11 @@ class _Run:
             if settled.all() or not np.isfinite(moved).all():
                 break
             if iteration % RENEWED_AFTER == 0:
-                inverse = np.linalg.inv(self._system(quantities)[0])
+                slope = self._heat_slope(grease)
+                matrix = self._system(quantities)[0] + np.einsum(
+                    "nbi,bj->nij", slope, readings, optimize=True
+                )
+                inverse = np.linalg.inv(matrix)
         quantities, grease = self._follow(unknowns)
         moving = self._moving(quantities)
         coefficients = self.inputs.coefficients.copy()
