@@ -283,7 +283,7 @@ def pairwise_distances(means: Sequence[Array], covariances: Sequence[Array]) -> 
     """Bhattacharyya distances of Gaussians, (k, k).
 
     >>> one = np.eye(1)
-    >>> pairwise_distances([np.zeros(1), np.full(1, 4.0)], [one, one])[0, 1].round(6)
+    >>> float(pairwise_distances([np.zeros(1), np.full(1, 4.0)], [one, one])[0, 1].round(6))
     2.0
     """
     count = len(means)

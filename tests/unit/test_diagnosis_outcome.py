@@ -312,8 +312,11 @@ def test_a_doubted_sensor_gets_a_second_one_beside_it(lying):
     assert found["why"].startswith("The data have decided")
 
 
-def test_consistent_recordings_get_a_proposal_too(consistent):
-    assert next_measurement(consistent)["options"] == []
+def test_without_a_rival_there_is_nothing_to_tell_apart(consistent):
+    found = next_measurement(consistent)
+    assert found["options"] == []
+    assert found["condition"] == AGAIN
+    assert "No other explanation" in found["why"]
 
 
 def test_slopes_of_a_trial_are_differences(heated):
