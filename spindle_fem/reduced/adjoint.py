@@ -58,7 +58,7 @@ def fast_gradient(
     SpecError
         A term that depends on temperature or time: take the sensitivities.
     """
-    run = TransientRun(fast, drive, parameters or {}, tuple(derivatives), tuple(terms))
+    run = TransientRun(fast, drive, parameters or {}, tuple(derivatives), tuple(terms), open_loop=False)
     if run.dynamic is not None:
         raise SpecError(
             "gradient",

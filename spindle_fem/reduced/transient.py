@@ -16,6 +16,7 @@ from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.exact_step import ExactPropagator
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.nonlinear import DynamicTerms, Evaluation, solve_added
+from spindle_fem.reduced.open_terms import is_open, with_open_terms
 from spindle_fem.reduced.start import Start
 from spindle_fem.reduced.stepping import (
     Propagator,
@@ -102,7 +103,15 @@ def simulate_fast(
 
 
 class TransientRun:
-    """One drive with one set of parameters."""
+    """One drive with one set of parameters.
+
+    Parameters
+    ----------
+    fast, drive, parameters, derivatives, terms
+        As for :func:`simulate_fast`; ``terms`` include the machine's own.
+    open_loop : bool
+        Whether terms that follow no temperature join the load inputs.
+    """
 
     def __init__(
         self,
@@ -111,6 +120,8 @@ class TransientRun:
         parameters: Mapping[str, float],
         derivatives: tuple[str, ...],
         terms: tuple[Term, ...],
+        *,
+        open_loop: bool = True,
     ) -> None:
         self.fast, self.drive, self.derivatives = fast, drive, derivatives
         self.built: RunOperators = run_operators(fast, drive.points, parameters, derivatives, terms)
@@ -129,7 +140,21 @@ class TransientRun:
         self._n_heat = len(fast.heat_places)
         self._friction_start_by = self._friction_derivatives(self.start_by)
         self._friction_end_by = self._friction_derivatives(self.end_by)
-        dynamic = [term for term in terms if term.is_dynamic]
+        known = [term for term in terms if open_loop and is_open(term)]
+        opened = with_open_terms(
+            fast,
+            drive,
+            self.built,
+            (self.start, self.end),
+            (self.start_by, self.end_by),
+            known,
+            parameters,
+            derivatives,
+        )
+        self.loads, self.loads_by = opened.loads, opened.loads_by
+        self.start, self.end = opened.start, opened.end
+        self.start_by, self.end_by = opened.start_by, opened.end_by
+        dynamic = [term for term in terms if term.is_dynamic and term not in known]
         self.dynamic = DynamicTerms(fast, drive, dynamic, parameters, derivatives) if dynamic else None
 
     def _load_inputs(self, inputs: Array) -> tuple[Array, dict[str, Array]]:
@@ -167,7 +192,7 @@ class TransientRun:
         size, steps = self.fast.model.size, len(self.drive.steps)
         response = np.empty((steps, size))
         for key, rows in self.groups.items():
-            loads = self.operators[key[0]].loads
+            loads = self.loads[key[0]]
             response[rows] = load_response(self.propagators[key], self.start[rows], self.end[rows], loads)
         states = np.empty((steps + 1, size))
         given = start.rows()
@@ -264,7 +289,7 @@ class TransientRun:
         column = self.fast.inlet_column
         if column is None:
             return np.zeros(self.fast.model.size)
-        return self.operators[number].loads[:, column]
+        return self.loads[number][:, column]
 
     # ---------------------------------------------------------- sensitivities
     def forcing_of(self, states: Array, tracks: Tracks | None) -> Array:
@@ -272,7 +297,7 @@ class TransientRun:
         forcing = np.zeros((len(self.drive.steps), states.shape[1], len(self.derivatives)))
         for group, (key, rows) in enumerate(self.groups.items()):
             operators, propagator = self.operators[key[0]], self.propagators[key]
-            start, end, loads = self.start[rows], self.end[rows], operators.loads
+            start, end, loads = self.start[rows], self.end[rows], self.loads[key[0]]
             if tracks is not None:
                 start = np.hstack((start, tracks.added_start[rows]))
                 end = np.hstack((end, tracks.added_end[rows]))
@@ -297,10 +322,9 @@ class TransientRun:
         self, parameter: str, number: int, rows: NDArray[np.int64], tracks: Tracks | None
     ) -> tuple[Array | None, Array | None]:
         """Derivative of the loads at both ends of some steps at fixed temperatures, the terms' own apart."""
-        operators = self.operators[number]
         start = end = None
-        if parameter in operators.loads_by:
-            by = operators.loads_by[parameter]
+        if parameter in self.loads_by[number]:
+            by = self.loads_by[number][parameter]
             inputs_start, inputs_end = self.start[rows], self.end[rows]
             if tracks is not None and self.dynamic.inlet_columns():
                 inlet = self.fast.load_names.index("coolant_inlet")
@@ -310,8 +334,9 @@ class TransientRun:
                 inputs_end[:, inlet] += tracks.added_end[np.ix_(rows, shift)].sum(axis=1)
             start, end = inputs_start @ by.T, inputs_end @ by.T
         if parameter in self.start_by:
-            heat = operators.loads[:, : self.start_by[parameter].shape[1]].T
-            more_start, more_end = self.start_by[parameter][rows] @ heat, self.end_by[parameter][rows] @ heat
+            loads = self.loads[number].T
+            more_start = self.start_by[parameter][rows] @ loads
+            more_end = self.end_by[parameter][rows] @ loads
             start = more_start if start is None else start + more_start
             end = more_end if end is None else end + more_end
         return start, end
@@ -391,6 +416,8 @@ class TransientRun:
         added = np.zeros((len(states), 0)) if tracks is None else tracks.added()
         shift_by = self._shift_inlet(inputs, tracks)
         inlet = fast.inlet_column
+        n_own = len(fast.load_names)
+        inputs = inputs[:, :n_own]
         for number, operators in enumerate(self.operators):
             rows = np.flatnonzero(owner == number)
             at_grid[rows] = states[rows] @ operators.outputs.T + inputs[rows] @ operators.output_inputs.T
@@ -400,6 +427,9 @@ class TransientRun:
             if shift_by is not None:
                 by_grid[rows] += operators.output_inputs[None, :, inlet, None] * shift_by[rows, None, :]
             for column, parameter in enumerate(self.derivatives):
+                if inlet is not None and parameter in self.start_by:
+                    slope = np.append(self.start_by[parameter][:, inlet], self.end_by[parameter][last, inlet])
+                    by_grid[rows, :, column] += np.outer(slope[rows], operators.output_inputs[:, inlet])
                 if parameter in operators.outputs_by:
                     by_grid[rows, :, column] += states[rows] @ operators.outputs_by[parameter].T
                     by_grid[rows, :, column] += inputs[rows] @ operators.output_inputs_by[parameter].T
