@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from spindle_fem.calibration.noise import SlowError
 from spindle_fem.diagnosis.inference import Fit, candidate_coordinates
@@ -251,7 +252,10 @@ def component_shares(
 
 
 def missing_heat(explanations: Sequence[Explanation], spot: str, plant: Plant) -> MissingHeat:
-    """Mean over time and signed peak of the heat track at a spot, all recordings together."""
+    """Mean over time and signed peak of the heat track at a spot, all recordings together.
+
+    A single step that stands out, as where readings are missing, is no peak.
+    """
     total, duration, peak = 0.0, 0.0, 0.0
     for item in explanations:
         if item.spot != spot:
@@ -260,7 +264,8 @@ def missing_heat(explanations: Sequence[Explanation], spot: str, plant: Plant) -
         lengths = np.diff(np.append(item.times, stop))
         total += float(item.heat @ lengths)
         duration += float(lengths.sum())
-        largest = float(item.heat[np.argmax(np.abs(item.heat))])
+        steady = median_filter(item.heat, 3, mode="nearest")
+        largest = float(steady[np.argmax(np.abs(steady))])
         peak = largest if abs(largest) > abs(peak) else peak
     return MissingHeat(total / duration if duration else 0.0, peak)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +37,7 @@ MOST_CHANNELS = 12
 MOST_POINTS = 1500
 BINS = 240
 NORMAL_90 = 1.645
+WRAPPED = 46
 LONG_SECONDS = 3.0 * 86400.0
 
 
@@ -238,13 +240,15 @@ def set_probabilities(data: xr.Dataset) -> Figure:
     )
     chosen = [*chosen[:9], False]
     rows = len(names)
-    figure = new_figure(150.0 + 52.0 * rows + 70.0)
-    longest = max(len(name) for name in names)
-    left = min(40.0 + 10.6 * longest, 900.0)
-    axes = pixel_axes(figure, left, 110.0, 1600.0 - left - 240.0, 52.0 * rows)
+    names = [textwrap.fill(name, WRAPPED) for name in names]
+    lines = [line for name in names for line in name.split("\n")]
+    height = 26.0 + 26.0 * max(name.count("\n") + 1 for name in names)
+    figure = new_figure(150.0 + height * rows + 70.0)
+    left = 50.0 + 11.0 * max(map(len, lines))
+    axes = pixel_axes(figure, left, 110.0, 1600.0 - left - 240.0, height * rows)
     colours = [CYCLE[0] if item else "#a9b7c4" for item in chosen]
     axes.barh(range(rows), chance, color=colours, height=0.64)
-    axes.set_yticks(range(rows), [_shortened(name) for name in names])
+    axes.set_yticks(range(rows), names)
     axes.set(ylim=(rows - 0.5, -0.5), xlim=(0.0, 1.0))
     axes.set_xlabel("probability")
     axes.grid(axis="y", visible=False)
@@ -266,10 +270,6 @@ def set_probabilities(data: xr.Dataset) -> Figure:
         "Each set fitted with the machine's uncertain parameters. Misfit: residual in units of its noise.",
     )
     return figure
-
-
-def _shortened(name: str, most: int = 80) -> str:
-    return name if len(name) <= most else name[: most - 1] + "…"
 
 
 @styled
