@@ -162,12 +162,14 @@ def diagnose_recordings(
 
 
 def _overlapping(view: MachineView) -> dict[str, frozenset[str]]:
-    """Components that share a bearing with each component: a set and its members."""
-    members = {name: frozenset(own) for name, own in view.sets.items()}
-    return {
-        name: frozenset(other for other, theirs in members.items() if own & theirs)
-        for name, own in members.items()
-    }
+    """Components that a decision does not tell apart from each: a set, its bearings, its other bearings."""
+    found: dict[str, set[str]] = {}
+    for group in view.groups:
+        members = set(view.sets[group])
+        family = {name for name, own in view.sets.items() if set(own) <= members}
+        for name in family:
+            found.setdefault(name, set()).update(family)
+    return {name: frozenset(family) for name, family in found.items()}
 
 
 def _refit(problem: Problem, found: Sequence[Hypothesis]) -> list[Hypothesis]:

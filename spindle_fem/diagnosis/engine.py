@@ -115,7 +115,33 @@ class Search:
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
         self._reduce()
+        self._widen()
         return self.ranked()
+
+    def _widen(self) -> None:
+        """Try the whole set where one of its bearings was found."""
+        for hypothesis in self.ranked()[:REDUCED]:
+            for position, candidate in enumerate(hypothesis.fit.candidates):
+                for wider in self._sets_of(candidate):
+                    members = list(hypothesis.fit.candidates)
+                    members[position] = wider
+                    if _identity(members) in self.found or len(
+                        {(c.effect, c.component) for c in members}
+                    ) < len(members):
+                        continue
+                    # What the bearing had is a start for the set; its own names differ.
+                    values = hypothesis.fit.values
+                    start = values | _renamed_values(candidate, wider, values)
+                    self._fit(tuple(members), start)
+
+    def _sets_of(self, candidate: Candidate) -> list[Candidate]:
+        """The same effect in the same form at the sets that a bearing belongs to."""
+        groups = [g for g in self.view.groups if candidate.component in self.view.sets[g]]
+        return [
+            item
+            for item in self.candidates
+            if item.effect == candidate.effect and item.component in groups and item.form == candidate.form
+        ]
 
     def _reduce(self) -> None:
         """Leave out what came first: each of the best sets without each of its members."""
@@ -124,12 +150,7 @@ class Search:
                 rest = tuple(c for c in hypothesis.fit.candidates if c is not left_out)
                 if _identity(rest) in self.found:
                     continue
-                paid = sum(self._paid.get(_identity((c,)), 0.0) for c in rest)
-                try:
-                    fitted = self.problem.fit(rest, hypothesis.fit.values, hopeless=self._hopeless())
-                except (ConvergenceError, SpecError):
-                    continue
-                self._keep(Hypothesis(fitted, self.log_prior(rest) - paid))
+                self._fit(rest, hypothesis.fit.values)
 
     def ranked(self) -> list[Hypothesis]:
         """Hypotheses, the most probable first."""
@@ -226,14 +247,17 @@ class Search:
             if id(variant.candidate) in intervals:
                 cost = intervals_cost(intervals[id(variant.candidate)])
                 self._paid[_identity((variant.candidate,))] = cost
-        paid = sum(self._paid.get(_identity((c,)), 0.0) for c in candidates)
-        if key in self.found:
-            return
+        if key not in self.found:
+            self._fit(candidates, start)
+
+    def _fit(self, candidates: tuple[Candidate, ...], start: Mapping[str, float]) -> None:
+        """Fit a set and keep it."""
         try:
             fitted = self.problem.fit(candidates, start, hopeless=self._hopeless())
         except (ConvergenceError, SpecError):
             # What cannot be simulated explains nothing; its neighbours are tried.
             return
+        paid = sum(self._paid.get(_identity((c,)), 0.0) for c in candidates)
         self._keep(Hypothesis(fitted, self.log_prior(candidates) - paid))
 
     def _hopeless(self) -> float:
@@ -258,6 +282,17 @@ class Search:
             found += float(np.log(self.weights[candidate.effect] / total / places / max(forms, 1)))
         # A set counts once, in whatever order it is drawn.
         return found + float(np.sum(np.log(np.arange(1, len(candidates) + 1))))
+
+
+def _renamed_values(candidate: Candidate, other: Candidate, values: Mapping[str, float]) -> dict[str, float]:
+    """Values of a candidate's parameters under the names of the same candidate elsewhere."""
+
+    def outer(item: Candidate) -> list[str]:
+        factors = {f.name for f in item.factors}
+        return [EFFECT_PREFIX + name if name in factors else name for name in item.parameters]
+
+    names = zip(outer(candidate), outer(other), strict=False)
+    return {theirs: values[own] for own, theirs in names if own in values}
 
 
 def intervals_cost(item: OnOff) -> float:
