@@ -101,7 +101,13 @@ class Case:
         self.spec = load_machine("recorded_spindle")
         model = _lumped_model()(self.spec)
         slopes = np.zeros((len(model.probe_names), 2, model.size))
-        self.fast = FastModel(replace(model, probe_gradients=slopes), self.spec)
+        model = replace(
+            model,
+            probe_gradients=slopes,
+            place_names=(*model.place_names, *(f"near.{name}" for name in model.probe_names)),
+            places=np.vstack((model.places, model.probes)),
+        )
+        self.fast = FastModel(model, self.spec)
         self.blank = written(folder, np.tile(20.0, (TIMES.size, len(PROBES))))
         self.view = view_of(self.fast, self.blank)
         self.candidates = {(c.effect, c.component): c for c in reversed(candidates_for(self.view))}
