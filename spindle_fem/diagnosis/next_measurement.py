@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 MOST_HYPOTHESES = 3
 SPACING = 300.0
-MOST_INSTANTS = 48
+FEWEST_INSTANTS, MOST_INSTANTS = 12, 48
 # Options that tell nearly as much as the best are worth as much; the simplest of them is proposed.
 AS_GOOD = 0.9
 # Below so many bits a test is not worth calling a decision.
@@ -211,8 +211,8 @@ def evaluate(
     options: list[Option] = []
     failed = []
     for trial in trials_of(plant, diagnosis.view):
-        grid = trial.drive.grid
-        spacing = max(SPACING, float(grid[-1] - grid[0]) / MOST_INSTANTS)
+        duration = float(trial.drive.grid[-1] - trial.drive.grid[0])
+        spacing = max(min(SPACING, duration / FEWEST_INSTANTS), duration / MOST_INSTANTS)
         try:
             answers = [answer(plant, fit, trial, places, spacing) for fit in fits]
         except (ConvergenceError, SpecError) as error:
