@@ -39,6 +39,9 @@ EFFECT_PREFIX = "effect:"
 PROBE_PREFIX = "probe."
 # Temperature of a node at the start of one recording: ``start.<recording>.initial.<node>``.
 START_PREFIX = "start."
+# How long before the middle of a gap an input had changed, s: ``jump.<recording>.<number>``.
+JUMP_PREFIX = "jump."
+GAP_STEPS = 1.5
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")
 # Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
@@ -133,6 +136,11 @@ class Plant:
             ]
         self.drives = tuple(replace(drive, times=drive.grid) for drive in drives)
         self._initial = [fast.initial_parameters(item) if self.is_network else () for item in self.recordings]
+        self._jumps = [
+            () if self.is_network else _unseen_jumps(item, drive)
+            for item, drive in zip(self.recordings, self.drives, strict=True)
+        ]
+        self._jump_slopes: dict[int, Array] = {}
         self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
         self.observations = self._observe(self.use)
         self.heldout = self._observe([~mask for mask in self.use])
@@ -175,6 +183,14 @@ class Plant:
             for item in items
         ]
 
+    def jumps(self) -> list[tuple[str, float, float]]:
+        """Changes of inputs that fell into gaps: name; least and most that they were earlier [s]."""
+        return [
+            (f"{JUMP_PREFIX}{number}.{index}", least, most)
+            for number, items in enumerate(self._jumps)
+            for index, (_, least, most) in enumerate(items)
+        ]
+
     # ---------------------------------------------------------------- simulation
     def start(
         self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
@@ -195,7 +211,7 @@ class Plant:
 
     def _run_name(self, number: int, name: str, readings: Mapping[str, object]) -> str | None:
         """What a coordinate is called in the run of one recording; None where it does not enter."""
-        if name in readings or name.startswith(PROBE_PREFIX):
+        if name in readings or name.startswith((PROBE_PREFIX, JUMP_PREFIX)):
             return None
         if name.startswith(START_PREFIX):
             owner, _, own = name.removeprefix(START_PREFIX).partition(".")
@@ -269,7 +285,10 @@ class Plant:
             if c.reading is not None
             for item in c.reading.parameters
         }
-        inner = {name: self._run_name(number, name, owners) for name in derivatives}
+        # A reading may share a parameter with its term: a bypass that joins before the outlet's sensor.
+        shared = {name for c in candidates for term in c.terms for name in term.names()}
+        apart = owners.keys() - shared
+        inner = {name: self._run_name(number, name, dict.fromkeys(apart)) for name in derivatives}
         of_run = tuple(dict.fromkeys(own for own in inner.values() if own is not None))
         run = self.transient(number, values, candidates, of_run)
         found: FastTransient = run.solve(self.start(number, values, of_run))
@@ -280,6 +299,7 @@ class Plant:
             if inner[name] is not None:
                 sensitivity[:, :, position] = found.sensitivity[:, columns, of_run.index(inner[name])]
         self._displace(number, found.states, values, derivatives, temperature, sensitivity)
+        self._advance_jumps(number, values, derivatives, temperature, sensitivity)
         for reading in self.effects.readings:
             self._read(number, reading, {}, (), temperature, sensitivity)
         for candidate in candidates:
@@ -322,6 +342,39 @@ class Plant:
             temperature[:, column] += values.get(name, 0.0) * slope
             if name in derivatives:
                 sensitivity[:, column, derivatives.index(name)] += slope
+
+    def _advance_jumps(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        derivatives: Sequence[str],
+        temperature: Array,
+        sensitivity: Array,
+    ) -> None:
+        """Let inputs change within the gaps that hide when they did, to first order, in place."""
+        prefix = f"{JUMP_PREFIX}{number}."
+        for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
+            slope = self._slopes_of_jumps(number)[:, :, int(name.removeprefix(prefix))]
+            temperature += values.get(name, 0.0) * slope
+            if name in derivatives:
+                sensitivity[:, :, derivatives.index(name)] += slope
+
+    def _slopes_of_jumps(self, number: int) -> Array:
+        """Change of the channels for each second that an input changed earlier, (G + 1, c, jumps) K/s."""
+        if number not in self._jump_slopes:
+            run = self.transient(number, {})
+            states, tracks = run.march(self.start(number))
+            forcing = np.zeros((len(run.drive.steps), states.shape[1], len(self._jumps[number])))
+            for index, (step, _, _) in enumerate(self._jumps[number]):
+                before, after = (int(run.drive.step_class[i]) for i in (step - 1, step))
+                gained = run.loads[after] @ run.start[step] - run.loads[before] @ run.end[step - 1]
+                gained -= (run.operators[after].conduction - run.operators[before].conduction) @ states[step]
+                forcing[step - 1, :, index] = np.linalg.solve(run.built.storage, gained)
+            tangent = run.tangents(forcing, tracks)
+            owner = np.append(run.drive.step_class, run.drive.step_class[-1])
+            outputs = np.array([item.outputs[self.columns[number]] for item in run.operators])
+            self._jump_slopes[number] = np.einsum("gcr,grm->gcm", outputs[owner], tangent, optimize=True)
+        return self._jump_slopes[number]
 
     def read(
         self, number: int, candidates: Sequence[Candidate], values: Mapping[str, float], temperature: Array
@@ -433,9 +486,46 @@ def _scaled(columns: Array) -> Array:
     return columns / np.sqrt(max(columns.shape[1], 1))
 
 
+def _unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, float], ...]:
+    """Changes of held inputs that fell into gaps, which :func:`coarse_drive` puts amid them.
+
+    Returns
+    -------
+    tuple of (int, float, float)
+        Step at whose start each is put; how much earlier [s], least and most,
+        it may have been.
+    """
+    usual = float(np.median(np.diff(recording.times)))
+    found = []
+    for step in 1 + np.flatnonzero(np.any(drive.start[1:] != drive.end[:-1], axis=1)):
+        time = drive.grid[step]
+        row = int(np.searchsorted(recording.times, time - 1e-6))
+        if not 0 < row < recording.times.size:
+            continue
+        first, last = recording.times[row - 1], recording.times[row]
+        if last - first > GAP_STEPS * usual:
+            found.append((int(step), float(time - last), float(time - first)))
+    return tuple(found)
+
+
+def _centred(fine: Drive, recording: Recording) -> Drive:
+    """The drive with changes that fell into gaps put amid them instead of at their ends."""
+    usual = float(np.median(np.diff(recording.times)))
+    held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
+    columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
+    start, end = fine.start.copy(), fine.end.copy()
+    for row in 1 + np.flatnonzero(np.diff(recording.times) > GAP_STEPS * usual):
+        first, last = recording.times[row - 1], recording.times[row]
+        begin, stop = np.searchsorted(fine.grid, [first - 1e-6, last - 1e-6])
+        if stop < len(start) and stop - begin > 1:
+            middle = begin + int(np.argmin(np.abs(fine.grid[begin:stop] - 0.5 * (first + last))))
+            start[middle:stop, columns] = end[middle:stop, columns] = fine.start[stop, columns]
+    return replace(fine, start=start, end=end)
+
+
 def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     """Inputs on steps from change to change, none longer than ``step``; outputs at their ends."""
-    fine = drive_of_recording(spec, recording)
+    fine = _centred(drive_of_recording(spec, recording), recording)
     begin, finish = fine.grid[0], fine.grid[-1]
     jumps = fine.grid[1:-1][np.any(fine.start[1:] != fine.end[:-1], axis=1)]
     edges = np.unique(np.concatenate(([begin], jumps, [finish])))

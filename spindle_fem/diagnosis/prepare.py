@@ -24,7 +24,8 @@ SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
 # A network of a few nodes is a coarse picture of its machine: its error is of the order of the
 # noise or of some per cent of what the temperatures move, and lasts for a share of the recording.
 NETWORK_SIGMAS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-NETWORK_SHARES = (0.01, 0.03, 0.1)
+NETWORK_TIMES = 5
+LONGEST_SHARE = 0.1
 NETWORK_SHARE_OF_RISE = 0.01
 
 
@@ -59,18 +60,23 @@ def machine_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
 
 
 def start_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
-    """Temperatures at the start of each recording, where they are not given."""
-    return tuple(
-        Coordinate(name, 1.0, sigma, True, -THETA_BOUND, THETA_BOUND) for name, sigma in plant.starts()
-    )
+    """What is uncertain of each recording: temperatures at its start, changes of inputs within gaps."""
+    starts = [Coordinate(name, 1.0, sigma, True, -THETA_BOUND, THETA_BOUND) for name, sigma in plant.starts()]
+    # Anywhere in the gap: a uniform distribution's mean, spread and ends.
+    ends = float(np.sqrt(3.0))
+    jumps = [
+        Coordinate(name, 0.5 * (least + most), (most - least) / np.sqrt(12.0), False, -ends, ends, "s")
+        for name, least, most in plant.jumps()
+    ]
+    return (*starts, *jumps)
 
 
 def expected_slow_error(plant: Plant) -> SlowError:
     """Slow error before any fit."""
     if not plant.is_network:
         return EXPECTED_SLOW
-    unit, duration = _network_scales(plant)
-    return SlowError(unit, NETWORK_SHARES[1] * duration)
+    unit, times = _network_scales(plant)
+    return SlowError(unit, times[len(times) // 2])
 
 
 def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
@@ -86,18 +92,18 @@ def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
     ]
     if not plant.is_network:
         return likely_slow_error(residuals, prior=EXPECTED_SLOW, sigmas=SLOW_SIGMAS, times=SLOW_TIMES)
-    unit, duration = _network_scales(plant)
+    unit, times = _network_scales(plant)
     return likely_slow_error(
         residuals,
         prior=expected_slow_error(plant),
         prior_width=1.0,
         sigmas=[share * unit for share in NETWORK_SIGMAS],
-        times=[share * duration for share in NETWORK_SHARES],
+        times=times,
     )
 
 
-def _network_scales(plant: Plant) -> tuple[float, float]:
-    """Usual error of a network [K] and length of its recordings [s]."""
+def _network_scales(plant: Plant) -> tuple[float, list[float]]:
+    """Usual error of a network [K]; correlation times from a few readings to a tenth of the time [s]."""
     moved = [
         float(np.ptp(np.quantile(recording.temperature[usable, channel], [0.05, 0.95])))
         for recording in plant.recordings
@@ -105,8 +111,11 @@ def _network_scales(plant: Plant) -> tuple[float, float]:
         if usable.any()
     ]
     duration = float(np.median([r.times[-1] - r.times[0] for r in plant.recordings]))
+    spacing = float(np.median([np.median(np.diff(item.bins.times)) for item in plant.observations]))
     noise = float(np.median([sigma for r in plant.recordings for sigma in r.sigma]))
-    return max(noise, NETWORK_SHARE_OF_RISE * float(np.median(moved))), duration
+    shortest = min(4.0 * spacing, 0.5 * LONGEST_SHARE * duration)
+    times = np.geomspace(shortest, LONGEST_SHARE * duration, NETWORK_TIMES)
+    return max(noise, NETWORK_SHARE_OF_RISE * float(np.median(moved))), times.tolist()
 
 
 def calibrate(earlier: Plant | None, plant: Plant) -> Calibrated:
