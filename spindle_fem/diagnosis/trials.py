@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from spindle_fem.diagnosis.inference import Fit
 from spindle_fem.diagnosis.layout import Layout
-from spindle_fem.diagnosis.plant import START_PREFIX, Plant
+from spindle_fem.diagnosis.plant import NO_VALUES, START_PREFIX, Plant
 from spindle_fem.effects.view import MachineView
 from spindle_fem.reduced.drive import STANDARD, Drive, make_drive
+from spindle_fem.reduced.start import Start
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
@@ -77,10 +78,15 @@ class TrialPlant(Plant):
         self.observations, self.heldout = (), ()
 
     def start(
-        self, number: int, values: Mapping[str, float] | None = None, derivatives: Sequence[str] = ()
-    ) -> float:
-        """Ambient temperature at the start; the recording's first readings where there is none, K."""
+        self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
+    ) -> float | Start:
+        """Ambient temperature at the start; the recording's first readings where there is none, K.
+
+        An operation with long gaps begins again after each, as it did in the recording.
+        """
         drive = self.drives[0]
+        if drive.restarts:
+            return super().start(number, values, derivatives)
         if "ambient" in drive.names:
             return drive.first("ambient")
         return float(np.mean(list(self.recordings[0].first_readings().values())))

@@ -256,8 +256,8 @@ def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Fi
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
         axes.fill_between(
             edges,
-            np.append(heat - NORMAL_90 * sigma, np.nan),
-            np.append(heat + NORMAL_90 * sigma, np.nan),
+            _to_the_end(heat - NORMAL_90 * sigma),
+            _to_the_end(heat + NORMAL_90 * sigma),
             step="post",
             color=CYCLE[5],
             alpha=0.35,
@@ -281,6 +281,10 @@ def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Fi
     return figure
 
 
+def _to_the_end(values: Array) -> Array:
+    return np.append(values, values[-1])
+
+
 def best_tracks(data: xr.Dataset, components: Sequence[str], number: int) -> dict[str, int]:
     """Track of the best spot of each component in a recording, the four first components."""
     evidence = dict(zip(data["spot"].values.tolist(), data["spot_log_evidence"].values, strict=True))
@@ -298,14 +302,40 @@ def best_tracks(data: xr.Dataset, components: Sequence[str], number: int) -> dic
 
 
 def _draw_drive(axes: Axes, own: xr.Dataset, scale: float) -> None:
+    """The speed; without one, the input that changes most and is no temperature."""
     names = [str(n) for n in own["input_name"].values]
-    chosen = next((n for n in names if n == "speed"), names[0] if names else None)
-    if chosen is None:
+    units = [str(u) for u in own["input_unit"].values]
+    if not names:
         return
-    item = own.sel(input_name=chosen)
-    values, label = item["input"].values, f"{chosen.replace('_', ' ')} / {item['input_unit'].values}"
-    if "radian" in str(item["input_unit"].values):
-        values, label = values * 30.0 / math.pi, "speed / rpm"
-    axes.step(item["time"].values / scale, values, where="post", color=INK, linewidth=1.3)
-    axes.set_ylabel(label)
-    axes.set_ylim(bottom=min(0.0, float(np.nanmin(values))))
+    values = own["input"].values
+
+    def changes(column: int) -> tuple[bool, bool, float]:
+        track = values[:, column]
+        size = float(np.nanmax(np.abs(track))) or 1.0
+        return names[column] == "speed", units[column] != "kelvin", float(np.nanstd(track)) / size
+
+    chosen = max(range(len(names)), key=changes)
+    track, label = values[:, chosen], f"{names[chosen].replace('_', ' ')} / {_symbol(units[chosen])}"
+    if "radian" in units[chosen]:
+        track, label = track * 30.0 / math.pi, f"{names[chosen].replace('_', ' ')} / rpm"
+    axes.step(own["time"].values / scale, track, where="post", color=INK, linewidth=1.3)
+    axes.set_title(label, fontsize=9.0, fontweight="normal", pad=3.0)
+    axes.set_ylim(bottom=min(0.0, float(np.nanmin(track))))
+
+
+def _symbol(unit: str) -> str:
+    """Symbol of an SI unit as recordings spell it.
+
+    >>> _symbol("kelvin"), _symbol("kilogram * meter ** 2 / second ** 3")
+    ('K', 'W')
+    """
+    known = {
+        "kelvin": "K",
+        "newton": "N",
+        "watt": "W",
+        "kilogram * meter ** 2 / second ** 3": "W",
+        "kilogram * meter / second ** 2": "N",
+        "meter ** 3 / second": "m³/s",
+        "dimensionless": "1",
+    }
+    return known.get(unit, unit)

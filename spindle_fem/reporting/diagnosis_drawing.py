@@ -124,7 +124,7 @@ def located_on_machine(
     _label_probes(axes, spec, reach, scale)
     draw_colour_bar(pixel_axes(figure, 420.0, total - 92.0, 760.0, 20.0), bar)
     notes = "Circles: the neighbourhood of each probe. Grey: not asked."
-    if component:
+    if component and regions_of(spec, component):
         notes += f" Framed in orange: where the diagnosis puts it ({component.replace('_', ' ')})."
     set_title(figure, "Where missing heat would explain the readings", notes)
     return figure

@@ -143,7 +143,7 @@ def where_text(content: Mapping[str, Any]) -> list[Text]:
     if where["r_mm"] is not None:
         text += f" (centroid at r = {where['r_mm']:.0f} mm, z = {where['z_mm']:.0f} mm)"
     others = [name.replace("_", " ") for name in where["credible"] if name != where["component"]]
-    text += f". Heat at {', '.join(others)} would explain nearly as much or more." if others else "."
+    text += f". Heat missing at {' or '.join(others)} alone would explain much of it too." if others else "."
     return [Text(text)]
 
 
