@@ -36,6 +36,8 @@ MOST_CHANNELS = 12
 MOST_POINTS = 1500
 BINS = 240
 NORMAL_90 = 1.645
+# As recordings are divided: a longer pause than so many usual steps.
+LONG_GAP_STEPS = 60.0
 LONG_SECONDS = 3.0 * 86400.0
 
 
@@ -128,13 +130,24 @@ def _draw_channel(upper: Axes, lower: Axes, own: xr.Dataset, number: int, name: 
     for key, colour, style in (("before", BEFORE, "--"), ("after", AFTER, "-")):
         thin = slice(None, None, max(1, len(times) // (3 * MOST_POINTS)))
         upper.plot(
-            times[thin], item[key].values[thin], color=colour, linestyle=style, linewidth=1.5, zorder=3
+            times[thin],
+            _broken(times, item[key].values)[thin],
+            color=colour,
+            linestyle=style,
+            linewidth=1.5,
+            zorder=3,
         )
         at, mean = _bin_means(times[good], (item["measured"] - item[key]).values[good])
         lower.plot(at, mean, color=colour, linewidth=1.3, linestyle=style, zorder=3)
     upper.set_title(name)
     upper.tick_params(labelbottom=False)
     upper.margins(x=0.01)
+
+
+def _broken(times: Array, values: Array) -> Array:
+    """Values with NaN where a long gap follows, so that no line crosses it."""
+    gaps = np.diff(times, append=times[-1])
+    return np.where(gaps > max(LONG_GAP_STEPS * float(np.median(gaps)), 1e-9), np.nan, values)
 
 
 def _bin_means(times: Array, values: Array) -> tuple[Array, Array]:
