@@ -188,9 +188,15 @@ def judge(
     other = float(np.clip((misfit - 1.1) / (2.0 * UNEXPLAINED_MISFIT), 0.0, 0.5))
     scaled = [Ranked(item.best, item.probability * (1.0 - other)) for item in ranked]
     chosen = scaled[0]
-    alternatives = tuple(item for item in scaled[1:] if item.probability >= LISTED and item.fit.candidates)
-    similar = sum(item.probability for item in scaled if _alike(item, chosen, overlapping or {}))
-    if similar < DECIDED * (1.0 - other):
+    alike = [item for item in scaled if _alike(item, chosen, overlapping or {})]
+    # Which bearing of a set it is does not matter for the decision; the best stands for all.
+    chosen = Ranked(chosen.best, sum(item.probability for item in alike))
+    alternatives = tuple(
+        item
+        for item in scaled[1:]
+        if item.probability >= LISTED and item.fit.candidates and item not in alike
+    )
+    if chosen.probability < DECIDED * (1.0 - other):
         return Judgement("ambiguous", p_value, chosen, alternatives, other, "several sets explain the data")
     return Judgement(kind_of(chosen.fit.candidates), p_value, chosen, alternatives, other, "")
 
