@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,7 +131,25 @@ def require_known_effects(entries: Sequence[EffectEntry]) -> None:
         raise FaultsError("effect", faults)
 
 
-def active_effects(entries: Sequence[EffectEntry], view: MachineView) -> ActiveEffects:
+def _with_unread(view: MachineView, probes: Sequence[str], outlets: Sequence[str]) -> MachineView:
+    """The view with a channel, whose name no recording has, for every probe without one."""
+    unread = {f"{probe} (not recorded)": probe for probe in probes if probe not in view.probes.values()}
+    if not unread:
+        return view
+    return replace(
+        view,
+        channels=(*view.channels, *unread),
+        probes={**view.probes, **unread},
+        outlets=view.outlets or tuple(name for name, probe in unread.items() if probe in outlets),
+    )
+
+
+def active_effects(
+    entries: Sequence[EffectEntry],
+    view: MachineView,
+    probes: Sequence[str] = (),
+    outlets: Sequence[str] = (),
+) -> ActiveEffects:
     """Effects of a definition on its machine, every fault at once.
 
     Parameters
@@ -139,6 +157,11 @@ def active_effects(entries: Sequence[EffectEntry], view: MachineView) -> ActiveE
     entries : sequence of EffectEntry
     view : MachineView
         Of the machine on what it is driven by.
+    probes : sequence of str
+        All that the machine has: a sensor that the recording lacks may have
+        an effect too, which then does nothing.
+    outlets : sequence of str
+        Those of them that read the mixed coolant after the channel.
 
     Raises
     ------
@@ -146,6 +169,7 @@ def active_effects(entries: Sequence[EffectEntry], view: MachineView) -> ActiveE
         An effect, place, form or parameter that does not exist, a value
         without or with a wrong unit, an entry given twice.
     """
+    view = _with_unread(view, probes, outlets)
     faults: list[SpindleFemError] = []
     found: list[Candidate] = []
     names: set[str] = set()
@@ -185,8 +209,12 @@ def effects_on(
     if not entries:
         return NO_EFFECTS
     if isinstance(fast, NetworkFastModel):
-        return active_effects(entries, view_of_network(fast.network, recording))
-    return active_effects(entries, view_of(fast, recording))
+        return active_effects(entries, view_of_network(fast.network, recording), fast.channels)
+    return active_effects(entries, view_of(fast, recording), fast.channels, _outlets(fast.spec))
+
+
+def _outlets(spec: MachineSpec) -> tuple[str, ...]:
+    return tuple(probe.name for probe in spec.probe if probe.kind == "coolant_outlet")
 
 
 def physics_of(machine: PreparedMachine) -> Physics:

@@ -21,6 +21,8 @@ from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.units import to_si
 
 Owner = TypeVar("Owner", Term, Reading)
+# Of a channel without flow: any range does, as film laws leave such a channel alone.
+STANDING_REYNOLDS = (100.0, 1000.0)
 
 
 @cache
@@ -80,6 +82,10 @@ def build(
 ) -> Candidate:
     """Candidate of an entry of a machine definition, its parameters fixed.
 
+    What a definition says holds on every recording: limits that a recording
+    sets to a search (half its length for a lag, the Reynolds numbers that
+    occur) do not apply; those of the physics (signs, shares) do.
+
     Parameters
     ----------
     effect, component, form : str
@@ -102,7 +108,7 @@ def build(
         A value without or with a wrong unit.
     """
     known = effect_of(effect, where)
-    candidate = _matching(known, component, form, view, _seconds(intervals, where), where)
+    candidate = _matching(known, component, form, _of_any_recording(view), _seconds(intervals, where), where)
     by_inner = {item.name: (outer, item) for outer, item in candidate.parameters.items()}
     edges = {name for name in by_inner if name.startswith(("start_", "end_"))} if intervals else set()
     allowed = sorted(set(by_inner) - edges)
@@ -122,6 +128,13 @@ def build(
         given[name] = _read(item, value, f"{where}.parameters.{name}")
         _require_possible(item, given[name], name == amplitude, f"{where}.parameters.{name}")
     return fixed(candidate, given)
+
+
+def _of_any_recording(view: MachineView) -> MachineView:
+    """The view with laws of the Reynolds number, also where no coolant flows and they do nothing."""
+    if view.channel is None or view.reynolds[0] > 0.0:
+        return view
+    return replace(view, reynolds=STANDING_REYNOLDS)
 
 
 def _require_possible(item: TermParameter, value: float, is_amplitude: bool, where: str) -> None:

@@ -66,7 +66,8 @@ class EffectEntry(SpecModel):
     form: str = ""
     """Which of the effect's forms, where it has several."""
     parameters: dict[str, FreeQuantity] = Field(default_factory=dict)
-    """Its parameters by name; those that are missing have their usual values."""
+    """Its parameters by name. Its amplitude, which says how strong it is, must be given; others that are
+    missing have their usual values."""
     intervals: tuple[Interval, ...] = ()
     """When it is on, from the start of a recording; only for effects of intervals."""
 

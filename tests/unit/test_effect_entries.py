@@ -1,20 +1,31 @@
 """Effects that a machine definition switches on: how they are written, refused and used."""
 
+import importlib.util
+import sys
 import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.effect_entries import NO_EFFECTS, ActiveEffects, active_effects, require_known_effects
+from spindle_fem.calibration.predictor import MachinePredictor
+from spindle_fem.effect_entries import (
+    NO_EFFECTS,
+    ActiveEffects,
+    active_effects,
+    effects_on,
+    require_known_effects,
+)
 from spindle_fem.effects.base import Candidate, Reading
 from spindle_fem.effects.term import TermParameter
 from spindle_fem.errors import FaultsError
 from spindle_fem.recordings.align import read_recording
+from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.simulate import simulate_recordings
 from spindle_fem.spec.effects import EffectEntry
-from spindle_fem.spec.load import find_machine, read_definition, validate, write_machine
+from spindle_fem.spec.load import find_machine, load_machine, read_definition, validate, write_machine
 from spindle_fem.spec.network import validate_network_machine, write_network_machine
 
 NETWORK = """
@@ -70,6 +81,17 @@ channel = [
 {column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
 ]
 """
+
+
+@pytest.fixture(scope="module")
+def lumped_model():
+    """Maker of a spindle of one unknown per part."""
+    path = Path(__file__).with_name("test_reduced_transient.py")
+    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
+    module = importlib.util.module_from_spec(loaded)
+    sys.modules[loaded.name] = module
+    loaded.loader.exec_module(module)
+    return module.lumped_model
 
 
 @pytest.fixture(scope="module")
@@ -224,3 +246,115 @@ def test_factors_of_effects_multiply_those_of_the_machine():
     }
     assert NO_EFFECTS.times_parameters({"a": 2.0}) == {"a": 2.0}
     assert active_effects((), SimpleNamespace()) == NO_EFFECTS
+
+
+IMPROVED = """
+base = "recorded_spindle"
+[[effect]]
+effect = "sensor_lag"
+component = "SP03"
+parameters = {time_constant = "1500 s"}
+[[effect]]
+effect = "sensor_offset"
+component = "SP05"
+parameters = {offset = "1 K"}
+[[effect]]
+effect = "coolant_film"
+component = "channel"
+form = "transition"
+parameters = {film_increase = 1.5, onset_reynolds = 900.0, width = 60.0}
+[[effect]]
+effect = "coolant_bypass"
+component = "channel"
+form = "outlet mixed"
+parameters = {fraction = 0.2}
+[[effect]]
+effect = "chiller_cycling"
+component = "channel"
+form = "sine"
+parameters = {amplitude = "1.5 K", period = "5000 s", phase = "0.4 rad"}
+[[effect]]
+effect = "unrecorded_heat_source"
+component = "nose"
+intervals = [["300 s", "900 s"], ["7200 s", "10000 s"]]
+parameters = {heat = "60 W", lag = "290 s", factor_1 = 1.1, factor_2 = 0.9}
+[[effect]]
+effect = "gap_closure"
+component = "front_bearings"
+form = "ring over housing"
+parameters = {opening = 0.7, closing_difference = "9 K", width = "4 K", lag = "500 s"}
+[[effect]]
+effect = "starvation"
+component = "front_bearings"
+parameters = {friction_change = 0.5, onset_speed = "3600 rpm", width = "100 rpm"}
+[[effect]]
+effect = "sensor_detached"
+component = "SP01"
+parameters = {share_of_air = 0.4, time = "9000 s", lag = "120 s"}
+[[effect]]
+effect = "ambient_drift"
+component = "ambient"
+form = "step"
+parameters = {change = "2 K", time = "8000 s", width = "300 s"}
+"""
+SPINDLE_MANIFEST = """
+schema = "spindle-fem/recording/1"
+name = "half an hour"
+data = "data.csv"
+time = {column = "time_s", unit = "s"}
+channel = [
+{column = "T1", role = "temperature", probe = "SP01", unit = "degC", sigma = 0.1},
+{column = "T3", role = "temperature", probe = "SP03", unit = "degC", sigma = 0.1},
+{column = "room", role = "input", drives = "ambient", unit = "degC"},
+{column = "n", role = "input", drives = "speed", unit = "rpm", hold = "previous"},
+{column = "flow", role = "input", drives = "coolant_flow", unit = "L/min", hold = "previous"},
+]
+"""
+
+
+def half_an_hour(folder, *, flow):
+    """A recording that could not have shown most of the effects above, and lacks sensors of some."""
+    times = np.arange(0.0, 1800.0, 20.0)
+    frame = pd.DataFrame({"time_s": times, "T1": 20.0 + times / 900.0, "T3": 20.0 + times / 900.0})
+    frame["room"], frame["n"], frame["flow"] = 20.0, 2000.0, flow
+    frame.to_csv(folder / "data.csv", index=False)
+    (folder / "recording.toml").write_text(SPINDLE_MANIFEST)
+    return read_recording(folder)
+
+
+@pytest.mark.parametrize("flow", [20.0, 0.0])
+def test_a_machine_that_was_improved_on_one_recording_runs_on_a_shorter_one(tmp_path, lumped_model, flow):
+    path = tmp_path / "improved_machine.toml"
+    path.write_text(IMPROVED)
+    spec = load_machine(path)
+    fast = FastModel(lumped_model(spec), spec)
+    recording = half_an_hour(tmp_path, flow=flow)
+    effects = effects_on(spec.effects, fast, recording)
+    assert [candidate.effect for candidate in effects.candidates] == [e.effect for e in spec.effects]
+    if not flow:
+        return  # a channel without flow has no film to simulate with
+    plain = MachinePredictor(fast, [recording])
+    start = np.zeros(len(plain.priors))
+    nominal = plain.predict(start, derivatives=False)[0][0]
+    improved = MachinePredictor(fast, [recording], effects=effects).predict(start, derivatives=False)[0][0]
+    assert np.isfinite(improved).all()
+    assert np.abs(improved - nominal).max() > 0.2
+    # A lag of 1500 s lets little of the first 20 s through.
+    assert np.ptp(improved[:2, 1]) < 0.1 * np.ptp(nominal[:2, 1])
+
+
+def test_the_physical_limits_of_an_entry_hold_on_every_recording(tmp_path, lumped_model):
+    spec = load_machine("recorded_spindle")
+    fast = FastModel(lumped_model(spec), spec)
+    recording = half_an_hour(tmp_path, flow=20.0)
+    entries = [
+        EffectEntry(effect="coolant_bypass", component="channel", parameters={"fraction": 1.4}),
+        EffectEntry(effect="sensor_lag", component="SP01", parameters={"time_constant": "-5 s"}),
+        EffectEntry(effect="sensor_lag", component="SP09", parameters={"time_constant": "5 s"}),
+    ]
+    with pytest.raises(FaultsError) as caught:
+        effects_on(entries, fast, recording)
+    messages = [str(fault) for fault in caught.value.faults]
+    assert "effect[1].parameters.fraction: is 1.4. Allowed: 0 to 0.95." in messages
+    assert "effect[2].parameters.time_constant: is -5 s. Allowed: 0 or more s." in messages
+    assert any('effect[3].component: "SP09" cannot have sensor_lag' in text for text in messages)
