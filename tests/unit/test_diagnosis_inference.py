@@ -1,0 +1,474 @@
+"""Fits, evidence and marginal likelihood on a small network, against exact linear-Gaussian results."""
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.optimize import lsq_linear
+from scipy.stats import chi2, multivariate_normal
+
+from spindle_fem.calibration.noise import ChannelBins, SlowError, Whitener, likely_slow_error
+from spindle_fem.diagnosis.inference import (
+    Belief,
+    Coordinate,
+    LinearProblem,
+    Problem,
+    _bounded_step,
+    _huber,
+    candidate_coordinates,
+)
+from spindle_fem.diagnosis.network_view import view_of_network
+from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Plant, even_drive
+from spindle_fem.diagnosis.prepare import calibrate, machine_coordinates, slow_error_of
+from spindle_fem.diagnosis.screening import BaseRun, Variant
+from spindle_fem.effects.catalogue import candidates_for, interval_effects
+from spindle_fem.network.build import build_network
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.reduced.network_model import NetworkFastModel
+from spindle_fem.spec.network import validate_network_machine
+
+MACHINE = """
+schema = "spindle-fem/machine/1"
+name = "small motor"
+[[network.node]]
+name = "winding"
+capacity = {value = "180 J/K", sigma_rel = 0.3}
+[[network.node]]
+name = "body"
+capacity = {value = "500 J/K", sigma_rel = 0.3}
+[[network.node]]
+name = "foot"
+capacity = "900 J/K"
+[[network.boundary]]
+name = "ambient"
+temperature = "ambient"
+[[network.link]]
+between = ["winding", "body"]
+conductance = {value = "2.3 W/K", sigma_rel = 0.3}
+[[network.link]]
+between = ["body", "ambient"]
+conductance = {value = "0.5 W/K", sigma_rel = 0.3}
+[[network.link]]
+between = ["body", "foot"]
+conductance = "1.5 W/K"
+[[network.link]]
+between = ["foot", "ambient"]
+conductance = "0.8 W/K"
+[[network.source]]
+node = "winding"
+input = "power"
+gain = {value = "0.8 W/W", sigma_rel = 0.1}
+[[network.source]]
+node = "body"
+input = "speed"
+gain = "15 W"
+reference = "1000 rpm"
+"""
+MANIFEST = """
+schema = "spindle-fem/recording/1"
+name = "synthetic"
+data = "data.csv"
+time = {column = "time_s", unit = "s"}
+channel = [
+{column = "T_winding", role = "temperature", probe = "winding", unit = "degC", sigma = 0.1},
+{column = "T_body", role = "temperature", probe = "body", unit = "degC", sigma = 0.1},
+{column = "T_room", role = "input", drives = "ambient", unit = "degC"},
+{column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
+{column = "n", role = "input", drives = "speed", unit = "rpm", hold = "previous"},
+]
+"""
+TRUTH = {
+    "capacity.winding": 1.2,
+    "capacity.body": 0.8,
+    "conductance.winding|body": 1.3,
+    "conductance.body|ambient": 0.75,
+    "gain.winding.power": 1.08,
+}
+QUIET = SlowError(1e-5, 1500.0)
+
+
+def frame_of(times, temperatures=None):
+    read = np.full((times.size, 2), 21.0) if temperatures is None else temperatures - 273.15
+    return pd.DataFrame(
+        {
+            "time_s": times,
+            "T_winding": read[:, 0],
+            "T_body": read[:, 1],
+            "T_room": 21.0 + np.sin(times / 1500.0),
+            "P": np.where(times % 2400.0 < 900.0, 90.0, 10.0),
+            "n": np.where(times % 3000.0 < 1500.0, 600.0, 1500.0),
+        }
+    )
+
+
+def written(folder, times, temperatures=None):
+    frame_of(times, temperatures).to_csv(folder / "data.csv", index=False)
+    (folder / "recording.toml").write_text(MANIFEST)
+    return read_recording(folder)
+
+
+@pytest.fixture(scope="module")
+def fast():
+    spec = validate_network_machine(tomllib.loads(MACHINE), "test")
+    return NetworkFastModel(build_network(spec.network), spec)
+
+
+@pytest.fixture(scope="module")
+def blank(fast, tmp_path_factory):
+    """The machine on a recording that says nothing yet."""
+    recording = written(tmp_path_factory.mktemp("blank"), np.arange(0.0, 9000.0, 30.0))
+    return Plant(fast, [recording], [np.ones(recording.times.size, dtype=bool)])
+
+
+def synthetic(plant, folder, seed, values=None, candidates=()):
+    """The machine on readings of its own with white noise of 0.1 K."""
+    on_grid = plant.predict(0, values or {}, candidates).temperature
+    times = plant.recordings[0].times
+    true = np.column_stack([np.interp(times, plant.drives[0].grid, column) for column in on_grid.T])
+    noise = np.random.default_rng(seed).normal(0.0, 0.1, true.shape)
+    recording = written(folder, times, true + noise)
+    return Plant(plant.fast, [recording], [np.ones(times.size, dtype=bool)])
+
+
+@pytest.fixture(scope="module")
+def view(fast, blank):
+    return view_of_network(fast.network, blank.recordings[0])
+
+
+@pytest.fixture(scope="module")
+def candidates(view):
+    found = {(c.effect, c.component, c.form): c for c in candidates_for(view)}
+    for effect in interval_effects():
+        candidate = effect.over(view, "foot", [(2000.0, 4000.0)])
+        found[candidate.effect, candidate.component, candidate.form] = candidate
+    return found
+
+
+# ------------------------------------------------------------------------ plant
+def test_derivatives_to_machine_and_start_of_a_network(blank):
+    names = [name for name, *_ in blank.uncertain()] + [name for name, _ in blank.starts()]
+    assert len(names) == 5 + 3
+    found = blank.predict(0, TRUTH, (), names)
+    for column, name in enumerate(names):
+        up, down = (
+            blank.predict(0, {**TRUTH, name: TRUTH.get(name, 1.0) * np.exp(sign * 1e-5)}).temperature
+            for sign in (1.0, -1.0)
+        )
+        difference = (up - down) / 2e-5
+        size = np.abs(difference).max()
+        assert size > 0.1, name
+        assert np.abs(found.sensitivity[:, :, column] - difference).max() < 1e-5 * size, name
+
+
+def test_a_start_belongs_to_its_own_recording(fast, blank):
+    recording = blank.recordings[0]
+    both = Plant(fast, [recording, recording], [blank.use[0]] * 2)
+    names = [name for name, _ in both.starts()]
+    assert len(names) == 6
+    first, second = (both.predict(number, {}, (), names).sensitivity for number in (0, 1))
+    assert np.abs(first[:, :, 3:]).max() == 0.0
+    assert np.abs(second[:, :, :3]).max() == 0.0
+    assert first[:, :, :3] == pytest.approx(second[:, :, 3:], abs=1e-12)
+
+
+def test_first_order_answers_of_a_network_are_differences(blank, candidates):
+    chosen = {(c.effect, c.form): c for c in candidates.values()}
+    variants = []
+    for candidate in chosen.values():
+        amplitude = candidate.null + 1e-3 * (candidate.reference - candidate.null)
+        variants.append(Variant(replace(candidate, reference=amplitude), candidate.starts[0]))
+    base = BaseRun(blank, 0, TRUTH)
+    answers = base.responses(variants)
+    nothing = blank.predict(0, TRUTH).temperature
+    seen = 0
+    for column, variant in enumerate(variants):
+        candidate = variant.candidate
+        factors = {item.name for item in candidate.factors}
+        own = variant.values(candidate.reference)
+        own = {EFFECT_PREFIX + n if n in factors else n: v for n, v in own.items()}
+        difference = blank.predict(0, TRUTH | own, (candidate,)).temperature - nothing
+        size = np.abs(difference).max()
+        if size < 1e-7:
+            assert np.abs(answers[:, :, column]).max() < 1e-6, candidate.label
+            continue
+        seen += 1
+        assert np.abs(answers[:, :, column] - difference).max() < 0.01 * size, candidate.label
+    assert seen > 25
+
+
+def test_even_steps_keep_the_integral_of_every_input(fast, tmp_path):
+    generator = np.random.default_rng(3)
+    times = np.cumsum(generator.uniform(10.0, 50.0, 300))
+    times[150:] += 20000.0
+    recording = written(tmp_path, times)
+    drive = even_drive(fast, recording)
+    fine = fast.drive(recording, largest_step=np.inf)
+    assert len(drive.restarts) == len(fine.restarts) == 1
+    ordinary = np.delete(drive.steps, np.array(drive.restarts) - 1)
+    # Of a length, but for one at the end of each stretch.
+    assert np.sum(np.abs(ordinary - np.median(ordinary)) > 1e-6) <= 2
+    cut = (fine.restarts[0], drive.restarts[0])
+    for name in ("ambient", "power", "speed"):
+        column = drive.names.index(name)
+        for part in (0, 1):
+            rows = [slice(0, at - 1) if part == 0 else slice(at, None) for at in cut]
+            exact, found = (
+                float(np.sum(0.5 * (item.start + item.end)[own, column] * item.steps[own]))
+                for item, own in ((fine, rows[0]), (drive, rows[1]))
+            )
+            # The last step reaches beyond the last reading by less than its own length.
+            slack = ordinary.max() * np.abs(drive.end[:, column]).max()
+            assert abs(found - exact) <= slack, name
+    column = drive.names.index("power")
+    edges = drive.grid[:40]
+    coarse = np.concatenate(([0.0], np.cumsum(drive.start[:39, column] * drive.steps[:39])))
+    own = 0.5 * (fine.start + fine.end)[:, column] * fine.steps
+    exact = np.interp(edges, fine.grid, np.concatenate(([0.0], np.cumsum(own))))
+    assert coarse == pytest.approx(exact, rel=1e-9)
+
+
+# ------------------------------------------------------------------------- fits
+def test_known_parameters_lie_within_their_intervals(blank, tmp_path):
+    squares, inside = [], 0
+    for seed in range(5):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        plant = synthetic(blank, folder, seed, TRUTH)
+        belief = Belief.prior(calibrate(None, plant).belief.coordinates)
+        fit = Problem(plant, belief, QUIET, plant.observations).fit()
+        own = [i for i, c in enumerate(fit.coordinates) if c.name in TRUTH]
+        true = np.array([fit.coordinates[i].of(TRUTH[fit.coordinates[i].name]) for i in own])
+        apart = fit.position[own] - true
+        squares.append(apart @ np.linalg.solve(fit.covariance[np.ix_(own, own)], apart))
+        for name, value in TRUTH.items():
+            low, high = fit.interval(name, 1.645)
+            inside += low < value < high
+            assert high / low < 1.3, name
+        assert fit.reduced_misfit == pytest.approx(1.0, abs=0.15)
+    assert chi2.sf(sum(squares), 5 * len(TRUTH)) > 1e-3
+    assert 17 <= inside <= 25
+
+
+def test_a_fit_does_not_depend_on_where_it_starts(blank, tmp_path):
+    plant = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(plant, calibrate(None, plant).belief, QUIET, plant.observations)
+    near = problem.fit((), TRUTH)
+    far = problem.fit((), {name: 1.0 / value for name, value in TRUTH.items()})
+    assert far.misfit_with_prior == pytest.approx(near.misfit_with_prior, abs=0.1)
+    sigma = np.sqrt(np.diag(near.covariance))
+    assert np.all(np.abs(far.position - near.position) < 0.3 * sigma)
+
+
+def sensor(candidates, effect):
+    """The candidate of a sensor effect on the second channel."""
+    own = [c for c in candidates.values() if c.effect == effect and c.reading.channel == "T_body"]
+    assert len(own) == 1
+    return own[0]
+
+
+def test_a_sensor_offset_has_the_evidence_of_its_exact_gaussian(blank, candidates, tmp_path, monkeypatch):
+    """An offset is linear: with the machine fixed, data are exactly Gaussian."""
+    # Gaussian tails: nothing is an outlier.
+    monkeypatch.setattr("spindle_fem.diagnosis.inference.OUTLIER_SIGMAS", 1e9)
+    offset = sensor(candidates, "sensor_offset")
+    plant = synthetic(blank, tmp_path, 5, {offset.amplitude: 0.06}, (offset,))
+    nothing = Belief.prior(())
+    slow = SlowError(0.02, 900.0)
+    problem = Problem(plant, nothing, slow, plant.observations)
+    empty, with_offset = problem.fit(), problem.fit((offset,))
+    sigma = offset.parameters[offset.amplitude].sigma
+    exact = {}
+    predicted = plant.predict(0, {}).temperature
+    for spread in (0.0, sigma):
+        total = 0.0
+        for item in plant.observations:
+            factor = item.bins.factor(slow)
+            covariance = factor @ factor.T
+            if plant.recordings[0].temperature_names[item.channel] == "T_body":
+                covariance = covariance + spread**2
+            residual = item.values - item.at(predicted[:, item.channel])
+            total += multivariate_normal.logpdf(residual, np.zeros(len(residual)), covariance)
+        exact[spread] = total
+    gained = with_offset.log_evidence - empty.log_evidence
+    assert gained == pytest.approx(exact[sigma] - exact[0.0], abs=1e-3)
+    low, high = with_offset.interval(offset.amplitude, 2.0)
+    assert low < 0.06 < high
+
+
+def test_an_amplitude_of_one_sign_counts_the_half_prior_twice(blank, candidates, tmp_path):
+    lag = sensor(candidates, "sensor_lag")
+    (coordinate,) = candidate_coordinates(lag)
+    assert coordinate.low == 0.0
+    assert not coordinate.logarithmic
+    plant = synthetic(blank, tmp_path, 6, {lag.amplitude: 150.0}, (lag,))
+    problem = Problem(plant, Belief.prior(()), QUIET, plant.observations)
+    fit = problem.fit((lag,), {lag.amplitude: 60.0})
+    assert fit.values[lag.amplitude] == pytest.approx(150.0, abs=5.0)
+    # By quadrature over the half normal.
+    values = np.linspace(120.0, 180.0, 121)
+    misfits = []
+    for value in values:
+        read = problem.whitened([plant.predict(0, {lag.amplitude: value}, (lag,)).temperature])
+        misfits.append(float(np.sum(_huber(problem.data - read))))
+    prior = 2.0 * np.exp(-0.5 * (values / coordinate.sigma) ** 2) / (np.sqrt(2.0 * np.pi) * coordinate.sigma)
+    likelihood = np.exp(-0.5 * (np.array(misfits) - min(misfits)))
+    exact = np.log(np.trapezoid(prior * likelihood, values)) - 0.5 * min(misfits)
+    assert fit.log_evidence == pytest.approx(exact, abs=0.05)
+
+
+def test_marginal_likelihood_of_columns_is_that_of_the_whole_covariance(blank, tmp_path):
+    plant = synthetic(blank, tmp_path, 8, TRUTH)
+    calibrated = calibrate(None, plant)
+    coordinates = calibrated.belief.coordinates
+    generator = np.random.default_rng(0)
+    root = np.triu(generator.normal(0.0, 0.3, (len(coordinates),) * 2)) + 1.5 * np.eye(len(coordinates))
+    belief = Belief(coordinates, 0.2 * generator.normal(size=len(coordinates)), root)
+    problem = Problem(plant, belief, QUIET, plant.observations)
+    fit = problem.fit()
+    linear = LinearProblem.about(problem, fit)
+    # One reading went astray: it counts less.
+    linear.weight[17] = 0.4
+    weight = linear.weight
+    predicted = problem.predict((), fit.coordinates, fit.position)
+    jacobian = problem.whitened([p.sensitivity for p in predicted])
+    residual = problem.data - problem.whitened([p.temperature for p in predicted])
+    linear.data[:] = weight * (residual + jacobian @ (fit.position - belief.mean))
+    linear.jacobian[:] = weight[:, None] * np.linalg.solve(root.T, jacobian.T).T
+    columns = generator.normal(size=(len(weight), 3))
+    gram, data, total = linear.gram(columns)
+    # The machine's coordinates as part of the covariance, by its dense inverse.
+    prior = np.linalg.inv(root.T @ root)
+    weighted = weight[:, None] * jacobian
+    inverse = np.linalg.inv(np.eye(len(weight)) + weighted @ prior @ weighted.T)
+    seen, read = weight[:, None] * columns, linear.data
+    assert gram == pytest.approx(seen.T @ inverse @ seen, rel=1e-8)
+    assert data == pytest.approx(seen.T @ inverse @ read, rel=1e-7, abs=1e-7)
+    assert total == pytest.approx(read @ inverse @ read, rel=1e-7)
+
+
+def test_what_calibration_told_is_the_belief_of_the_diagnosis(fast, blank, tmp_path):
+    earlier = synthetic(blank, tmp_path, 11, TRUTH)
+    calibrated = calibrate(earlier, blank)
+    fit, belief = calibrated.fit, calibrated.belief
+    count = len(machine_coordinates(blank))
+    assert [c.name for c in belief.coordinates[:count]] == [c.name for c in fit.coordinates[:count]]
+    covariance = np.linalg.inv(belief.root.T @ belief.root)
+    assert covariance[:count, :count] == pytest.approx(fit.covariance[:count, :count], rel=1e-6, abs=1e-12)
+    assert belief.mean[:count] == pytest.approx(fit.position[:count])
+    for coordinate, position in zip(belief.coordinates[:count], belief.mean, strict=False):
+        assert coordinate.at(position) == pytest.approx(TRUTH[coordinate.name], rel=0.1)
+    # Temperatures at the start of the other recording are as open as before.
+    assert covariance[count:, count:] == pytest.approx(np.eye(3))
+
+
+def test_slow_error_of_white_readings_is_small_and_of_drifting_ones_is_not(blank, tmp_path):
+    names = ("white", "drifting")
+    found = {}
+    for name in names:
+        folder = tmp_path / name
+        folder.mkdir()
+        plant = synthetic(blank, folder, 12)
+        if name == "drifting":
+            wander = 0.8 * np.sin(plant.recordings[0].times / 400.0)[:, None]
+            plant = synthetic_with(blank, folder, plant.recordings[0].temperature + wander)
+        problem = Problem(plant, Belief.prior(()), SlowError(0.1, 300.0), plant.observations)
+        found[name] = slow_error_of(problem, problem.fit())
+    # Half a per cent of what the temperatures move is the least that a network is off.
+    moved = np.ptp(np.quantile(blank.predict(0, {}).temperature, [0.05, 0.95], axis=0), axis=0)
+    assert found["white"].sigma == pytest.approx(0.005 * np.median(moved), rel=0.1)
+    assert found["drifting"].sigma >= 2.0 * found["white"].sigma
+    assert found["drifting"].sigma == pytest.approx(0.8 / np.sqrt(2.0), rel=1.0)
+
+
+def synthetic_with(plant, folder, temperatures):
+    recording = written(folder, plant.recordings[0].times, temperatures)
+    return Plant(plant.fast, [recording], [np.ones(recording.times.size, dtype=bool)])
+
+
+# ------------------------------------------------------------------- coordinates
+def test_coordinates_go_there_and_back():
+    logarithmic = Coordinate("a", 5.0, 0.3, True, -4.0, 4.0)
+    assert logarithmic.at(1.0) == pytest.approx(5.0 * np.exp(0.3))
+    assert logarithmic.of(logarithmic.at(-1.7)) == pytest.approx(-1.7)
+    linear = Coordinate("b", 20.0, 4.0, False, -2.0, np.inf, "K")
+    assert linear.at(0.5) == 22.0
+    assert linear.of(30.0) == pytest.approx(2.5)
+    assert linear.of(-100.0) == -2.0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_bounded_step_is_the_least_squares_step_within_the_bounds(seed):
+    generator = np.random.default_rng(seed)
+    jacobian, residual = generator.normal(size=(12, 4)), 3.0 * generator.normal(size=12)
+    # Nearly orthogonal columns, for which holding what would leave is exact.
+    jacobian, _ = np.linalg.qr(jacobian)
+    position = generator.uniform(-0.5, 0.5, 4)
+    low, high = np.full(4, -0.8), np.array([0.8, np.inf, 0.6, np.inf])
+    move = _bounded_step(jacobian.T @ jacobian, jacobian.T @ residual, 0.0, position, low, high)
+    exact = lsq_linear(jacobian, residual, bounds=(low - position, high - position), tol=1e-14).x
+    assert position + move == pytest.approx(np.clip(position + move, low, high), abs=1e-15)
+    assert move == pytest.approx(exact, abs=1e-6)
+
+
+def test_an_unbounded_step_is_newtons():
+    generator = np.random.default_rng(2)
+    root, gradient = generator.normal(size=(5, 3)), generator.normal(size=3)
+    hessian = root.T @ root
+    free = np.full(3, np.inf)
+    move = _bounded_step(hessian, gradient, 0.0, np.zeros(3), -free, free)
+    assert hessian @ move == pytest.approx(gradient)
+    damped = _bounded_step(hessian, gradient, 10.0, np.zeros(3), -free, free)
+    assert (hessian + 10.0 * np.diag(np.diag(hessian))) @ damped == pytest.approx(gradient)
+
+
+def test_large_residuals_count_linearly():
+    assert _huber(np.array([-2.0, 3.0, 10.0])) == pytest.approx([4.0, 9.0, 51.0])
+    step = 1e-6
+    slope = (_huber(np.array([3.0 + step])) - _huber(np.array([3.0 - step]))) / (2.0 * step)
+    assert slope == pytest.approx([6.0], abs=1e-4)
+
+
+# ---------------------------------------------------------------------- whitener
+def bins_of(count, *, number=1.0, spacing=0.0, seed=0):
+    generator = np.random.default_rng(seed)
+    times = np.cumsum(generator.uniform(40.0, 90.0, count))
+    many = np.full(count, number)
+    rows = np.arange(count)
+    return ChannelBins(0, rows, rows, times, many, np.full(count, spacing), 0.1)
+
+
+def test_whitened_readings_are_independent_of_unit_variance():
+    bins, slow = bins_of(60, number=4.0, spacing=12.0), SlowError(0.2, 700.0)
+    factor = bins.factor(slow)
+    white = Whitener(bins, slow)
+    assert white(factor) == pytest.approx(np.eye(60), abs=1e-10)
+    assert white.log_root_determinant == pytest.approx(0.5 * np.linalg.slogdet(factor @ factor.T)[1])
+
+
+def test_the_filter_is_the_cholesky_factor(monkeypatch):
+    bins, slow = bins_of(150), SlowError(0.15, 900.0)
+    values = np.random.default_rng(1).normal(size=(150, 3))
+    dense = Whitener(bins, slow)
+    monkeypatch.setattr("spindle_fem.calibration.noise.MOST_DENSE", 100)
+    filtered = Whitener(bins, slow)
+    assert filtered.factor is None
+    assert filtered(values) == pytest.approx(dense(values), rel=1e-9, abs=1e-9)
+    assert filtered(values[:, 0]) == pytest.approx(dense(values[:, 0]), rel=1e-9, abs=1e-9)
+    assert filtered.log_root_determinant == pytest.approx(dense.log_root_determinant, rel=1e-10)
+
+
+def test_the_slow_error_of_a_known_process_is_found():
+    generator = np.random.default_rng(4)
+    true = SlowError(0.17, 1200.0)
+    residuals = []
+    for seed in range(6):
+        bins = bins_of(120, seed=seed)
+        residuals.append((bins, bins.factor(true) @ generator.normal(size=120)))
+    choices = {"sigmas": (0.01, 0.05, 0.11, 0.17, 0.25, 0.65), "times": (300.0, 1200.0, 4800.0)}
+    found = likely_slow_error(residuals, **choices)
+    assert found.sigma in (0.11, 0.17, 0.25)
+    assert found.time == 1200.0
+    held = likely_slow_error(residuals, prior=SlowError(0.01, 1200.0), prior_width=0.005, **choices)
+    assert held.sigma == 0.01

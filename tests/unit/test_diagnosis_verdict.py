@@ -1,0 +1,272 @@
+"""What fitted hypotheses amount to, on hypotheses made up for the purpose."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from spindle_fem.calibration.noise import SlowError
+from spindle_fem.diagnosis.engine import Hypothesis
+from spindle_fem.diagnosis.heldout import heldout_stamps
+from spindle_fem.diagnosis.inference import Coordinate, Fit
+from spindle_fem.diagnosis.verdict import (
+    PRIOR_SIGMAS,
+    TEMPERATURE,
+    detection_p_value,
+    judge,
+    kind_of,
+    rank,
+    within_prior,
+)
+from spindle_fem.effects.base import Candidate
+from spindle_fem.effects.term import TermParameter
+from spindle_fem.errors import SpecError
+
+HEAT = Coordinate("heat.front", 1.0, 0.2, True, -4.0, 4.0)
+DATA = 400
+
+
+def candidate(effect, component="front_bearings", kind="missing_physics", form="", factor=None):
+    factors = () if factor is None else (TermParameter(factor, 1.0, 0.6),)
+    return Candidate(
+        effect,
+        component,
+        form,
+        kind,
+        factor or f"{effect}.size",
+        1.0,
+        1.2,
+        factors=factors,
+        shift_of_prior=bool(factor),
+    )
+
+
+def hypothesis(*candidates, misfit, evidence=None, log_prior=0.0, position=(), reduced=1.0):
+    """A fit with one coordinate for each candidate beside the machine's own."""
+    own = [Coordinate(f"effect:{c.amplitude}", 1.0, 0.6, True, -4.0, 4.0) for c in candidates]
+    coordinates = (HEAT, *own)
+    where = np.zeros(len(coordinates))
+    where[: len(position)] = position
+    fit = Fit(
+        tuple(candidates),
+        coordinates,
+        where,
+        np.eye(len(coordinates)),
+        -0.5 * misfit - 2.0 * len(candidates) if evidence is None else evidence,
+        reduced * DATA,
+        misfit,
+        np.zeros(DATA),
+        SlowError(),
+    )
+    return Hypothesis(fit, log_prior)
+
+
+def verdict(*found, calibrated=False, trials=100, overlapping=None):
+    return judge(list(found), trials=trials, calibrated=calibrated, overlapping=overlapping)
+
+
+PRELOAD = candidate("thermal_preload")
+CHURNING = candidate("grease_churning")
+SCALE = candidate("heat_scale", kind="parameter", factor="heat.front")
+OFFSET = candidate("sensor_offset", "SP02", "sensor")
+
+
+# ------------------------------------------------------------------------ ranking
+def test_probabilities_of_sets_add_up_over_their_forms():
+    first = hypothesis(replace(PRELOAD, form="one"), misfit=400.0)
+    second = hypothesis(replace(PRELOAD, form="two"), misfit=400.0)
+    rival = hypothesis(CHURNING, misfit=400.0)
+    empty = hypothesis(misfit=400.0, evidence=-300.0)
+    ranked = rank([first, rival, second, empty])
+    assert ranked[0].probability == pytest.approx(2.0 / 3.0, rel=1e-6)
+    assert ranked[0].fit.keys == {("thermal_preload", "front_bearings")}
+    assert sum(item.probability for item in ranked) == pytest.approx(1.0)
+    assert [item.probability for item in ranked] == sorted((i.probability for i in ranked), reverse=True)
+
+
+def test_the_better_form_speaks_for_its_set():
+    worse = hypothesis(replace(PRELOAD, form="worse"), misfit=420.0)
+    better = hypothesis(replace(PRELOAD, form="better"), misfit=400.0)
+    ranked = rank([worse, better, hypothesis(misfit=900.0)])
+    assert ranked[0].fit.candidates[0].form == "better"
+
+
+def test_differences_of_likelihood_count_by_the_temperature():
+    better = hypothesis(PRELOAD, misfit=400.0)
+    worse = hypothesis(CHURNING, misfit=408.0)
+    ranked = rank([worse, better, hypothesis(misfit=420.0, evidence=-1e4)])
+    odds = ranked[0].probability / ranked[1].probability
+    assert odds == pytest.approx(np.exp(0.5 * 8.0 / TEMPERATURE), rel=0.05)
+
+
+def test_complexity_and_prior_count_in_full():
+    plain = hypothesis(PRELOAD, misfit=400.0, evidence=-200.0 - 1.0)
+    complex_ = hypothesis(CHURNING, misfit=400.0, evidence=-200.0 - 4.0, log_prior=-1.0)
+    ranked = rank([plain, complex_, hypothesis(misfit=400.0, evidence=-1e4)])
+    assert ranked[0].probability / ranked[1].probability == pytest.approx(np.exp(4.0))
+
+
+def test_what_a_strong_effect_leaves_counts_less():
+    """The same difference of misfit decides less after a large improvement."""
+
+    def odds(first):
+        ranked = rank(
+            [hypothesis(misfit=first), hypothesis(PRELOAD, misfit=400.0), hypothesis(CHURNING, misfit=420.0)]
+        )
+        share = {item.fit.keys: item.probability for item in ranked}
+        return share[PRELOAD_KEY] / share[CHURNING_KEY]
+
+    assert odds(600.0) > 1.1 * odds(20000.0) > 1.1
+
+
+PRELOAD_KEY = frozenset({("thermal_preload", "front_bearings")})
+CHURNING_KEY = frozenset({("grease_churning", "front_bearings")})
+
+
+# ---------------------------------------------------------------------- detection
+def test_the_p_value_corrects_for_the_number_of_trials():
+    null, better = hypothesis(misfit=430.0), hypothesis(PRELOAD, misfit=400.0)
+    alone = chi2.sf(30.0 / np.sqrt(TEMPERATURE), 1)
+    assert detection_p_value([null, better], 1) == pytest.approx(alone)
+    assert detection_p_value([null, better], 50) == pytest.approx(1.0 - (1.0 - alone) ** 50, rel=1e-9)
+
+
+def test_pairs_are_corrected_for_the_number_of_pairs():
+    null = hypothesis(misfit=430.0)
+    pair = hypothesis(PRELOAD, CHURNING, misfit=400.0)
+    alone = chi2.sf(30.0 / np.sqrt(TEMPERATURE), 2)
+    assert detection_p_value([null, pair], 50) == pytest.approx(-np.expm1(1225 * np.log1p(-alone)), rel=1e-9)
+
+
+def test_nothing_better_than_nothing_has_the_largest_p_value():
+    assert detection_p_value([hypothesis(misfit=400.0), hypothesis(PRELOAD, misfit=400.0)], 50) == 1.0
+
+
+def test_p_values_of_pure_chance_are_seldom_small():
+    """Gains of a chi-square of one degree of freedom each: at most a few per cent below one per cent."""
+    generator = np.random.default_rng(0)
+    low = 0
+    for _ in range(400):
+        gains = generator.chisquare(1, 40)
+        found = [hypothesis(misfit=400.0)]
+        found += [hypothesis(PRELOAD, misfit=400.0 - gain) for gain in gains]
+        low += detection_p_value(found, 40) < 0.01
+    assert low <= 10
+
+
+# ------------------------------------------------------------------------ verdicts
+def test_nothing_missing_is_consistent():
+    found = verdict(hypothesis(misfit=400.0), hypothesis(PRELOAD, misfit=396.0, log_prior=-3.0))
+    assert found.verdict == "consistent"
+    assert found.p_value > 0.5
+    assert found.chosen.fit.candidates == ()
+    assert found.other == 0.0
+
+
+@pytest.mark.parametrize(
+    ("member", "expected"), [(PRELOAD, "missing_physics"), (OFFSET, "sensor"), (SCALE, "parameter")]
+)
+def test_a_clear_single_effect_gets_the_verdict_of_its_kind(member, expected):
+    found = verdict(
+        hypothesis(misfit=1400.0), hypothesis(member, misfit=400.0, position=(0.0, 2.5)), calibrated=True
+    )
+    assert found.verdict == expected
+    assert found.p_value < 1e-6
+    assert found.chosen.probability > 0.99
+    assert found.alternatives == ()
+
+
+def test_physics_comes_before_parameters_before_sensors():
+    assert kind_of([OFFSET, SCALE, PRELOAD]) == "missing_physics"
+    assert kind_of([OFFSET, SCALE]) == "parameter"
+    assert kind_of([OFFSET]) == "sensor"
+    assert kind_of([]) == "consistent"
+
+
+def test_two_sets_as_good_are_ambiguous_and_both_named():
+    found = verdict(
+        hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0), hypothesis(CHURNING, misfit=400.4)
+    )
+    assert found.verdict == "ambiguous"
+    assert found.chosen.fit.keys == PRELOAD_KEY
+    assert [item.fit.keys for item in found.alternatives] == [CHURNING_KEY]
+    total = found.chosen.probability + sum(item.probability for item in found.alternatives) + found.other
+    assert total <= 1.0 + 1e-12
+
+
+def test_a_bearing_and_its_set_are_one_place_for_a_decision():
+    group = {"front_bearings": frozenset({"F1", "front_bearings"}), "F1": frozenset({"F1", "front_bearings"})}
+    found = [
+        hypothesis(misfit=1400.0),
+        hypothesis(CHURNING, misfit=400.0),
+        hypothesis(replace(CHURNING, component="F1"), misfit=400.4),
+    ]
+    assert verdict(*found).verdict == "ambiguous"
+    assert verdict(*found, overlapping=group).verdict == "missing_physics"
+    other = hypothesis(replace(CHURNING, component="R1"), misfit=400.4)
+    assert verdict(found[0], found[1], other, overlapping=group).verdict == "ambiguous"
+
+
+def test_a_fit_that_stays_above_the_noise_leaves_room_for_something_else():
+    found = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=3000.0, reduced=4.0))
+    assert found.other > 0.1
+    assert found.chosen.probability <= 1.0 - found.other + 1e-12
+    good = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0, reduced=1.0))
+    assert good.other == 0.0
+
+
+def test_a_shift_that_the_prior_holds_is_consistent():
+    """0.2 is one standard deviation: shifts are judged by their sum, machine and effect together."""
+    own_sigma = 0.6
+    held = hypothesis(SCALE, misfit=400.0, position=(1.0, 1.2 * 0.2 / own_sigma))
+    assert within_prior(held.fit, calibrated=False)
+    assert verdict(hypothesis(misfit=460.0), held).verdict == "consistent"
+    beyond = hypothesis(SCALE, misfit=400.0, position=(1.0, 2.0 * 0.2 / own_sigma))
+    assert not within_prior(beyond.fit, calibrated=False)
+    assert verdict(hypothesis(misfit=460.0), beyond).verdict == "parameter"
+    edge = 0.2 * (PRIOR_SIGMAS - 1.0) / own_sigma
+    for factor, expected in ((0.99, True), (1.01, False)):
+        fit = hypothesis(SCALE, misfit=400.0, position=(1.0, factor * edge)).fit
+        assert within_prior(fit, calibrated=False) is expected
+
+
+def test_after_a_calibration_a_shift_is_a_parameter():
+    held = hypothesis(SCALE, misfit=400.0, position=(0.0, 0.3))
+    assert not within_prior(held.fit, calibrated=True)
+    assert verdict(hypothesis(misfit=460.0), held, calibrated=True).verdict == "parameter"
+
+
+def test_physics_is_never_within_a_prior():
+    assert not within_prior(hypothesis(PRELOAD, misfit=400.0).fit, calibrated=False)
+    both = hypothesis(SCALE, PRELOAD, misfit=400.0)
+    assert not within_prior(both.fit, calibrated=False)
+    assert not within_prior(hypothesis(misfit=400.0).fit, calibrated=False)
+
+
+# ------------------------------------------------------------------------ held out
+@pytest.mark.parametrize("times", [np.arange(1000.0), np.sort(np.random.default_rng(0).uniform(0, 9e4, 700))])
+def test_blocks_are_whole_stretches_of_time(times):
+    held, how = heldout_stamps(SimpleNamespace(times=times))
+    assert held.mean() == pytest.approx(0.25, abs=0.05)
+    assert np.abs(np.diff(held.astype(int))).sum() == 10
+    share = (times - times[0]) / np.ptp(times)
+    assert not held[share < 0.1 - 1e-9].any()
+    assert held[(share > 0.1001) & (share < 0.1499)].all()
+    assert "stretches" in how
+
+
+def test_the_last_part_is_the_last_part():
+    times = np.array([0.0, 1.0, 5.0, 9.0, 9.5, 10.0]) + 100.0
+    held, how = heldout_stamps(SimpleNamespace(times=times), "last:0.4")
+    assert held.tolist() == [False, False, False, True, True, True]
+    assert how == "the last 40 % of the time"
+
+
+@pytest.mark.parametrize(
+    "choice", ["last", "last:", "last:0", "last:0.9", "first:0.2", "last:x", "", "last:nan"]
+)
+def test_other_choices_are_refused(choice):
+    with pytest.raises(SpecError, match=r'Allowed: "blocks", or "last:0.4"'):
+        heldout_stamps(SimpleNamespace(times=np.arange(10.0)), choice)
