@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 ONSETS = 40
 WALK_SCALES = (1.0, 3.0, 10.0, 30.0, 100.0)
 MOST_INTERVALS = 3
+# Moves of edges that gain less (natural logarithm) are none.
+SMALLEST_SETTLING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +208,9 @@ def explain(onsets: Onsets) -> Explanation:
 def find_intervals(onsets: Onsets, spread: float, stop: float) -> list[OnOff]:
     """Best one, two and three intervals of one strength at a spot.
 
+    Each further one is put beside the others, or a rest is cut into one of
+    them; then all edges are moved until none gains.
+
     Parameters
     ----------
     onsets : Onsets
@@ -219,43 +224,80 @@ def find_intervals(onsets: Onsets, spread: float, stop: float) -> list[OnOff]:
     gram = np.zeros((count + 1, count + 1))
     gram[:count, :count] = onsets.gram
     data = np.append(onsets.data, 0.0)
-    first, last = np.triu_indices(count + 1, 1)
-    pairs = np.column_stack((first, last))
+    pairs = np.column_stack(np.triu_indices(count + 1, 1))
     times = np.append(onsets.times, stop)
-    chosen: list[int] = []
+    edges: list[int] = []
     found = []
-    weights = np.zeros(count + 1)
     for number in range(1, MOST_INTERVALS + 1):
-        allowed = np.ones(len(pairs), dtype=bool)
-        for index in chosen:
-            # At least one instant of rest between two intervals.
-            allowed &= (pairs[:, 0] > pairs[index, 1]) | (pairs[:, 1] < pairs[index, 0])
-        options = np.flatnonzero(allowed)
-        if options.size == 0:
+        added = _best_addition(gram, data, edges, pairs, spread)
+        if added is None:
             break
-        cross = gram @ weights
-        own = gram[first, first] + gram[last, last] - 2.0 * gram[first, last]
-        size = own + 2.0 * (cross[first] - cross[last]) + weights @ gram @ weights
-        overlap = data[first] - data[last] + weights @ data
-        gain = _gain(overlap[options], size[options], spread)
-        best = int(options[np.argmax(gain)])
-        chosen.append(best)
-        weights[first[best]] += 1.0
-        weights[last[best]] -= 1.0
+        edges = _settled(gram, data, sorted([*edges, *added]), spread)
+        weights = _weights(edges, count + 1)
         square, along = float(weights @ gram @ weights), float(weights @ data)
-        strength = along / (square + 1.0 / spread**2)
         paid = number * np.log(len(pairs)) - sum(np.log(i) for i in range(1, number + 1))
-        intervals = sorted((float(times[first[i]]), float(times[last[i]])) for i in chosen)
         found.append(
             OnOff(
                 onsets.pattern,
                 onsets.recording,
-                tuple(intervals),
-                strength,
+                tuple(
+                    (float(times[a]), float(times[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)
+                ),
+                along / (square + 1.0 / spread**2),
                 float(_gain(np.array([along]), np.array([square]), spread)[0]) - paid,
             )
         )
     return found
+
+
+def _weights(edges: Sequence[int], size: int) -> Array:
+    """Steps up at every first edge, down at every second."""
+    found = np.zeros(size)
+    found[list(edges[::2])], found[list(edges[1::2])] = 1.0, -1.0
+    return found
+
+
+def _best_addition(
+    gram: Array, data: Array, edges: Sequence[int], pairs: NDArray[np.int64], spread: float
+) -> tuple[int, int] | None:
+    """Two edges more: an interval beside the others, or a rest within one of them."""
+    first, last = pairs.T
+    # No edge of the others between the two, nor on them.
+    passed = np.searchsorted(edges, first, side="right")
+    allowed = passed == np.searchsorted(edges, last, side="left")
+    allowed &= ~np.isin(first, edges) & ~np.isin(last, edges)
+    if not allowed.any():
+        return None
+    first, last = first[allowed], last[allowed]
+    sign = np.where(passed[allowed] % 2 == 0, 1.0, -1.0)
+    weights = _weights(edges, len(data))
+    cross = gram @ weights
+    own = gram[first, first] + gram[last, last] - 2.0 * gram[first, last]
+    size = weights @ cross + 2.0 * sign * (cross[first] - cross[last]) + own
+    overlap = weights @ data + sign * (data[first] - data[last])
+    best = int(np.argmax(_gain(overlap, size, spread)))
+    return int(first[best]), int(last[best])
+
+
+def _settled(gram: Array, data: Array, edges: list[int], spread: float) -> list[int]:
+    """Edges moved one after the other, between their neighbours, until none gains."""
+    edges, moved = list(edges), True
+    while moved:
+        moved = False
+        for index, edge in enumerate(edges):
+            low = edges[index - 1] + 1 if index else 0
+            high = edges[index + 1] if index + 1 < len(edges) else len(data)
+            options = np.arange(low, high)
+            sign = 1.0 if index % 2 == 0 else -1.0
+            rest = _weights(edges, len(data))
+            rest[edge] = 0.0
+            cross = gram @ rest
+            size = rest @ cross + 2.0 * sign * cross[options] + gram[options, options]
+            gain = _gain(rest @ data + sign * data[options], size, spread)
+            best = int(np.argmax(gain))
+            if gain[best] > gain[edge - low] + SMALLEST_SETTLING:
+                edges[index], moved = int(options[best]), True
+    return edges
 
 
 def _gain(overlap: Array, size: Array, spread: float) -> Array:

@@ -27,7 +27,7 @@ from spindle_fem.spec.network import NetworkMachineSpec
 Progress = Callable[[str], None]
 
 # A network is stepped from stamp to stamp: so many suffice for what its nodes can follow.
-MOST_STAMPS = 5_000
+MOST_STAMPS = 3_000
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,11 @@ START_PREFIX = "start."
 # How long before the middle of a gap an input had changed, s: ``jump.<recording>.<number>``.
 JUMP_PREFIX = "jump."
 GAP_STEPS = 1.5
+# Friction that the bearings gave within a gap beyond what the inputs beside it say, as a share of
+# the highest that they give: ``within_gap.<recording>.<number>``. Shorter gaps hide nothing that matters.
+GAP_PREFIX = "within_gap."
+SHORTEST_GAP = 120.0
+GAP_PIECE, MOST_PIECES = 300.0, 6
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")
 # Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
@@ -140,7 +145,8 @@ class Plant:
             () if self.is_network else _unseen_jumps(item, drive)
             for item, drive in zip(self.recordings, self.drives, strict=True)
         ]
-        self._jump_slopes: dict[int, Array] = {}
+        self._gaps = [() if self.is_network else _gaps(item) for item in self.recordings]
+        self._slopes: dict[tuple[str, int], Array] = {}
         self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
         self.observations = self._observe(self.use)
         self.heldout = self._observe([~mask for mask in self.use])
@@ -191,6 +197,14 @@ class Plant:
             for index, (_, least, most) in enumerate(items)
         ]
 
+    def gaps(self) -> list[str]:
+        """Names of what the bearings gave within gaps."""
+        return [
+            f"{GAP_PREFIX}{number}.{index}"
+            for number, items in enumerate(self._gaps)
+            for index in range(len(items))
+        ]
+
     # ---------------------------------------------------------------- simulation
     def start(
         self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
@@ -211,7 +225,7 @@ class Plant:
 
     def _run_name(self, number: int, name: str, readings: Mapping[str, object]) -> str | None:
         """What a coordinate is called in the run of one recording; None where it does not enter."""
-        if name in readings or name.startswith((PROBE_PREFIX, JUMP_PREFIX)):
+        if name in readings or name.startswith((PROBE_PREFIX, JUMP_PREFIX, GAP_PREFIX)):
             return None
         if name.startswith(START_PREFIX):
             owner, _, own = name.removeprefix(START_PREFIX).partition(".")
@@ -299,7 +313,7 @@ class Plant:
             if inner[name] is not None:
                 sensitivity[:, :, position] = found.sensitivity[:, columns, of_run.index(inner[name])]
         self._displace(number, found.states, values, derivatives, temperature, sensitivity)
-        self._advance_jumps(number, values, derivatives, temperature, sensitivity)
+        self._unseen(number, values, derivatives, temperature, sensitivity)
         for reading in self.effects.readings:
             self._read(number, reading, {}, (), temperature, sensitivity)
         for candidate in candidates:
@@ -343,7 +357,7 @@ class Plant:
             if name in derivatives:
                 sensitivity[:, column, derivatives.index(name)] += slope
 
-    def _advance_jumps(
+    def _unseen(
         self,
         number: int,
         values: Mapping[str, float],
@@ -351,30 +365,52 @@ class Plant:
         temperature: Array,
         sensitivity: Array,
     ) -> None:
-        """Let inputs change within the gaps that hide when they did, to first order, in place."""
-        prefix = f"{JUMP_PREFIX}{number}."
-        for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
-            slope = self._slopes_of_jumps(number)[:, :, int(name.removeprefix(prefix))]
-            temperature += values.get(name, 0.0) * slope
-            if name in derivatives:
-                sensitivity[:, :, derivatives.index(name)] += slope
+        """What happened in gaps of the recording, to first order, in place."""
+        for kind in (JUMP_PREFIX, GAP_PREFIX):
+            prefix = f"{kind}{number}."
+            for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
+                slope = self._slopes_of(kind, number)[:, :, int(name.removeprefix(prefix))]
+                temperature += values.get(name, 0.0) * slope
+                if name in derivatives:
+                    sensitivity[:, :, derivatives.index(name)] += slope
 
-    def _slopes_of_jumps(self, number: int) -> Array:
-        """Change of the channels for each second that an input changed earlier, (G + 1, c, jumps) K/s."""
-        if number not in self._jump_slopes:
+    def _slopes_of(self, kind: str, number: int) -> Array:
+        """Change of the channels (G + 1, c, n): K for each second that an input changed earlier, or K."""
+        if (kind, number) not in self._slopes:
             run = self.transient(number, {})
             states, tracks = run.march(self.start(number))
-            forcing = np.zeros((len(run.drive.steps), states.shape[1], len(self._jumps[number])))
-            for index, (step, _, _) in enumerate(self._jumps[number]):
-                before, after = (int(run.drive.step_class[i]) for i in (step - 1, step))
-                gained = run.loads[after] @ run.start[step] - run.loads[before] @ run.end[step - 1]
-                gained -= (run.operators[after].conduction - run.operators[before].conduction) @ states[step]
-                forcing[step - 1, :, index] = np.linalg.solve(run.built.storage, gained)
+            forcing = (
+                self._jump_forcing(run, states, number)
+                if kind == JUMP_PREFIX
+                else self._gap_forcing(run, number)
+            )
             tangent = run.tangents(forcing, tracks)
             owner = np.append(run.drive.step_class, run.drive.step_class[-1])
             outputs = np.array([item.outputs[self.columns[number]] for item in run.operators])
-            self._jump_slopes[number] = np.einsum("gcr,grm->gcm", outputs[owner], tangent, optimize=True)
-        return self._jump_slopes[number]
+            self._slopes[kind, number] = np.einsum("gcr,grm->gcm", outputs[owner], tangent, optimize=True)
+        return self._slopes[kind, number]
+
+    def _jump_forcing(self, run: TransientRun, states: Array, number: int) -> Array:
+        forcing = np.zeros((len(run.drive.steps), states.shape[1], len(self._jumps[number])))
+        for index, (step, _, _) in enumerate(self._jumps[number]):
+            before, after = (int(run.drive.step_class[i]) for i in (step - 1, step))
+            gained = run.loads[after] @ run.start[step] - run.loads[before] @ run.end[step - 1]
+            gained -= (run.operators[after].conduction - run.operators[before].conduction) @ states[step]
+            forcing[step - 1, :, index] = np.linalg.solve(run.built.storage, gained)
+        return forcing
+
+    def _gap_forcing(self, run: TransientRun, number: int) -> Array:
+        n_heat = len(self.fast.heat_places)
+        highest = run.start[:, :n_heat].max(axis=0)
+        forcing = np.zeros((len(run.drive.steps), self.fast.model.size, len(self._gaps[number])))
+        for key, rows in run.groups.items():
+            propagator = run.propagators[key]
+            load = run.loads[key[0]][:, :n_heat] @ highest
+            answer = (propagator.from_start + propagator.from_end) @ load
+            middles = 0.5 * (run.drive.grid[rows] + run.drive.grid[rows + 1])
+            for index, (begin, end) in enumerate(self._gaps[number]):
+                forcing[rows[(middles > begin) & (middles < end)], :, index] = answer
+        return forcing
 
     def read(
         self, number: int, candidates: Sequence[Candidate], values: Mapping[str, float], temperature: Array
@@ -484,6 +520,18 @@ class Plant:
 def _scaled(columns: Array) -> Array:
     """Columns so that a thousand snapshots of one kind weigh as much as one of another."""
     return columns / np.sqrt(max(columns.shape[1], 1))
+
+
+def _gaps(recording: Recording) -> tuple[tuple[float, float], ...]:
+    """Gaps long enough for something to have happened in them, in pieces of some minutes, [s]."""
+    spacing = np.diff(recording.times)
+    rows = np.flatnonzero((spacing > GAP_STEPS * np.median(spacing)) & (spacing >= SHORTEST_GAP))
+    found = []
+    for row in rows:
+        first, last = recording.times[row : row + 2]
+        edges = np.linspace(first, last, 1 + min(MOST_PIECES, int(np.ceil((last - first) / GAP_PIECE))))
+        found += [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
+    return tuple(found)
 
 
 def _unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, float], ...]:

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 PROBE_PLACE_SIGMA = 1.0e-3
 # Error that neighbouring readings share: of logger and sensor, and of the model against its machine.
 EXPECTED_SLOW = SlowError(0.045, 1500.0)
+# Of the highest friction, within a gap: most machines went on as they did before and after it.
+GAP_SIGMA = 0.3
 SLOW_SIGMAS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13)
 SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
 # A network of a few nodes is a coarse picture of its machine: its error is of the order of the
@@ -68,7 +70,10 @@ def start_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
         Coordinate(name, 0.5 * (least + most), (most - least) / np.sqrt(12.0), False, -ends, ends, "s")
         for name, least, most in plant.jumps()
     ]
-    return (*starts, *jumps)
+    gaps = [
+        Coordinate(name, 0.0, GAP_SIGMA, False, -1.0 / GAP_SIGMA, 1.0 / GAP_SIGMA) for name in plant.gaps()
+    ]
+    return (*starts, *jumps, *gaps)
 
 
 def expected_slow_error(plant: Plant) -> SlowError:

@@ -25,7 +25,7 @@ from spindle_fem.diagnosis.machines import DiagnosedMachine, open_machine
 from spindle_fem.diagnosis.next_measurement import next_measurement
 from spindle_fem.diagnosis.sufficiency import says_too_little
 from spindle_fem.diagnosis.where import where_of
-from spindle_fem.recordings.align import Recording, read_recording
+from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.reporting.output import output_folder, replace_text
 from spindle_fem.results.summary import package_versions
@@ -94,7 +94,7 @@ def diagnose(
             content = _write(diagnosis, opened, place, report=report, progress=tell)
         content["wall_time_s"] = time.perf_counter() - started
         replace_text(place / "diagnosis.json", json.dumps(_plain(content), indent=1) + "\n")
-        if report and not reason:
+        if report:
             from spindle_fem.reporting.diagnosis_report import write_diagnosis_report
 
             tell("report")
@@ -243,6 +243,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.bool_):
         return bool(value)
     return value
-
-
-__all__ = ["Recording", "diagnose"]

@@ -55,4 +55,4 @@ class ClockShift(SensorEffect):
         """How far."""
         shift = reported["shift"].value
         word = "late" if shift >= 0.0 else "early"
-        return f"Channel {candidate.component} is {abs(shift):.0f} s {word}; the machine is as modelled."
+        return f"Channel {candidate.component} is {abs(shift):.0f} s {word}."

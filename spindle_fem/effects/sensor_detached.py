@@ -87,5 +87,5 @@ class SensorDetached(SensorEffect):
         since = f"since {reported['time'].value / 60.0:.0f} min" if "time" in reported else "from the start"
         return (
             f"Sensor {candidate.component} has been off its place {since}: it reads the air to "
-            f"{100.0 * reported['share_of_air'].value:.0f} %; the machine is as modelled."
+            f"{100.0 * reported['share_of_air'].value:.0f} %."
         )

@@ -63,7 +63,4 @@ class SensorDrift(SensorEffect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How fast."""
         since = f" from {reported['start'].value / 60.0:.0f} min on" if "start" in reported else ""
-        return (
-            f"Sensor {candidate.component} drifts by {reported['rate'].value:+.2g} K/h{since}; the "
-            "machine is as modelled."
-        )
+        return f"Sensor {candidate.component} drifts by {reported['rate'].value:+.2g} K/h{since}."

@@ -52,5 +52,5 @@ class SensorGain(SensorEffect):
         """The scale."""
         return (
             f"Sensor {candidate.component} has a wrong scale: it shows {reported['gain'].value:.3f} times "
-            "the distance from 20 °C; the machine is as modelled."
+            "the distance from 20 °C."
         )

@@ -61,5 +61,5 @@ class SensorLag(SensorEffect):
         """How late."""
         return (
             f"Sensor {candidate.component} follows the temperature with a time constant of "
-            f"{reported['time_constant'].value:.0f} s; the machine is as modelled."
+            f"{reported['time_constant'].value:.0f} s."
         )
