@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words, quantity
-from spindle_fem.effects.laws import RPM, Complex, amplitude, linear, repeated, shape, smooth_step
+from spindle_fem.effects.laws import RPM, Complex, amplitude, linear, relaxed, repeated, shape, smooth_step
 from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 
@@ -15,7 +15,9 @@ USUAL_SPEED = 3000.0 * RPM
 
 
 class StarvationTerm(Term):
-    """Factor ``1 + a S((n - n0)/w)`` on friction with a smooth step S.
+    """Factor ``1 + a s`` on friction; s follows a smooth step ``S((n - n0)/w)`` with a lag.
+
+    The lag is that of the tracks, which run dry and refill over many turns.
 
     Parameters
     ----------
@@ -27,20 +29,28 @@ class StarvationTerm(Term):
         Of it, for the prior of the onset.
     """
 
+    n_states = 1
+
     def __init__(self, name: str, bearings: tuple[str, ...], speed: str, highest: float) -> None:
         self.name, self.bearings, self._speed = name, bearings, speed
         self.parameters = (
             amplitude("friction_change", 0.4, low=-0.9, high=5.0),
             linear("onset_speed", 0.6 * highest, 0.3 * highest, "rad/s", low=0.0, high=1.3 * highest),
             shape("width", 120.0 * RPM, 0.7, "rad/s", low=5.0 * RPM, high=1500.0 * RPM),
+            shape("lag", 100.0, 1.0, "s", low=1.0, high=5000.0),
         )
 
     def friction(self, context: TermContext) -> Complex:
         """Factor on every bearing, (n, k)."""
+        factor = 1.0 + context.parameters["friction_change"] * context.state[0]
+        return repeated(context, factor, len(self.bearings))
+
+    def advance(self, context: TermContext, step: float) -> Complex:
+        """Starved share, (1, k)."""
         own = context.parameters
         speed = np.abs(context.inputs[self._speed])
-        step = smooth_step((speed - own["onset_speed"]) / own["width"])
-        return repeated(context, 1.0 + own["friction_change"] * step, len(self.bearings))
+        target = smooth_step((speed - own["onset_speed"]) / own["width"])
+        return relaxed(context.state, (target + 0.0 * own["lag"])[None], step, own["lag"])
 
 
 class Starvation(Effect):

@@ -109,9 +109,14 @@ def test_grease_counts_only_running_time_and_may_begin_anew():
 
 def test_starvation_is_half_at_its_onset():
     term = StarvationTerm("t", ("F1",), "speed", 400.0)
-    own = {"friction_change": 0.6, "onset_speed": 100.0, "width": 5.0}
-    assert term.friction(context(term, **own))[0, 0].real == pytest.approx(1.3)
-    assert term.friction(context(term, inputs={"speed": -400.0}, **own))[0, 0].real == pytest.approx(1.6)
+    own = {"friction_change": 0.6, "onset_speed": 100.0, "width": 5.0, "lag": 200.0}
+    settled = 1e5
+    for speed, factor in ((100.0, 1.3), (-400.0, 1.6)):
+        share = term.advance(context(term, inputs={"speed": speed}, state=[0.0], **own), settled)
+        starved = context(term, inputs={"speed": speed}, state=share[:, 0].real, **own)
+        assert term.friction(starved)[0, 0].real == pytest.approx(factor)
+    begun = term.advance(context(term, inputs={"speed": 400.0}, state=[0.0], **own), 200.0)
+    assert begun[0, 0].real == pytest.approx(1.0 - np.exp(-1.0))
 
 
 def test_a_moved_share_keeps_the_heat():
