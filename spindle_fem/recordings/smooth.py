@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.ndimage import median_filter
 
 from spindle_fem.recordings.align import Recording
 
@@ -25,16 +25,23 @@ Array = NDArray[np.float64]
 
 LAGS = 20
 FEWEST = 60
+# Of the square of a standard normal number.
+MEDIAN_OF_SQUARE = 0.4549
+# Readings at most, to either side; weights below exp(-4) do not count.
+LONGEST_REACH, NEGLIGIBLE = 60, 4.0
+# A level that differs by more than the walk and the noise explain lies beyond a jump.
+JUMP_SIGMAS, MEDIAN_WINDOW = 2.0, 5
 # A walk slower than this share of the noise in each reading cannot be told from none.
 SLOWEST = 1.0e-3
 TEMPERATURE_UNIT = "kelvin"
 
 
 def walk_and_noise(values: Array) -> tuple[float, float]:
-    """Variance of a random walk's step and of the white noise on it.
+    """Variance of a random walk's step and of the white noise on it, jumps apart.
 
-    From the mean squares of differences over 1 to 20 readings, which are
-    ``lag * step + 2 * noise``.
+    From the medians of squared differences over 1 to 20 readings, which are
+    ``0.4549 (lag * step + 2 * noise)`` for normal ones; the few that a jump
+    makes large do not move a median.
 
     Parameters
     ----------
@@ -50,20 +57,20 @@ def walk_and_noise(values: Array) -> tuple[float, float]:
     --------
     >>> generator = np.random.default_rng(0)
     >>> walk = np.cumsum(0.01 * generator.standard_normal(20_000))
+    >>> walk[9_000:] += 5.0
     >>> step, noise = walk_and_noise(walk + 0.05 * generator.standard_normal(20_000))
     >>> bool(abs(step**0.5 - 0.01) < 2e-3 and abs(noise**0.5 - 0.05) < 2e-3)
     True
     """
     lags = np.arange(1, min(LAGS, len(values) // 3) + 1)
-    squares = np.array([np.mean((values[lag:] - values[:-lag]) ** 2) for lag in lags])
+    squares = np.array([np.median((values[lag:] - values[:-lag]) ** 2) for lag in lags]) / MEDIAN_OF_SQUARE
     # A difference of one reading has the most independent samples.
     slope, offset = np.polyfit(lags, squares, 1, w=1.0 / lags)
-    noise = max(0.5 * float(offset), 0.0)
-    return max(float(slope), 0.0), noise
+    return max(float(slope), 0.0), max(0.5 * float(offset), 0.0)
 
 
 def smoothed(values: Array, step: float, noise: float) -> Array:
-    """Most probable random walk behind noisy readings, away from the ends exactly.
+    """Most probable random walk behind noisy readings; ends and jumps are not averaged over.
 
     Parameters
     ----------
@@ -77,18 +84,20 @@ def smoothed(values: Array, step: float, noise: float) -> Array:
     True
     """
     ratio = max(step / noise, SLOWEST)
-    # Steady gain of the filter: K² = ratio (1 - K).
+    # Steady gain of the filter: K² = ratio (1 - K); its smoother weighs by (1 - K)^|lag|.
     gain = 0.5 * (np.sqrt(ratio**2 + 4.0 * ratio) - ratio)
-    kept = 1.0 - gain
-
-    def both_ways(series: Array) -> Array:
-        forward = lfilter([1.0], [1.0, -kept], series)
-        backward = lfilter([1.0], [1.0, -kept], series[::-1])[::-1]
-        return forward + backward - series
-
-    # Less a mean, so that the sums do not lose the digits of 293 K.
-    mean = float(np.mean(values))
-    return mean + both_ways(values - mean) / both_ways(np.ones_like(values))
+    reach = min(LONGEST_REACH, int(np.ceil(NEGLIGIBLE / gain)), len(values) - 1)
+    level = median_filter(values, size=MEDIAN_WINDOW, mode="nearest")
+    total, weights = values.copy(), np.ones_like(values)
+    for lag in range(1, reach + 1):
+        apart = level[lag:] - level[:-lag]
+        spread = JUMP_SIGMAS**2 * (noise + step * lag)
+        weight = (1.0 - gain) ** lag * np.exp(-0.5 * apart**2 / spread)
+        total[lag:] += weight * values[:-lag]
+        total[:-lag] += weight * values[lag:]
+        weights[lag:] += weight
+        weights[:-lag] += weight
+    return total / weights
 
 
 def without_input_noise(recording: Recording) -> tuple[Recording, tuple[str, ...]]:

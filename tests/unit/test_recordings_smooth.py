@@ -22,12 +22,25 @@ def test_step_and_noise_are_found(walk):
 
 
 def test_the_smoother_is_that_of_the_random_walk(walk):
-    # Against the normal equations of the same model, away from the ends.
+    # Against the normal equations of the same model, away from the ends; the guard against
+    # jumps and the truncated tails take a share of the noise of 0.05 back.
     read = walk[1][:300]
     step, noise = 0.004**2, 0.05**2
     difference = np.diff(np.eye(300), axis=0)
     exact = np.linalg.solve(np.eye(300) / noise + difference.T @ difference / step, read / noise)
-    assert smoothed(read, step, noise)[80:220] == pytest.approx(exact[80:220], abs=2e-4)
+    assert smoothed(read, step, noise)[80:220] == pytest.approx(exact[80:220], abs=0.008)
+
+
+def test_a_jump_stays_where_it_is(walk):
+    true, read = walk
+    true, read = true.copy(), read.copy()
+    true[2000:] += 2.0
+    read[2000:] += 2.0
+    step, noise = walk_and_noise(read)
+    assert np.sqrt(noise) == pytest.approx(0.05, rel=0.05)
+    left = smoothed(read, step, noise) - true
+    assert np.abs(left[1990:2010]).max() < 0.15
+    assert left.std() < 0.45 * (read - true).std()
 
 
 def test_noise_shrinks_and_a_clean_series_stays(walk):
