@@ -123,7 +123,8 @@ def _open_network(
 
     own = tuple(thinned(item) for item in recordings)
     earlier = tuple(thinned(item) for item in calibration)
-    view = _widest([view_of_network(network, recording) for recording in own])
+    has = frozenset(f"{entry.effect} @ {entry.component}" for entry in spec.effects)
+    view = _widest([view_of_network(network, recording, has=has) for recording in own])
     return DiagnosedMachine(spec.name, spec, fast, active_effects(spec.effects, view), view, own, earlier)
 
 
