@@ -232,7 +232,15 @@ class Search:
         for effect, item in found[:12]:
             if item.gain > 0.0:
                 candidate = effect.over(self.view, item.pattern.spot, item.intervals)
-                yield item, replace(candidate, reference=max(item.strength, 1e-3))
+                several = len(self.problem.plant.recordings) > 1
+                yield (
+                    item,
+                    replace(
+                        candidate,
+                        reference=max(item.strength, 1e-3),
+                        recording=item.recording if several else None,
+                    ),
+                )
 
     def _try(
         self, fit: Fit, additions: Sequence[tuple[Variant, float]], intervals: Mapping[int, OnOff]

@@ -74,7 +74,11 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
     reported = {name: Reported(item["value"], item["unit"]) for name, item in parameters.items()}
     intervals = (
         [
-            {"start": diagnosis.stamp(start), "end": diagnosis.stamp(end)}
+            {
+                "start": diagnosis.stamp(start, candidate.recording or 0),
+                "end": diagnosis.stamp(end, candidate.recording or 0),
+            }
+            | _named(diagnosis, candidate)
             for start, end in effect.intervals(candidate, values)
         ]
         if isinstance(effect, IntervalEffect)
@@ -91,6 +95,13 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
         "statement": effect.statement(candidate, reported),
         "check": effect.check,
     }
+
+
+def _named(diagnosis: Diagnosis, candidate: Candidate) -> dict[str, str]:
+    """Name of the recording in which a candidate acts, where there are several."""
+    if candidate.recording is None or len(diagnosis.plant.recordings) < 2:
+        return {}
+    return {"recording": diagnosis.plant.recordings[candidate.recording].name}
 
 
 def findings_of(diagnosis: Diagnosis, ranked: Ranked, *, split: bool) -> list[dict[str, Any]]:
@@ -119,6 +130,7 @@ def states_of(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                     "value": size["value"],
                     "unit": size["unit"] or name,
                 }
+                | ({"recording": interval["recording"]} if "recording" in interval else {})
             )
     return rows
 

@@ -268,6 +268,8 @@ class Plant:
             Names of the machine or of terms.
         """
         drive = self.drives[number]
+        candidates, idle = _acting(candidates, number)
+        values = {name: value for name, value in values.items() if name not in idle}
         terms: list[Term] = [*self.fast.own_terms(drive), *self.effects.terms]
         known: dict[str, float] = {}
         readings: set[str] = set()
@@ -293,6 +295,8 @@ class Plant:
         factors of candidates (``effect:<name>``) and parameters of readings.
         Derivatives are to logarithms, to values for parameters that say so.
         """
+        candidates, idle = _acting(candidates, number)
+        values = {name: value for name, value in values.items() if name not in idle}
         owners = {
             f"{c.reading.name}.{item.name}": (c.reading, item)
             for c in candidates
@@ -302,7 +306,8 @@ class Plant:
         # A reading may share a parameter with its term: a bypass that joins before the outlet's sensor.
         shared = {name for c in candidates for term in c.terms for name in term.names()}
         apart = owners.keys() - shared
-        inner = {name: self._run_name(number, name, dict.fromkeys(apart)) for name in derivatives}
+        outside = dict.fromkeys((*apart, *idle))
+        inner = {name: self._run_name(number, name, outside) for name in derivatives}
         of_run = tuple(dict.fromkeys(own for own in inner.values() if own is not None))
         run = self.transient(number, values, candidates, of_run)
         found: FastTransient = run.solve(self.start(number, values, of_run))
@@ -520,6 +525,18 @@ class Plant:
 def _scaled(columns: Array) -> Array:
     """Columns so that a thousand snapshots of one kind weigh as much as one of another."""
     return columns / np.sqrt(max(columns.shape[1], 1))
+
+
+def _acting(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candidate, ...], set[str]]:
+    """Candidates that act in a recording, and names that belong to the others only."""
+    acting = tuple(c for c in candidates if c.recording in (None, number))
+    idle = {
+        EFFECT_PREFIX + name if name in {f.name for f in c.factors} else name
+        for c in candidates
+        if c.recording not in (None, number)
+        for name in c.parameters
+    }
+    return acting, idle
 
 
 def _gaps(recording: Recording) -> tuple[tuple[float, float], ...]:

@@ -20,6 +20,7 @@ from spindle_fem.diagnosis.findings import (
     rmse,
     states_of,
 )
+from spindle_fem.diagnosis.full_model import OFF, full_model_errors, nothing_run, require_choice
 from spindle_fem.diagnosis.improved import improved_machine
 from spindle_fem.diagnosis.machines import DiagnosedMachine, open_machine
 from spindle_fem.diagnosis.next_measurement import next_measurement
@@ -44,6 +45,7 @@ def diagnose(
     overrides: Iterable[str] = (),
     *,
     heldout: str = "blocks",
+    full_model: str = OFF,
     report: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -65,6 +67,8 @@ def diagnose(
         ``path=value`` texts.
     heldout : str
         ``blocks`` or ``last:0.4``: readings that the fit does not see.
+    full_model : {"off", "coarse", "own"}
+        Mesh on which both fits are run again by the full model.
     report : bool
         Whether to write figures and the report too.
     progress : callable, optional
@@ -79,6 +83,7 @@ def diagnose(
     SpindleFemError
     """
     started = time.perf_counter()
+    require_choice(full_model)
     tell = progress or (lambda stage: None)
     tell("reading")
     read = [read_recording(path) for path in recordings]
@@ -88,10 +93,14 @@ def diagnose(
         reason = says_too_little(opened)
         if reason:
             content = _unexplained(opened, reason)
+            content["fit"]["full_model"] = nothing_run(full_model, "Nothing was fitted.")
         else:
             diagnosis = diagnose_recordings(opened, heldout=heldout, progress=tell)
             tell("writing")
             content = _write(diagnosis, opened, place, report=report, progress=tell)
+            content["fit"]["full_model"] = full_model_errors(
+                diagnosis, opened, mesh=full_model, progress=tell
+            )
         content["wall_time_s"] = time.perf_counter() - started
         replace_text(place / "diagnosis.json", json.dumps(_plain(content), indent=1) + "\n")
         if report:
@@ -155,7 +164,10 @@ def _write(
     rows = states_of(findings)
     if rows:
         with (place / "states.csv").open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.DictWriter(stream, STATE_COLUMNS, lineterminator="\n")
+            columns = (
+                (*STATE_COLUMNS, "recording") if any("recording" in row for row in rows) else STATE_COLUMNS
+            )
+            writer = csv.DictWriter(stream, columns, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
     if report:

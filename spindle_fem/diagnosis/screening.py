@@ -119,6 +119,8 @@ class BaseRun:
         dynamic, steady = [], []
         for position, variant in enumerate(variants):
             candidate = variant.candidate
+            if candidate.recording not in (None, self.number):
+                continue
             if candidate.reading is not None:
                 found[:, :, position] += self._reading(variant)
             if any(term.is_dynamic for term in candidate.terms):

@@ -112,6 +112,8 @@ class Candidate:
     shift_of_prior : bool
         Whether the candidate is a wider prior for something that the machine
         definition itself calls uncertain (kind ``parameter``).
+    recording : int or None
+        The only recording in which it acts, of several; all of them when None.
     constants : mapping of str to float
         Numbers of the machine that a report needs.
     """
@@ -128,6 +130,7 @@ class Candidate:
     reading: Reading | None = None
     starts: tuple[Mapping[str, float], ...] = field(default=(MappingProxyType({}),))
     shift_of_prior: bool = False
+    recording: int | None = None
     constants: Mapping[str, float] = field(default_factory=dict)
 
     @property
