@@ -257,6 +257,15 @@ def diagnose(
             help='Readings that the fit does not see: "blocks" or "last:0.4" (the last 40 % of the time).',
         ),
     ] = "blocks",
+    full_model: Annotated[
+        str,
+        typer.Option(
+            "--full-model",
+            metavar="off|coarse|own",
+            help="Run both fits again by the full finite-element model: on the coarse mesh with linear "
+            "temperatures (minutes a recording) or on the machine's own mesh (much longer).",
+        ),
+    ] = "off",
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
@@ -273,6 +282,7 @@ def diagnose(
             calibrate=calibrate or (),
             overrides=set_ or (),
             heldout=heldout,
+            full_model=full_model,
             progress=tell,
         )
     _print_json(content) if as_json else print_diagnosis(content, output)

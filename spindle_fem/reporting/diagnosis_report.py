@@ -13,6 +13,7 @@ from spindle_fem.errors import BadInputError, SpindleFemError
 from spindle_fem.reporting.diagnosis_charts import before_after, missing_heat, residual_map
 from spindle_fem.reporting.diagnosis_data import DATA_SCHEMA
 from spindle_fem.reporting.diagnosis_drawing import located_on_machine, located_on_network
+from spindle_fem.reporting.diagnosis_full_model import full_model_sections
 from spindle_fem.reporting.diagnosis_odds import finding_intervals, machine_parameters, set_probabilities
 from spindle_fem.reporting.diagnosis_tables import (
     cards,
@@ -198,6 +199,7 @@ def render(content: Mapping[str, Any], pictures: Mapping[str, list[Any]]) -> str
             "Before and after",
             [fit_table(content), *of("before_after"), *of("residual_map"), *channel_table(content)],
         ),
+        *full_model_sections(content),
         Section("what", "Which physics", [*of("sets", "findings"), *set_tables(content)]),
     ]
     if content["verdict"] != "consistent":
