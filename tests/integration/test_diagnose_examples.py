@@ -1,0 +1,75 @@
+"""The spindle examples with answers, where the recordings lie beside the repository."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from spindle_fem.diagnosis.run import diagnose
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "spindle_examples"
+CASES = sorted(path.name for path in EXAMPLES.glob("example_*") if path.is_dir())
+# Names of parameters that an answer and a finding share; how near they have to come.
+TOLERANCE = 0.15
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CASES, reason=f"no recordings in {EXAMPLES.name} beside the repository"),
+]
+
+
+def diagnosed(name, folder):
+    case = EXAMPLES / name
+    earlier = case / "calibration.toml"
+    return diagnose(
+        "recorded_spindle",
+        [case / "recording.toml"],
+        folder,
+        [earlier] if earlier.exists() else (),
+        ("mesh.preset=coarse",),
+        report=False,
+    )
+
+
+def is_acceptable(findings, accepted):
+    """Whether every effect of a set is found once at one of its places, and nothing else."""
+    left = list(findings)
+    for wanted in accepted:
+        match = next(
+            (
+                item
+                for item in left
+                if item["effect"] == wanted["effect"] and item["component"] in wanted["components"]
+            ),
+            None,
+        )
+        if match is None:
+            return False
+        left.remove(match)
+    return not left
+
+
+@pytest.mark.parametrize("name", CASES or ["none"])
+def test_an_example_is_answered_right(name, tmp_path):
+    answer = json.loads((EXAMPLES / "answers" / f"{name}.json").read_text(encoding="utf-8"))
+    content = diagnosed(name, tmp_path / "out")
+    assert content["verdict"] in answer["acceptable_verdicts"]
+    found = [(item["effect"], item["component"]) for item in content["findings"]]
+    assert any(is_acceptable(content["findings"], item) for item in answer["acceptable_sets"]), found
+    for effect in answer["effects"]:
+        finding = next((i for i in content["findings"] if i["effect"] == effect["effect"]), None)
+        if finding is None:
+            # Another acceptable set has other parameters.
+            continue
+        for parameter, given in effect["parameters"].items():
+            true = given["value"]
+            value = finding["parameters"][parameter]["value"]
+            assert value == pytest.approx(true, rel=TOLERANCE), f"{effect['effect']} {parameter}"
+    total = sum(item["probability"] for item in (*content["findings"], *content["alternatives"]))
+    assert total <= 1.0 + 1e-9
+    errors = content["fit"]
+    assert errors["after"]["heldout_rmse_K"] < 1.5 * answer["noise"]["total_K"]
+    if answer["effects"]:
+        assert errors["after"]["heldout_rmse_K"] < errors["before"]["heldout_rmse_K"]
+    else:
+        assert errors["after"] == errors["before"]

@@ -1,0 +1,180 @@
+"""The improved machine, written and read back: it predicts what the fit did."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.linalg import expm
+
+from spindle_fem.diagnosis.findings import predictions_at_stamps, reported_parameters
+from spindle_fem.diagnosis.improved import improved_machine
+from spindle_fem.diagnosis.inference import Problem
+from spindle_fem.diagnosis.machines import open_machine
+from spindle_fem.diagnosis.plant import Plant
+from spindle_fem.diagnosis.prepare import calibrate, expected_slow_error
+from spindle_fem.diagnosis.sufficiency import response_time, says_too_little
+from spindle_fem.effects.catalogue import candidates_for, effect_of, interval_effects
+from spindle_fem.recordings.align import read_recording
+
+MACHINE = """
+schema = "spindle-fem/machine/1"
+name = "small motor"
+initial = "ambient"
+[[network.node]]
+name = "winding"
+capacity = {value = "180 J/K", sigma_rel = 0.3}
+[[network.node]]
+name = "body"
+capacity = {low = "400 J/K", high = "700 J/K"}
+[[network.boundary]]
+name = "ambient"
+temperature = "ambient"
+[[network.link]]
+between = ["winding", "body"]
+conductance = {value = "2.3 W/K", sigma_rel = 0.3}
+[[network.link]]
+between = ["body", "ambient"]
+conductance = "0.9 W/K"
+[[network.source]]
+node = "winding"
+input = "power"
+gain = {value = "0.8 W/W", sigma_rel = 0.1}
+"""
+MANIFEST = """
+schema = "spindle-fem/recording/1"
+name = "synthetic"
+data = "data.csv"
+time = {column = "time_s", unit = "s"}
+channel = [
+{column = "T_winding", role = "temperature", probe = "winding", unit = "degC", sigma = 0.1},
+{column = "T_body", role = "temperature", probe = "body", unit = "degC", sigma = 0.1},
+{column = "T_room", role = "input", drives = "ambient", unit = "degC"},
+{column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
+]
+"""
+
+
+def written(folder, temperatures=None):
+    times = np.arange(0.0, 6000.0, 30.0)
+    read = np.full((times.size, 2), 21.0) if temperatures is None else temperatures - 273.15
+    columns = {"time_s": times, "T_winding": read[:, 0], "T_body": read[:, 1], "T_room": 21.0}
+    columns["P"] = np.where(times % 2400.0 < 900.0, 90.0, 10.0)
+    pd.DataFrame(columns).to_csv(folder / "data.csv", index=False)
+    (folder / "recording.toml").write_text(MANIFEST)
+    return read_recording(folder)
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("machine")
+    (folder / "machine.toml").write_text(MACHINE)
+    return open_machine(folder / "machine.toml", (), [written(folder)], ())
+
+
+def plant_of(machine, recording=None):
+    chosen = machine.recordings[0] if recording is None else recording
+    return Plant(machine.fast, [chosen], [np.ones(chosen.times.size, dtype=bool)], machine.effects)
+
+
+def candidate_of(opened, effect):
+    for item in interval_effects():
+        if item.name == effect:
+            return item.over(opened.view, "body", [(1500.0, 3000.0)])
+    return next(
+        c
+        for c in candidates_for(opened.view)
+        if c.effect == effect and c.component in ("body", "winding|body", "ambient")
+    )
+
+
+@pytest.fixture(
+    scope="module", params=["unrecorded_heat_source", "sensor_lag", "joint_conductance", "ambient_drift"]
+)
+def found(request, opened, tmp_path_factory):
+    """A fit that found an effect, as the outcome of a diagnosis."""
+    candidate = candidate_of(opened, request.param)
+    blank = plant_of(opened)
+    factors = {item.name for item in candidate.factors}
+    own = {("effect:" + n if n in factors else n): item.value for n, item in candidate.free.items()}
+    name = candidate.amplitude
+    own["effect:" + name if name in factors else name] = candidate.reference
+    truth = {"capacity.body": 1.2, "gain.winding.power": 0.93} | own
+    true = predictions_at_stamps(blank, SimpleNamespace(values=truth, candidates=(candidate,)))[0]
+    noise = np.random.default_rng(1).normal(0.0, 0.1, true.shape)
+    folder = tmp_path_factory.mktemp("run")
+    plant = plant_of(opened, written(folder, true + noise))
+    calibrated = calibrate(None, plant)
+    problem = Problem(plant, calibrated.belief, expected_slow_error(plant), plant.observations)
+    fit = problem.fit((candidate,), own)
+    outcome = SimpleNamespace(final=fit, plant=plant, plant_coordinates=calibrated.belief.coordinates)
+    return outcome, folder
+
+
+def test_the_written_machine_predicts_what_the_fit_did(found, opened):
+    outcome, folder = found
+    path = folder / "improved.toml"
+    path.write_text(improved_machine(outcome, opened))
+    again = open_machine(path, (), outcome.plant.recordings, ())
+    assert len(again.effects.factors) + len(again.effects.terms) + len(again.effects.readings) == 1
+    nothing = SimpleNamespace(values={}, candidates=())
+    expected = predictions_at_stamps(outcome.plant, outcome.final)[0]
+    plain = predictions_at_stamps(plant_of(opened, outcome.plant.recordings[0]), nothing)[0]
+    told = predictions_at_stamps(plant_of(again), nothing)[0]
+    assert np.abs(plain - expected).max() > 0.3
+    assert told == pytest.approx(expected, abs=2e-3)
+
+
+def test_what_is_switched_on_is_not_found_again(found, opened):
+    outcome, folder = found
+    path = folder / "again.toml"
+    path.write_text(improved_machine(outcome, opened))
+    again = open_machine(path, (), outcome.plant.recordings, ())
+    (candidate,) = outcome.final.candidates
+    offered = {(c.effect, c.component, c.form) for c in candidates_for(again.view)}
+    assert (candidate.effect, candidate.component, candidate.form) not in offered
+
+
+def test_parameters_keep_what_is_left_of_their_uncertainty(found, opened):
+    outcome, folder = found
+    path = folder / "kept.toml"
+    path.write_text(improved_machine(outcome, opened))
+    again = open_machine(path, (), outcome.plant.recordings, ())
+    before = {name: sigma for name, sigma, _ in plant_of(opened).uncertain()}
+    after = {name: sigma for name, sigma, _ in plant_of(again).uncertain()}
+    assert set(after) == set(before)
+    fit = outcome.final
+    for index, coordinate in enumerate(fit.coordinates[: len(before)]):
+        left = coordinate.sigma * np.sqrt(fit.covariance[index, index])
+        assert after[coordinate.name] == pytest.approx(left, rel=1e-3)
+        assert after[coordinate.name] < before[coordinate.name] + 1e-9
+
+
+def test_stated_intervals_hold_the_value_and_the_truth(found):
+    outcome, _ = found
+    (candidate,) = outcome.final.candidates
+    stated = reported_parameters(outcome.final, candidate)
+    assert all(item["low"] <= item["value"] <= item["high"] for item in stated.values())
+    true = effect_of(candidate.effect).report(candidate, {candidate.amplitude: candidate.reference})
+    name, size = next(iter(true.items()))
+    assert stated[name]["low"] <= size.value <= stated[name]["high"]
+    assert stated[name]["unit"] == size.unit
+
+
+# ------------------------------------------------------------------------ sufficiency
+def test_the_response_time_is_that_of_the_slow_mode(opened):
+    """By the exact step response of two bodies."""
+    capacity = np.array([180.0, np.sqrt(400.0 * 700.0)])
+    conduction = np.array([[2.3, -2.3], [-2.3, 2.3 + 0.9]])
+    matrix = -conduction / capacity[:, None]
+    final = np.linalg.solve(conduction, [1.0, 0.0])
+    crossed = []
+    for node in range(2):
+        times = np.arange(0.0, 6000.0, 5.0)
+        share = np.array([1.0 - (expm(matrix * time) @ final)[node] / final[node] for time in times[::20]])
+        crossed.append(float(np.interp(0.632, share, times[::20])))
+    assert response_time(plant_of(opened)) == pytest.approx(np.median(crossed), rel=0.02)
+
+
+def test_a_recording_that_says_enough_is_not_refused(opened):
+    assert says_too_little(opened) == ""
