@@ -25,6 +25,14 @@ from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.compare import ALL, Comparison, compare, simulation_summary, write_simulated
 from spindle_fem.reduced.build import ReductionOptions, reduced_model_of
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.film_heat import (
+    FilmHeat,
+    needs_map,
+    operators_machine,
+    tabulate_friction,
+    tabulated_machine,
+    thrusts_between,
+)
 from spindle_fem.reduced.network_model import NetworkFastModel
 from spindle_fem.reporting.output import output_folder, replace_text
 from spindle_fem.results.summary import package_versions
@@ -133,19 +141,61 @@ def simulate_recordings(
 def fast_model_for(
     spec: MachineSpec, recordings: Sequence[Recording], *, progress: Progress = lambda stage: None
 ) -> FastModel:
-    """Reduced model whose range holds the speeds of some recordings."""
-    highest = max(
-        (
-            float(np.nanmax(np.abs(item.inputs[:, item.input_names.index("speed")])))
-            for item in recordings
-            if "speed" in item.input_names
-        ),
-        default=0.0,
-    )
+    """Reduced model whose range holds the speeds of some recordings.
+
+    Friction and ball contacts that follow their films are solved once over the
+    speeds and thrusts of the recordings; the model's ``spec`` then has a heat
+    table and constant ball rows, and a term among its own brings both to the
+    film temperature of the moment.
+
+    Raises
+    ------
+    SpecError
+        Heat that follows expansion.
+    """
+    options = _options_for(spec, recordings)
+    if not needs_map(spec):
+        return FastModel(reduced_model_of(spec, options=options, progress=progress), spec)
+    progress("friction over speed, thrust and film temperature")
+    thrusts = thrusts_between(spec, *_recorded_range(recordings, "thrust", spec.operation.thrust))
+    friction = tabulate_friction(spec, options.highest_speed_of(spec), thrusts)
+    table = tabulated_machine(spec, friction)
+    term = FilmHeat(friction, spec, table)
+    made_of = operators_machine(table, term)
+    return FastModel(reduced_model_of(made_of, options=options, progress=progress), table, (term,))
+
+
+def _options_for(spec: MachineSpec, recordings: Sequence[Recording]) -> ReductionOptions:
+    """A range that ends at the highest recorded speed where that is beyond the definition's."""
+    _, highest = _recorded_range(recordings, "speed", 0.0)
     options = ReductionOptions()
     if highest > options.highest_speed_of(spec) * (1.0 + 1e-6):
         options = ReductionOptions(highest_speed=highest)
-    return FastModel(reduced_model_of(spec, options=options, progress=progress), spec)
+    return options
+
+
+def _recorded_range(recordings: Sequence[Recording], name: str, otherwise: float) -> tuple[float, float]:
+    """Lowest and highest value of an input in all recordings that have it; speeds have no sign."""
+    columns = [
+        item.inputs[:, item.input_names.index(name)] for item in recordings if name in item.input_names
+    ]
+    if not columns:
+        return otherwise, otherwise
+    values = np.concatenate(columns)
+    if name == "speed":
+        values = np.abs(values)
+    return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+def _centred(
+    fast: FastModel, factors: Mapping[str, float], options: ReductionOptions, progress: Progress
+) -> FastModel:
+    """The same machine on a reduced model that was made at some factors."""
+    terms = fast.extra_terms
+    film_heat = next((term for term in terms if isinstance(term, FilmHeat)), None)
+    made_of = fast.spec if film_heat is None else operators_machine(fast.spec, film_heat)
+    model = reduced_model_of(with_parameters(made_of, factors), options=options, progress=progress)
+    return FastModel(model, fast.spec, terms)
 
 
 def _simulate_geometry(
@@ -161,14 +211,20 @@ def _simulate_geometry(
     outside = _outside_range(predictor, factors)
     if outside:
         progress("reduced model: outside its range, made anew")
-        centred = reduced_model_of(with_parameters(spec, factors), progress=progress)
-        fast = FastModel(centred, spec)
+        fast = _centred(fast, factors, _options_for(spec, (recording, *calibration)), progress)
         predictor = MachinePredictor(fast, [recording], effects=effects)
         outside = _outside_range(predictor, factors)
     progress("simulation")
     log_factors = np.zeros(len(predictor.priors)) if result is None else result.log_factors
     predicted, sensitivity = predictor.predict(log_factors)[0]
     notes = [*predictor.drives[0].notes, *_effect_notes(effects)]
+    if fast.extra_terms:
+        what = (
+            "ball contacts"
+            if spec.heat.model == "table"
+            else f'"{spec.heat.model}" friction and ball contacts'
+        )
+        notes.append(f"{what} from a map over speed, thrust and film temperature")
     if spec.coolant is not None and spec.coolant.properties_at == "bulk":
         notes.append("the coolant's film is taken at its inlet temperature, not along the channel")
     if outside:

@@ -65,11 +65,15 @@ class FastModel:
     spec : MachineSpec
         The machine that the model was made of, or one that differs only in
         coefficients, operation and effects.
+    extra_terms : sequence of Term
+        Always there, as the machine's natural films are: with a tabulated
+        machine, its :class:`spindle_fem.reduced.film_heat.FilmHeat`.
     """
 
-    def __init__(self, model: ReducedModel, spec: MachineSpec) -> None:
+    def __init__(self, model: ReducedModel, spec: MachineSpec, extra_terms: Sequence[Term] = ()) -> None:
         self.model = model
         self.spec = spec
+        self.extra_terms = tuple(extra_terms)
         self.table: CoefficientTable = model.table(spec)
         self.bearings = tuple(bearing.name for _, bearing in spec.bearings)
         self.channels = tuple(probe.name for probe in spec.probe)
@@ -99,7 +103,7 @@ class FastModel:
 
     def projected(self, basis: Array) -> FastModel:
         """The same machine on a smaller basis, (r, s)."""
-        return FastModel(self.model.projected(basis), self.spec)
+        return FastModel(self.model.projected(basis), self.spec, self.extra_terms)
 
     # ------------------------------------------------------------- operators
     def storage(self, factors: Mapping[str, float], added: Mapping[str, float] = NO_CHANGES) -> Array:
@@ -282,7 +286,7 @@ class FastModel:
         return ()
 
     def own_terms(self, drive: Drive) -> tuple[Term, ...]:
-        """Terms that are always there: natural films, and heat that the drive gives.
+        """Terms that are always there: natural films, those given, and heat that the drive gives.
 
         Raises
         ------
@@ -293,10 +297,10 @@ class FastModel:
             raise SpecError(
                 "heat.model",
                 f'"{self.spec.heat.model}" follows the temperatures of every bearing.',
-                'The fast model takes heat.model = "table".',
+                'The fast model takes heat.model = "table"; spindle_fem.simulate.fast_model_for makes one.',
             )
         recorded = tuple(RecordedHeat(name) for name in drive.names if name.startswith("heat."))
-        return (*natural_film_terms(self.spec), *recorded)
+        return (*natural_film_terms(self.spec), *self.extra_terms, *recorded)
 
     def load_inputs(
         self,

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebder, chebval, chebvander
+from numpy.polynomial.chebyshev import chebder, chebvander
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
@@ -21,6 +21,7 @@ from spindle_fem.effects.term import Operating, Term, TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.loads.bearing_heat import BearingMechanics
 from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.reduced.build import ReductionOptions
 from spindle_fem.spec.model import HeatTable, MachineSpec
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
 
@@ -32,6 +33,11 @@ FILM_TEMPERATURES = (ZERO_CELSIUS_K + 5.0, ZERO_CELSIUS_K + 95.0)
 TEMPERATURE_POINTS = 8
 NOMINAL_FILM_TEMPERATURE = ZERO_CELSIUS_K + 30.0
 TABLE_POINTS = 61
+MOST_KNOWN = 1024
+# Range of thrusts that two points, the definition's among them, describe to 0.1 %.
+NARROW_THRUSTS = 0.1
+# Conductances of the reduced operators, in decimals of their logarithm to ten: FilmHeat gives the rest.
+CONDUCTANCE_DECIMALS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +55,9 @@ class FrictionMap:
     conductances : CubicSpline
         Over the same, (n_thrusts, 2 n_bearings, n_t): of the conductance between
         the balls and the inner and the outer raceway of each bearing in turn.
+    shares : CubicSpline or None
+        Over the thrust, (n_thrusts,): how much each of them counts; None where
+        there is but one.
     """
 
     bearings: tuple[str, ...]
@@ -56,6 +65,7 @@ class FrictionMap:
     thrust: Array
     moments: CubicSpline
     conductances: CubicSpline
+    shares: CubicSpline | None
 
     def log_moment(self, speed: float, thrust: float, film_temperature: NDArray) -> NDArray:
         """Natural logarithm of the friction moment in N·m.
@@ -70,16 +80,14 @@ class FrictionMap:
         film_temperature : (n_bearings, k) ndarray, [K]
             May be complex, for derivatives.
         """
-        return _series(self._at(self.moments, speed, thrust), film_temperature)
+        return _series(self.at(speed, thrust)[0], film_temperature)
 
     def log_conductance(self, speed: float, thrust: float, film_temperature: NDArray) -> NDArray:
         """Logarithm of the conductance in W/K between balls and raceways, (n_bearings, 2, k).
 
         Parameters as for :meth:`log_moment`.
         """
-        twice = np.repeat(film_temperature, 2, axis=0)
-        found = _series(self._at(self.conductances, speed, thrust), twice)
-        return found.reshape(len(self.bearings), 2, -1)
+        return _by_side(self.at(speed, thrust)[1], film_temperature)
 
     def heat(self, speed: float, thrust: float, film_temperature: Array) -> Array:
         """Friction heat of every bearing before its factors, (n_bearings,) [W].
@@ -95,15 +103,14 @@ class FrictionMap:
         film = np.full((len(self.bearings), 1), NOMINAL_FILM_TEMPERATURE)
         return np.exp(self.log_conductance(speed, thrust, film)[:, :, 0])
 
-    def _at(self, curves: CubicSpline, speed: float, thrust: float) -> Array:
+    def at(self, speed: float, thrust: float) -> tuple[Array, Array]:
+        """Series over the film temperature, of moments (n, n_t) and of conductances (2 n, n_t)."""
         self._require(speed, thrust)
-        values = curves(np.log(max(speed, self.speed[0])))
-        if len(self.thrust) == 1:
-            return values[0]
-        after = int(np.clip(np.searchsorted(self.thrust, thrust), 1, len(self.thrust) - 1))
-        low, high = self.thrust[after - 1 : after + 1]
-        part = (thrust - low) / (high - low)
-        return (1.0 - part) * values[after - 1] + part * values[after]
+        known = np.log(max(speed, self.speed[0]))
+        shares = np.ones(1) if self.shares is None else self.shares(thrust)
+        return tuple(
+            np.tensordot(shares, curves(known), axes=1) for curves in (self.moments, self.conductances)
+        )
 
     def _require(self, speed: float, thrust: float) -> None:
         for name, value, known in (("speed", speed, self.speed), ("thrust", thrust, self.thrust)):
@@ -121,12 +128,42 @@ def _series(coefficients: Array, film_temperature: NDArray) -> NDArray:
     """Chebyshev series of each row at its temperatures, (rows, k)."""
     low, high = FILM_TEMPERATURES
     scaled = (2.0 * film_temperature - low - high) / (high - low)
-    ends = np.clip(scaled.real, -1.0, 1.0)
-    inside = np.where(np.abs(scaled.real) <= 1.0, scaled, ends)
-    order = coefficients.T[:, :, None]
-    slope = chebder(coefficients, axis=1).T[:, :, None]
-    found = chebval(inside, order, tensor=False)
-    return found + chebval(ends, slope, tensor=False) * (scaled - inside)
+    # Along the tangent: beyond the ends, and for the imaginary part of a complex step.
+    at = np.clip(scaled.real, -1.0, 1.0)
+    basis = chebvander(at, coefficients.shape[1] - 1)
+    slope = chebder(coefficients, axis=1)
+    found = np.matmul(basis, coefficients[:, :, None])[:, :, 0]
+    return found + np.matmul(basis[:, :, :-1], slope[:, :, None])[:, :, 0] * (scaled - at)
+
+
+def _by_side(coefficients: Array, film_temperature: NDArray) -> NDArray:
+    """Series of both sides of every bearing at the temperatures of its film, (n_bearings, 2, k)."""
+    found = _series(coefficients, np.repeat(film_temperature, 2, axis=0))
+    return found.reshape(len(film_temperature), 2, -1)
+
+
+def needs_map(spec: MachineSpec) -> bool:
+    """Whether friction or ball rows of a machine follow their films."""
+    return spec.heat.model != "table" or any(group.ball_row.kind == "contact" for group in spec.bearing_set)
+
+
+def thrusts_between(spec: MachineSpec, low: float, high: float) -> tuple[float, ...]:
+    """Thrusts at which to solve the bearings so that a range and the definition's are covered.
+
+    Parameters
+    ----------
+    low, high : float, [N]
+    """
+    given = spec.operation.thrust
+    low, high = min(low, given), max(high, given)
+    found = {low, given, high}
+    wide = high - low
+    if wide > NARROW_THRUSTS * max(abs(low), abs(high)):
+        middle = 0.5 * (low + high)
+        # A definition near the middle is the middle.
+        if abs(middle - given) > 0.15 * wide:
+            found.add(middle)
+    return tuple(sorted(found))
 
 
 def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence[float]) -> FrictionMap:
@@ -135,24 +172,26 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
     Parameters
     ----------
     spec : MachineSpec
-        With an analytical or empirical heat model.
+        With an analytical or empirical heat model, or ball rows that follow
+        their contacts.
     highest_speed : float, [rad/s]
     thrusts : sequence of float, [N]
-        That occur; linear between them.
+        That occur; a cubic spline between them (a parabola through three).
 
     Raises
     ------
     SpecError
-        Heat by table, or heat that follows expansion.
+        Nothing to tabulate, or heat that follows expansion.
     NoEquilibriumError, OutOfValidityError
     """
-    if spec.heat.model == "table":
+    if not needs_map(spec):
         raise SpecError("heat.model", "the heat is given by table already.", "Use the machine as it is.")
-    if spec.heat.thermal_preload:
+    if spec.heat.thermal_preload and spec.heat.model != "table":
         raise SpecError(
             "heat.thermal_preload",
             "with it heat follows every ring, and no table over one film temperature holds.",
-            "Switch it off for the fast model, or run the full model.",
+            "Switch it off for the fast model (--set heat.thermal_preload=false), give the heat by table "
+            "(--set heat.model=table, with a [heat.table]), or run the full model (spindle-fem transient).",
         )
     mechanics = BearingMechanics(spec)
     names = tuple(bearing.name for _, bearing in spec.bearings)
@@ -175,7 +214,8 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
                 conductances[i, j, :, side] = np.linalg.solve(fit, np.log(values).T).T
     conductances = conductances.reshape(len(speeds), len(loads), -1, TEMPERATURE_POINTS)
     at = np.log(speeds)
-    return FrictionMap(names, speeds, loads, CubicSpline(at, moments), CubicSpline(at, conductances))
+    shares = CubicSpline(loads, np.eye(len(loads))) if len(loads) > 1 else None
+    return FrictionMap(names, speeds, loads, CubicSpline(at, moments), CubicSpline(at, conductances), shares)
 
 
 def _point(spec: MachineSpec, speed: float, thrust: float) -> OperatingPoint:
@@ -198,55 +238,70 @@ class FilmHeat(Term):
     machine : MachineSpec
     table : MachineSpec
         As :func:`tabulated_machine` makes it of the machine and the map.
+
+    Attributes
+    ----------
+    friction_map : FrictionMap
+    follow : (k,) ndarray of int
+        Bearings whose ball row follows its contacts.
     """
 
     name = "film_heat"
 
     def __init__(self, friction_map: FrictionMap, machine: MachineSpec, table: MachineSpec) -> None:
-        self._map = friction_map
-        self.bearings = friction_map.bearings
+        self.friction_map = friction_map
+        names = friction_map.bearings
+        # Heat that is given by table stays as it is, and so do ball rows of constant conductance.
+        self.bearings = () if machine.heat.model == "table" else names
+        self.follow = np.flatnonzero([group.ball_row.kind == "contact" for group, _ in machine.bearings])
         sides = ("inner_raceway", "outer_raceway", "balls")
-        self.reads = tuple(f"{name}.{side}" for name in self.bearings for side in sides)
+        self.reads = tuple(f"{name}.{side}" for name in names for side in sides)
         self._grid = np.asarray(table.heat.table.speed)
-        self._table = np.array([table.heat.table.heat[name] for name in self.bearings])
+        self._table = np.array([table.heat.table.heat[name] for name in names])
         self._conductance = np.array([group.ball_row.conductance.value for group, _ in table.bearings])
-        # Ball rows of constant conductance stay as they are.
-        self._follow = np.flatnonzero([group.ball_row.kind == "contact" for group, _ in machine.bearings])
-        self.heat_places = tuple(self.reads[3 * row + side] for row in self._follow for side in range(3))
+        self.heat_places = tuple(self.reads[3 * row + side] for row in self.follow for side in range(3))
+        self._known: dict[tuple[float, float], tuple[Array, Array, Array]] = {}
+
+    def _curves(self, context: TermContext) -> tuple[Array, Array, Array]:
+        """Of moments and conductances over the film temperature, and conductances at 30 °C."""
+        key = (float(context.inputs["speed"]), float(context.inputs["thrust"]))
+        if key not in self._known:
+            if len(self._known) >= MOST_KNOWN:
+                self._known.clear()
+            moments, conductances = self.friction_map.at(*key)
+            self._known[key] = (moments, conductances, self.friction_map.nominal_conductance(*key))
+        return self._known[key]
 
     def _film(self, context: TermContext) -> tuple[NDArray, NDArray]:
         """Temperatures by bearing and side, and of the film."""
-        by_bearing = context.temperatures.reshape(len(self.bearings), 3, -1)
+        by_bearing = context.temperatures.reshape(len(self._table), 3, -1)
         return by_bearing, 0.25 * (by_bearing[:, 0] + by_bearing[:, 1]) + 0.5 * by_bearing[:, 2]
 
     def friction(self, context: TermContext) -> NDArray[np.complex128]:
         """Heat of the map over that of the table; 1 at standstill."""
-        speed, thrust = float(context.inputs["speed"]), float(context.inputs["thrust"])
+        speed = float(context.inputs["speed"])
         _, film = self._film(context)
         if speed == 0.0:
-            return np.ones_like(film)
+            return np.ones_like(film[: len(self.bearings)])
+        moments, _, _ = self._curves(context)
         tabulated = np.array([np.interp(speed, self._grid, row) for row in self._table])
-        moment = self._map.log_moment(speed, thrust, film)
-        return np.exp(moment + np.log(speed / tabulated)[:, None])
+        return np.exp(_series(moments, film) + np.log(speed / tabulated)[:, None])[: len(self.bearings)]
 
     def heat(self, context: TermContext) -> NDArray[np.complex128]:
         """What flows between balls and raceways beside what flows with a film at 30 °C."""
-        speed, thrust = float(context.inputs["speed"]), float(context.inputs["thrust"])
         temperatures, film = self._film(context)
-        nominal = np.full((len(film), 1), NOMINAL_FILM_TEMPERATURE)
-        more = np.exp(self._map.log_conductance(speed, thrust, film)) - np.exp(
-            self._map.log_conductance(speed, thrust, nominal)
-        )
+        _, conductances, nominal = self._curves(context)
+        more = np.exp(_by_side(conductances, film)) - nominal[:, :, None]
         flow = more * (temperatures[:, 2:] - temperatures[:, :2])
         found = np.concatenate((flow, -flow.sum(axis=1, keepdims=True)), axis=1)
-        return found[self._follow].reshape(len(self.heat_places), -1)
+        return found[self.follow].reshape(len(self.heat_places), -1)
 
     def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:
         """Conductances between balls and raceways at a speed and thrust, over the constant ones."""
-        found = self._map.nominal_conductance(point.speed, point.thrust) / self._conductance[:, None]
+        found = self.friction_map.nominal_conductance(point.speed, point.thrust) / self._conductance[:, None]
         return {
             f"balls.{self.bearings[row]}.{side}": float(found[row, column])
-            for row in self._follow
+            for row in self.follow
             for column, side in enumerate(("inner", "outer"))
         }
 
@@ -265,6 +320,8 @@ def tabulated_machine(spec: MachineSpec, friction_map: FrictionMap) -> MachineSp
     heat = np.array([friction_map.heat(speed, thrust, nominal) for speed in grid])
     turning = operation.speed or 2.0 / 3.0 * friction_map.speed[-1]
     conductance = friction_map.nominal_conductance(min(turning, friction_map.speed[-1]), thrust).mean(axis=1)
+    # Round, so that the operators do not depend on which thrusts a recording has.
+    conductance = 10.0 ** np.round(np.log10(conductance), CONDUCTANCE_DECIMALS)
     by_name = dict(zip(friction_map.bearings, conductance.tolist(), strict=True))
     table = HeatTable.model_construct(
         speed=tuple(grid.tolist()),
@@ -279,5 +336,54 @@ def tabulated_machine(spec: MachineSpec, friction_map: FrictionMap) -> MachineSp
             mean = float(np.mean([by_name[bearing.name] for bearing in group.bearing]))
             row = row.model_copy(update={"kind": "constant", "conductance": Uncertain(mean)})
         sets.append(group.model_copy(update={"ball_row": row}))
+    if spec.heat.model == "table":
+        return spec.model_copy(update={"bearing_set": tuple(sets)})
     heat_model = spec.heat.model_copy(update={"model": "table", "table": table})
     return spec.model_copy(update={"heat": heat_model, "bearing_set": tuple(sets)})
+
+
+def operators_machine(table: MachineSpec, film_heat: FilmHeat) -> MachineSpec:
+    """What the reduced operators of a tabulated machine are made of, whatever its heat.
+
+    Ball rows that follow their contacts get the range over which ``film_heat``
+    moves them, so that the basis knows it.
+
+    Parameters
+    ----------
+    table : MachineSpec
+        As :func:`tabulated_machine` makes it, with other parameters or not.
+    film_heat : FilmHeat
+    """
+    known = film_heat.friction_map
+    highest = float(known.speed[-1])
+    thrust = float(np.clip(table.operation.thrust, known.thrust[0], known.thrust[-1]))
+    films = np.tile(np.array(FILM_TEMPERATURES), (len(known.bearings), 1))
+    decades = np.log10(np.e) * np.array(
+        [known.log_conductance(speed, thrust, films) for speed in (0.0, highest)]
+    )
+    least, most = decades.min(axis=(0, 2, 3)), decades.max(axis=(0, 2, 3))
+    sets = []
+    for group in table.bearing_set:
+        rows = [known.bearings.index(bearing.name) for bearing in group.bearing]
+        if set(rows) <= set(film_heat.follow.tolist()):
+            low, high = least[rows].min(), most[rows].max()
+            middle = 10.0 ** round(0.5 * (low + high), CONDUCTANCE_DECIMALS)
+            # The next tenth of a decade: other thrusts move it a little further.
+            sigma = np.log(10.0) * np.ceil(10.0 * (0.5 * (high - low) + 0.02)) / 10.0
+            row = group.ball_row.model_copy(
+                update={"conductance": Uncertain(middle, float(sigma / ReductionOptions().sigmas))}
+            )
+            group = group.model_copy(update={"ball_row": row})
+        sets.append(group)
+    heat = HeatTable.model_construct(
+        speed=(0.0, highest),
+        heat=dict.fromkeys(known.bearings, (0.0, 0.0)),
+        thrust_coefficient={},
+        reference_thrust=table.heat.table.reference_thrust,
+    )
+    return table.model_copy(
+        update={
+            "heat": table.heat.model_copy(update={"table": heat}),
+            "bearing_set": tuple(sets),
+        }
+    )

@@ -1,5 +1,8 @@
 """Friction of an analytical heat model as a map, against the model itself."""
 
+import importlib.util
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,11 +13,20 @@ from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.loads.bearing_heat import BearingMechanics
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.drive import heat_of_table
-from spindle_fem.reduced.film_heat import FilmHeat, tabulate_friction, tabulated_machine
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.film_heat import (
+    FilmHeat,
+    operators_machine,
+    tabulate_friction,
+    tabulated_machine,
+    thrusts_between,
+)
+from spindle_fem.reduced.transient import simulate_fast
 from spindle_fem.spec.load import load_machine
+from spindle_fem.units import Uncertain
 
 RPM = np.pi / 30.0
-THRUSTS = (900.0, 1750.0)
+THRUSTS = (875.0, 1312.5, 1750.0)
 
 
 @pytest.fixture(scope="module")
@@ -39,21 +51,22 @@ def context(term, temperatures, *, speed=3000.0 * RPM, thrust=1750.0):
 
 
 @pytest.mark.parametrize(
-    ("speed", "celsius"), [(400.0, 15.0), (1500.0, 33.0), (3000.0, 61.0), (4200.0, 88.0)]
+    ("speed", "celsius", "thrust"),
+    [(400.0, 15.0, 1750.0), (1500.0, 33.0, 1530.0), (3000.0, 61.0, 1750.0), (4200.0, 88.0, 1090.0)],
 )
-def test_the_map_is_the_heat_model_between_its_points(spec, friction, speed, celsius):
+def test_the_map_is_the_heat_model_between_its_points(spec, friction, speed, celsius, thrust):
     given = OperatingPoint.of(spec)
     point = OperatingPoint(
         speed * RPM,
-        1750.0,
+        thrust,
         given.ambient_temperature,
         given.coolant_inlet_temperature,
         given.coolant_flow,
     )
     exact = BearingMechanics(spec).over_film_temperature(point, [celsius + 273.15])
     kelvin = np.full(len(friction.bearings), celsius + 273.15)
-    found = friction.heat(point.speed, 1750.0, kelvin)
-    conductance = np.exp(friction.log_conductance(point.speed, 1750.0, kelvin[:, None]))[:, :, 0]
+    found = friction.heat(point.speed, thrust, kelvin)
+    conductance = np.exp(friction.log_conductance(point.speed, thrust, kelvin[:, None]))[:, :, 0]
     for row, name in enumerate(friction.bearings):
         assert found[row] == pytest.approx(exact[name].heat[0], rel=2e-3)
         assert conductance[row, 0] == pytest.approx(exact[name].conductance_inner[0], rel=1e-3)
@@ -118,10 +131,126 @@ def test_what_no_map_can_hold_is_refused(spec, friction):
     with pytest.raises(SpecError, match=r"heat.model: the heat is given by table already"):
         tabulate_friction(load_machine("recorded_spindle"), 400.0, THRUSTS)
     follows = spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": True})})
-    with pytest.raises(SpecError, match=r"heat.thermal_preload: with it heat follows every ring"):
+    with pytest.raises(
+        SpecError,
+        match=r"heat.thermal_preload: with it heat follows every ring.*--set heat.thermal_preload=false",
+    ):
         tabulate_friction(follows, 400.0, THRUSTS)
     film = np.full(len(friction.bearings), 300.0)
     with pytest.raises(OutOfValidityError, match=r"friction map: speed: 600 is outside 0 to 471"):
         friction.heat(600.0, 1750.0, film)
-    with pytest.raises(OutOfValidityError, match=r"friction map: thrust: 100 is outside 900 to 1750"):
+    with pytest.raises(OutOfValidityError, match=r"friction map: thrust: 100 is outside 875 to 1750"):
         friction.heat(300.0, 100.0, film)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (1750.0, 1750.0, (1750.0,)),
+        (0.0, 1750.0, (0.0, 875.0, 1750.0)),
+        (1745.0, 1760.0, (1745.0, 1750.0, 1760.0)),
+        (500.0, 3000.0, (500.0, 1750.0, 3000.0)),
+        (3000.0, 3000.0, (1750.0, 2375.0, 3000.0)),
+    ],
+)
+def test_thrusts_of_a_map_cover_those_that_occur_and_the_definition(spec, low, high, expected):
+    assert thrusts_between(spec, low, high) == expected
+
+
+def test_heat_by_table_stays_where_only_the_ball_rows_follow(spec, friction):
+    given = spec.model_copy(update={"heat": spec.heat.model_copy(update={"model": "table"})})
+    table = tabulated_machine(given, friction)
+    assert table.heat == given.heat
+    assert {group.ball_row.kind for group in table.bearing_set} == {"constant"}
+    term = FilmHeat(friction, given, table)
+    assert term.bearings == ()
+    assert term.friction(context(term, np.full((15, 1), 310.0))).shape == (0, 1)
+    assert len(term.heat_places) == 15
+
+
+def test_constant_ball_rows_stay_where_only_friction_follows(spec, friction):
+    row = spec.bearing_set[0].ball_row.model_copy(
+        update={"kind": "constant", "conductance": Uncertain(2.0, 0.1)}
+    )
+    front = spec.bearing_set[0].model_copy(update={"ball_row": row})
+    given = spec.model_copy(update={"bearing_set": (front, spec.bearing_set[1])})
+    table = tabulated_machine(given, friction)
+    assert table.bearing_set[0].ball_row == row
+    term = FilmHeat(friction, given, table)
+    assert {place.split(".")[0] for place in term.heat_places} == {"R1", "R2"}
+    assert operators_machine(table, term).bearing_set[0].ball_row == row
+
+
+def test_operators_do_not_depend_on_which_thrusts_a_recording_has(spec, friction, table):
+    other = tabulate_friction(spec, 4500.0 * RPM, (1700.0, 1750.0))
+    machines = []
+    for known in (friction, other):
+        tabulated = tabulated_machine(spec, known)
+        machines.append(operators_machine(tabulated, FilmHeat(known, spec, tabulated)))
+    assert machines[0].model_dump() == machines[1].model_dump()
+
+
+def test_the_range_of_the_ball_rows_holds_what_the_map_gives(spec, friction, table):
+    found = operators_machine(table, FilmHeat(friction, spec, table))
+    for row, (group, _) in enumerate(found.bearings):
+        prior = group.ball_row.conductance
+        reach = np.exp(3.0 * prior.sigma_log)
+        for speed in (0.0, 1000.0 * RPM, 4500.0 * RPM):
+            for thrust in THRUSTS:
+                film = np.full((len(friction.bearings), 1), 320.0)
+                values = np.exp(friction.log_conductance(speed, thrust, film))[row]
+                assert values.min() > prior.value / reach
+                assert values.max() < prior.value * reach
+
+
+def test_values_at_an_operating_point_are_remembered_and_do_not_mix(spec, friction, table):
+    term = FilmHeat(friction, spec, table)
+    columns = np.tile([320.0, 316.0, 330.0], len(friction.bearings))[:, None]
+    first = term.heat(context(term, columns, speed=900.0 * RPM))
+    term.heat(context(term, columns, speed=3300.0 * RPM))
+    assert term.heat(context(term, columns, speed=900.0 * RPM)).tolist() == first.tolist()
+    assert term.heat(context(term, columns, speed=900.0 * RPM, thrust=900.0))[0, 0] != first[0, 0]
+
+
+@pytest.fixture(scope="module")
+def lumped(spec, friction, table):
+    """The tabulated machine with one unknown a part, and a drive through two speeds and a rest."""
+    path = Path(__file__).with_name("test_reduced_transient.py")
+    loaded = importlib.util.spec_from_file_location("lumped_spindle_of_films", path)
+    module = importlib.util.module_from_spec(loaded)
+    sys.modules[loaded.name] = module
+    loaded.loader.exec_module(module)
+    fast = FastModel(module.lumped_model(table), table, (FilmHeat(friction, spec, table),))
+    times = np.arange(0.0, 5400.0, 60.0)
+    return fast, module.drive_of(times, np.select([times < 2400, times < 3600], [3000.0, 1000.0], 0.0))
+
+
+def test_given_terms_are_always_there_and_stay_on_a_smaller_basis(lumped):
+    fast, drive = lumped
+    [term] = fast.extra_terms
+    assert term in fast.own_terms(drive)
+    assert fast.projected(np.eye(fast.model.size)[:, :-1]).extra_terms == (term,)
+    assert FastModel(fast.model, fast.spec).own_terms(drive) == ()
+
+
+def test_derivatives_through_the_films_are_those_of_differences(lumped):
+    fast, drive = lumped
+    names = ("heat.front", "film.outside", "coolant.film_factor", "heat.inner_share")
+    run = simulate_fast(fast, drive, 291.0, derivatives=names)
+    for column, name in enumerate(names):
+        ends = [
+            simulate_fast(fast, drive, 291.0, parameters={name: np.exp(sign * 1e-4)}).temperature
+            for sign in (1.0, -1.0)
+        ]
+        expected = (ends[0] - ends[1]) / 2e-4
+        assert run.sensitivity[:, :, column] == pytest.approx(
+            expected, rel=1e-4, abs=1e-4 * np.abs(expected).max()
+        ), name
+
+
+def test_a_warmer_film_makes_less_heat_than_the_table(lumped):
+    fast, drive = lumped
+    with_films = simulate_fast(fast, drive, 320.0).temperature
+    by_table = simulate_fast(FastModel(fast.model, fast.spec), drive, 320.0).temperature
+    row = fast.channels.index("SP01")
+    assert with_films[10, row] < by_table[10, row] - 0.01

@@ -1,0 +1,107 @@
+"""A machine with analytical friction in the fast model, against the full model and through its files."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.coupling import prepare_machine
+from spindle_fem.errors import SpecError
+from spindle_fem.loads.operating_point import OperatingPoint
+from spindle_fem.network.history import InputHistory
+from spindle_fem.reduced.drive import STANDARD, make_drive
+from spindle_fem.reduced.film_heat import FilmHeat
+from spindle_fem.reduced.transient import simulate_fast
+from spindle_fem.simulate import fast_model_for, simulate_machine
+from spindle_fem.spec.load import load_machine
+from spindle_fem.transients.run import TransientOptions, simulate_full
+
+RPM = np.pi / 30.0
+# The fast model holds the coolant's properties at the inlet.
+OVERRIDES = ("mesh.preset=coarse", "mesh.order=1", "coolant.properties_at=inlet")
+HELD = np.array([True, True, False, False, True])
+TIMES = np.arange(0.0, 2401.0, 20.0)
+SPEED = RPM * np.where(TIMES < 1200.0, 3000.0, 1000.0)
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return load_machine("wu_tan_2016", OVERRIDES)
+
+
+@pytest.fixture(scope="module")
+def fast(spec):
+    return fast_model_for(spec, [SimpleNamespace(input_names=("speed",), inputs=SPEED[:, None])])
+
+
+def test_expansion_is_refused_with_a_way_out(spec):
+    follows = spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": True})})
+    with pytest.raises(SpecError, match=r"every ring.*heat.thermal_preload=false.*spindle-fem transient"):
+        fast_model_for(follows, [])
+
+
+@pytest.mark.slow
+def test_it_follows_the_full_model_whose_friction_follows_its_films(spec, fast):
+    point = OperatingPoint.of(spec)
+    columns = (SPEED, 1750.0, point.ambient_temperature, point.coolant_inlet_temperature, point.coolant_flow)
+    values = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), TIMES.shape) for c in columns])
+    full = simulate_full(
+        prepare_machine(spec),
+        InputHistory(TIMES, STANDARD, values, HELD),
+        sample_times=TIMES[::3],
+        options=TransientOptions(error=0.01),
+    )
+    drive = make_drive(TIMES, STANDARD, values, HELD)
+    run = simulate_fast(fast, drive, point.ambient_temperature)
+    for probe in full.probes:
+        reduced = run.temperature[::3, fast.channels.index(probe)]
+        assert np.abs(reduced - full.reading(probe)).max() < 0.05, probe
+    # Without the term the same heat table errs visibly.
+    plain = type(fast)(fast.model, fast.spec)
+    cold = simulate_fast(plain, drive, point.ambient_temperature)
+    row = fast.channels.index("SP01")
+    assert np.abs(cold.temperature[::3, row] - full.reading("SP01")).max() > 0.05
+
+
+MANIFEST = """
+schema = "spindle-fem/recording/1"
+name = "made"
+data = "made.csv"
+time = {column = "time", unit = "s"}
+[[channel]]
+column = "rear seat"
+role = "temperature"
+probe = "SP05"
+unit = "degC"
+sigma = 0.1
+[[channel]]
+column = "n"
+role = "input"
+drives = "speed"
+unit = "rpm"
+hold = "previous"
+"""
+
+
+@pytest.mark.slow
+def test_simulate_takes_it_and_a_calibrated_machine_keeps_its_heat_model(spec, fast, tmp_path):
+    point = OperatingPoint.of(spec)
+    columns = (SPEED, 1750.0, point.ambient_temperature, point.coolant_inlet_temperature, point.coolant_flow)
+    values = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), TIMES.shape) for c in columns])
+    drive = make_drive(TIMES, STANDARD, values, HELD)
+    made = simulate_fast(fast, drive, point.ambient_temperature).temperature
+    frame = pd.DataFrame({"time": TIMES, "n": SPEED / RPM})
+    noise = np.random.default_rng(5).normal(0.0, 0.1, TIMES.size)
+    frame["rear seat"] = made[:, fast.channels.index("SP05")] - 273.15 + noise
+    frame.to_csv(tmp_path / "made.csv", index=False)
+    (tmp_path / "recording.toml").write_text(MANIFEST)
+    found = simulate_machine(
+        "wu_tan_2016", tmp_path, tmp_path / "out", calibrate=[tmp_path], overrides=OVERRIDES
+    )
+    assert found["channels"][0]["rmse_K"] < 0.12
+    assert any('"full" friction and ball contacts from a map' in note for note in found["notes"])
+    written = load_machine(tmp_path / "out" / "calibrated_machine.toml")
+    assert written.heat.model == "full"
+    assert {group.ball_row.kind for group in written.bearing_set} == {"contact"}
+    assert isinstance(fast.extra_terms[0], FilmHeat)
