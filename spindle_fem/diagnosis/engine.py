@@ -30,6 +30,8 @@ LARGEST_SET = 3
 EXPLAINED = 1.03
 #: Prior probability of 0, 1, 2 and 3 effects.
 NUMBER_PRIOR = (0.4, 0.35, 0.2, 0.05)
+# An interval that lies in gaps of the recording by more than this share explains what nobody saw.
+HIDDEN = 0.5
 # Sets that are tried without each of their members.
 REDUCED = 3
 SINGLES, PAIRS, TRIPLES = 8, 6, 3
@@ -226,6 +228,7 @@ class Search:
                 probe = effect.over(self.view, pattern.spot, [(0.0, stop)])
                 spread = probe.parameters[probe.amplitude].sigma
                 options = find_intervals(onsets, spread, stop)
+                options = [o for o in options if not self._within_gaps(o.intervals, recording)]
                 if options:
                     found.append((effect, max(options, key=lambda item: item.gain)))
         found.sort(key=lambda item: -item[1].gain)
@@ -265,8 +268,24 @@ class Search:
         except (ConvergenceError, SpecError):
             # What cannot be simulated explains nothing; its neighbours are tried.
             return
+        if any(self._unseen(candidate, fitted.values) for candidate in candidates):
+            return
         paid = sum(self._paid.get(_identity((c,)), 0.0) for c in candidates)
         self._keep(Hypothesis(fitted, self.log_prior(candidates) - paid))
+
+    def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
+        """Whether an effect is on only where nothing was recorded, neither readings nor inputs."""
+        effect = self.effects[candidate.effect]
+        if not isinstance(effect, IntervalEffect):
+            return False
+        return self._within_gaps(effect.intervals(candidate, values), candidate.recording or 0)
+
+    def _within_gaps(self, intervals: Sequence[tuple[float, float]], recording: int) -> bool:
+        gaps = self.problem.plant.gap_intervals(recording)
+        hidden = sum(
+            max(0.0, min(end, stop) - max(start, begin)) for start, end in intervals for begin, stop in gaps
+        )
+        return hidden > HIDDEN * sum(end - start for start, end in intervals)
 
     def _hopeless(self) -> float:
         """Misfit beyond which a hypothesis does not matter."""

@@ -46,7 +46,7 @@ GAP_STEPS = 1.5
 # the highest that they give: ``within_gap.<recording>.<number>``. Shorter gaps hide nothing that matters.
 GAP_PREFIX = "within_gap."
 SHORTEST_GAP = 120.0
-GAP_PIECE, MOST_PIECES = 300.0, 6
+GAP_PIECE, MOST_PIECES = 150.0, 8
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")
 # Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
@@ -204,6 +204,10 @@ class Plant:
             for number, items in enumerate(self._gaps)
             for index in range(len(items))
         ]
+
+    def gap_intervals(self, number: int) -> tuple[tuple[float, float], ...]:
+        """Pieces of the gaps of one recording in which something may have happened, [s]."""
+        return self._gaps[number]
 
     # ---------------------------------------------------------------- simulation
     def start(

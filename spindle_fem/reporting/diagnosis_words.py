@@ -120,7 +120,9 @@ def _heat_words(content: Mapping[str, Any]) -> str:
     component = mismatch["where"]["component"]
     heat = mismatch["missing_heat_W"].get(component)
     when = _when(content) or "Overall "
-    if heat is None:
+    unrecorded = any(item["effect"].startswith("unrecorded_") for item in content["findings"])
+    if heat is None or unrecorded:
+        # An unrecorded source says itself how much; what the parameters absorb of it would confuse.
         return ""
     more = "more" if heat["mean"] >= 0.0 else "less"
     return (
