@@ -199,8 +199,14 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
             table.add_row(
                 name, _number(fit[name]["train_rmse_K"], 3), _number(fit[name]["heldout_rmse_K"], 3)
             )
+        full = fit["full_model"]
+        for name in ("before", "after") if full["reason"] is None else ():
+            errors = (full[name]["train_rmse_K"], full[name]["heldout_rmse_K"])
+            table.add_row(f"{name}, full model", *(_number(error, 3) for error in errors))
         table.add_row("noise", _number(fit["noise_K"], 3), _number(fit["noise_K"], 3))
         console.print(table)
+    if fit["full_model"]["mesh"] != "off" and fit["full_model"]["reason"]:
+        console.print(f"Full model: {fit['full_model']['reason']}")
     following = content["next_measurement"]
     console.print(f"Next: {following['quantity']} at {following['where']}, {following['condition']}.")
     console.print(f"Files: {folder}")
