@@ -8,112 +8,28 @@ so that Newton's method works on ``q`` alone and the step stays implicit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.linalg.lapack import dgesv
 
-from spindle_fem.effects.term import COOLANT_INLET, Term, TermContext
+from spindle_fem.effects.term import COOLANT_INLET, Term
 from spindle_fem.errors import ConvergenceError, SpecError, did_you_mean
 from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.term_layout import Evaluation, Layout
 
 Array = NDArray[np.float64]
 
-COMPLEX_STEP = 1e-30
 # In the energy-orthonormal basis an eigenvalue is a share of the stored energy's dissipation.
 RANK_TOLERANCE = 1e-3
 # Newton's last change; its square, in relative terms, is the error that is left.
 TEMPERATURE_TOLERANCE = 1e-4
 MOST_ITERATIONS = 25
-
-
-@dataclass(frozen=True, slots=True)
-class Evaluation:
-    """Added quantities at one instant and their derivatives.
-
-    Attributes
-    ----------
-    value : (m,) ndarray
-    by_sensed : (m, n_y) ndarray
-    by_state : (m, n_x) ndarray
-    by_parameter : (m, p) ndarray
-        Explicit part, to the coordinates of the asked parameters.
-    """
-
-    value: Array
-    by_sensed: Array
-    by_state: Array
-    by_parameter: Array
-
-
-@dataclass(frozen=True, slots=True)
-class _Layout:
-    """Complex columns of a term: the value first, then one for each direction of a derivative.
-
-    Attributes
-    ----------
-    reads, states : slice
-        Rows of the sensed temperatures and of the states.
-    split, end : int
-        Columns of the states' and of the parameters' directions begin here.
-    targets : list of int
-        Derivative that each of the latter belongs to.
-    temperatures, state : ndarray
-        Perturbations, to which the values are added.
-    parameters : mapping of str to ndarray
-    """
-
-    reads: slice
-    states: slice
-    split: int
-    end: int
-    targets: list[int]
-    temperatures: NDArray[np.complex128]
-    state: NDArray[np.complex128]
-    parameters: Mapping[str, NDArray[np.complex128]]
-
-    @classmethod
-    def of(
-        cls, term: Term, values: Mapping[str, float], reads: slice, states: slice, own: Mapping[str, int]
-    ) -> _Layout:
-        """Layout of a term with parameter values; ``own`` maps its asked parameters to derivatives."""
-        n_reads, n_states = len(term.reads), term.n_states
-        split, end = 1 + n_reads, 1 + n_reads + n_states
-        width = end + len(own)
-        temperatures = np.zeros((n_reads, width), dtype=complex)
-        state = np.zeros((n_states, width), dtype=complex)
-        temperatures[np.arange(n_reads), 1 + np.arange(n_reads)] = 1j * COMPLEX_STEP
-        state[np.arange(n_states), split + np.arange(n_states)] = 1j * COMPLEX_STEP
-        parameters = {name: np.full(width, value, dtype=complex) for name, value in values.items()}
-        kinds = {item.name: item.logarithmic for item in term.parameters}
-        for i, name in enumerate(own):
-            parameters[name][end + i] += 1j * COMPLEX_STEP * (values[name] if kinds[name] else 1.0)
-        return cls(reads, states, split, end, list(own.values()), temperatures, state, parameters)
-
-    def context(self, time: float, inputs: Mapping[str, float], sensed: Array, states: Array) -> TermContext:
-        """What the term sees."""
-        return TermContext(
-            time,
-            inputs,
-            self.temperatures + sensed[self.reads, None],
-            self.state + states[self.states, None],
-            self.parameters,
-        )
-
-    def spread(
-        self, answers: NDArray, rows: slice, scale: Array | float, slopes: tuple[Array, Array, Array]
-    ) -> None:
-        """Add complex answers, times what they multiply in each row, to the derivatives."""
-        by_sensed, by_state, by_parameter = slopes
-        found = scale * (answers.imag / COMPLEX_STEP)
-        by_sensed[rows, self.reads] += found[:, 1 : self.split]
-        if self.end > self.split:
-            by_state[rows, self.states] += found[:, self.split : self.end]
-        for i, target in enumerate(self.targets):
-            by_parameter[rows, target] += found[:, self.end + i]
+NO_SHIFTS: Mapping[str, tuple[float, Array]] = MappingProxyType({})
+NO_SHIFT = (0.0, None)
 
 
 class DynamicTerms:
@@ -201,7 +117,7 @@ class DynamicTerms:
             names = term.names()
             own = {names[name].name: i for i, name in enumerate(self.derivatives) if name in names}
             self._layouts.append(
-                _Layout.of(term, self.values[number], self._reads[number], self._states[number], own)
+                Layout.of(term, self.values[number], self._reads[number], self._states[number], own)
             )
             fluids = fast.fluid_places
             self._shifted.append(
@@ -212,6 +128,12 @@ class DynamicTerms:
             own = fast.fluid_parameters(coefficient)
             scale = float(np.prod([values.get(name, 1.0) for name in own]))
             self._fluids[coefficient] = (scale, [i for i, n in enumerate(self.derivatives) if n in own])
+        # Rows that shift the fluid of a film which a term also scales.
+        self._fluid_rows: dict[str, list[int]] = {}
+        for row, place in self.place_columns:
+            film = fast.fluid_places.get(place)
+            if film in self._spectra:
+                self._fluid_rows.setdefault(film, []).append(row)
 
     def _require_place(self, term: Term, place: str) -> None:
         model = self.fast.model
@@ -283,6 +205,7 @@ class DynamicTerms:
         states: Array,
         friction: Array,
         friction_by: Array,
+        shifts: Mapping[str, tuple[float, Array]] = NO_SHIFTS,
     ) -> Evaluation:
         """Added quantities where the sensed temperatures are given.
 
@@ -300,16 +223,18 @@ class DynamicTerms:
             Heat that the machine itself gives to its heat places.
         friction_by : (n_heat_places, p) ndarray, [W]
             Its derivatives to the coordinates of the asked parameters.
+        shifts : mapping of coefficient to (float, (p,) ndarray), [K]
+            What shifts fluids beside these terms, and derivatives.
         """
         n_sensed, n_derivatives = len(self.sense), len(self.derivatives)
         value = np.zeros(self.n_added)
         by_sensed = np.zeros((self.n_added, n_sensed))
         by_state = np.zeros((self.n_added, self.n_states))
         by_parameter = np.zeros((self.n_added, n_derivatives))
+        slopes = (by_sensed, by_state, by_parameter)
+        contexts = [layout.context(time, inputs, sensed, states) for layout in self._layouts]
         for number, term in enumerate(self.terms):
-            layout = self._layouts[number]
-            context = layout.context(time, inputs, sensed, states)
-            slopes = (by_sensed, by_state, by_parameter)
+            layout, context = self._layouts[number], contexts[number]
             if term.heat_places:
                 answers = np.asarray(term.heat(context), dtype=complex)
                 rows = self._heat[number]
@@ -331,21 +256,37 @@ class DynamicTerms:
                     value[columns] = excess * friction[positions]
                     layout.spread(answers[i : i + 1], columns, friction[positions][:, None], slopes)
                     by_parameter[columns] += excess * friction_by[positions]
-            if term.coefficients:
-                answers = np.asarray(term.factor(context), dtype=complex)
-                for i, (coefficient, own_sensed, columns) in enumerate(self._moved[number]):
-                    strength = coefficients[coefficient] * self._spectra[coefficient]
-                    scale, moves = self._fluids[coefficient]
-                    fluid = scale * self.fast.fluid_temperature(coefficient, inputs)
-                    difference = sensed[own_sensed] - fluid * self._uniform[own_sensed]
-                    excess = answers[i, 0].real - 1.0
-                    value[columns] = -excess * strength * difference
-                    by_sensed[columns, own_sensed].flat[:: len(strength) + 1] -= excess * strength
-                    layout.spread(answers[i : i + 1], columns, -(strength * difference)[:, None], slopes)
-                    for target in touched.get(coefficient, ()):
-                        by_parameter[columns, target] += value[columns]
-                    for target in moves:
-                        by_parameter[columns, target] += excess * strength * fluid * self._uniform[own_sensed]
+        # What shifts fluids is known: heat that a changed film moves counts from where they are now.
+        for number, term in enumerate(self.terms):
+            if not term.coefficients:
+                continue
+            layout = self._layouts[number]
+            answers = np.asarray(term.factor(contexts[number]), dtype=complex)
+            for i, (coefficient, own_sensed, columns) in enumerate(self._moved[number]):
+                strength = coefficients[coefficient] * self._spectra[coefficient]
+                uniform = self._uniform[own_sensed]
+                scale, moves = self._fluids[coefficient]
+                fluid = scale * self.fast.fluid_temperature(coefficient, inputs)
+                shift, shift_by = shifts.get(coefficient, NO_SHIFT)
+                flow = strength * ((fluid + shift) * uniform - sensed[own_sensed])
+                excess = answers[i, 0].real - 1.0
+                value[columns] = excess * flow
+                by_sensed[columns, own_sensed].flat[:: len(strength) + 1] -= excess * strength
+                for target in touched.get(coefficient, ()):
+                    by_parameter[columns, target] += value[columns]
+                for target in moves:
+                    by_parameter[columns, target] += excess * strength * fluid * uniform
+                if shift_by is not None:
+                    by_parameter[columns] += np.outer(excess * strength * uniform, shift_by)
+                for row in self._fluid_rows.get(coefficient, ()):
+                    # These rows are shifts times the coefficient, and so are their derivatives.
+                    share = self._spectra[coefficient] * uniform
+                    flow = flow + share * value[row]
+                    value[columns] += excess * share * value[row]
+                    moved = (excess * share)[:, None]
+                    for slope in slopes:
+                        slope[columns] += moved * slope[row]
+                layout.spread(answers[i : i + 1], columns, flow[:, None], slopes)
         return Evaluation(value, by_sensed, by_state, by_parameter)
 
     def advance(

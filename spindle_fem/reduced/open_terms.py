@@ -7,7 +7,7 @@ derivatives, so that the march is that of the linear model.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +40,8 @@ class OpenLoads:
     loads_by : list of mapping of parameter to (r, n_w) ndarray
     start, end : (G, n_w) ndarray
     start_by, end_by : mapping of parameter to (G, n_w) ndarray
+    fluids : mapping of coefficient to int
+        Load input that shifts the fluid of a film, K.
     """
 
     loads: list[Array]
@@ -48,6 +50,36 @@ class OpenLoads:
     end: Array
     start_by: dict[str, Array]
     end_by: dict[str, Array]
+    fluids: dict[str, int]
+
+    def shifts(
+        self, coefficients: Collection[str], derivatives: Sequence[str]
+    ) -> tuple[dict[str, tuple[Array, Array]], dict[str, tuple[Array, Array]]]:
+        """Shift of the fluids of some films at the start and at the end of every step.
+
+        Parameters
+        ----------
+        coefficients : collection of str
+        derivatives : sequence of str
+
+        Returns
+        -------
+        mapping of coefficient to (G,) and (G, p) ndarray, [K]
+            Only those that open terms shift; with derivatives.
+        """
+        found: tuple[dict[str, tuple[Array, Array]], ...] = ({}, {})
+        for film, column in self.fluids.items():
+            if film not in coefficients:
+                continue
+            for ends, values, by in zip(
+                found, (self.start, self.end), (self.start_by, self.end_by), strict=True
+            ):
+                slopes = np.zeros((len(values), len(derivatives)))
+                for position, name in enumerate(derivatives):
+                    if name in by:
+                        slopes[:, position] = by[name][:, column]
+                ends[film] = (values[:, column], slopes)
+        return found
 
 
 def with_open_terms(
@@ -113,7 +145,7 @@ def with_open_terms(
                         for name, slope in machine_by.items():
                             if position < min(slope.shape[1], n_heat):
                                 by[name][:, position] += excess * slope[:, position]
-    return OpenLoads(columns.loads(), columns.loads_by(), *found, *found_by)
+    return OpenLoads(columns.loads(), columns.loads_by(), *found, *found_by, columns.fluids())
 
 
 class _Columns:
@@ -150,6 +182,11 @@ class _Columns:
         if place == COOLANT_INLET and self.fast.inlet_column is not None:
             return self.fast.inlet_column
         return len(self.fast.load_names) + self.names.index(place)
+
+    def fluids(self) -> dict[str, int]:
+        """Column of the fluid of each film."""
+        films = {place: self._film(place) for place in self.names}
+        return {film: self.of(place) for place, film in films.items() if film is not None}
 
     def _film(self, place: str) -> str | None:
         """Coefficient of the film whose fluid a place is."""

@@ -15,7 +15,7 @@ from spindle_fem.reduced.assemble import RunOperators, run_operators
 from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.exact_step import ExactPropagator
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.nonlinear import DynamicTerms, Evaluation, solve_added
+from spindle_fem.reduced.nonlinear import DynamicTerms, solve_added
 from spindle_fem.reduced.open_terms import is_open, with_open_terms
 from spindle_fem.reduced.start import Start
 from spindle_fem.reduced.stepping import (
@@ -25,6 +25,7 @@ from spindle_fem.reduced.stepping import (
     sensitivity_forcing,
     stage_values,
 )
+from spindle_fem.reduced.term_layout import Evaluation
 
 Array = NDArray[np.float64]
 
@@ -156,6 +157,8 @@ class TransientRun:
         self.start_by, self.end_by = opened.start_by, opened.end_by
         dynamic = [term for term in terms if term.is_dynamic and term not in known]
         self.dynamic = DynamicTerms(fast, drive, dynamic, parameters, derivatives) if dynamic else None
+        scaled = {name for term in dynamic for name in term.coefficients}
+        self._shifts = opened.shifts(scaled, derivatives)
 
     def _load_inputs(self, inputs: Array) -> tuple[Array, dict[str, Array]]:
         """Load inputs of every step at one of its ends, and their derivatives."""
@@ -224,6 +227,7 @@ class TransientRun:
             states=memory,
             friction=(self.end if at_end else self.start)[step, : self._n_heat],
             friction_by=(self._friction_end_by if at_end else self._friction_start_by)[step],
+            shifts={film: (float(k[step]), by[step]) for film, (k, by) in self._shifts[at_end].items()},
         )
 
     def _march_terms(self, start: Start, states: Array, response: Array) -> Tracks:

@@ -351,13 +351,52 @@ class Friction(Term):
         return kept * context.state + (1.0 - kept) * difference
 
 
+class Room(Term):
+    """Air beside the housing that follows nothing but time and its own memory."""
+
+    name = "room"
+    parameters = (TermParameter("change", 3.0, 1.0, "K", False), TermParameter("time", 1200.0, 0.5, "s"))
+    heat_places = ("fluid.housing.outside",)
+    n_states = 1
+
+    def heat(self, context):
+        swing = 1.0 + 0.3 * np.sin(context.time / 700.0)
+        return (context.parameters["change"] * swing * context.state[0])[None]
+
+    def advance(self, context, step):
+        kept = np.exp(-step / context.parameters["time"])
+        return kept * context.state + (1.0 - kept)
+
+
+class Plume(Term):
+    """The same air, warmed by the housing itself with a lag."""
+
+    name = "plume"
+    parameters = (TermParameter("share", 0.2, 0.1), TermParameter("time", 800.0, 0.5, "s"))
+    heat_places = ("fluid.housing.outside",)
+    reads = ("housing",)
+    n_states = 1
+
+    def heat(self, context):
+        excess = context.temperatures[0] - context.inputs["ambient"]
+        return (context.parameters["share"] * (context.state[0] + 0.5 * excess))[None]
+
+    def advance(self, context, step):
+        excess = context.temperatures - context.inputs["ambient"]
+        kept = np.exp(-step / context.parameters["time"])
+        return kept * context.state + (1.0 - kept) * excess
+
+
 TERMS = (Feedback(), Closure(), Fading(), Steady(), Friction())
+# Two that shift the fluid of a film, one known before the march and one not, and one that scales the film.
+SHIFTED = (Closure(), Room(), Plume())
 
 
-def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monkeypatch):
+@pytest.mark.parametrize("terms", [TERMS, SHIFTED], ids=["everything", "shifted fluid of a scaled film"])
+def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monkeypatch, terms):
     # Derivatives are those at Newton's last but one iterate: exact to its last change.
     monkeypatch.setattr(nonlinear, "TEMPERATURE_TOLERANCE", 1e-7)
-    owned = {name: item for term in TERMS for name, item in term.names().items()}
+    owned = {name: item for term in terms for name, item in term.names().items()}
     names = (
         *owned,
         "film.outside",
@@ -368,14 +407,14 @@ def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monk
         "heat.front",
         "heat.inner_share",
     )
-    run = simulate_fast(fast, steps, 293.15, terms=TERMS, derivatives=names)
+    run = simulate_fast(fast, steps, 293.15, terms=terms, derivatives=names)
     for column, name in enumerate(names):
         item = owned.get(name)
         value = 1.0 if item is None else item.value
         width = 1e-5 * value
         ends = [
             simulate_fast(
-                fast, steps, 293.15, terms=TERMS, parameters={name: value + sign * width}
+                fast, steps, 293.15, terms=terms, parameters={name: value + sign * width}
             ).temperature
             for sign in (1.0, -1.0)
         ]
@@ -415,6 +454,34 @@ def test_a_constant_factor_as_a_term_is_a_factor_of_the_machine(fast, steps):
         apart.append(np.abs(by_term - by_factor)[:: round(60.0 / step)].max())
     assert apart[0] < 0.02
     assert np.log2(apart[1] / apart[2]) > 1.7
+
+
+@pytest.mark.parametrize("reads", [(), ("housing",)], ids=["known before", "within the step"])
+def test_heat_that_a_scaled_film_moves_counts_from_its_shifted_fluid(fast, reads):
+    class Scaled(Term):
+        name = "scaled"
+        coefficients = ("film.housing.outside",)
+
+        def factor(self, context):
+            return np.full((1, context.temperatures.shape[-1]), 1.8, dtype=complex)
+
+    class Shifted(Term):
+        name = "shifted"
+        heat_places = ("fluid.housing.outside",)
+
+        def heat(self, context):
+            return np.full((1, context.temperatures.shape[-1]), 30.0, dtype=complex)
+
+    shift = Shifted()
+    shift.reads = reads
+    drive = drive_of(np.linspace(0.0, 1.0e6, 4000), 3000.0)
+    factor = {"film.housing.outside": 1.8}
+    expected = simulate_fast(fast, drive, 293.15, terms=(shift,), parameters=factor).temperature[-1]
+    unscaled = simulate_fast(fast, drive, 293.15, terms=(shift,)).temperature[-1]
+    for terms in ((Scaled(), shift), (shift, Scaled())):
+        both = simulate_fast(fast, drive, 293.15, terms=terms).temperature[-1]
+        assert both == pytest.approx(expected, abs=1e-7)
+        assert np.abs(both - unscaled).max() > 0.1
 
 
 def test_constant_heat_as_a_term_is_heat_of_the_table(fast):
