@@ -1,0 +1,362 @@
+"""Diagnosis of a written network, its recordings made by an independent integrator with known differences."""
+
+import csv
+import json
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import solve_ivp
+
+from spindle_fem.diagnosis.run import diagnose
+from spindle_fem.errors import BadInputError
+from spindle_fem.simulate import simulate_machine
+
+MACHINE = """
+schema = "spindle-fem/machine/1"
+name = "drive"
+[[network.node]]
+name = "winding"
+capacity = {value = "400 J/K", sigma_rel = 0.1}
+[[network.node]]
+name = "bearing"
+capacity = {value = "250 J/K", sigma_rel = 0.1}
+[[network.node]]
+name = "body"
+capacity = {value = "1500 J/K", sigma_rel = 0.1}
+[[network.boundary]]
+name = "ambient"
+temperature = "ambient"
+[[network.link]]
+between = ["winding", "body"]
+conductance = {value = "4 W/K", sigma_rel = 0.15}
+[[network.link]]
+between = ["bearing", "body"]
+conductance = {value = "3 W/K", sigma_rel = 0.15}
+[[network.link]]
+between = ["body", "ambient"]
+conductance = {value = "2.5 W/K", sigma_rel = 0.15}
+[[network.source]]
+node = "winding"
+input = "power"
+gain = {value = "0.9 W/W", sigma_rel = 0.05}
+[[network.source]]
+node = "bearing"
+input = "speed"
+gain = {value = "12 W", sigma_rel = 0.1}
+reference = "1000 rpm"
+exponent = 1.5
+"""
+MANIFEST = """
+schema = "spindle-fem/recording/1"
+name = "%s"
+data = "data.csv"
+time = {column = "t", unit = "s"}
+channel = [
+{column = "Tw", role = "temperature", probe = "winding", unit = "degC", sigma = 0.1},
+{column = "Tl", role = "temperature", probe = "bearing", unit = "degC", sigma = 0.1},
+{column = "Tb", role = "temperature", probe = "body", unit = "degC", sigma = 0.1},
+{column = "room", role = "input", drives = "ambient", unit = "degC"},
+{column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
+{column = "n", role = "input", drives = "speed", unit = "rpm", hold = "previous"},
+]
+"""
+NODES = ("winding", "bearing", "body")
+SPREADS = {
+    "winding": ("C", 400.0, 0.1),
+    "bearing": ("C", 250.0, 0.1),
+    "body": ("C", 1500.0, 0.1),
+    "winding|body": ("G", 4.0, 0.15),
+    "bearing|body": ("G", 3.0, 0.15),
+    "body|ambient": ("G", 2.5, 0.15),
+    "power": ("gain", 0.9, 0.05),
+    "speed": ("gain", 12.0, 0.1),
+}
+STEP, DURATION = 60.0, 14400.0
+# Steps that are held, at stamps of the recording: start, W, rpm.
+PROGRAMME = ((0.0, 0.0, 0.0), (900.0, 60.0, 1500.0), (4500.0, 60.0, 0.0), (6300.0, 0.0, 3000.0))
+PROGRAMME = (*PROGRAMME, (9000.0, 90.0, 2000.0), (11700.0, 0.0, 0.0))
+
+
+def as_built(seed):
+    """A machine drawn from half of what its definition leaves open, as values."""
+    generator = np.random.default_rng(1000 + seed)
+    return {
+        key: nominal * np.exp(0.5 * sigma * generator.standard_normal())
+        for key, (_, nominal, sigma) in SPREADS.items()
+    }
+
+
+def inputs_at(time):
+    row = next(row for row in reversed(PROGRAMME) if time >= row[0] - 1e-9)
+    return row[1], row[2], 21.0 + 1.5 * np.sin(time / 4000.0)
+
+
+def temperatures(built, times, extra=lambda time: 0.0):
+    """Of the nodes by an adaptive integrator, restarted where an input jumps; ``extra`` heats the body."""
+
+    def slope(time, state):
+        power, speed, room = inputs_at(min(time, stop - 1e-6))
+        winding, bearing, body = state
+        one = built["winding|body"] * (winding - body)
+        two = built["bearing|body"] * (bearing - body)
+        out = built["body|ambient"] * (body - room)
+        heat = built["speed"] * (speed / 1000.0) ** 1.5
+        return [
+            (built["power"] * power - one) / built["winding"],
+            (heat - two) / built["bearing"],
+            (one + two - out + extra(time)) / built["body"],
+        ]
+
+    state, found = np.full(3, inputs_at(0.0)[2]), np.empty((times.size, 3))
+    edges = np.unique([row[0] for row in PROGRAMME] + [e for pair in HOT for e in pair] + [times[-1]])
+    for start, stop in pairwise(edges):
+        own = (times >= start) & (times < stop)
+        wanted = np.append(times[own], stop)
+        solved = solve_ivp(slope, (start, stop), state, t_eval=wanted, rtol=1e-8, atol=1e-8, max_step=60.0)
+        found[own], state = solved.y[:, :-1].T, solved.y[:, -1]
+    found[times == times[-1]] = state
+    return found
+
+
+HOT = ((5100.0, 6600.0), (9900.0, 11400.0))
+HEAT = 40.0
+
+
+def hot(time):
+    return HEAT if any(start <= time < end for start, end in HOT) else 0.0
+
+
+def record(folder, seed, *, built=None, extra=lambda time: 0.0, reading=None, times=None):
+    """Write a recording; ``reading`` turns the temperatures (N, 3) into what the sensors tell."""
+    folder.mkdir(parents=True)
+    times = np.arange(0.0, DURATION + 1.0, STEP) if times is None else times
+    told = temperatures(as_built(seed) if built is None else built, times, extra)
+    if reading is not None:
+        told = reading(times, told)
+    told = told + np.random.default_rng(seed).normal(0.0, 0.1, told.shape)
+    power, speed, room = np.array([inputs_at(time) for time in times]).T
+    columns = {"t": times, "Tw": told[:, 0], "Tl": told[:, 1], "Tb": told[:, 2], "room": room}
+    pd.DataFrame(columns | {"P": power, "n": speed}).to_csv(folder / "data.csv", index=False)
+    (folder / "recording.toml").write_text(MANIFEST % folder.name)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory):
+    path = tmp_path_factory.mktemp("machine") / "drive.toml"
+    path.write_text(MACHINE)
+    return path
+
+
+def effects(content):
+    return {(item["effect"], item["component"]) for item in content["findings"]}
+
+
+def require_probabilities(content):
+    total = sum(item["probability"] for item in content["findings"])
+    total += sum(item["probability"] for item in content["alternatives"])
+    assert 0.0 <= total <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_machine_within_its_priors_is_consistent(machine, tmp_path, seed):
+    content = diagnose(machine, [record(tmp_path / "run", seed)], tmp_path / "out", report=False)
+    assert content["verdict"] == "consistent"
+    assert not content["mismatch"]["detected"]
+    assert content["mismatch"]["p_value"] > 0.01
+    assert content["findings"] == []
+    assert content["fit"]["after"] == content["fit"]["before"]
+    assert content["fit"]["after"]["heldout_rmse_K"] < 0.13
+    require_probabilities(content)
+
+
+def test_a_link_beyond_what_the_calibration_told_is_a_parameter(machine, tmp_path):
+    built = as_built(4)
+    earlier = record(tmp_path / "earlier", 4, built=built)
+    loose = record(tmp_path / "loose", 5, built=built | {"body|ambient": 0.55 * built["body|ambient"]})
+    content = diagnose(machine, [loose], tmp_path / "out", [earlier], report=False)
+    assert content["verdict"] == "parameter"
+    assert effects(content) == {("joint_conductance", "body|ambient")}
+    factor = content["findings"][0]["parameters"]["factor"]
+    assert factor["value"] == pytest.approx(0.55, rel=0.08)
+    assert factor["low"] < 0.55 < factor["high"]
+    assert content["fit"]["after"]["heldout_rmse_K"] < 0.13 < content["fit"]["before"]["heldout_rmse_K"]
+    require_probabilities(content)
+
+
+def test_a_sensor_that_reads_high_is_the_sensor(machine, tmp_path):
+    def high(times, told):
+        return told + np.array([0.0, 0.0, 3.0])
+
+    earlier = record(tmp_path / "earlier", 6)
+    run = record(tmp_path / "run", 16, built=as_built(6), reading=high)
+    content = diagnose(machine, [run], tmp_path / "out", [earlier], report=False)
+    assert content["verdict"] == "sensor"
+    (finding,) = content["findings"]
+    assert finding["effect"] == "sensor_offset"
+    assert finding["component"] in ("body", "Tb")
+    assert finding["parameters"]["offset"]["value"] == pytest.approx(3.0, abs=0.3)
+
+
+def test_a_sensor_that_lags_is_the_sensor(machine, tmp_path):
+    def slow(times, told):
+        found = told.copy()
+        for row in range(1, times.size):
+            step = times[row] - times[row - 1]
+            share = -np.expm1(-step / 240.0)
+            found[row, 0] = found[row - 1, 0] + share * (
+                0.5 * (told[row, 0] + told[row - 1, 0]) - found[row - 1, 0]
+            )
+        return found
+
+    earlier = record(tmp_path / "earlier", 7)
+    run = record(tmp_path / "run", 17, built=as_built(7), reading=slow)
+    content = diagnose(machine, [run], tmp_path / "out", [earlier], report=False)
+    assert content["verdict"] == "sensor"
+    (finding,) = content["findings"]
+    assert finding["effect"] == "sensor_lag"
+    assert finding["component"] in ("winding", "Tw")
+    assert finding["parameters"]["time_constant"]["value"] == pytest.approx(240.0, rel=0.15)
+
+
+@pytest.fixture(scope="module")
+def heated(machine, tmp_path_factory):
+    """Two intervals of heat that nobody wrote down."""
+    folder = tmp_path_factory.mktemp("heated")
+    run = record(folder / "run", 8, extra=hot)
+    return run, folder / "out", diagnose(machine, [run], folder / "out", report=False)
+
+
+def test_heat_that_nobody_recorded_is_found_with_its_intervals(heated):
+    _, out, content = heated
+    assert content["verdict"] == "missing_physics"
+    assert effects(content) == {("unrecorded_heat_source", "body")}
+    (finding,) = content["findings"]
+    assert finding["parameters"]["heat"]["value"] == pytest.approx(HEAT, rel=0.2)
+    assert len(finding["intervals"]) == 2
+    for found, true in zip(finding["intervals"], HOT, strict=True):
+        assert [found["start"], found["end"]] == pytest.approx(true, abs=250.0)
+    with (out / "states.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0]) == ["start", "end", "effect", "component", "value", "unit"]
+    assert [float(row["start"]) for row in rows] == [item["start"] for item in finding["intervals"]]
+    assert {(row["effect"], row["component"], row["unit"]) for row in rows} == {
+        ("unrecorded_heat_source", "body", "W")
+    }
+    assert content["mismatch"]["where"]["component"] == "body"
+    assert content["mismatch"]["missing_heat_W"]["body"]["peak"] == pytest.approx(HEAT, rel=0.5)
+    require_probabilities(content)
+
+
+def test_what_is_held_out_does_not_touch_the_findings(machine, heated, tmp_path):
+    run, _, content = heated
+    frame = pd.read_csv(run / "data.csv")
+    share = (frame["t"] - frame["t"].iloc[0]) / (frame["t"].iloc[-1] - frame["t"].iloc[0])
+    held = np.minimum((share * 20).astype(int), 19) % 4 == 2
+    assert held.mean() == pytest.approx(0.25, abs=0.01)
+    frame.loc[held, ["Tw", "Tl", "Tb"]] += np.random.default_rng(0).normal(0.0, 2.0, (held.sum(), 3))
+    copy = tmp_path / "run"
+    copy.mkdir()
+    frame.to_csv(copy / "data.csv", index=False)
+    (copy / "recording.toml").write_text((run / "recording.toml").read_text())
+    again = diagnose(machine, [copy], tmp_path / "out", report=False)
+    assert again["verdict"] == content["verdict"]
+    assert again["findings"] == content["findings"]
+    assert again["machine_parameters"] == content["machine_parameters"]
+    assert again["fit"]["after"]["train_rmse_K"] == content["fit"]["after"]["train_rmse_K"]
+    assert again["fit"]["after"]["heldout_rmse_K"] > 1.5
+
+
+def test_the_improved_machine_simulates_what_the_diagnosis_predicts(heated, tmp_path):
+    """Read back by another command; temperatures at the start are then those of the first readings."""
+    run, out, content = heated
+    simulated = simulate_machine(out / "improved_machine.toml", run, tmp_path / "simulated")
+    before = {row["channel"]: row["rmse_K"] for row in content["mismatch"]["channels"]}
+    after = {row["channel"]: row["rmse_K"] for row in content["fit"]["channels_after"]}
+    for row in simulated["channels"]:
+        assert row["rmse_K"] == pytest.approx(after[row["channel"]], abs=0.02)
+    assert max(after.values()) < 0.13 < max(before.values())
+    predicted, again = (
+        pd.read_csv(path) for path in (out / "after.csv", tmp_path / "simulated" / "simulated.csv")
+    )
+    assert list(predicted.columns) == list(again.columns) == ["time_s", "Tw", "Tl", "Tb"]
+    late = predicted["time_s"] > 1800.0
+    for name in ("Tw", "Tl", "Tb"):
+        assert (predicted[name] - again[name])[late].abs().max() < 0.2
+
+
+def test_two_things_at_once_are_both_named(machine, tmp_path):
+    def high(times, told):
+        return told + np.array([0.0, -2.5, 0.0])
+
+    earlier = record(tmp_path / "earlier", 9)
+    run = record(tmp_path / "run", 19, built=as_built(9), extra=hot, reading=high)
+    content = diagnose(machine, [run], tmp_path / "out", [earlier], report=False)
+    # Physics before sensors.
+    assert content["verdict"] == "missing_physics"
+    found = {item["effect"]: item for item in content["findings"]}
+    assert set(found) == {"unrecorded_heat_source", "sensor_offset"}
+    assert found["unrecorded_heat_source"]["component"] == "body"
+    assert found["sensor_offset"]["component"] in ("bearing", "Tl")
+    assert found["sensor_offset"]["parameters"]["offset"]["value"] == pytest.approx(-2.5, abs=0.3)
+    assert found["unrecorded_heat_source"]["parameters"]["heat"]["value"] == pytest.approx(HEAT, rel=0.2)
+    require_probabilities(content)
+
+
+# ------------------------------------------------------------- what says too little
+def quiet(folder, **changes):
+    """A recording, and its columns changed."""
+    record(folder, 3, times=np.arange(0.0, changes.pop("until", DURATION) + 1.0, changes.pop("step", STEP)))
+    frame = pd.read_csv(folder / "data.csv")
+    for name, value in changes.items():
+        frame[name] = value(frame)
+    frame.to_csv(folder / "data.csv", index=False)
+    return folder
+
+
+def noisy(frame):
+    return 21.0 + np.random.default_rng(len(frame)).normal(0.0, 0.1, len(frame))
+
+
+TOO_LITTLE = {
+    "shorter than a time constant": ({"until": 600.0, "step": 10.0}, "to answer a change at the probes"),
+    "no excitation": (
+        {"P": lambda f: 0.0 * f.P, "n": lambda f: 0.0 * f.n, "room": lambda f: 21.0 + 0.0 * f.P}
+        | dict.fromkeys(("Tw", "Tl", "Tb"), noisy),
+        "holds no excitation",
+    ),
+    "too few readings": ({"step": 900.0}, "at least 30 are needed"),
+}
+
+
+@pytest.mark.parametrize("name", TOO_LITTLE)
+def test_what_says_too_little_is_unexplained_with_the_reason(machine, tmp_path, name):
+    changes, reason = TOO_LITTLE[name]
+    content = diagnose(machine, [quiet(tmp_path / "run", **changes)], tmp_path / "out")
+    assert content["verdict"] == "unexplained"
+    assert reason in content["reason"]
+    assert content["findings"] == content["alternatives"] == []
+    assert not content["mismatch"]["detected"]
+    assert content["next_measurement"]["why"] == content["reason"]
+    written = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert written["verdict"] == "unexplained"
+
+
+def test_a_recording_of_inputs_only_is_refused(machine, tmp_path):
+    run = record(tmp_path / "run", 3)
+    kept = [line for line in (run / "recording.toml").read_text().splitlines() if '"temperature"' not in line]
+    (run / "recording.toml").write_text("\n".join(kept))
+    with pytest.raises(BadInputError, match="no channel is a temperature") as caught:
+        diagnose(machine, [run], tmp_path / "out")
+    assert caught.value.exit_status == 2
+
+
+def test_a_probe_that_the_machine_lacks_is_refused(machine, tmp_path):
+    run = record(tmp_path / "run", 3)
+    manifest = run / "recording.toml"
+    manifest.write_text(manifest.read_text().replace('probe = "body"', 'probe = "boddy"'))
+    with pytest.raises(BadInputError, match=r"boddy(.|\n)*body") as caught:
+        diagnose(machine, [run], tmp_path / "out")
+    assert caught.value.exit_status == 2
