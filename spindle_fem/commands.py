@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from spindle_fem.errors import SpecError
+from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
 from spindle_fem.spec.load import load_machine
-from spindle_fem.units import to_si
+from spindle_fem.units import ZERO_CELSIUS_K, to_si
 
 if TYPE_CHECKING:
+    from spindle_fem.spec.effects import EffectEntry
     from spindle_fem.spec.model import MachineSpec
+    from spindle_fem.spec.network import NetworkMachineSpec
+    from spindle_fem.units import Uncertain
 
 
 def run_machine(
@@ -75,11 +79,22 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
     Returns
     -------
     dict
-        ``machine``, ``parts``, ``surfaces``, ``contacts``, ``probes``, ``warnings``.
+        ``machine``, ``parts``, ``surfaces``, ``contacts``, ``probes``,
+        ``effects``, ``warnings``; of a ``[network]`` machine ``machine``,
+        ``nodes``, ``boundaries``, ``links``, ``sources``, ``effects``,
+        ``warnings``.
+
+    Raises
+    ------
+    FaultsError
     """
     from spindle_fem.geometry.assembly import build_assembly
     from spindle_fem.loads.joints import group_of_contacts
+    from spindle_fem.spec.load import find_machine, read_definition
+    from spindle_fem.spec.network import is_network_machine
 
+    if is_network_machine(read_definition(find_machine(machine))):
+        return _check_network(machine, overrides)
     spec = _load_buildable(machine, overrides)
     assembly = build_assembly(spec)
     groups = group_of_contacts(spec, assembly.joint_names)
@@ -102,6 +117,7 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
         "probes": [
             {"name": probe.name, "detail": probe.part or "mixed coolant outlet"} for probe in spec.probe
         ],
+        "effects": _effect_rows(spec.effects),
         "warnings": [{"code": "geometry_note", "text": note} for note in assembly.notes],
     }
 
@@ -205,18 +221,135 @@ def rebuild(folder: Path) -> Path:
 
 
 def _load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:
-    """Machine whose parts fit together; faults of its tables and of its geometry at once."""
-    from spindle_fem.effect_entries import require_known_effects
+    """Machine whose parts fit together; faults of its tables, geometry and effects at once."""
+    from spindle_fem.effect_entries import check_effects, require_known_effects
     from spindle_fem.geometry.assembly import build_assembly
     from spindle_fem.loads.joints import group_of_contacts
+    from spindle_fem.spec.load import examine_machine
+
+    overrides = tuple(overrides)
 
     def fits_together(spec: MachineSpec) -> None:
         group_of_contacts(spec, build_assembly(spec).joint_names)
 
-    def knows_its_effects(spec: MachineSpec) -> None:
-        require_known_effects(spec.effects)
+    def has_possible_effects(spec: MachineSpec) -> None:
+        if not spec.effects:
+            return
+        examination = examine_machine(machine, overrides)
+        entries = _by_number(spec.effects, [fault.where for fault in examination.faults])
+        others = [fault for fault in examination.faults if not _ENTRY.search(fault.where)]
+        try:
+            fits_together(spec)
+        except BadInputError as error:
+            others.append(error)
+        # Where they act needs the rest of the machine; that they exist does not.
+        if others:
+            require_known_effects(entries)
+        else:
+            check_effects(entries, spec)
 
-    return load_machine(machine, overrides, checks=(fits_together, knows_its_effects))
+    return load_machine(machine, overrides, checks=(fits_together, has_possible_effects))
+
+
+_ENTRY = re.compile(r"(?:^|: )effect\[(\d+)\]")
+
+
+def _by_number(entries: Sequence[EffectEntry], faulty: Iterable[str]) -> list[EffectEntry | None]:
+    """Sound entries at their places in the file, None at those of faulty ones."""
+    refused = {int(match[1]) for where in faulty if (match := _ENTRY.search(where))}
+    sound = iter(entries)
+    return [
+        None if number in refused else next(sound) for number in range(1, len(entries) + len(refused) + 1)
+    ]
+
+
+def _check_network(machine: str | Path, overrides: Iterable[str]) -> dict[str, Any]:
+    """Contents of a sound ``[network]`` machine; every fault at once."""
+    spec = _load_network(machine, overrides)
+    tables = spec.network
+    return {
+        "machine": spec.name,
+        "nodes": [{"name": n.name, "detail": _amount(n.capacity, "J/K")} for n in tables.node],
+        "boundaries": [
+            {
+                "name": boundary.name,
+                "detail": f'input "{boundary.temperature}"'
+                if isinstance(boundary.temperature, str)
+                else _amount(boundary.temperature, "°C", ZERO_CELSIUS_K),
+            }
+            for boundary in tables.boundary
+        ],
+        "links": [{"name": k.label, "detail": _amount(k.conductance, "W/K")} for k in tables.link],
+        "sources": [
+            {"name": source.label, "detail": _amount(source.gain.amount, source.gain.unit)}
+            for source in tables.source
+        ],
+        "effects": _effect_rows(spec.effects),
+        "warnings": [],
+    }
+
+
+def _load_network(machine: str | Path, overrides: Iterable[str]) -> NetworkMachineSpec:
+    """A sound ``[network]`` machine; faults of its keys, its network and its effects at once."""
+    from pydantic import ValidationError
+
+    from spindle_fem.effect_entries import check_network_effects, require_known_effects
+    from spindle_fem.network.build import build_network
+    from spindle_fem.spec.effects import EffectEntry
+    from spindle_fem.spec.inherit import apply_overrides
+    from spindle_fem.spec.load import find_machine, read_toml
+    from spindle_fem.spec.network import NetworkMachineSpec, NetworkSpec, validate_network_machine
+    from spindle_fem.spec.network_faults import network_faults
+
+    path = find_machine(machine)
+    content = read_toml(path)
+    faults: list[SpindleFemError] = []
+    for override in overrides:
+        try:
+            content = apply_overrides(content, [override], NetworkMachineSpec)
+        except SpecError as error:
+            faults.append(error)
+    spec, network = None, None
+    try:
+        spec = validate_network_machine(content, path.name)
+        network = spec.network
+    except FaultsError as error:
+        faults += error.faults
+        with contextlib.suppress(ValidationError):
+            network = NetworkSpec.model_validate(content["network"])
+    known = {str(fault) for fault in faults}
+
+    def add(found: Iterable[SpindleFemError]) -> None:
+        located = [type(f)(f"{path.name}: {f.where}", f.what, f.how_to_fix) for f in found]
+        faults.extend(fault for fault in located if str(fault) not in known)
+
+    between = [] if network is None else network_faults(network)
+    add(between)
+    written = content.get("effect", ())
+    entries: list[EffectEntry | None] = []
+    for item in written if isinstance(written, (list, tuple)) else ():
+        entries.append(None)
+        with contextlib.suppress(ValidationError):
+            entries[-1] = EffectEntry.model_validate(item)
+    try:
+        if network is None or between:
+            require_known_effects(entries)
+        else:
+            check_network_effects(entries, build_network(network))
+    except FaultsError as error:
+        add(error.faults)
+    if faults or spec is None:
+        raise FaultsError(path.name, faults)
+    return spec
+
+
+def _amount(value: Uncertain, unit: str, zero: float = 0.0) -> str:
+    text = f"{value.value - zero:g} {unit}".rstrip()
+    return text if value.is_fixed else f"{text}, uncertain"
+
+
+def _effect_rows(entries: Sequence[EffectEntry]) -> list[dict[str, str]]:
+    return [{"name": entry.effect, "detail": f"{entry.component} {entry.form}".rstrip()} for entry in entries]
 
 
 @contextlib.contextmanager

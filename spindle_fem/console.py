@@ -84,7 +84,9 @@ def print_check(content: dict[str, Any]) -> None:
     """What a valid machine is made of."""
     console = _console()
     console.print(f"[bold]{content['machine']}[/] is valid.")
-    for key in ("parts", "surfaces", "contacts", "probes"):
+    for key in (key for key, rows in content.items() if isinstance(rows, list) and key != "warnings"):
+        if not content[key]:
+            continue
         table = _table(key, "name", "")
         for row in content[key]:
             table.add_row(row["name"], row.get("detail", ""))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,15 +14,15 @@ from spindle_fem.effects.base import Candidate, Reading
 from spindle_fem.effects.catalogue import build, effect_of
 from spindle_fem.effects.term import Term
 from spindle_fem.effects.view import MachineView
-from spindle_fem.errors import FaultsError, SpecError, SpindleFemError
+from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
+from spindle_fem.network.model import ThermalNetwork
 from spindle_fem.recordings.align import Recording
-from spindle_fem.recordings.checks import ChannelNoise
-from spindle_fem.recordings.defects import DefectReport
+from spindle_fem.recordings.defined import at_the_defined_point, of_a_network
 from spindle_fem.reduced.affine import build_affine_system
 from spindle_fem.reduced.coefficients import gap_radii_of
-from spindle_fem.reduced.drive import standard_inputs
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.model import project
+from spindle_fem.reduced.names import MachineNames
 from spindle_fem.reduced.network_model import NetworkFastModel
 from spindle_fem.spec.effects import EffectEntry
 from spindle_fem.spec.model import MachineSpec
@@ -114,8 +114,13 @@ class ActiveEffects:
 NO_EFFECTS = ActiveEffects()
 
 
-def require_known_effects(entries: Sequence[EffectEntry]) -> None:
+def require_known_effects(entries: Sequence[EffectEntry | None]) -> None:
     """Refuse entries that the catalogue does not know, every one at once.
+
+    Parameters
+    ----------
+    entries : sequence of EffectEntry or None
+        None stands for one that was refused already.
 
     Raises
     ------
@@ -123,6 +128,8 @@ def require_known_effects(entries: Sequence[EffectEntry]) -> None:
     """
     faults: list[SpindleFemError] = []
     for number, entry in enumerate(entries, 1):
+        if entry is None:
+            continue
         try:
             effect_of(entry.effect, f"effect[{number}].effect")
         except SpecError as error:
@@ -145,7 +152,7 @@ def _with_unread(view: MachineView, probes: Sequence[str], outlets: Sequence[str
 
 
 def active_effects(
-    entries: Sequence[EffectEntry],
+    entries: Sequence[EffectEntry | None],
     view: MachineView,
     probes: Sequence[str] = (),
     outlets: Sequence[str] = (),
@@ -154,7 +161,8 @@ def active_effects(
 
     Parameters
     ----------
-    entries : sequence of EffectEntry
+    entries : sequence of EffectEntry or None
+        None stands for one that was refused already.
     view : MachineView
         Of the machine on what it is driven by.
     probes : sequence of str
@@ -170,21 +178,22 @@ def active_effects(
         without or with a wrong unit, an entry given twice.
     """
     view = _with_unread(view, probes, outlets)
+    return _built(entries, lambda entry, where: _candidate(entry, view, where))
+
+
+def _built(
+    entries: Sequence[EffectEntry | None], candidate_of: Callable[[EffectEntry, str], Candidate]
+) -> ActiveEffects:
+    """Candidates of entries, every fault at once; None stands for an entry that was refused already."""
     faults: list[SpindleFemError] = []
     found: list[Candidate] = []
     names: set[str] = set()
     for number, entry in enumerate(entries, 1):
+        if entry is None:
+            continue
         where = f"effect[{number}]"
         try:
-            candidate = build(
-                entry.effect,
-                entry.component,
-                entry.form,
-                {name: str(value) for name, value in entry.values().items()},
-                view,
-                entry.intervals,
-                where,
-            )
+            candidate = candidate_of(entry, where)
         except SpindleFemError as error:
             faults += error.faults if isinstance(error, FaultsError) else [error]
             continue
@@ -195,6 +204,78 @@ def active_effects(
     if faults:
         raise FaultsError("effect", faults)
     return ActiveEffects(tuple(found))
+
+
+def _candidate(entry: EffectEntry, view: MachineView, where: str) -> Candidate:
+    values = {name: str(value) for name, value in entry.values().items()}
+    return build(entry.effect, entry.component, entry.form, values, view, entry.intervals, where)
+
+
+def check_effects(entries: Sequence[EffectEntry | None], spec: MachineSpec) -> None:
+    """Refuse entries that a machine with geometry cannot have, without mesh or recording, all at once.
+
+    Sizes that a recording would give are those of the defined operating point.
+
+    Parameters
+    ----------
+    entries : sequence of EffectEntry or None
+        None stands for one that was refused already.
+    spec : MachineSpec
+
+    Raises
+    ------
+    FaultsError
+        As :func:`active_effects` has it.
+    """
+    if any(entry is not None for entry in entries):
+        names = MachineNames.of(spec)
+        view = view_of(names, at_the_defined_point(spec))
+        active_effects(entries, view, names.channels, _outlets(spec))
+
+
+def check_network_effects(entries: Sequence[EffectEntry | None], network: ThermalNetwork) -> None:
+    """Refuse entries that a written network cannot have, without a recording, all at once.
+
+    Which inputs are speeds is for a recording to say, and effects that follow
+    a speed have forms by their names: an entry passes where a recording could
+    make it right.
+
+    Parameters
+    ----------
+    entries : sequence of EffectEntry or None
+        None stands for one that was refused already.
+    network : ThermalNetwork
+
+    Raises
+    ------
+    FaultsError
+        As :func:`active_effects` has it.
+    """
+    views: dict[tuple[str, ...], MachineView] = {}
+
+    def candidate_of(entry: EffectEntry, where: str) -> Candidate:
+        faults: list[BadInputError] = []
+        for speeds in _possible_speeds(network, entry.form):
+            if speeds not in views:
+                views[speeds] = view_of_network(network, of_a_network(network, speeds))
+            try:
+                return _candidate(entry, views[speeds], where)
+            except BadInputError as error:
+                faults.append(error)
+        # Where some recording offers the place and form, what else is wrong says more.
+        raise next((f for f in faults if not f.where.endswith((".component", ".form"))), faults[0])
+
+    _built(entries, candidate_of)
+
+
+def _possible_speeds(network: ThermalNetwork, form: str) -> list[tuple[str, ...]]:
+    """Inputs that may be speeds, the most likely choice first."""
+    units = zip(network.source_input, network.source_gain_unit, strict=True)
+    turning = dict.fromkeys(name for name, unit in units if name is not None and "rad" in unit)
+    likely = tuple(turning) or ("speed",)
+    named = form.split()[-1:]
+    choices = [likely, *((name,) for name in likely), tuple(dict.fromkeys((*likely, *named, "speed")))]
+    return list(dict.fromkeys(choices))
 
 
 def effects_on(
@@ -230,7 +311,7 @@ def physics_of(machine: PreparedMachine) -> Physics:
     entries = machine.spec.effects
     if not entries:
         return NO_PHYSICS
-    effects = active_effects(entries, view_of(_names_of(machine), _at_the_defined_point(machine.spec)))
+    effects = active_effects(entries, view_of(_names_of(machine), at_the_defined_point(machine.spec)))
     return Physics(effects.terms, {}, effects.factors)
 
 
@@ -248,54 +329,3 @@ def _names_of(machine: PreparedMachine) -> FastModel:
         digest="names",
     )
     return FastModel(model, machine.spec)
-
-
-def _at_the_defined_point(spec: MachineSpec) -> Recording:
-    """A day about the operating point of a definition, all of it at the ambient temperature."""
-    inputs = standard_inputs(spec)
-    # Flow and speed have a range, as laws of the Reynolds number ask for one.
-    low = {**inputs, **{name: 0.5 * inputs[name] for name in ("speed", "coolant_flow")}}
-    high = {**inputs, **{name: 1.5 * inputs[name] for name in ("speed", "coolant_flow")}}
-    probes = tuple(probe.name for probe in spec.probe)
-    times = np.array([0.0, 86400.0])
-    noise = ChannelNoise(0.0, 0.0, 0.0, 0.0)
-    return Recording(
-        name="defined operating point",
-        source=spec.name,
-        start=None,
-        times=times,
-        temperature_names=probes,
-        probes=probes,
-        temperature=np.full((2, len(probes)), inputs["ambient"]),
-        flags=np.zeros((2, len(probes)), dtype=np.uint8),
-        sigma=np.ones(len(probes)),
-        noise=(noise,) * len(probes),
-        input_names=tuple(inputs),
-        input_columns=tuple(inputs),
-        inputs=np.array([list(low.values()), list(high.values())]),
-        held=np.ones(len(inputs), dtype=bool),
-        input_units=("",) * len(inputs),
-        covariate_names=(),
-        covariates=np.empty((2, 0)),
-        segments=np.array([[0, 2]]),
-        defects=DefectReport(
-            name=spec.name,
-            rows=2,
-            stamps=2,
-            duration_s=float(times[-1]),
-            rows_without_time=0,
-            blank_rows=0,
-            short_rows=0,
-            truncated_last_row=False,
-            unordered_rows=0,
-            repeated_rows=0,
-            conflicting_stamps=0,
-            median_step_s=float(times[-1]),
-            non_uniform_steps=0,
-            gaps=(),
-            long_gap_s=float(times[-1]),
-            segments=1,
-            unused_columns=(),
-            channels=(),
-        ),
-    )

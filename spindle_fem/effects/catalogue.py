@@ -107,7 +107,7 @@ def build(
     UnitError
         A value without or with a wrong unit.
     """
-    known = effect_of(effect, where)
+    known = effect_of(effect, f"{where}.effect")
     candidate = _matching(known, component, form, _of_any_recording(view), _seconds(intervals, where), where)
     by_inner = {item.name: (outer, item) for outer, item in candidate.parameters.items()}
     edges = {name for name in by_inner if name.startswith(("start_", "end_"))} if intervals else set()
