@@ -1,0 +1,108 @@
+"""Both fits of a diagnosis through the finite-element model, on a recording that the full model made."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.coupling import prepare_machine
+from spindle_fem.diagnosis import full_model
+from spindle_fem.diagnosis.full_model import OPTIONS, full_model_errors, inputs_of_drive, spec_on
+from spindle_fem.diagnosis.plant import Plant
+from spindle_fem.diagnosis.view import view_of
+from spindle_fem.effects.catalogue import candidates_for, effect_of
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reporting.diagnosis_full_model import full_model_sections
+from spindle_fem.spec.load import load_machine
+from spindle_fem.spec.parameters import with_parameters
+from spindle_fem.transients.run import simulate_full
+from spindle_fem.transients.terms import Physics
+
+PROBES = ("SP01", "SP05", "COOLANT_OUT")
+MANIFEST = """
+schema = "spindle-fem/recording/1"
+name = "steps"
+data = "steps.csv"
+time = {column = "t", unit = "s"}
+channel = [
+{column = "speed", role = "input", hold = "previous", drives = "speed", unit = "rpm"},
+{column = "ambient", role = "input", drives = "ambient", unit = "degC"},
+%s]
+"""
+CHANNEL = '{column = "%s", role = "temperature", probe = "%s", unit = "degC", sigma = 0.1},\n'
+TIMES = np.arange(0.0, 1801.0, 60.0)
+MACHINE = {"heat.front": 1.1, "film.outside": 1.2}
+HEAT, OFFSET = 150.0, 2.0
+
+
+def lumped_model(spec):
+    path = Path(__file__).parents[1] / "unit" / "test_reduced_transient.py"
+    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
+    module = importlib.util.module_from_spec(loaded)
+    sys.modules[loaded.name] = module
+    loaded.loader.exec_module(module)
+    return module.lumped_model(spec)
+
+
+def recorded_as(folder, temperatures):
+    columns = {
+        "t": TIMES,
+        "speed": np.where(TIMES < 1200.0, 3000.0, 0.0),
+        "ambient": np.full(TIMES.size, 20.0),
+    }
+    columns |= {name: temperatures[:, column] for column, name in enumerate(PROBES)}
+    pd.DataFrame(columns).to_csv(folder / "steps.csv", index=False)
+    manifest = MANIFEST % "".join(CHANNEL % (name, name) for name in PROBES)
+    (folder / "steps.toml").write_text(manifest, encoding="utf-8")
+    return read_recording(folder / "steps.toml")
+
+
+@pytest.mark.slow
+def test_the_full_model_confirms_what_was_found(tmp_path, monkeypatch):
+    spec = load_machine("recorded_spindle")
+    fast = FastModel(lumped_model(spec), spec)
+    blank = recorded_as(tmp_path, np.full((TIMES.size, len(PROBES)), 20.0))
+    view = view_of(fast, blank)
+    lying = next(c for c in candidates_for(view) if (c.effect, c.component) == ("sensor_offset", "SP05"))
+    source = effect_of("unrecorded_heat_source").over(view, "housing", [(300.0, 1500.0)])
+    effects = {source.amplitude: HEAT, lying.amplitude: OFFSET}
+
+    # The truth: parameters in the definition itself, the term beside it, the offset added by hand.
+    coarse = prepare_machine(spec_on(spec, "coarse"))
+    true = prepare_machine(with_parameters(coarse.spec, MACHINE))
+    plant = Plant(fast, [blank], [np.ones(TIMES.size, dtype=bool)])
+    drive = plant.drives[0]
+    physics = Physics(source.terms, {source.amplitude: HEAT}, {})
+    run = simulate_full(true, inputs_of_drive(drive), sample_times=TIMES, options=OPTIONS, physics=physics)
+    readings = np.column_stack([run.reading(name) for name in PROBES]) - 273.15
+    readings[:, 1] += OFFSET
+    held = (TIMES > 600.0) & (TIMES < 900.0)
+    plant = Plant(fast, [recorded_as(tmp_path, readings)], [~held])
+
+    monkeypatch.setattr(full_model, "prepare_machine", lambda own: coarse)
+    diagnosis = SimpleNamespace(
+        plant=plant,
+        null=SimpleNamespace(candidates=(), values=MACHINE),
+        final=SimpleNamespace(candidates=(source, lying), values={**MACHINE, **effects}),
+    )
+    machine = SimpleNamespace(is_network=False, spec=spec)
+    found = full_model_errors(diagnosis, machine, mesh="coarse")
+    assert found["reason"] is None
+    assert (found["preset"], found["order"]) == ("coarse", 1)
+    assert found["unknowns"] == coarse.operators.n_unknowns
+    # Stamps are points of the reduced model's grid: nothing is lost by straight lines between.
+    for kind in ("train_rmse_K", "heldout_rmse_K"):
+        assert found["before"][kind] > 1.0
+        assert found["after"][kind] < 0.005
+    assert [row["channel"] for row in found["differences"]] == list(PROBES)
+    # The lumped spindle is another machine: its differences are large, and finite.
+    assert all(0.0 < row[key] < 100.0 for row in found["differences"] for key in ("before_K", "after_K"))
+    (section,) = full_model_sections(
+        {"fit": {"before": found["before"], "after": found["after"], "full_model": found}}
+    )
+    assert [block.kind for block in section.blocks] == ["text", "table", "table"]
