@@ -111,9 +111,7 @@ def test_effects_that_follow_a_speed_pass_where_a_recording_could_have_it(writte
 def test_effects_of_a_network_are_checked_without_a_recording(written):
     text = WINDAGE.format(component="spindle", form="", heat="20 W")
     text += WINDAGE.format(component="headstock", form="", heat="20 K")
-    text += (
-        '[[effect]]\neffect = "sensor_lag"\ncomponent = "headstok"\nparameters = {time_constant = "9s"}\n'
-    )
+    text += '[[effect]]\neffect = "sensor_lag"\ncomponent = "headstok"\nparameters = {time_constant = "9s"}\n'
     text += '[[effect]]\neffect = "coolant_film"\ncomponent = "channel"\nparameters = {factor = 0.7}\n'
     place, unit, sensor, channel = faults_of(written("turning_centre", text))
     assert 'effect[1].component: "spindle" cannot have windage.' in place
