@@ -208,7 +208,7 @@ class BaseRun:
                     added += (heat[row] * np.ones(steps))[:, None] * model.place(place)
         if term.bearings:
             factor = np.asarray(term.friction(context)).real
-            friction = (run.start if before else run.end)[:, : len(self.plant.fast.heat_places)]
+            friction = run.friction_start if before else run.friction_end
             for row, bearing in enumerate(term.bearings):
                 for position in self.plant.fast.heat_rows(bearing):
                     heat = (factor[row] - 1.0) * friction[:, position]

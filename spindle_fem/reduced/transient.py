@@ -152,6 +152,8 @@ class TransientRun:
             parameters,
             derivatives,
         )
+        # What terms scale is the machine's own friction: their excesses add up.
+        self.friction_start, self.friction_end = (item[:, : self._n_heat] for item in (self.start, self.end))
         self.loads, self.loads_by = opened.loads, opened.loads_by
         self.start, self.end = opened.start, opened.end
         self.start_by, self.end_by = opened.start_by, opened.end_by
@@ -225,7 +227,7 @@ class TransientRun:
             self.built.coefficients[number],
             self.built.touched,
             states=memory,
-            friction=(self.end if at_end else self.start)[step, : self._n_heat],
+            friction=(self.friction_end if at_end else self.friction_start)[step],
             friction_by=(self._friction_end_by if at_end else self._friction_start_by)[step],
             shifts={film: (float(k[step]), by[step]) for film, (k, by) in self._shifts[at_end].items()},
         )

@@ -205,9 +205,6 @@ def test_parameters_of_readings_and_what_passes_through_them(plant, candidates, 
         assert np.abs(found.sensitivity[:, others, own]).max() == 0.0
 
 
-@pytest.mark.xfail(
-    strict=True, reason="what a term without temperatures adds to friction is not in others' derivatives"
-)
 def test_two_terms_on_the_same_friction(plant, candidates):
     pair = [candidates["thermal_preload", ""], candidates["starvation", ""]]
     values = NOW | values_of(pair[0]) | values_of(pair[1])
