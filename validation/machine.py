@@ -5,6 +5,7 @@ Dimensions in metres, from the drawing of ``geometry/wu_tan_2016.toml`` and the 
 in one of the two shows.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,7 +101,7 @@ def build_grid(sectors: int = 32, refine: int = 1) -> Grid:
     r = _refined(np.array(_R_LINES) * 1e-3, refine)
     lines = [
         np.linspace(start, stop, number, endpoint=False)
-        for (start, number), (stop, _) in zip(_Z_STATIONS[:-1], _Z_STATIONS[1:], strict=True)
+        for (start, number), (stop, _) in itertools.pairwise(_Z_STATIONS)
     ]
     z = _refined(np.append(np.concatenate(lines), _Z_STATIONS[-1][0]) * 1e-3, refine)
     r_mid, z_mid = 0.5 * (r[1:] + r[:-1]), 0.5 * (z[1:] + z[:-1])

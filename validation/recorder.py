@@ -130,14 +130,19 @@ def record(
 
 
 def _manifest(name: str, data: str, sigma: float) -> str:
-    head = f'schema = "spindle-fem/recording/1"\nname = "{name}"\ndata = "{data}"\ntime = {{column = "time_s", unit = "s"}}\n'
+    head = (
+        f'schema = "spindle-fem/recording/1"\nname = "{name}"\ndata = "{data}"\n'
+        'time = {column = "time_s", unit = "s"}\n'
+    )
     blocks = [
-        f'\n[[channel]]\ncolumn = "{c}"\nrole = "temperature"\nprobe = "{c}"\nunit = "degC"\nsigma = {sigma:g}\n'
+        f'\n[[channel]]\ncolumn = "{c}"\nrole = "temperature"\nprobe = "{c}"\n'
+        f'unit = "degC"\nsigma = {sigma:g}\n'
         for c in CHANNELS
     ]
     for column, drives, unit in _INPUTS:
         hold = 'hold = "previous"\n' if column in ("speed", "thrust") else ""
         blocks.append(
-            f'\n[[channel]]\ncolumn = "{column}"\nrole = "input"\ndrives = "{drives}"\n{hold}unit = "{unit}"\n'
+            f'\n[[channel]]\ncolumn = "{column}"\nrole = "input"\n'
+            f'drives = "{drives}"\n{hold}unit = "{unit}"\n'
         )
     return head + "".join(blocks)

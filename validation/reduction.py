@@ -35,7 +35,8 @@ def nominal_coefficients(fv_groups: dict[str, object]) -> dict[str, float]:
         else:
             value = {
                 "axial": m.AXIAL_CONTACT, "gap": 20.0, "labyrinth": m.LABYRINTH_FILM,
-                "outside": m.OUTSIDE_FILM, "flange_back": m.FLANGE_BACK_FILM, "nose_end": 60.0, "drive_end": 50.0,
+                "outside": m.OUTSIDE_FILM, "flange_back": m.FLANGE_BACK_FILM,
+                "nose_end": 60.0, "drive_end": 50.0,
             }[kind]  # fmt: skip
         values[name] = value
     return values

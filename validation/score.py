@@ -1,6 +1,7 @@
 """Hold diagnoses against answers: ``python -m validation.score DIR RESULTS [--json FILE]``."""
 
 import argparse
+import itertools
 import json
 from collections import Counter
 from pathlib import Path
@@ -135,7 +136,7 @@ def reliability(
 ) -> list:
     """Stated probability of the first set against how often it was right."""
     out = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         here = [r for r in rows if low <= r["probability"] < high]
         if here:
             out.append(
@@ -277,7 +278,8 @@ def _print(summary: dict[str, Any]) -> None:
     print("\nreliability of the first set")
     for row in summary["reliability"]:
         print(
-            f"  {row['from']:.2f}-{row['to']:.2f}  cases {row['cases']:4d}  stated {row['stated']:.3f}  right {row['right']:.3f}"
+            f"  {row['from']:.2f}-{row['to']:.2f}  cases {row['cases']:4d}  "
+            f"stated {row['stated']:.3f}  right {row['right']:.3f}"
         )
     print("\nverdicts (rows: truth)\n" + " " * 18 + "".join(f"{v[:12]:>14s}" for v in VERDICTS))
     for true, counts in summary["confusion"].items():
@@ -288,7 +290,8 @@ def _print(summary: dict[str, Any]) -> None:
             f"{'+'.join(a['set']) or 'nothing'} {a['probability']:.2f}" for a in row["alternatives"]
         )
         print(
-            f"  {row['case']} {'+'.join(row['truth']) or 'nothing'} (ratio {row['ratio']}, {'clear' if row['clear'] else 'hard'})"
+            f"  {row['case']} {'+'.join(row['truth']) or 'nothing'} "
+            f"(ratio {row['ratio']}, {'clear' if row['clear'] else 'hard'})"
             f" -> {row['verdict']}: {'+'.join(row['found']) or 'nothing'} {row['probability']:.2f} | {rest}"
         )
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from spindle_fem.diagnosis.view import view_of, view_of_network
-from spindle_fem.effect_entries import ActiveEffects, active_effects
+from spindle_fem.effect_entries import ActiveEffects, effects_on
 from spindle_fem.effects.view import MachineView
 from spindle_fem.errors import RecordingError
 from spindle_fem.network.build import build_network
@@ -90,7 +90,7 @@ def open_machine(
         spec.name,
         spec,
         fast,
-        active_effects(spec.effects, view),
+        effects_on(spec.effects, fast, recordings[0]),
         view,
         tuple(recordings),
         tuple(calibration),
@@ -125,7 +125,7 @@ def _open_network(
     earlier = tuple(thinned(item) for item in calibration)
     has = frozenset(f"{entry.effect} @ {entry.component}" for entry in spec.effects)
     view = _widest([view_of_network(network, recording, has=has) for recording in own])
-    return DiagnosedMachine(spec.name, spec, fast, active_effects(spec.effects, view), view, own, earlier)
+    return DiagnosedMachine(spec.name, spec, fast, effects_on(spec.effects, fast, own[0]), view, own, earlier)
 
 
 def _widest(views: Sequence[MachineView]) -> MachineView:

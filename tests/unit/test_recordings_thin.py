@@ -78,7 +78,7 @@ def test_powers_are_averaged_where_heat_follows_them(gapped):
     moving = np.abs(gapped.inputs[:, 2]) > 0.0
     assert plain.inputs[:, 2].mean() == pytest.approx(speed * moving.mean(), rel=0.02)
     assert np.mean(powered.inputs[:, 2] ** 1.5) == pytest.approx(speed**1.5 * moving.mean(), rel=0.02)
-    with pytest.raises(OutOfValidityError, match="has no power 0.5"):
+    with pytest.raises(OutOfValidityError, match=r"has no power 0\.5"):
         thinned_recording(replace(gapped, inputs=-gapped.inputs), 300.0, exponents={"power": 0.5})
 
 

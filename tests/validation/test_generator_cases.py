@@ -83,7 +83,8 @@ def test_recording_depends_on_its_seed_alone(tmp_path):
             np.random.default_rng(5),
         )
     assert (tmp_path / "a/recording.csv.gz").read_bytes() == (tmp_path / "b/recording.csv.gz").read_bytes()
-    header = gzip.open(tmp_path / "a/recording.csv.gz", "rt").readline().strip()
+    with gzip.open(tmp_path / "a/recording.csv.gz", "rt") as stream:
+        header = stream.readline().strip()
     assert header == "time_s,SP01,SP02,SP03,SP04,SP05,COOLANT_OUT,ambient,coolant_in,speed,thrust"
 
 
@@ -156,8 +157,13 @@ def test_score_of_a_right_and_a_wrong_case():
         _diagnosis("missing_physics", [("windage", "shaft")], 0.95, [([("heat_scale", "F1")], 0.04)]),
         14.0,
     )
-    assert right["exact"] and right["rank"] == 1 and right["place"] and right["coverage"][0]["inside"]
-    assert not wrong["exact"] and wrong["rank"] == 2 and wrong["place"] is None
+    assert right["exact"]
+    assert right["rank"] == 1
+    assert right["place"]
+    assert right["coverage"][0]["inside"]
+    assert not wrong["exact"]
+    assert wrong["rank"] == 2
+    assert wrong["place"] is None
     summary = summarise([right, wrong], [])
     assert summary["clear_single_first"] == {"share": 0.5, "of": 2}
     assert summary["clear_single_within_three"] == {"share": 1.0, "of": 2}
@@ -196,12 +202,13 @@ def test_judgement_of_what_cannot_be_seen(reduced):
         "own_simple_form": None,
     }
     out = judge([effect], known, calibrated=True)
-    assert (
-        "consistent" in out["acceptable_verdicts"] and [] in out["acceptable_sets"] and not out["detectable"]
-    )
+    assert "consistent" in out["acceptable_verdicts"]
+    assert [] in out["acceptable_sets"]
+    assert not out["detectable"]
     twin = {"effect": "ambient_drift", "component": "ambient", "form": "", "ratio": 0.1, "chi2": 3.0}
     known |= {"ratio": 4.0, "chi2": 900.0, "best_mimics": [twin]}
     assert judge([effect], known, calibrated=True)["acceptable_verdicts"] == ["missing_physics", "ambiguous"]
     known |= {"best_mimics": [twin | {"ratio": 2.0, "chi2": 400.0}]}
     clear = judge([effect], known, calibrated=True)
-    assert clear["clear"] and clear["acceptable_verdicts"] == ["missing_physics"]
+    assert clear["clear"]
+    assert clear["acceptable_verdicts"] == ["missing_physics"]
