@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from spindle_fem.diagnosis.heldout import heldout_stamps
 from spindle_fem.diagnosis.view import view_of, view_of_network
 from spindle_fem.effect_entries import ActiveEffects, effects_on
 from spindle_fem.effects.view import MachineView
 from spindle_fem.errors import RecordingError
 from spindle_fem.network.build import build_network
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.checks import Flag
 from spindle_fem.recordings.smooth import without_input_noise
 from spindle_fem.recordings.thin import thinned_recording
 from spindle_fem.reduced.fast_model import FastModel
@@ -66,9 +68,13 @@ def open_machine(
     recordings: Sequence[Recording],
     calibration: Sequence[Recording],
     *,
+    heldout: str = "blocks",
     progress: Progress = lambda stage: None,
 ) -> DiagnosedMachine:
     """Read a machine and make or fetch its fast model.
+
+    What is held out (``heldout`` as :func:`heldout_stamps` takes it) does not
+    enter what is usual on the recordings either.
 
     Raises
     ------
@@ -78,14 +84,14 @@ def open_machine(
     if not recordings:
         raise RecordingError("recordings", "there are none.", "Give at least one to be diagnosed.")
     if network_spec.is_network_machine(read_definition(find_machine(machine))):
-        return _open_network(machine, overrides, recordings, calibration)
+        return _open_network(machine, overrides, recordings, calibration, heldout)
     spec = load_machine(machine, overrides)
     recordings = [without_input_noise(item)[0] for item in recordings]
     calibration = [without_input_noise(item)[0] for item in calibration]
     fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
     for recording in (*recordings, *calibration):
         fast.require_channels(recording.probes, recording.source)
-    view = _widest([view_of(fast, recording) for recording in recordings])
+    view = _widest([view_of(fast, _seen(recording, heldout)) for recording in recordings])
     return DiagnosedMachine(
         spec.name,
         spec,
@@ -102,6 +108,7 @@ def _open_network(
     overrides: Sequence[str],
     recordings: Sequence[Recording],
     calibration: Sequence[Recording],
+    heldout: str,
 ) -> DiagnosedMachine:
     spec = network_spec.load_network_machine(machine, overrides)
     network = build_network(spec.network)
@@ -124,8 +131,16 @@ def _open_network(
     own = tuple(thinned(item) for item in recordings)
     earlier = tuple(thinned(item) for item in calibration)
     has = frozenset(f"{entry.effect} @ {entry.component}" for entry in spec.effects)
-    view = _widest([view_of_network(network, recording, has=has) for recording in own])
+    view = _widest([view_of_network(network, _seen(recording, heldout), has=has) for recording in own])
     return DiagnosedMachine(spec.name, spec, fast, effects_on(spec.effects, fast, own[0]), view, own, earlier)
+
+
+def _seen(recording: Recording, heldout: str) -> Recording:
+    """The recording with what is held out marked as not to be used."""
+    held, _ = heldout_stamps(recording, heldout)
+    flags = recording.flags.copy()
+    flags[held] |= int(Flag.MISSING)
+    return replace(recording, flags=flags)
 
 
 def _widest(views: Sequence[MachineView]) -> MachineView:

@@ -51,6 +51,10 @@ NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")
 # Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
 INLET_BIN = 3.0
+# Of the highest speed: the films that follow it are small beside the oil's.
+SPEED_BIN = 0.01
+# Classes of one oil temperature share what the channel does.
+INLET_STEP = 0.5
 BASIS_TOLERANCE = 3.0e-4
 
 
@@ -611,7 +615,11 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     for ends, owner, at in ((start, first, grid[:-1]), (end, last, grid[1:])):
         part = ((at - fine.grid[owner]) / fine.steps[owner])[:, None]
         ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
-    step_class, points = classes_of(0.5 * (start + end), INLET_BIN)
+    step_class, points = classes_of(0.5 * (start + end), INLET_BIN, SPEED_BIN)
+    points = tuple(
+        replace(p, coolant_inlet_temperature=INLET_STEP * round(p.coolant_inlet_temperature / INLET_STEP))
+        for p in points
+    )
     return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
 
 

@@ -111,8 +111,8 @@ def _network_scales(plant: Plant) -> tuple[float, list[float]]:
     """Usual error of a network [K]; correlation times from a few readings to a tenth of the time [s]."""
     moved = [
         float(np.ptp(np.quantile(recording.temperature[usable, channel], [0.05, 0.95])))
-        for recording in plant.recordings
-        for channel, usable in enumerate(recording.usable.T)
+        for recording, use in zip(plant.recordings, plant.use, strict=True)
+        for channel, usable in enumerate((recording.usable & use[:, None]).T)
         if usable.any()
     ]
     duration = float(np.median([r.times[-1] - r.times[0] for r in plant.recordings]))

@@ -88,7 +88,7 @@ def diagnose(
     tell("reading")
     read = [read_recording(path) for path in recordings]
     earlier = [read_recording(path) for path in calibrate]
-    opened = open_machine(machine, tuple(overrides), read, earlier, progress=tell)
+    opened = open_machine(machine, tuple(overrides), read, earlier, heldout=heldout, progress=tell)
     with output_folder(folder) as place:
         reason = says_too_little(opened)
         if reason:

@@ -216,11 +216,11 @@ def _grid(times: Array, held: Array, largest: float, breaks: Array) -> Array:
 
 
 def classes_of(
-    inputs: Array, inlet_bin: float = INLET_BIN
+    inputs: Array, inlet_bin: float = INLET_BIN, speed_bin: float = SPEED_BIN
 ) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
     """Steps whose films differ too little to matter share one operator."""
     speed, thrust, ambient, inlet, flow = inputs[:, : len(STANDARD)].T
-    width = SPEED_BIN * max(float(speed.max()), 1.0)
+    width = speed_bin * max(float(speed.max()), 1.0)
     flow_width = FLOW_BIN * max(float(flow.max()), 1e-9)
     inlet_width = inlet_bin
     while True:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -24,6 +24,7 @@ from spindle_fem.spec.parameters import uncertain_parameters
 
 Array = NDArray[np.float64]
 
+MOST_MAPS = 64
 NO_CHANGES: Mapping[str, float] = MappingProxyType({})
 
 
@@ -83,6 +84,7 @@ class FastModel:
         self._point_rows = [row for row, probe in enumerate(spec.probe) if probe.kind == "point"]
         self._base: dict[tuple[float, float], dict[str, float]] = {}
         self._films: dict[tuple[float, float], tuple[Array, float, float]] = {}
+        self._maps: dict[tuple[str, bytes, float, float], CoolantMaps] = {}
         self.loop = CoolantLoop(spec, model.channel_cells()) if spec.channel is not None else None
         self.fixed_fluids = tuple(
             dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
@@ -227,12 +229,12 @@ class FastModel:
                 loads_by[parameter] = by
         if self.loop is not None:
             film, rate, friction = self.channel_film(point, factors, changes)
-            maps = coolant_maps(model, film, rate, friction)
+            maps = self._coolant(coolant_maps, film, rate, friction)
             conduction = conduction + maps.conduction
             self._add_coolant(loads, outputs, output_inputs, maps)
             for parameter in parameters:
                 if set(table.targets(parameter)) & set(table.groups[CHANNEL_FILM]):
-                    by = film_derivative(model, film, rate, friction)
+                    by = self._coolant(film_derivative, film, rate, friction)
                     conduction_by[parameter] = conduction_by.get(parameter, 0.0) + by.conduction
                     loads_by.setdefault(parameter, np.zeros_like(loads))
                     outputs_by[parameter] = np.zeros_like(outputs)
@@ -250,6 +252,17 @@ class FastModel:
         if film.temperature == "ambient":
             return self.load_names.index("ambient")
         return self.load_names.index(f"fixed[{self.fixed_fluids.index(film.temperature)}]")
+
+    def _coolant(
+        self, kind: Callable[..., CoolantMaps], film: Array, rate: float, friction: float
+    ) -> CoolantMaps:
+        """Maps of the coolant or their derivative, kept for the classes of one oil temperature."""
+        key = (kind.__name__, film.tobytes(), rate, friction)
+        if key not in self._maps:
+            if len(self._maps) >= MOST_MAPS:
+                self._maps.clear()
+            self._maps[key] = kind(self.model, film, rate, friction)
+        return self._maps[key]
 
     def _add_coolant(self, loads: Array, outputs: Array, output_inputs: Array, maps: CoolantMaps) -> None:
         inlet, friction = self.load_names.index("coolant_inlet"), self.load_names.index("coolant_friction")
