@@ -174,6 +174,8 @@ def test_spring_preload_keeps_its_force_when_the_rings_grow():
         [
             "mesh.preset=coarse",
             "heat.thermal_preload=true",
+            # Warm rings lose their fit: the equilibrium of the sprung sets ends near 3000 rpm.
+            "operation.speed=1500rpm",
             "bearing_set.front.preload_kind=spring",
             "bearing_set.rear.preload_kind=spring",
         ],
