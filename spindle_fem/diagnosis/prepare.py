@@ -25,7 +25,7 @@ SLOW_SIGMAS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13)
 SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
 # A network of a few nodes is a coarse picture of its machine: its error is of the order of the
 # noise or of some per cent of what the temperatures move, and lasts for a share of the recording.
-NETWORK_SIGMAS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+NETWORK_SIGMAS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 NETWORK_TIMES = 5
 LONGEST_SHARE = 0.1
 NETWORK_SHARE_OF_RISE = 0.01
@@ -101,7 +101,7 @@ def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
     return likely_slow_error(
         residuals,
         prior=expected_slow_error(plant),
-        prior_width=1.0,
+        prior_width=1.5,
         sigmas=[share * unit for share in NETWORK_SIGMAS],
         times=times,
     )
