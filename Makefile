@@ -10,7 +10,7 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint wheel-check reference clean
+.PHONY: run test setup lint wheel-check reference study clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
@@ -39,6 +39,13 @@ $(READY): pyproject.toml constraints.txt scripts/setup.sh
 # A small run from an installed wheel, away from the source tree.
 wheel-check: $(READY)
 	bash scripts/wheel_check.sh $(BIN)/python
+
+# Concealed cases from the independent model, diagnosed without their answers, then scored. Resumable.
+STUDY ?= runs/study
+study: $(READY)
+	$(BIN)/python -m validation.generate --cases 200 --seed 7 -o $(STUDY)
+	$(BIN)/python -m validation.run_study $(STUDY) $(STUDY)/results --jobs 2 --mesh coarse
+	$(BIN)/python -m validation.score $(STUDY) $(STUDY)/results --json $(STUDY)/score.json
 
 clean:
 	rm -rf $(VENV) build dist runs .pytest_cache .ruff_cache .hypothesis
