@@ -20,7 +20,7 @@ from spindle_fem.diagnosis.screening import Variant, variants_of
 from spindle_fem.diagnosis.search import Screened, amplitude_value, screen
 from spindle_fem.effects.base import Candidate, Effect, IntervalEffect
 from spindle_fem.effects.view import MachineView
-from spindle_fem.errors import ConvergenceError, SpecError
+from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -265,7 +265,7 @@ class Search:
         """Fit a set and keep it."""
         try:
             fitted = self.problem.fit(candidates, start, hopeless=self._hopeless())
-        except (ConvergenceError, SpecError):
+        except (ConvergenceError, OutOfValidityError, SpecError):
             # What cannot be simulated explains nothing; its neighbours are tried.
             return
         if any(self._unseen(candidate, fitted.values) for candidate in candidates):

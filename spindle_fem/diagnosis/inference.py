@@ -20,7 +20,7 @@ from scipy.linalg import solve_triangular
 from spindle_fem.calibration.noise import SlowError, Whitener
 from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Observation, Plant, Prediction
 from spindle_fem.effects.base import Candidate
-from spindle_fem.errors import ConvergenceError, SpecError
+from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 
 Array = NDArray[np.float64]
 
@@ -284,7 +284,7 @@ class Problem:
                     move *= LARGEST_MOVE / largest
                 try:
                     trial = evaluate(position + move)
-                except (ConvergenceError, SpecError):
+                except (ConvergenceError, OutOfValidityError, SpecError):
                     # Outside what can be simulated (a share above one, a runaway): a shorter step.
                     trial = (np.inf, residual, jacobian)
                 if trial[0] < cost - 1e-9:

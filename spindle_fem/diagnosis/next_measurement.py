@@ -35,7 +35,7 @@ from spindle_fem.diagnosis.trials import (
 from spindle_fem.diagnosis.verdict import TEMPERATURE, Ranked, rank
 from spindle_fem.effects.base import IntervalEffect, place_words
 from spindle_fem.effects.catalogue import effect_of
-from spindle_fem.errors import ConvergenceError, SpecError
+from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ def evaluate(
         spacing = max(min(SPACING, duration / FEWEST_INSTANTS), duration / MOST_INSTANTS)
         try:
             answers = [answer(plant, fit, trial, places, spacing) for fit in fits]
-        except (ConvergenceError, SpecError) as error:
+        except (ConvergenceError, OutOfValidityError, SpecError) as error:
             failed.append({"condition": trial.name, "reason": str(error)})
             continue
         noise = [

@@ -616,9 +616,12 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
         part = ((at - fine.grid[owner]) / fine.steps[owner])[:, None]
         ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
     step_class, points = classes_of(0.5 * (start + end), INLET_BIN, SPEED_BIN)
+    # Within the range that occurs, so that no property is asked for outside it.
+    inlets = np.array([p.coolant_inlet_temperature for p in points])
+    steps = np.round((inlets - inlets.min()) / INLET_STEP) * INLET_STEP
+    shared = np.minimum(inlets.min() + steps, inlets.max()).tolist()
     points = tuple(
-        replace(p, coolant_inlet_temperature=INLET_STEP * round(p.coolant_inlet_temperature / INLET_STEP))
-        for p in points
+        replace(p, coolant_inlet_temperature=inlet) for p, inlet in zip(points, shared, strict=True)
     )
     return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
 
