@@ -7,7 +7,7 @@ import numpy as np
 from spindle_fem.diagnosis.core import Diagnosis
 from spindle_fem.diagnosis.findings import candidate_values
 from spindle_fem.diagnosis.machines import DiagnosedMachine
-from spindle_fem.diagnosis.plant import GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX, START_PREFIX
+from spindle_fem.diagnosis.plant import OF_ONE_RECORDING, PROBE_PREFIX
 from spindle_fem.effects.catalogue import definition_entry
 from spindle_fem.network.build import value_in_definition
 from spindle_fem.spec import network as network_spec
@@ -32,7 +32,7 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     own = {
         coordinate.name: (values[coordinate.name], coordinate.sigma)
         for coordinate in diagnosis.plant_coordinates
-        if not coordinate.name.startswith((PROBE_PREFIX, START_PREFIX, JUMP_PREFIX, GAP_PREFIX))
+        if not coordinate.name.startswith((PROBE_PREFIX, *OF_ONE_RECORDING))
     }
     if not machine.is_network:
         spec = with_parameters(machine.spec, {name: value for name, (value, _) in own.items()})

@@ -46,6 +46,8 @@ GAP_STEPS = 1.5
 # the highest that they give: ``within_gap.<recording>.<number>``. Shorter gaps hide nothing that matters.
 GAP_PREFIX = "within_gap."
 SHORTEST_GAP = 120.0
+# Coordinates that say nothing about other recordings.
+OF_ONE_RECORDING = (START_PREFIX, JUMP_PREFIX, GAP_PREFIX)
 GAP_PIECE, MOST_PIECES = 150.0, 8
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.diagnosis.inference import Fit
 from spindle_fem.diagnosis.layout import Layout
-from spindle_fem.diagnosis.plant import NO_VALUES, START_PREFIX, Plant
+from spindle_fem.diagnosis.plant import NO_VALUES, OF_ONE_RECORDING, Plant
 from spindle_fem.effects.view import MachineView
 from spindle_fem.reduced.drive import STANDARD, Drive, make_drive
 from spindle_fem.reduced.start import Start
@@ -138,9 +138,9 @@ def answer(plant: Plant, fit: Fit, trial: Trial, places: Sequence[Place], spacin
         The hypothesis runs away in this operation.
     """
     own = TrialPlant(plant, trial.drive)
-    chosen = [(c, i) for i, c in enumerate(fit.coordinates) if not c.name.startswith(START_PREFIX)]
+    chosen = [(c, i) for i, c in enumerate(fit.coordinates) if not c.name.startswith(OF_ONE_RECORDING)]
     names = [c.name for c, _ in chosen]
-    values = {name: value for name, value in fit.values.items() if not name.startswith(START_PREFIX)}
+    values = {name: value for name, value in fit.values.items() if not name.startswith(OF_ONE_RECORDING)}
     told = own.predict(0, values, fit.candidates, names)
     readings, slopes = [told.temperature], [told.sensitivity]
     if places:
