@@ -12,6 +12,7 @@ from spindle_fem.diagnosis.prepare import all_stamps
 # Readings must move by so many times their noise, by measurement or by the model's word.
 EXCITED_SIGMAS = 6.0
 FEWEST_READINGS = 30
+ONE_SIDED_SIGMAS = 1.645
 # Share of the quickest time constant that heat from the bearings follows to a probe.
 REACHED = 0.632
 
@@ -35,7 +36,8 @@ def says_too_little(machine: DiagnosedMachine) -> str:
             continue
         plant = Plant(machine.fast, [recording], all_stamps([recording]), machine.effects)
         duration = float(recording.times[-1] - recording.times[0])
-        needed = response_time(plant)
+        # A network whose values are guesses may be that much quicker than its nominal values say.
+        needed = response_time(plant) / prior_factor(plant)
         if duration < needed:
             reasons.append(
                 f'"{recording.name}" lasts {duration / 60.0:.3g} min, but the machine needs '
@@ -57,6 +59,19 @@ def says_too_little(machine: DiagnosedMachine) -> str:
                 f"{EXCITED_SIGMAS:g} times its noise, nor should it by the model."
             )
     return " ".join(reasons) if len(reasons) == len(machine.recordings) else ""
+
+
+def prior_factor(plant: Plant) -> float:
+    """How much quicker than nominal the priors allow a machine to be (95 % bound), 1 for what is known."""
+    sigmas: dict[str, list[float]] = {"capacity": [], "conductance": []}
+    if plant.is_network:
+        for name, sigma, _ in plant.uncertain():
+            kind = name.partition(".")[0]
+            if kind in sigmas:
+                sigmas[kind].append(sigma)
+    # A time constant is a capacity over a conductance.
+    variance = sum(float(np.median(values)) ** 2 for values in sigmas.values() if values)
+    return float(np.exp(ONE_SIDED_SIGMAS * np.sqrt(variance)))
 
 
 def response_time(plant: Plant) -> float:
