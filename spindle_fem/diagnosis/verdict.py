@@ -177,13 +177,12 @@ def judge(
     empty = next(item for item in ranked if not item.fit.candidates)
     chosen = ranked[0]
     if p_value > SIGNIFICANT or not chosen.fit.candidates or within_prior(chosen.fit, calibrated):
-        rest = (
-            tuple(item for item in ranked if item is not empty and item.probability >= LISTED)
-            if p_value > SIGNIFICANT and not empty.probability > 0.9
-            else ()
-        )
-        consistent = max(empty.probability, 1.0 - p_value if not rest else empty.probability)
-        return Judgement("consistent", p_value, Ranked(empty.best, consistent), (), 0.0, "")
+        if np.sqrt(empty.fit.reduced_misfit) <= UNEXPLAINED_MISFIT or within_prior(chosen.fit, calibrated):
+            return Judgement("consistent", p_value, empty, (), 0.0, "")
+        # The residual is there, and no set of the catalogue makes it likelier.
+        left_over = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
+        reason = "the readings differ from the model by more than the noise, and no effect explains it"
+        return Judgement("unexplained", left_over, empty, (), 1.0, reason)
     misfit = float(np.sqrt(chosen.fit.reduced_misfit))
     other = float(np.clip((misfit - 1.1) / (2.0 * UNEXPLAINED_MISFIT), 0.0, 0.5))
     scaled = [Ranked(item.best, item.probability * (1.0 - other)) for item in ranked]

@@ -34,7 +34,8 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
     if verdict == "consistent":
         return (
             f"The recording agrees with the machine: what differs, {kelvin(fit['after']['heldout_rmse_K'])} "
-            f"on held-out readings, is noise ({kelvin(fit['noise_K'])}) and what the uncertain parameters "
+            f"on held-out readings, is noise ({kelvin(fit['noise_K'])}), the slow error allowed to sensors "
+            f"and model ({kelvin(content['slow_error']['sigma_K'])}) and what the uncertain parameters "
             f"absorb within their priors (p {level(content['mismatch']['p_value'])})."
         )
     if verdict == "ambiguous":

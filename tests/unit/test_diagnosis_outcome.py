@@ -363,6 +363,7 @@ def content_of(diagnosis, before, after, proposal):
         "mismatch": {"p_value": judgement.p_value, "channels": channels, **where_of(diagnosis).to_json()},
         "findings": findings_of(diagnosis, judgement.chosen, split=True),
         "set_probability": judgement.chosen.probability,
+        "slow_error": {"sigma_K": diagnosis.final.slow.sigma, "time_s": diagnosis.final.slow.time},
         "alternatives": [
             {"findings": findings_of(diagnosis, item, split=False), "probability": item.probability}
             for item in judgement.alternatives

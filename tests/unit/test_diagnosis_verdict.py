@@ -165,6 +165,17 @@ def test_nothing_missing_is_consistent():
     assert found.other == 0.0
 
 
+def test_a_misfit_that_nothing_explains_is_unexplained():
+    null, useless = hypothesis(misfit=4e3, reduced=10.0), hypothesis(PRELOAD, misfit=4e3, reduced=10.0)
+    found = verdict(null, useless)
+    assert found.verdict == "unexplained"
+    assert found.p_value < 1e-10
+    assert "no effect explains" in found.reason
+    assert found.chosen.fit.candidates == ()
+    # A little above the noise is still what a consistent recording may leave.
+    assert verdict(hypothesis(misfit=600.0, reduced=1.5)).verdict == "consistent"
+
+
 @pytest.mark.parametrize(
     ("member", "expected"), [(PRELOAD, "missing_physics"), (OFFSET, "sensor"), (SCALE, "parameter")]
 )
