@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit, Problem
-from spindle_fem.diagnosis.locate import OnOff, Onsets, Pattern, find_intervals, onset_answers
+from spindle_fem.diagnosis.locate import ONSETS, OnOff, Onsets, Pattern, find_intervals, onset_answers
 from spindle_fem.diagnosis.screening import Variant, variants_of
 from spindle_fem.diagnosis.search import Screened, amplitude_value, screen
 from spindle_fem.effects.base import Candidate, Effect, IntervalEffect
@@ -324,7 +324,7 @@ def _renamed_values(candidate: Candidate, other: Candidate, values: Mapping[str,
 
 def intervals_cost(item: OnOff) -> float:
     """What choosing the intervals costs, as a logarithm."""
-    options = 40 * 41 / 2
+    options = ONSETS * (ONSETS + 1) / 2
     number = len(item.intervals)
     return number * float(np.log(options)) - float(np.sum(np.log(np.arange(1, number + 1))))
 

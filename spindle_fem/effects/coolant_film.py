@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
@@ -34,7 +35,7 @@ def reynolds_number(channel: ChannelFlow, flow: float, temperature: float) -> fl
     return flow / channel.area * channel.hydraulic_diameter / viscosity
 
 
-class ReynoldsFilmTerm(Term):
+class ReynoldsFilmTerm(Term, ABC):
     """Factor on the channel's film by the Reynolds number.
 
     Parameters
@@ -46,9 +47,9 @@ class ReynoldsFilmTerm(Term):
     def __init__(self, name: str, channel: ChannelFlow) -> None:
         self.name, self._channel = name, channel
 
+    @abstractmethod
     def law(self, reynolds: float, parameters: Mapping[str, float]) -> float:
         """Factor at a Reynolds number."""
-        raise NotImplementedError
 
     def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:
         """Of the class's operating point."""
