@@ -210,6 +210,8 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     if fit["full_model"]["mesh"] != "off" and fit["full_model"]["reason"]:
         console.print(f"Full model: {fit['full_model']['reason']}")
     following = content["next_measurement"]
+    for note in content.get("notes", ()):
+        console.print(note, style="dim")
     console.print(f"Next: {following['quantity']} at {following['where']}, {following['condition']}.")
     console.print(f"Files: {folder}")
 

@@ -46,6 +46,9 @@ class DiagnosedMachine:
     view : MachineView
         Of the first recording, ranges over all.
     recordings, calibration : tuple of Recording
+        As they are used: measured inputs smoothed, long ones of networks thinned.
+    notes : tuple of str
+        What was done to them.
     """
 
     name: str
@@ -55,6 +58,7 @@ class DiagnosedMachine:
     view: MachineView
     recordings: tuple[Recording, ...]
     calibration: tuple[Recording, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def is_network(self) -> bool:
@@ -86,8 +90,8 @@ def open_machine(
     if network_spec.is_network_machine(read_definition(find_machine(machine))):
         return _open_network(machine, overrides, recordings, calibration, heldout)
     spec = load_machine(machine, overrides)
-    recordings = [without_input_noise(item)[0] for item in recordings]
-    calibration = [without_input_noise(item)[0] for item in calibration]
+    recordings, notes = _denoised(recordings)
+    calibration, more = _denoised(calibration)
     fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
     for recording in (*recordings, *calibration):
         fast.require_channels(recording.probes, recording.source)
@@ -100,6 +104,7 @@ def open_machine(
         view,
         tuple(recordings),
         tuple(calibration),
+        (*notes, *more),
     )
 
 
@@ -120,7 +125,6 @@ def _open_network(
     }
 
     def thinned(recording: Recording) -> Recording:
-        recording, _ = without_input_noise(recording)
         count = recording.times.size
         if count <= MOST_STAMPS:
             return recording
@@ -128,11 +132,37 @@ def _open_network(
         covered = sum(recording.times[end - 1] - recording.times[begin] for begin, end in recording.segments)
         return thinned_recording(recording, float(covered) / MOST_STAMPS, exponents=exponents)
 
-    own = tuple(thinned(item) for item in recordings)
-    earlier = tuple(thinned(item) for item in calibration)
+    smooth, notes = _denoised(recordings)
+    smooth_earlier, more = _denoised(calibration)
+    own = tuple(thinned(item) for item in smooth)
+    earlier = tuple(thinned(item) for item in smooth_earlier)
+    averaged = [
+        f"{item.name}: {item.times.size} rows averaged to {short.times.size}"
+        for item, short in zip((*smooth, *smooth_earlier), (*own, *earlier), strict=True)
+        if short.times.size < item.times.size
+    ]
     has = frozenset(f"{entry.effect} @ {entry.component}" for entry in spec.effects)
     view = _widest([view_of_network(network, _seen(recording, heldout), has=has) for recording in own])
-    return DiagnosedMachine(spec.name, spec, fast, effects_on(spec.effects, fast, own[0]), view, own, earlier)
+    return DiagnosedMachine(
+        spec.name,
+        spec,
+        fast,
+        effects_on(spec.effects, fast, own[0]),
+        view,
+        own,
+        earlier,
+        (*notes, *more, *averaged),
+    )
+
+
+def _denoised(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Recordings without the noise of their measured inputs, and what was done in words."""
+    found, notes = [], []
+    for recording in recordings:
+        smooth, done = without_input_noise(recording)
+        found.append(smooth)
+        notes += [f"{recording.name}: {text}" for text in done]
+    return found, notes
 
 
 def _seen(recording: Recording, heldout: str) -> Recording:

@@ -157,6 +157,7 @@ def _write(
         "candidates_tried": diagnosis.candidates_tried,
         "hypotheses_fitted": len(diagnosis.hypotheses),
         "seconds": dict(diagnosis.seconds),
+        "notes": [*opened.notes, *dict.fromkeys(note for drive in plant.drives for note in drive.notes)],
         "defects": [recording.defects.to_json() for recording in plant.recordings],
         "versions": package_versions(),
     }
