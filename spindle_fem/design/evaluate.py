@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spindle_fem import __version__
+from spindle_fem.cache import cache_directory
 from spindle_fem.checks import require_checks
 from spindle_fem.conduction.operators import ThermalOperators, build_operators
 from spindle_fem.coupling import machine_on_mesh
@@ -29,7 +30,7 @@ from spindle_fem.loads.coolant_loop import CoolantLoop
 from spindle_fem.loads.joints import group_of_contacts
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.meshing.build import build_mesh
-from spindle_fem.meshing.cache import cache_directory, mesh_digest
+from spindle_fem.meshing.cache import mesh_digest
 from spindle_fem.meshing.sizes import build_sizes
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.results.summary import build_summary

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import sys
 import tempfile
 import zipfile
 from dataclasses import asdict
@@ -15,20 +14,18 @@ from types import MappingProxyType
 
 import numpy as np
 
+from spindle_fem.cache import cache_directory, source_digest
 from spindle_fem.errors import MeshTagError
 from spindle_fem.geometry.assembly import AssemblyGeometry
 from spindle_fem.meshing.sizes import MeshSizes
 from spindle_fem.meshing.tagged_mesh import Joint, TaggedMesh
 from spindle_fem.meshing.tags import freeze
 
-CACHE_VARIABLE = "SPINDLE_FEM_CACHE"
-# Raise it whenever the same input gives another mesh.
-MESHER_REVISION = 1
 FORMAT = "spindle-fem/mesh/1"
 
 
 def mesh_digest(assembly: AssemblyGeometry, sizes: MeshSizes) -> str:
-    """Hash of geometry, sizes and versions: the identity of a mesh.
+    """Hash of geometry, sizes, and versions and source of the mesher: the identity of a mesh.
 
     Parameters
     ----------
@@ -42,26 +39,13 @@ def mesh_digest(assembly: AssemblyGeometry, sizes: MeshSizes) -> str:
     """
     content = {
         "format": FORMAT,
-        "revision": MESHER_REVISION,
+        "source": source_digest("geometry", "meshing"),
         "versions": {name: version(name) for name in ("gmsh", "pygmsh", "numpy")},
         "assembly": asdict(assembly),
         "sizes": sizes.key(),
     }
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def cache_directory() -> Path:
-    """Where meshes are kept: $SPINDLE_FEM_CACHE, or the platform's cache folder."""
-    chosen = os.environ.get(CACHE_VARIABLE)
-    if chosen:
-        return Path(chosen)
-    home = Path.home()
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local")) / "spindle-fem" / "meshes"
-    if sys.platform == "darwin":
-        return home / "Library" / "Caches" / "spindle-fem" / "meshes"
-    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "spindle-fem" / "meshes"
 
 
 def cached_mesh(digest: str) -> TaggedMesh | None:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
-import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from spindle_fem.cache import cache_directory, load_record, save_record, source_digest
 from spindle_fem.loads.channel_cells import ChannelCells
-from spindle_fem.meshing.cache import MESHER_REVISION, cache_directory
 from spindle_fem.reduced.affine import AffineSystem
 from spindle_fem.reduced.coefficients import CoefficientTable, build_coefficient_table
 from spindle_fem.spec.model import MachineSpec
@@ -24,8 +21,14 @@ from spindle_fem.spec.model import MachineSpec
 Array = NDArray[np.float64]
 
 FORMAT = "spindle-fem/reduced/2"
-# Raise it whenever the same machine gives another reduced model.
-REVISION = 3
+# Packages and modules whose change gives the same machine another reduced model.
+_MADE_BY = (
+    *("geometry", "meshing", "conduction", "loads", "coolant", "surroundings", "coupling"),
+    *(
+        f"reduced/{name}"
+        for name in ("affine", "build", "coefficients", "model", "probe_places", "snapshots")
+    ),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,41 +152,17 @@ class ReducedModel:
     # ----------------------------------------------------------------- disk
     def save(self, path: Path) -> None:
         """Write to an .npz file; readers never see half of it."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        arrays, header = {}, {"schema": FORMAT}
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                arrays[item.name] = value
-            else:
-                header[item.name] = dict(value) if isinstance(value, Mapping) else value
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".partial")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                np.savez_compressed(stream, header=json.dumps(header), **arrays)
-            Path(temporary).replace(path)
-        finally:
-            Path(temporary).unlink(missing_ok=True)
+        save_record(self, path, FORMAT)
 
     @classmethod
     def load(cls, path: Path) -> ReducedModel | None:
         """What :meth:`save` wrote; None where there is none, or another version, or a damaged file."""
-        if not path.is_file():
+        found = load_record(path, FORMAT)
+        if found is None:
             return None
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                header = json.loads(str(data["header"]))
-                arrays = {name: data[name] for name in data.files if name != "header"}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            return None
-        if header.pop("schema", None) != FORMAT:
-            return None
-        for name, value in header.items():
-            if isinstance(value, list):
-                header[name] = tuple(value)
         for name in ("gap_radii", "ranges"):
-            header[name] = {key: tuple(pair) for key, pair in header[name].items()}
-        return cls(**header, **arrays)
+            found[name] = {key: tuple(pair) for key, pair in found[name].items()}
+        return cls(**found)
 
 
 def project(
@@ -260,7 +239,7 @@ def reduced_digest(spec: MachineSpec, options: Mapping[str, float]) -> str:
     text = json.dumps(
         {
             "format": FORMAT,
-            "revision": [REVISION, MESHER_REVISION],
+            "source": source_digest(*_MADE_BY),
             "spec": content,
             "options": dict(options),
         },

@@ -9,11 +9,10 @@ import meshio
 import numpy as np
 import pytest
 
+from spindle_fem.cache import CACHE_VARIABLE, cache_directory, source_digest
 from spindle_fem.errors import BadInputError, MeshTagError
 from spindle_fem.geometry.assembly import AnnularSegment, PartGeometry, assemble
 from spindle_fem.meshing.cache import (
-    CACHE_VARIABLE,
-    cache_directory,
     cached_mesh,
     load_npz,
     mesh_digest,
@@ -55,6 +54,23 @@ def test_digest_follows_geometry_and_sizes():
     assert len(reference) == 64
     assert reference != mesh_digest(ring(0.061), build_sizes(ring(), "normal"))
     assert reference != mesh_digest(ring(), build_sizes(ring(), "coarse"))
+
+
+def test_a_key_follows_the_source_that_made_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("spindle_fem.cache._PACKAGE", tmp_path)
+    (tmp_path / "mesher").mkdir()
+    (tmp_path / "mesher" / "one.py").write_text("SIZE = 1\n")
+    (tmp_path / "other.py").write_text("SIZE = 1\n")
+    source_digest.cache_clear()
+    first = source_digest("mesher", "other")
+    source_digest.cache_clear()
+    assert source_digest("mesher", "other") == first
+    (tmp_path / "mesher" / "one.py").write_text("SIZE = 2\n")
+    source_digest.cache_clear()
+    assert source_digest("mesher", "other") != first
+    with pytest.raises(FileNotFoundError):
+        source_digest("missing")
+    source_digest.cache_clear()
 
 
 def test_round_trip_keeps_everything(tiny, tmp_path):

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from spindle_fem.cache import CACHE_VARIABLE
 from spindle_fem.errors import GeometryError, MeshQualityError, MeshTagError
 from spindle_fem.geometry.assembly import (
     AnnularSegment,
@@ -23,7 +24,6 @@ from spindle_fem.geometry.design_space import draw_valid_designs
 from spindle_fem.geometry.solids import build_solids, gmsh_session
 from spindle_fem.geometry.step import export_step
 from spindle_fem.meshing.build import build_mesh, generate_mesh
-from spindle_fem.meshing.cache import CACHE_VARIABLE
 from spindle_fem.meshing.classify import classify_face
 from spindle_fem.meshing.generate import Attempt
 from spindle_fem.meshing.quality import area_errors, facet_areas, gmsh_quality, volume_errors

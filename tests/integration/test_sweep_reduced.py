@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from spindle_fem.cache import CACHE_VARIABLE
 from spindle_fem.design.designs import Design
 from spindle_fem.design.evaluate import Question, TaskBuilder, row_of, solve_checked
 from spindle_fem.design.fast.backend import LARGEST_ERROR, GroupTask, answer_group, answer_tasks, model_of
@@ -13,7 +14,6 @@ from spindle_fem.design.fast.model import SteadyModel
 from spindle_fem.design.sweep import prepare_study, sweep_machine
 from spindle_fem.design.table import RESULTS, read_results
 from spindle_fem.errors import FaultsError
-from spindle_fem.meshing.cache import CACHE_VARIABLE
 from spindle_fem.spec.load import load_machine
 
 QUICK = ("mesh.preset=coarse", "mesh.order=1")

@@ -12,7 +12,7 @@ import pytest
 import spindle_fem
 
 PACKAGE = Path(spindle_fem.__file__).parent
-ROOT_MODULES = {"errors", "units", "constants", "validity"}
+ROOT_MODULES = {"errors", "units", "constants", "validity", "cache"}
 
 # Packages that a package may import, besides the root modules and itself.
 ALLOWED = {

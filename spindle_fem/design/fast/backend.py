@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spindle_fem import __version__
+from spindle_fem.cache import source_digest
 from spindle_fem.coupling import machine_on_mesh
 from spindle_fem.design.evaluate import (
     FILM_HIGH,
@@ -30,7 +31,7 @@ from spindle_fem.design.fast.build import (
 )
 from spindle_fem.design.fast.heat import BearingTables
 from spindle_fem.design.fast.inputs import DesignInputs, design_inputs
-from spindle_fem.design.fast.model import FORMAT, REVISION, SteadyModel, model_path
+from spindle_fem.design.fast.model import FORMAT, MADE_BY, SteadyModel, model_path
 from spindle_fem.design.fast.outputs import band_ratios, extreme_temperatures, values_of
 from spindle_fem.design.fast.solve import SteadyBatch, SteadySolver
 from spindle_fem.design.table import OK, REDUCED, Row
@@ -188,7 +189,6 @@ def model_of(group: GroupTask, question: Question) -> tuple[SteadyModel, list[Ro
     SpindleFemError
         The machine cannot be meshed, solved or projected.
     """
-    """Model of the planned designs, and the rows of those that were solved in full to check it."""
     first = group.plan[0]
     path = model_path(_digest(group, question))
     tables = BearingTables(*FIRST_TABLES)
@@ -207,9 +207,8 @@ def model_of(group: GroupTask, question: Question) -> tuple[SteadyModel, list[Ro
 
 def _digest(group: GroupTask, question: Question) -> str:
     keys = sorted({task.key for task in group.plan})
-    text = json.dumps(
-        [FORMAT, REVISION, __version__, group.plan[0].structure, keys, question.film_uncertainty]
-    )
+    made_by = [FORMAT, source_digest(*MADE_BY), __version__]
+    text = json.dumps([*made_by, group.plan[0].structure, keys, question.film_uncertainty])
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import json
-import os
-import tempfile
-import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.cache import cache_directory, load_record, save_record
 from spindle_fem.conduction.evaluate import temperature_at_nodes
 from spindle_fem.coupling import PreparedMachine
 from spindle_fem.loads.channel_cells import ChannelCells
-from spindle_fem.meshing.cache import cache_directory
 from spindle_fem.reduced.affine import AffineSystem
 from spindle_fem.reduced.coefficients import gap_radii_of
 
 Array = NDArray[np.float64]
 
 FORMAT = "spindle-fem/steady-model/1"
-# Raise it whenever the same designs give another model.
-REVISION = 1
+# Packages and modules whose change gives the same designs another model.
+MADE_BY = (
+    *("geometry", "meshing", "conduction", "loads", "coolant", "surroundings", "tribology", "coupling"),
+    *("reduced/affine", "reduced/coefficients", "reduced/snapshots", "design/evaluate", "design/fast"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,37 +125,13 @@ class SteadyModel:
     # ----------------------------------------------------------------- disk
     def save(self, path: Path) -> None:
         """Write to an .npz file; readers never see half of it."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        arrays, header = {}, {"schema": FORMAT}
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                arrays[item.name] = value
-            else:
-                header[item.name] = dict(value) if isinstance(value, Mapping) else value
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".partial")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                np.savez(stream, header=json.dumps(header), **arrays)
-            Path(temporary).replace(path)
-        finally:
-            Path(temporary).unlink(missing_ok=True)
+        save_record(self, path, FORMAT)
 
     @classmethod
     def load(cls, path: Path) -> SteadyModel | None:
         """What :meth:`save` wrote; None where there is none, or another version, or a damaged file."""
-        if not path.is_file():
-            return None
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                header = json.loads(str(data["header"]))
-                arrays = {name: data[name] for name in data.files if name != "header"}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            return None
-        if header.pop("schema", None) != FORMAT:
-            return None
-        lists = {name: tuple(value) for name, value in header.items() if isinstance(value, list)}
-        return cls(**{**header, **lists}, **arrays)
+        found = load_record(path, FORMAT)
+        return None if found is None else cls(**found)
 
 
 def model_path(digest: str) -> Path:
