@@ -93,7 +93,9 @@ def product_table(table: ReferenceTable) -> NDArray[np.float64]:
 
 
 def is_straight(points: NDArray[np.float64], tetrahedra: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which quadratic tetrahedra have every edge middle on its chord, (n_elements,)."""
+    """Which tetrahedra are linear or have every edge middle on its chord, (n_elements,)."""
+    if tetrahedra.shape[1] == 4:
+        return np.ones(len(tetrahedra), dtype=bool)
     ends = points[tetrahedra[:, EDGES]]
     bow = np.abs(points[tetrahedra[:, 4:]] - 0.5 * (ends[:, :, 0] + ends[:, :, 1])).max(axis=(1, 2))
     return bow <= STRAIGHT_TOLERANCE * np.abs(ends[:, :, 1] - ends[:, :, 0]).max(axis=(1, 2))
@@ -155,9 +157,10 @@ def integrate_elements(
     Parameters
     ----------
     points : (n_nodes, 3) ndarray, [m]
-    tetrahedra : (n_elements, 10) int64 ndarray
+    tetrahedra : (n_elements, 10) or (n_elements, 4) int ndarray
+        Quadratic, or linear: straight.
     order : int
-        Of the temperature, 1 or 2; the geometry is always quadratic.
+        Of the temperature, 1 or 2.
 
     Raises
     ------
@@ -214,7 +217,7 @@ def integrate_circumferential(
     """Upper matrices of ``∫ (∂u/∂s)(∂v/∂s) dV`` with s around the z axis, (n_elements, n_upper) [m]."""
     metric = _metric_table(order)
     flat_metric = metric.reshape(-1, metric.shape[2])
-    geometry = tetrahedron_table(2)
+    geometry = tetrahedron_table(1 if tetrahedra.shape[1] == 4 else 2)
     out = np.empty((len(tetrahedra), metric.shape[2]))
     for start in range(0, len(tetrahedra), CHUNK):
         nodes = points[tetrahedra[start : start + CHUNK]]
@@ -248,8 +251,8 @@ class FacetIntegrals:
 
 
 def integrate_facets(points: NDArray[np.float64], facets: NDArray[np.int64], order: int) -> FacetIntegrals:
-    """Film matrices with unit coefficient on curved facets, ``facets`` (n_facets, 6)."""
-    table, geometry = triangle_table(order), triangle_table(2)
+    """Film matrices with unit coefficient on facets, (n_facets, 6) curved or (n_facets, 3) straight."""
+    table, geometry = triangle_table(order), triangle_table(1 if facets.shape[1] == 3 else 2)
     nodes = points[facets]
     tangents = [[nodes[:, :, i] @ geometry.gradients[:, :, k].T for i in range(3)] for k in range(2)]
     first, second = tangents

@@ -42,9 +42,10 @@ def build_operators(
     Parameters
     ----------
     mesh : TaggedMesh
+        Its elements may also be linear, (n, 4) with facets (n, 3), for order 1.
     order : int
         Of the temperature: 1 (corner nodes) or 2 (all nodes). The geometry is
-        curved in both.
+        the mesh's in both.
     circumferential_parts : collection of str
         Parts that may get another conductivity around the axis.
     area_tolerance : float, [-]
@@ -61,6 +62,8 @@ def build_operators(
     """
     if order not in (1, 2):
         raise SpecError("order", f"{order!r}.", "Allowed: 1 or 2.")
+    if order == 2 and mesh.tetrahedra.shape[1] == 4:
+        raise SpecError("order", "2 on linear elements.", "Allowed: 1, or a quadratic mesh.")
     n_unknowns = mesh.n_corners if order == 1 else len(mesh.points)
     element_nodes = mesh.tetrahedra[:, : 4 if order == 1 else 10].astype(np.int64)
     part_of_unknown = _parts_of_unknowns(mesh, element_nodes, n_unknowns)

@@ -102,6 +102,8 @@ class MachineNetwork:
     """Everything about a machine's network that no operating point changes.
 
     Node order: solid nodes, balls, gap air, coolant along the flow.
+    ``ball_nodes`` are the nodes of the ball rows; ``seats`` the nodes that each
+    ring sits on, and the share of its seat at each.
     """
 
     spec: MachineSpec
@@ -117,6 +119,8 @@ class MachineNetwork:
     node_names: tuple[str, ...]
     capacity: Array
     refinement: int
+    ball_nodes: Mapping[str, int]
+    seats: Mapping[str, tuple[NDArray[np.int64], Array]]
 
     @property
     def n_solid(self) -> int:
@@ -127,11 +131,6 @@ class MachineNetwork:
     def n_nodes(self) -> int:
         """Number of all nodes."""
         return len(self.node_names)
-
-    @property
-    def ball_nodes(self) -> dict[str, int]:
-        """Node of each ball row."""
-        return {bearing.name: self.n_solid + i for i, (_, bearing) in enumerate(self.spec.bearings)}
 
     @property
     def air_start(self) -> int:
@@ -250,7 +249,25 @@ def build_machine_network(
         node_names=names,
         capacity=capacity,
         refinement=int(refinement),
+        ball_nodes={
+            bearing.name: len(partition.node_names) + i for i, (_, bearing) in enumerate(spec.bearings)
+        },
+        seats={
+            ring: _seat(cells, partition, ring)
+            for _, bearing in spec.bearings
+            for ring in (f"{bearing.name}.inner_ring", f"{bearing.name}.outer_ring")
+        },
     )
+
+
+def _seat(cells: MeridianCells, partition: Partition, ring: str) -> tuple[NDArray[np.int64], Array]:
+    """Nodes behind the joint that a ring sits on, and the share of each."""
+    contact, own = cells.contact, cells.part_names.index(ring)
+    on_first, on_second = cells.part[contact.first] == own, cells.part[contact.second] == own
+    rows = np.flatnonzero((on_first | on_second) & contact.radial)
+    other = np.where(on_first[rows], contact.second[rows], contact.first[rows])
+    area = contact.area[rows]
+    return partition.node_of_cell[other], area / area.sum() if rows.size else area
 
 
 def _column_lines(spec: MachineSpec, assembly: AssemblyGeometry) -> tuple[float, ...]:

@@ -27,6 +27,7 @@ CONTACT_ROUNDS = 30
 CONTACT_TOLERANCE = 1.0e-7
 # Contacts that follow their films leave some 1e-5 of the last change: the state is good to about 1e-6 K.
 FOLLOWED_TOLERANCE = 0.1
+FIRST_ROUND = 0.05
 # K; a step beyond it comes from a matrix that is singular but for rounding.
 LARGEST_STEP = 1.0e9
 
@@ -111,11 +112,15 @@ class SparseBalance:
         rows = np.concatenate([first, second, first, second, down, down])
         columns = np.concatenate([first, second, second, first, down, up])
         values = np.concatenate([g, g, -g, -g, rate, -rate])
-        whole = sparse.csr_array((values, (rows, columns)), shape=(total, total))
-        self.matrix = whole[:n, :n].tocsc()
+        self.full: Array | None = None
+        if total <= DENSE_UP_TO:
+            whole = np.bincount(rows * total + columns, values, total * total).reshape(total, total)
+            self.matrix = self.full = np.ascontiguousarray(whole[:n, :n])
+        else:
+            whole = sparse.csr_array((values, (rows, columns)), shape=(total, total))
+            self.matrix = whole[:n, :n].tocsc()
         self.load = network.heat - whole[:n, n:] @ network.boundary_temperature
         self.n = n
-        self.full = self.matrix.toarray() if n <= DENSE_UP_TO else None
 
     def net_heat(self, temperature: Array) -> Array:
         """Net heat into every node, (n,) [W]."""
@@ -163,8 +168,8 @@ def _solve(derivative: sparse.csc_array | Array, right: Array) -> Array:
     return step
 
 
-def newton(network: OperatingNetwork, start: Array) -> tuple[Array, int]:
-    """Temperatures at which every balance is zero.
+def newton(network: OperatingNetwork, start: Array, *, enough: float = 0.0) -> tuple[Array, int]:
+    """Temperatures at which every balance is zero, or that a step moved by less than ``enough`` K.
 
     Raises
     ------
@@ -200,6 +205,8 @@ def newton(network: OperatingNetwork, start: Array) -> tuple[Array, int]:
                 )
         temperature, net, derivative, norm = trial, trial_net, trial_derivative, trial_norm
         moved = float(np.abs(damping * step).max())
+        if moved < enough:
+            return temperature, iteration
         if norm <= rounding and (not network.laws or moved < 1.0e-8):
             return temperature, iteration
     raise ConvergenceError(
@@ -241,7 +248,9 @@ def solve_machine_network(
     temperature = np.full(machine.n_nodes, point.ambient_temperature) if start is None else start
     for _ in range(CONTACT_ROUNDS):
         network = operate(machine, point, heat_model, around=around, friction=friction, coolant=coolant)
-        temperature, used = newton(network, temperature)
+        # about a state that films will leave, rounding is not worth a step
+        first = around is None and friction is not None
+        temperature, used = newton(network, temperature, enough=FIRST_ROUND if first else 0.0)
         steps += used
         found = bearing_temperatures(network, temperature)
         change = _change(around, found)
@@ -340,15 +349,8 @@ def bearing_temperatures(network: OperatingNetwork, temperature: Array) -> dict[
 
 def _seat(machine: MachineNetwork, temperature: Array, ring: str, default: float) -> float:
     """Mean of what a ring sits on, taken at the nodes behind the joint."""
-    contact = machine.cells.contact
-    own = machine.cells.part_names.index(ring)
-    part = machine.cells.part
-    on_first, on_second = part[contact.first] == own, part[contact.second] == own
-    rows = np.flatnonzero((on_first | on_second) & contact.radial)
-    if not rows.size:
-        return default
-    other = np.where(on_first[rows], contact.second[rows], contact.first[rows])
-    return float(np.average(temperature[machine.partition.node_of_cell[other]], weights=contact.area[rows]))
+    nodes, share = machine.seats[ring]
+    return float(temperature[nodes] @ share) if nodes.size else default
 
 
 def _state(network: OperatingNetwork, temperature: Array, iterations: int) -> MachineNetworkState:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
+from spindle_fem.coolant.properties import Coolant
 from spindle_fem.coolant.regimes import ChannelState, select_film
+from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.loads.films import film_coefficient, gap_coefficient
 from spindle_fem.loads.model import BearingHeat
@@ -27,6 +30,8 @@ Law = WallFilmLaw | CoolantLaw | FrictionLaw | BallContactLaw
 FILM_RANGE = (-60.0, 140.0)
 FILM_POINTS = 801
 TABLE_POINTS = 24
+# Flows whose films are remembered.
+TABLES_KEPT = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,6 +390,18 @@ def _pumping(machine: MachineNetwork, point: OperatingPoint) -> Array:
     return state.pressure.pumping_power * coolant.area / coolant.area.sum()
 
 
+@lru_cache(maxsize=TABLES_KEPT)
+def _film_table(
+    coolant: Coolant, section: ChannelSection, model: str, flow: float, factor: float
+) -> RectBivariateSpline:
+    """Film coefficient over bulk and wall temperature, W/(m²·K)."""
+    bulk = np.linspace(coolant.lowest_temperature, coolant.highest_temperature, TABLE_POINTS)
+    wall = np.linspace(coolant.lowest_temperature, coolant.highest_temperature, 2 * TABLE_POINTS)
+    state = ChannelState(coolant, flow, np.repeat(bulk, len(wall)), np.tile(wall, len(bulk)))
+    value = factor * np.asarray(select_film(model, section, state).value, dtype=float)
+    return RectBivariateSpline(bulk, wall, value.reshape(len(bulk), len(wall)))
+
+
 def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
     """The enthalpy march as streams and conductances; film by the definition's correlation."""
     coolant, settings = machine.coolant, machine.spec.coolant
@@ -394,18 +411,13 @@ def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
     start, n = machine.coolant_start, len(coolant.area)
     nodes = np.arange(start, start + n)
     factor = settings.film_factor.value
-
-    def coefficient(bulk: Array, wall: Array | None) -> Array:
-        state = ChannelState(loop.coolant, point.coolant_flow, bulk, wall)
-        return factor * np.asarray(select_film(settings.film_model, loop.section, state).value, dtype=float)
-
     bulk_range = wall_range = (loop.coolant.lowest_temperature, loop.coolant.highest_temperature)
-    film: RectBivariateSpline | float = float(coefficient(np.float64(inlet), None))
+    film: RectBivariateSpline | float
     if settings.properties_at == "bulk":
-        bulk = np.linspace(*bulk_range, TABLE_POINTS)
-        wall = np.linspace(*wall_range, 2 * TABLE_POINTS)
-        every = np.repeat(bulk, len(wall)), np.tile(wall, len(bulk))
-        film = RectBivariateSpline(bulk, wall, coefficient(*every).reshape(len(bulk), len(wall)))
+        film = _film_table(loop.coolant, loop.section, settings.film_model, point.coolant_flow, factor)
+    else:
+        state = ChannelState(loop.coolant, point.coolant_flow, np.float64(inlet), None)
+        film = factor * float(select_film(settings.film_model, loop.section, state).value)
     return CoolantLaw(
         patch=coolant.patch,
         cell=coolant.cell,
