@@ -34,6 +34,8 @@ NUMBER_PRIOR = (0.4, 0.35, 0.2, 0.05)
 HIDDEN = 0.5
 # Sets that are tried without each of their members.
 REDUCED = 3
+# Sets in which each member is exchanged for the best other effects at its place, and how many of these.
+EXCHANGED, OTHERS = 2, 6
 SINGLES, PAIRS, TRIPLES = 8, 6, 3
 BEAM, ADDITIONS = 3, 6
 # A hypothesis this much less likely (natural logarithm) than the best is not extended.
@@ -95,6 +97,7 @@ class Search:
     weights: Mapping[str, float]
     progress: Progress = lambda stage: None
     found: dict[frozenset, Hypothesis] | None = None
+    _screenings: dict[frozenset, Screened] = field(default_factory=dict)
     _paid: dict[frozenset, float] = field(default_factory=dict)
 
     def run(self) -> list[Hypothesis]:
@@ -117,8 +120,29 @@ class Search:
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
         self._reduce()
+        self._exchange()
         self._widen()
         return self.ranked()
+
+    def _exchange(self) -> None:
+        """Try other effects in the place of each member of the best sets.
+
+        What a large effect does is misjudged to first order, so that its
+        neighbours may not have come through the screening.
+        """
+        with_intervals = {effect.name for effect in self.interval_effects}
+        for hypothesis in [h for h in self.ranked() if h.fit.candidates][:EXCHANGED]:
+            for member in hypothesis.fit.candidates:
+                rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
+                base = self.found.get(_identity(rest))
+                if base is None or isinstance(self.effects[member.effect], IntervalEffect):
+                    continue
+                if _identity(rest) not in self._screenings:
+                    self.screened(base.fit)
+                screened = self._screenings[_identity(rest)]
+                places = {member.component, *self._groups_of(member.component)}
+                for index, amplitude in screened.best_at(places, {member.effect, *with_intervals}, OTHERS):
+                    self._try(base.fit, [(screened.variants[index], amplitude)], {})
 
     def _widen(self) -> None:
         """Try the whole set where one of its bearings was found."""
@@ -136,9 +160,13 @@ class Search:
                     start = values | _renamed_values(candidate, wider, values)
                     self._fit(tuple(members), start)
 
+    def _groups_of(self, component: str) -> list[str]:
+        """Bearing sets that a bearing belongs to."""
+        return [g for g in self.view.groups if component in self.view.sets[g]]
+
     def _sets_of(self, candidate: Candidate) -> list[Candidate]:
         """The same effect in the same form at the sets that a bearing belongs to."""
-        groups = [g for g in self.view.groups if candidate.component in self.view.sets[g]]
+        groups = self._groups_of(candidate.component)
         return [
             item
             for item in self.candidates
@@ -200,7 +228,9 @@ class Search:
                 variant = Variant(candidate, {})
                 intervals[id(candidate)] = found
                 variants.append(variant)
-        return screen(self.problem, fit, variants, self.weights), intervals
+        found = screen(self.problem, fit, variants, self.weights)
+        self._screenings[_identity(fit.candidates)] = found
+        return found, intervals
 
     def _residual(self, fit: Fit) -> tuple[Array, Array]:
         """What a fit leaves of the readings of the first recording that may be used, NaN elsewhere."""
@@ -217,6 +247,7 @@ class Search:
             (effect, Pattern(spot, self.view.spots[spot], effect.name == "unrecorded_cooling"))
             for effect in self.interval_effects
             for spot in effect.places(self.view)
+            if not self.view.switched_on(effect.name, self.view.component(spot))
         ]
         found: list[tuple[IntervalEffect, OnOff]] = []
         for recording in range(len(self.problem.plant.recordings)):

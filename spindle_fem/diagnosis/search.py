@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,6 +114,18 @@ class Screened:
             if len(found) == number:
                 break
         return list(found.values())
+
+    def best_at(self, places: Collection[str], but: Collection[str], number: int) -> list[tuple[int, float]]:
+        """Best variant of each effect and form at some places, with its amplitude, some effects left out."""
+        gain = self.singles()
+        found: dict[tuple[str, str, str], int] = {}
+        for index in np.argsort(-gain):
+            candidate = self.variants[index].candidate
+            if not np.isfinite(gain[index]) or len(found) == number:
+                break
+            if candidate.component in places and candidate.effect not in but:
+                found.setdefault((candidate.effect, candidate.component, candidate.form), int(index))
+        return [(index, self.amplitudes([index])[index]) for index in found.values()]
 
     def _distinct(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Sets of different candidates, no two of one effect at one place."""

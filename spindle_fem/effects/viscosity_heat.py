@@ -13,6 +13,9 @@ from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 from spindle_fem.units import ZERO_CELSIUS_K
 
+# Where the temperature of nominal friction is sought from, °C.
+NOMINAL_TEMPERATURES = (22.0, 35.0, 50.0)
+
 
 class Walther:
     """Viscosity of an oil against temperature, ``log log (ν + 0.7) = A - B log T``, ν in mm²/s.
@@ -114,6 +117,7 @@ class ViscosityHeat(Effect):
                     amplitude="viscosity_exponent",
                     reference=0.4,
                     form=machine.form(group),
+                    starts=[{"nominal_temperature": ZERO_CELSIUS_K + t} for t in NOMINAL_TEMPERATURES],
                 )
             )
         return tuple(found)
