@@ -25,6 +25,8 @@ from spindle_fem.spec.parameters import uncertain_parameters
 Array = NDArray[np.float64]
 
 MOST_MAPS = 64
+# Numbers in remembered sums of operators.
+MOST_SUMS = 4_000_000
 NO_CHANGES: Mapping[str, float] = MappingProxyType({})
 
 
@@ -85,6 +87,9 @@ class FastModel:
         self._base: dict[tuple[float, float], dict[str, float]] = {}
         self._films: dict[tuple[float, float], tuple[Array, float, float]] = {}
         self._maps: dict[tuple[str, bytes, float, float], CoolantMaps] = {}
+        self._sums: dict[tuple[tuple[int, ...], bytes], Array] = {}
+        self._scales: tuple[dict[str, float], dict[str, float]] = ({}, {})
+        self._reached: dict[str, frozenset[str]] = {}
         self.loop = CoolantLoop(spec, model.channel_cells()) if spec.channel is not None else None
         self.fixed_fluids = tuple(
             dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
@@ -161,10 +166,9 @@ class FastModel:
         key = (point.speed, point.ambient_temperature)
         if key not in self._base:
             self._base[key] = self.table.base(point)
-        base = self._base[key]
+        base, scales = self._base[key], self._scales_of(factors)
         found = {
-            name: base[name] * self.table.scale(name, factors) * changes.get(name, 1.0)
-            for name in self.model.coefficient_names
+            name: base[name] * scales[name] * changes.get(name, 1.0) for name in self.model.coefficient_names
         }
         if self.loop is not None:
             found[CHANNEL_FILM] = float(self.channel_film(point, factors, changes)[0].mean())
@@ -193,7 +197,7 @@ class FastModel:
         conductances : mapping of str to float, [W/K]
             From places to the ambient, beside the machine's own films.
         """
-        model, table = self.model, self.table
+        model = self.model
         found = self.coefficients(point, factors, changes)
         values = np.array([found[name] for name in model.coefficient_names])
         conduction = np.tensordot(values, model.operators, axes=1)
@@ -213,11 +217,11 @@ class FastModel:
         output_inputs = np.zeros((len(self.channels), len(self.load_names)))
         conduction_by, loads_by, outputs_by, output_inputs_by = {}, {}, {}, {}
         for parameter in parameters:
-            targets = set(table.targets(parameter))
-            rows = [i for i, n in enumerate(model.coefficient_names) if targets & set(table.groups[n])]
+            reached = self.reached(parameter)
+            rows = tuple(i for i, name in enumerate(model.coefficient_names) if name in reached)
             if not rows:
                 continue
-            conduction_by[parameter] = np.tensordot(values[rows], model.operators[rows], axes=1)
+            conduction_by[parameter] = self._sum(rows, values)
             films = [
                 model.coefficient_names[i] for i in rows if model.coefficient_names[i] in self._fluid_rows
             ]
@@ -233,7 +237,7 @@ class FastModel:
             conduction = conduction + maps.conduction
             self._add_coolant(loads, outputs, output_inputs, maps)
             for parameter in parameters:
-                if set(table.targets(parameter)) & set(table.groups[CHANNEL_FILM]):
+                if CHANNEL_FILM in self.reached(parameter):
                     by = self._coolant(film_derivative, film, rate, friction)
                     conduction_by[parameter] = conduction_by.get(parameter, 0.0) + by.conduction
                     loads_by.setdefault(parameter, np.zeros_like(loads))
@@ -245,6 +249,32 @@ class FastModel:
         return ClassOperators(
             conduction, loads, outputs, output_inputs, conduction_by, loads_by, outputs_by, output_inputs_by
         )
+
+    def _scales_of(self, factors: Mapping[str, float]) -> dict[str, float]:
+        """Factor on every coefficient, made once for the classes of a run."""
+        if self._scales[0] != factors or not self._scales[1]:
+            names = self.model.coefficient_names
+            self._scales = dict(factors), {name: self.table.scale(name, factors) for name in names}
+        return self._scales[1]
+
+    def reached(self, parameter: str) -> frozenset[str]:
+        """Coefficients that a parameter scales."""
+        if parameter not in self._reached:
+            targets = set(self.table.targets(parameter))
+            self._reached[parameter] = frozenset(
+                name for name, group in self.table.groups.items() if targets & set(group)
+            )
+        return self._reached[parameter]
+
+    def _sum(self, rows: tuple[int, ...], values: Array) -> Array:
+        """Weighted sum of some operators, shared by the classes that do not differ in them."""
+        chosen = list(rows)
+        key = (rows, values[chosen].tobytes())
+        if key not in self._sums:
+            if len(self._sums) * self.model.size**2 >= MOST_SUMS:
+                self._sums.clear()
+            self._sums[key] = np.tensordot(values[chosen], self.model.operators[chosen], axes=1)
+        return self._sums[key]
 
     def _fluid_column(self, coefficient: str) -> int:
         surface = coefficient.removeprefix("film.")

@@ -13,7 +13,7 @@ Source: Bank et al. (1985), IEEE Trans. CAD 4, 436-451.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,52 +110,69 @@ def stage_values(
     return before @ propagator.stage.T + weight * ((2.0 - GAMMA) * start + GAMMA * end) @ matrix.T
 
 
+@dataclass(frozen=True, slots=True)
+class MatrixChange:
+    """Derivatives of a system to one parameter; None where it does not enter.
+
+    Attributes
+    ----------
+    conduction, storage : (r, r) ndarray or None
+    load_start, load_end : (n, r) ndarray or None
+        Loads at both ends of each step.
+    """
+
+    conduction: Array | None = None
+    storage: Array | None = None
+    load_start: Array | None = None
+    load_end: Array | None = None
+
+
 def sensitivity_forcing(
     propagator: Propagator | ExactPropagator,
     before: Array,
     stage: Array,
     after: Array,
-    conduction_by: Array | None,
-    storage_by: Array | None,
-    load_start: Array | None,
-    load_end: Array | None,
+    changes: Sequence[MatrixChange],
 ) -> Array:
-    """What one parameter adds to the derivative of ``u_1`` in many equal steps.
+    """What parameters add to the derivative of ``u_1`` in many equal steps.
 
     Parameters
     ----------
     before, stage, after : (n, r) ndarray
         ``u_0``, :func:`stage_values` and ``u_1`` of each step.
-    conduction_by, storage_by : (r, r) ndarray or None
-        Derivatives of the matrices.
-    load_start, load_end : (n, r) ndarray or None
-        Derivatives of the loads at both ends.
+    changes : sequence of MatrixChange
+        One a parameter.
 
     Returns
     -------
-    (n, r) ndarray
+    (n, r, p) ndarray
     """
     if isinstance(propagator, ExactPropagator):
-        return propagator.forcing(before, stage, conduction_by, storage_by, load_start, load_end)
+        columns = [
+            propagator.forcing(before, stage, c.conduction, c.storage, c.load_start, c.load_end)
+            for c in changes
+        ]
+        return np.stack(columns, axis=2) if columns else np.zeros((*before.shape, 0))
     weight = SHARE * propagator.step
-    carried, inverse = propagator.carried, propagator.inverse
-    found = np.zeros_like(before)
-    if conduction_by is not None:
-        if len(before) > len(inverse):
-            # Many steps: small products first.
-            found -= (before + stage) @ (weight * carried @ conduction_by).T
-            found -= after @ (weight * inverse @ conduction_by).T
-        else:
-            found -= weight * (
-                (before + stage) @ conduction_by.T @ carried.T + after @ conduction_by.T @ inverse.T
-            )
-    if storage_by is not None:
-        found += (before - stage) @ (carried @ storage_by).T
-        found += (STAGE_WEIGHT * stage - START_WEIGHT * before - after) @ (inverse @ storage_by).T
-    if load_start is not None:
-        found += (weight * ((2.0 - GAMMA) * load_start + GAMMA * load_end)) @ carried.T
-        found += (weight * load_end) @ inverse.T
-    return found
+    # Defects of both halves of the step; all parameters share the products with the inverses.
+    first = np.zeros((len(changes), *before.shape))
+    second = np.zeros_like(first)
+    by_conduction = [i for i, change in enumerate(changes) if change.conduction is not None]
+    if by_conduction:
+        matrices = np.stack([changes[i].conduction.T for i in by_conduction])
+        first[by_conduction] -= weight * ((before + stage) @ matrices)
+        second[by_conduction] -= weight * (after @ matrices)
+    for own_first, own_second, change in zip(first, second, changes, strict=True):
+        if change.storage is not None:
+            own_first += (before - stage) @ change.storage.T
+            own_second += (STAGE_WEIGHT * stage - START_WEIGHT * before - after) @ change.storage.T
+        if change.load_start is not None:
+            own_first += weight * ((2.0 - GAMMA) * change.load_start + GAMMA * change.load_end)
+            own_second += weight * change.load_end
+    size = before.shape[1]
+    found = first.reshape(-1, size) @ propagator.carried.T
+    found += second.reshape(-1, size) @ propagator.inverse.T
+    return found.reshape(first.shape).transpose(1, 2, 0)
 
 
 def group_steps(step_class: NDArray[np.int64], steps: Array) -> Mapping[tuple[int, float], NDArray[np.int64]]:

@@ -19,6 +19,7 @@ from spindle_fem.reduced.nonlinear import DynamicTerms, solve_added
 from spindle_fem.reduced.open_terms import is_open, with_open_terms
 from spindle_fem.reduced.start import Start
 from spindle_fem.reduced.stepping import (
+    MatrixChange,
     Propagator,
     group_steps,
     load_response,
@@ -310,18 +311,15 @@ class TransientRun:
                 loads = np.hstack((loads, tracks.columns[group]))
             before, after = states[rows], states[rows + 1]
             stage = stage_values(propagator, before, start, end, loads)
-            for column, parameter in enumerate(self.derivatives):
-                load_start, load_end = self._load_derivatives(parameter, key[0], rows, tracks)
-                forcing[rows, :, column] = sensitivity_forcing(
-                    propagator,
-                    before,
-                    stage,
-                    after,
+            changes = [
+                MatrixChange(
                     operators.conduction_by.get(parameter),
                     self.built.storage_by.get(parameter),
-                    load_start,
-                    load_end,
+                    *self._load_derivatives(parameter, key[0], rows, tracks),
                 )
+                for parameter in self.derivatives
+            ]
+            forcing[rows] = sensitivity_forcing(propagator, before, stage, after, changes)
         return forcing
 
     def _load_derivatives(

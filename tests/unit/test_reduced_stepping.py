@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from spindle_fem.reduced.stepping import (
+    MatrixChange,
     build_propagator,
     group_steps,
     load_response,
@@ -98,16 +99,16 @@ def test_forcing_of_the_sensitivities_is_the_derivative_of_the_step(kind):
 
     states, propagator = run(0.0)
     stage = stage_values(propagator, states[:-1], start, end, np.eye(3))
-    forcing = sensitivity_forcing(
-        propagator,
-        states[:-1],
-        stage,
-        states[1:],
-        change if kind == "conduction" else None,
-        change if kind == "storage" else None,
-        shift_start if kind == "loads" else None,
-        shift_end if kind == "loads" else None,
-    )
+    own = {
+        "conduction": MatrixChange(conduction=change),
+        "storage": MatrixChange(storage=change),
+        "loads": MatrixChange(load_start=shift_start, load_end=shift_end),
+    }[kind]
+    # beside others: each keeps its column
+    others = (MatrixChange(), MatrixChange(conduction=np.eye(3)), MatrixChange(storage=np.eye(3)))
+    forcing = sensitivity_forcing(propagator, states[:-1], stage, states[1:], (*others, own))
+    assert not forcing[:, :, 0].any()
+    forcing = forcing[:, :, 3]
     slope = np.zeros(3)
     for added in forcing:
         slope = propagator.advance @ slope + added
