@@ -10,7 +10,7 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint wheel-check reference study clean
+.PHONY: run test setup lint wheel-check reference study book clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
@@ -46,6 +46,13 @@ study: $(READY)
 	$(BIN)/python -m validation.generate --cases 200 --seed 7 -o $(STUDY)
 	$(BIN)/python -m validation.run_study $(STUDY) $(STUDY)/results --jobs 2 --mesh coarse
 	$(BIN)/python -m validation.score $(STUDY) $(STUDY)/results --json $(STUDY)/score.json
+
+# The verification and validation book. STUDY=folder names another concealed study, RECORDINGS another folder of
+# real recordings; chapters without their data are left out by name. PEER_PYTHONS: interpreters with other solvers.
+RECORDINGS ?= ../shared/recordings
+book: $(READY)
+	test -d $(STUDY)/answers || $(MAKE) --no-print-directory study
+	$(BIN)/python -m book -o reports/book --study $(STUDY) --recordings $(RECORDINGS)
 
 clean:
 	rm -rf $(VENV) build dist runs .pytest_cache .ruff_cache .hypothesis

@@ -9,6 +9,20 @@ from typing import Any
 
 import numpy as np
 
+# What is asked of a diagnosis: key of the summary, words, relation, bound; a share unless said otherwise.
+ASKED = (
+    ("false_alarms", "consistent recordings flagged as mismatch", "<=", 0.02),
+    ("clear_single_first", "clear single effects named first", ">=", 0.95),
+    ("clear_single_within_three", "clear single effects within the first three sets", ">=", 0.99),
+    ("clear_pair_exact", "clear pairs named", ">=", 0.85),
+    ("place_of_named", "place of a rightly named effect right", ">=", 0.95),
+    ("interval_coverage", "stated 90 % intervals that hold the truth", "within", (0.85, 0.95)),
+    ("heldout_after_over_noise.median", "held-out error after over noise, median", "<=", 1.05),
+    ("heldout_after_over_noise.worst", "held-out error after over noise, worst", "<=", 1.5),
+    ("ambiguous_truth_kept", "undecidable cases with the truth among the sets named", ">=", 0.95),
+    ("confident_wrong", "confident (above 0.9) and wrong", "<=", 0.01),
+    ("wall_s.worst", "wall time of a case on one core of a shared machine, worst, s", "<=", 60.0),
+)
 VERDICTS = ("consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained")
 FAULTY_ABOVE = 0.9
 
@@ -37,7 +51,10 @@ def true_set(answer: dict[str, Any]) -> list[dict[str, Any]]:
 def ranked_sets(diagnosis: dict[str, Any]) -> list[tuple[list[dict[str, Any]], float]]:
     """The findings and the alternatives with their probabilities, most probable first."""
     findings = diagnosis["findings"]
-    stated = min((f["probability"] for f in findings), default=1.0)
+    # A finding's own probability is its share of its set's, which stands beside it.
+    stated = diagnosis.get("set_probability")
+    if stated is None:
+        stated = min((f["probability"] for f in findings), default=1.0)
     sets = [(findings, float(stated))]
     sets += [(a["findings"], float(a["probability"])) for a in diagnosis.get("alternatives", [])]
     return sets
@@ -53,8 +70,6 @@ def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | 
     truth = true_set(answer)
     sets = ranked_sets(diagnosis)
     found, probability = sets[0]
-    if not found and diagnosis["verdict"] == "consistent":
-        probability = float(diagnosis.get("probability_consistent", 1.0))
     within = next((i + 1 for i, (s, _) in enumerate(sets) if matches(s, truth)), None)
     named = next((f for f in found for t in truth if f["effect"] == t["effect"]), None)
     places = [f["component"] in t["components"] for f in found for t in truth if f["effect"] == t["effect"]]
@@ -204,6 +219,8 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
         "ambiguous_called": _share(twins, "called_ambiguous"),
         "confident_wrong": _share(rows, "confident_wrong"),
         "reliability": reliability(rows),
+        "by_strength": by_strength(rows),
+        "effect_confusion": effect_confusion(rows),
         "interval_coverage": _share(covered, "inside")
         | {
             "by_parameter": {
@@ -240,6 +257,95 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
     }
 
 
+def held_against_asked(summary: dict[str, Any]) -> list[dict[str, Any]]:
+    """Every figure that is asked for: what it is, on how many cases, and whether it is met.
+
+    >>> one = held_against_asked({"false_alarms": {"share": 0.01, "of": 100}})[0]
+    >>> one["value"], one["met"]
+    (0.01, True)
+    """
+    rows = []
+    for key, words, relation, bound in ASKED:
+        name, _, part = key.partition(".")
+        found = summary.get(name) or {}
+        value = found.get(part or "share")
+        met = None
+        if value is not None:
+            met = {
+                "<=": lambda v, b: v <= b,
+                ">=": lambda v, b: v >= b,
+                "within": lambda v, b: b[0] <= v <= b[1],
+            }[relation](value, bound)
+        share = not part
+        low, high = wilson(value, found["of"]) if share and value is not None else (None, None)
+        rows.append(
+            {
+                "key": key,
+                "words": words,
+                "relation": relation,
+                "bound": bound,
+                "value": value,
+                "of": found.get("of", 0),
+                "low": low,
+                "high": high,
+                "share": share,
+                "met": met,
+            }
+        )
+    return rows
+
+
+def wilson(share: float, number: int, z: float = 1.645) -> tuple[float, float]:
+    """90 % interval of a share that was seen on a number of cases (Wilson 1927).
+
+    >>> [round(x, 3) for x in wilson(1.0, 50)]
+    [0.949, 1.0]
+    """
+    if number == 0:
+        return 0.0, 1.0
+    spread = z * np.sqrt(share * (1.0 - share) / number + z * z / (4.0 * number * number))
+    middle, scale = share + z * z / (2.0 * number), 1.0 + z * z / number
+    return max(0.0, float((middle - spread) / scale)), min(1.0, float((middle + spread) / scale))
+
+
+def by_strength(
+    rows: list[dict[str, Any]], edges: tuple[float, ...] = (0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 1e9)
+) -> list[dict[str, Any]]:
+    """What became of concealed effects, by the ratio of what they leave after a re-fit to the noise."""
+    out = []
+    for low, high in itertools.pairwise(edges):
+        here = [r for r in rows if r["truth"] and r["ratio"] is not None and low <= r["ratio"] < high]
+        if here:
+            right = [r["exact"] for r in here]
+            kept = [not r["exact"] and r["rank"] is not None for r in here]
+            silent = [not r["exact"] and r["rank"] is None and r["verdict"] == "consistent" for r in here]
+            out.append(
+                {
+                    "from": low,
+                    "to": high,
+                    "cases": len(here),
+                    "named": sum(right),
+                    "among_the_sets": sum(kept),
+                    "consistent": sum(silent),
+                    "other": len(here) - sum(right) - sum(kept) - sum(silent),
+                }
+            )
+    return out
+
+
+def effect_confusion(rows: list[dict[str, Any]]) -> dict[str, dict[str, int]]:
+    """Of every concealed single effect, what was named first."""
+    out: dict[str, Counter[str]] = {}
+    for row in rows:
+        if len(row["truth"]) > 1:
+            continue
+        true = row["truth"][0].split("@")[0] if row["truth"] else "nothing"
+        named = " + ".join(sorted(f.split("@")[0] for f in row["found"])) or row["verdict"]
+        named = "nothing" if named == "consistent" else named
+        out.setdefault(true, Counter())[named] += 1
+    return {true: dict(counts) for true, counts in sorted(out.items())}
+
+
 def _quantiles(values: list[float]) -> dict[str, Any]:
     if not values:
         return {"of": 0}
@@ -272,7 +378,7 @@ def score_study(study: Path, results: Path) -> tuple[dict[str, Any], list[dict[s
 
 def _print(summary: dict[str, Any]) -> None:
     for key, value in summary.items():
-        if key in ("wrong", "confusion", "reliability"):
+        if key in ("wrong", "confusion", "reliability", "by_strength", "effect_confusion"):
             continue
         print(f"{key:42s} {json.dumps(value) if isinstance(value, (dict, list)) else value}")
     print("\nreliability of the first set")
@@ -307,6 +413,11 @@ def main(arguments: list[str] | None = None) -> None:
     target = given.json or given.results / "score.json"
     target.write_text(json.dumps({"summary": summary, "cases": rows}, indent=1), encoding="utf-8")
     _print(summary)
+    print("\nasked for")
+    for row in held_against_asked(summary):
+        met = {True: "met", False: "NOT MET", None: "no case"}[row["met"]]
+        bound = f"{row['relation']} {row['bound']}"
+        print(f"  {row['words']:62s} {row['value']!s:>8} {bound}  of {row['of']}  {met}")
 
 
 if __name__ == "__main__":

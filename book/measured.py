@@ -1,0 +1,180 @@
+"""Comparisons that the tests made, as numbers: measured, reference, allowed, share of it used."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from book.work import ROOT, Desk, Step
+from spindle_fem.errors import SpindleFemError
+
+_NUMBER = r"[-+]?(?:\d+\.\d*|\.\d+|\d+)(?:[eE][-+]?\d+)?"
+_BAND = re.compile(rf"({_NUMBER}) ± ({_NUMBER})")
+_LIMIT = re.compile(rf"^\(?({_NUMBER})\)?\s*(<=|>=|<|>)\s*\(?({_NUMBER})\)?$")
+# What pytest adds beneath a comparison: where values come from, and a table of unequal ones.
+_APPENDED = re.compile(r"\n\s*(?:\+|comparison failed)")
+_WRAPPED = re.compile(rf"(?:np\.)?(?:float64|float32|int64)\(({_NUMBER})\)")
+
+
+class TestsFailedError(SpindleFemError):
+    """A test failed, so there is nothing that its chapter could show."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One comparison of a test; ``used`` is the deviation over what is allowed, for equalities."""
+
+    source: str
+    relation: str
+    measured: float | None
+    reference: float | None
+    allowed: float | None
+    used: float | None
+    text: str
+    values: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    """One test: what it says, what it compared, and the errors of its refinements."""
+
+    identifier: str
+    name: str
+    says: str
+    checks: tuple[Check, ...]
+    rate: Mapping[str, Any] | None
+    seconds: float
+
+    @property
+    def file(self) -> str:
+        """File of the test."""
+        return self.identifier.partition("::")[0]
+
+    @property
+    def title(self) -> str:
+        """What it says, or its name in words."""
+        name, _, case = self.name.partition("[")
+        words = self.says.split("\n")[0].rstrip(".") or name.removeprefix("test_").replace("_", " ")
+        return f"{words} [{case.rstrip(']')}]" if case else words
+
+
+def run_tests(desk: Desk) -> Step:
+    """Run the verification and published tests and keep their figures.
+
+    Raises
+    ------
+    TestsFailedError
+    """
+
+    def make(folder: Path) -> None:
+        command = [
+            sys.executable,
+            *("-m", "pytest", "-q", "-p", "book.recorder", "-p", "no:cacheprovider"),
+            *("-o", "enable_assertion_pass_hook=true", "-o", "verbosity_assertions=2"),
+            *("--figures", str((folder / "figures.json").resolve())),
+            *("tests/verification", "tests/published"),
+        ]
+        # Modules compiled without the hook would stay silent.
+        outside = os.environ | {"PYTHONPYCACHEPREFIX": str((folder / "compiled").resolve())}
+        outside["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+        done = subprocess.run(command, cwd=ROOT, env=outside, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise TestsFailedError(
+                "tests/verification, tests/published",
+                f"pytest ended with {done.returncode}:\n{done.stdout[-3000:]}{done.stderr[-1000:]}",
+                "Mend what failed; the book shows figures of tests that hold.",
+            )
+
+    return desk.step("tests", make, sources=("tool", "tests"))
+
+
+def read_tests(path: Path) -> list[Test]:
+    """Tests of a file that the recorder wrote."""
+    return [
+        Test(
+            item["test"],
+            item["name"],
+            item["says"],
+            tuple(_check(check) for check in item["checks"]),
+            item["rate"],
+            float(item.get("seconds", 0.0)),
+        )
+        for item in json.loads(path.read_text(encoding="utf-8"))
+    ]
+
+
+def _check(item: Mapping[str, Any]) -> Check:
+    if "text" not in item:
+        used = _share(item["measured"], item["reference"], item["allowed"])
+        return Check(
+            item["source"],
+            "=",
+            item["measured"],
+            item["reference"],
+            item["allowed"],
+            used,
+            "",
+            item["values"],
+        )
+    return comparison_of(item["source"], item["text"])
+
+
+def comparison_of(source: str, text: str) -> Check:
+    """Numbers of an assertion as pytest explains it.
+
+    >>> check = comparison_of("rate == pytest.approx(2.0, abs=0.1)", "np.float64(1.98) == 2.0 ± 0.1")
+    >>> check.measured, check.reference, check.allowed, round(check.used, 2)
+    (1.98, 2.0, 0.1, 0.2)
+    >>> comparison_of("error < 1e-8", "3e-10 < 1e-08").relation
+    '<'
+    """
+    source = " ".join(source.split())
+    text = _WRAPPED.sub(r"\1", _APPENDED.split(text)[0].replace("\n", " ")).strip()
+    left, equals, right = text.partition(" == ")
+    if equals:
+        if "±" in left and "±" not in right:
+            left, right = right, left
+        bands = [(float(a), float(b)) for a, b in _BAND.findall(right)]
+        found = [float(value) for value in re.findall(_NUMBER, left)]
+        if bands and len(bands) == len(found):
+            shares = [
+                _share(value, reference, allowed)
+                for value, (reference, allowed) in zip(found, bands, strict=True)
+            ]
+            worst = max(range(len(shares)), key=shares.__getitem__)
+            return Check(source, "=", found[worst], *bands[worst], shares[worst], text, len(found))
+    limit = _LIMIT.match(text)
+    if limit:
+        value, relation, bound = limit.groups()
+        return Check(source, relation, float(value), float(bound), None, None, text)
+    return Check(source, "", None, None, None, None, text)
+
+
+def _share(value: float, reference: float, allowed: float) -> float:
+    difference = abs(value - reference)
+    if difference == 0.0:
+        return 0.0
+    return difference / allowed if allowed else math.inf
+
+
+def worst_by_assertion(checks: Sequence[Check]) -> list[tuple[Check, int]]:
+    """Of an assertion that ran several times the tightest one, with the number of values compared."""
+    kept: dict[tuple[str, str], tuple[Check, int]] = {}
+    for check in checks:
+        key = (check.source, check.relation)
+        before, count = kept.get(key, (check, 0))
+        tighter = check if (check.used or 0.0) > (before.used or 0.0) else before
+        if check.relation in ("<", "<=") and (check.measured or 0.0) > (before.measured or 0.0):
+            tighter = check
+        if check.relation in (">", ">=") and (check.measured or 0.0) < (before.measured or 0.0):
+            tighter = check
+        kept[key] = (tighter, count + check.values)
+    return list(kept.values())

@@ -1,0 +1,62 @@
+"""Twenty concealed cases: a benchmark of what the diagnosis is worth, run by hand (``-m slow``).
+
+The floors are modest, so that they fail on damage and not on one unlucky case; the figures that are
+asked for stand in the book's chapter of the concealed study, on two hundred cases.
+"""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from validation import generate, run_study  # noqa: E402
+from validation.score import score_study  # noqa: E402
+
+CASES, SEED = 20, 104729
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def scored(tmp_path_factory):
+    study = tmp_path_factory.mktemp("study")
+    generate.main(["--cases", str(CASES), "--seed", str(SEED), "-o", str(study)])
+    run_study.main([str(study), str(study / "results"), "--jobs", "2", "--mesh", "coarse"])
+    summary, rows = score_study(study, study / "results")
+    print({key: value for key, value in summary.items() if key not in ("wrong", "effect_confusion")})
+    return summary, rows
+
+
+def test_every_case_is_diagnosed(scored):
+    summary, rows = scored
+    assert summary["failed"] == []
+    assert len(rows) == CASES
+
+
+def test_false_alarms_at_most_one(scored):
+    alarms = [row["case"] for row in scored[1] if row["false_alarm"]]
+    assert len(alarms) <= 1, alarms
+
+
+def test_most_clear_single_effects_are_named_first(scored):
+    clear = [row for row in scored[1] if len(row["truth"]) == 1 and row["clear"] and not row["foreign"]]
+    named = [row for row in clear if row["exact"]]
+    assert len(clear) >= 4
+    assert len(named) >= 0.8 * len(clear), [row["case"] for row in clear if not row["exact"]]
+
+
+def test_most_verdicts_are_acceptable(scored):
+    assert scored[0]["verdict_acceptable"]["share"] >= 0.75
+
+
+def test_places_of_named_effects_are_right(scored):
+    assert scored[0]["place_of_named"]["share"] >= 0.8
+
+
+def test_error_after_comes_near_the_noise(scored):
+    found = scored[0]["heldout_after_over_noise"]
+    assert found["of"] >= 5
+    assert found["median"] <= 1.25
