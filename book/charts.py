@@ -24,10 +24,10 @@ def matrix(
     across = list(dict.fromkeys(name for row in counts.values() for name in row))
     down = list(counts)
     values = np.array([[counts[a].get(b, 0) for b in across] for a in down], dtype=float)
-    height = 200 + 46 * len(down) + 130
+    height = 100 + 46 * len(down) + 190
     figure = new_figure(height)
     set_title(figure, title, notes)
-    axes = figure.add_axes((0.22, 190 / height, 0.75, 46 * len(down) / height))
+    axes = figure.add_axes((0.2, 190 / height, 0.77, 46 * len(down) / height))
     shown = np.where(values > 0, values, np.nan)
     axes.imshow(shown, cmap=_COUNTS, norm=LogNorm(0.8, max(values.max(), 2.0)), aspect="auto")
     for i, j in zip(*np.nonzero(values), strict=True):
@@ -57,9 +57,9 @@ def matrix(
 @styled
 def calibration_curve(bins: Sequence[Mapping[str, Any]]) -> Figure:
     """Stated probability of the first set against how often it was right, with 90 % intervals."""
-    figure = new_figure(720, 1100)
+    figure = new_figure(760)
     set_title(figure, "Stated probability against how often it was right")
-    axes = figure.add_axes((0.1, 0.12, 0.85, 0.74))
+    axes = figure.add_axes((0.07, 0.11, 0.9, 0.77))
     axes.plot([0, 1], [0, 1], color=MUTED, linewidth=1.0, linestyle="--", label="perfectly calibrated")
     stated = np.array([row["stated"] for row in bins])
     right = np.array([row["right"] for row in bins])
@@ -70,14 +70,14 @@ def calibration_curve(bins: Sequence[Mapping[str, Any]]) -> Figure:
         axes.annotate(
             f"{row['cases']} cases",
             (row["stated"], row["right"]),
-            xytext=(-8, -4),
+            xytext=(-6, 5),
             textcoords="offset points",
             ha="right",
-            va="top",
+            va="bottom",
             fontsize=8.5,
             color=MUTED,
         )
-    axes.set(xlim=(0, 1.02), ylim=(0, 1.02))
+    axes.set(xlim=(0, 1.02), ylim=(-0.03, 1.05))
     axes.set_xlabel("mean stated probability of the first set")
     axes.set_ylabel("share of cases in which it was an acceptable answer")
     axes.legend(loc="upper left")
@@ -176,7 +176,12 @@ def errors_against_noise(rows: Sequence[Mapping[str, Any]]) -> Figure:
     axes.plot(at[wrong], after[wrong], "D", color=WRONG, markersize=4.5, label="after, truth not named first")
     axes.axhline(1.0, color=INK, linewidth=0.9, linestyle="--", label="noise")
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")
+    ticks = [
+        tick for tick in (0.5, 1, 2, 3, 5, 10, 20, 50, 100) if tick <= 1.2 * max(before.max(), after.max())
+    ]
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.set_ylim(0.85 * min(1.0, after.min()), 1.6 * max(before.max(), after.max()))
     axes.set_xlim(-1, len(shown))
     axes.set_xlabel("cases")
     axes.set_ylabel("held-out error / noise")
@@ -187,9 +192,9 @@ def errors_against_noise(rows: Sequence[Mapping[str, Any]]) -> Figure:
 @styled
 def times_chart(walls: Sequence[float], limit: float) -> Figure:
     """Distribution of the wall times."""
-    figure = new_figure(420, 1100)
+    figure = new_figure(460)
     set_title(figure, "Wall time of a diagnosis")
-    axes = figure.add_axes((0.09, 0.19, 0.87, 0.62))
+    axes = figure.add_axes((0.06, 0.17, 0.91, 0.66))
     axes.hist(walls, bins=np.linspace(0, max(*walls, limit) * 1.05, 32), color=CYCLE[0])
     axes.axvline(limit, color=CYCLE[1], linewidth=1.4, label=f"{limit:g} s asked for")
     axes.set_xlabel("wall time / s")

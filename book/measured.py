@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import math
+import operator
 import os
 import re
 import subprocess
@@ -18,10 +20,19 @@ from spindle_fem.errors import SpindleFemError
 
 _NUMBER = r"[-+]?(?:\d+\.\d*|\.\d+|\d+)(?:[eE][-+]?\d+)?"
 _BAND = re.compile(rf"({_NUMBER}) ± ({_NUMBER})")
-_LIMIT = re.compile(rf"^\(?({_NUMBER})\)?\s*(<=|>=|<|>)\s*\(?({_NUMBER})\)?$")
+_LIMIT = re.compile(r"^([^<>=]+?)\s*(<=|>=|<|>)\s*([^<>=]+)$")
 # What pytest adds beneath a comparison: where values come from, and a table of unequal ones.
 _APPENDED = re.compile(r"\n\s*(?:\+|comparison failed)")
 _WRAPPED = re.compile(rf"(?:np\.)?(?:float64|float32|int64)\(({_NUMBER})\)")
+
+_SIGNS = {ast.USub: operator.neg, ast.UAdd: operator.pos}
+_OPERATIONS = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
 
 
 class TestsFailedError(SpindleFemError):
@@ -153,9 +164,32 @@ def comparison_of(source: str, text: str) -> Check:
             return Check(source, "=", found[worst], *bands[worst], shares[worst], text, len(found))
     limit = _LIMIT.match(text)
     if limit:
-        value, relation, bound = limit.groups()
-        return Check(source, relation, float(value), float(bound), None, None, text)
+        value, bound = number_of(limit[1]), number_of(limit[3])
+        if value is not None and bound is not None:
+            return Check(source, limit[2], value, bound, None, None, text)
     return Check(source, "", None, None, None, None, text)
+
+
+def number_of(text: str) -> float | None:
+    """Value of a number or of a sum, product, power of numbers; None of anything else.
+
+    >>> number_of("(0.6 * 0.5)"), number_of("288.15 - 1e-09 > 3"), number_of("'laminar'")
+    (0.3, None, None)
+    """
+    try:
+        return _value(ast.parse(text.strip(), mode="eval").body)
+    except (SyntaxError, ValueError, ZeroDivisionError, OverflowError):
+        return None
+
+
+def _value(node: ast.AST) -> float:
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        return float(node.value)
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _SIGNS:
+        return _SIGNS[type(node.op)](_value(node.operand))
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
+        return _OPERATIONS[type(node.op)](_value(node.left), _value(node.right))
+    raise ValueError(f"{type(node).__name__} is no number")
 
 
 def _share(value: float, reference: float, allowed: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from book.measured import Test, worst_by_assertion
+from book.measured import Check, Test, worst_by_assertion
 from spindle_fem.reporting.document import Table
 from spindle_fem.reporting.tables import column, rows_of, significant
 
@@ -25,7 +25,7 @@ def comparisons(tests: Sequence[Test], caption: str, folded: str = "") -> Table:
                     check.source if len(check.source) < 90 else check.source[:87] + "…",
                     str(count),
                     significant(check.measured, 6),
-                    _RELATIONS[check.relation] + significant(check.reference, 6),
+                    _reference(check),
                     "" if check.allowed is None else significant(check.allowed, 2),
                     "" if check.used is None else f"{100 * check.used:.0f} %",
                 ]
@@ -41,6 +41,11 @@ def comparisons(tests: Sequence[Test], caption: str, folded: str = "") -> Table:
         column("used", number=True),
     )
     return Table(columns, rows_of(rows), caption, folded)
+
+
+def _reference(check: Check) -> str:
+    digits = 6 if check.relation == "=" else 3
+    return _RELATIONS[check.relation] + significant(check.reference, digits)
 
 
 def tightest(tests: Sequence[Test]) -> tuple[int, int, float]:

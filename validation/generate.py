@@ -331,6 +331,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--no-identifiability", action="store_true")
     given = parser.parse_args(arguments)
     model = load_reduced(given.cache)
+    given.output.mkdir(parents=True, exist_ok=True)
+    drawn = {"schema": "spindle-fem/concealed-study/1", "seed": given.seed, "cases": given.cases}
+    (given.output / "study.json").write_text(json.dumps(drawn, indent=1), encoding="utf-8")
     for number in range(given.first, given.first + given.cases):
         began = clock.perf_counter()
         answer = make_case(model, given.output, given.seed, number, identify=not given.no_identifiability)

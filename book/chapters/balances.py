@@ -83,7 +83,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
         ],
         evidence=[
             "No heat is lost between friction, solids, joints, films, balls, gap air and oil.",
-            "What the reports print does not depend on the mesh at the digits that they print.",
+            "What the reports print depends on the mesh by a few hundredths of a kelvin.",
         ],
         not_evidence=[
             "A balance closes for wrong coefficients as well as for right ones.",

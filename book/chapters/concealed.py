@@ -88,7 +88,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
                 pictures.add(
                     "strength",
                     charts.outcome_by_strength(summary["by_strength"]),
-                    "Strong effects are named, those below the noise rightly disappear.",
+                    "Below a third of the noise an effect cannot be seen and consistent is the right answer.",
                 ),
             ],
         ),

@@ -115,7 +115,7 @@ def _rate_table(rates: list[tuple[Test, int, float]]) -> Table:
         column("element order", mark=True),
         column("norm"),
         column("cells or steps"),
-        column("errors / K (H1: K/m, all in units of the case)"),
+        column("errors / K (H1: K/m)"),
         column("rate", number=True),
         column("expected", number=True),
     )
@@ -141,7 +141,10 @@ def rate_plot(tests: list[Test]) -> Figure:
             slope, level = np.polyfit(np.log(levels), np.log(errors), 1)
             colour = CYCLE[at % len(CYCLE)]
             name = test.title.split("[")[0].split(";")[0].strip()
-            label = f"{_short(name)}{_case(test)}, {_norm_name(test, number)}: {-slope:.2f}"
+            norm = _norm_name(test, number).removesuffix(" norm").removesuffix(" seminorm")
+            label = f"{_short(name)}{_case(test)}, {norm}: {-slope:.2f}"
+            if test.rate["order"] is None:
+                label = f"manufactured solution, {norm}: {-slope:.2f}"
             own.loglog(levels, errors, "o", color=colour, markersize=5)
             own.loglog(levels, np.exp(level) * levels**slope, color=colour, linewidth=1.3, label=label)
         own.set_title(title)
@@ -155,7 +158,7 @@ def rate_plot(tests: list[Test]) -> Figure:
 
 
 def _short(name: str) -> str:
-    return name if len(name) < 34 else name[:32] + "…"
+    return name if len(name) < 30 else name[:28].rstrip() + "…"
 
 
 def _case(test: Test) -> str:

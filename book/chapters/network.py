@@ -93,7 +93,6 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
         not_evidence=[
             "Films, friction and coolant are the same functions in both: an error in them is in both.",
         ],
-        tone="good",
     )
 
 
