@@ -139,9 +139,15 @@ def simulate_recordings(
 
 
 def fast_model_for(
-    spec: MachineSpec, recordings: Sequence[Recording], *, progress: Progress = lambda stage: None
+    spec: MachineSpec,
+    recordings: Sequence[Recording],
+    *,
+    as_given: bool = False,
+    progress: Progress = lambda stage: None,
 ) -> FastModel:
     """Reduced model whose range holds the speeds of some recordings.
+
+    ``as_given`` says that the machine's coefficients will not be moved.
 
     Friction and ball contacts that follow their films are solved once over the
     speeds and thrusts of the recordings; the model's ``spec`` then has a heat
@@ -155,14 +161,16 @@ def fast_model_for(
     """
     options = _options_for(spec, recordings)
     if not needs_map(spec):
-        return FastModel(reduced_model_of(spec, options=options, progress=progress), spec)
+        model = reduced_model_of(spec, options=options, as_given=as_given, progress=progress)
+        return FastModel(model, spec)
     progress("friction over speed, thrust and film temperature")
     thrusts = thrusts_between(spec, *_recorded_range(recordings, "thrust", spec.operation.thrust))
     friction = tabulate_friction(spec, options.highest_speed_of(spec), thrusts)
     table = tabulated_machine(spec, friction)
     term = FilmHeat(friction, spec, table)
     made_of = operators_machine(table, term)
-    return FastModel(reduced_model_of(made_of, options=options, progress=progress), table, (term,))
+    model = reduced_model_of(made_of, options=options, as_given=as_given, progress=progress)
+    return FastModel(model, table, (term,))
 
 
 def _options_for(spec: MachineSpec, recordings: Sequence[Recording]) -> ReductionOptions:
@@ -201,7 +209,7 @@ def _centred(
 def _simulate_geometry(
     spec: MachineSpec, recording: Recording, calibration: Sequence[Recording], progress: Progress
 ) -> Simulation:
-    fast = fast_model_for(spec, (recording, *calibration), progress=progress)
+    fast = fast_model_for(spec, (recording, *calibration), as_given=not calibration, progress=progress)
     effects = effects_on(spec.effects, fast, recording)
     result = None
     if calibration:

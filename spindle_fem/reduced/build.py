@@ -21,7 +21,8 @@ from spindle_fem.reduced.coefficients import (
     free_parameters,
     gap_radii_of,
 )
-from spindle_fem.reduced.model import ReducedModel, project, reduced_digest, reduced_path
+from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.model import ReducedModel, family_of, project, reduced_digest, reduced_path
 from spindle_fem.reduced.probe_places import NEAR
 from spindle_fem.reduced.snapshots import (
     Sample,
@@ -163,6 +164,7 @@ def reduced_model_of(
     spec: MachineSpec,
     *,
     options: ReductionOptions | None = None,
+    as_given: bool = False,
     progress: Progress = lambda stage: None,
 ) -> ReducedModel:
     """Reduced model of a machine, from the cache where it was made before.
@@ -171,6 +173,10 @@ def reduced_model_of(
     ----------
     spec : MachineSpec
     options : ReductionOptions, optional
+    as_given : bool
+        Whether the coefficients stay as the definition gives them; a model of
+        a machine that differs in coefficients only will then do, where its
+        range holds these.
     progress : callable
         Told each stage by name as it begins.
     """
@@ -179,10 +185,24 @@ def reduced_model_of(
     found = ReducedModel.load(reduced_path(digest))
     if found is not None and found.digest == digest:
         return found
+    for path in family_of(digest) if as_given else []:
+        found = ReducedModel.load(path)
+        if found is not None and _holds(found, spec, chosen.highest_speed_of(spec)):
+            return found
     machine = prepare_machine(spec, progress=progress)
     model = build_reduced_model(machine, chosen, progress=progress)
     model.save(reduced_path(digest))
     return model
+
+
+def _holds(model: ReducedModel, spec: MachineSpec, highest_speed: float) -> bool:
+    """Whether every coefficient of a machine is in the range of a model, from rest to a speed (rad/s)."""
+    fast = FastModel(model, spec)
+    values = [fast.table.capacities()]
+    for share in SPEED_SHARES:
+        point = replace(OperatingPoint.of(spec), speed=share * highest_speed)
+        values.append(fast.coefficients(point, {}))
+    return not any(model.outside_range(item) for item in values)
 
 
 def build_reduced_model(

@@ -118,12 +118,25 @@ def test_it_is_found_again_in_the_cache(machine, monkeypatch, tmp_path):
     small = ReductionOptions(samples=1, checks=1, sigmas=0.1, tolerance=1e-3, error=5.0, largest=60)
     from spindle_fem.reduced import build
 
-    monkeypatch.setattr(build, "prepare_machine", lambda spec, progress=None: machine)
+    made = []
+
+    def prepare(spec, progress=None):
+        made.append(spec)
+        return replace(machine, spec=spec)
+
+    monkeypatch.setattr(build, "prepare_machine", prepare)
     first = reduced_model_of(machine.spec, options=small)
     stages = []
     again = reduced_model_of(machine.spec, options=small, progress=stages.append)
     assert stages == []
     assert np.array_equal(first.operators, again.operators)
+    # a machine with other coefficients, within the range of the first and beyond it
+    near, far = (with_parameters(machine.spec, {"film.outside": factor}) for factor in (1.02, 2.0))
+    assert reduced_model_of(near, options=small, as_given=True).digest == first.digest
+    assert made == [machine.spec]
+    assert reduced_model_of(far, options=small, as_given=True).digest != first.digest
+    assert reduced_model_of(near, options=small).digest != first.digest
+    assert made == [machine.spec, far, near]
     assert reduced_model_of(machine.spec, options=replace(small, tolerance=1e-2)).digest != first.digest
 
 
@@ -205,7 +218,7 @@ def test_simulate_writes_what_every_channel_should_have_read(fast, made, tmp_pat
 def test_speeds_beyond_the_table_get_a_range_of_their_own(fast, monkeypatch):
     asked = []
 
-    def remember(spec, *, options, progress):
+    def remember(spec, *, options, as_given, progress):
         asked.append(options)
         return fast.model
 

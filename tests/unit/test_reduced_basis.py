@@ -144,3 +144,8 @@ def test_the_identity_of_a_model_follows_coefficients_but_not_words_or_operation
     assert reduced_digest(plain, {}) == reduced_digest(same, {})
     assert reduced_digest(plain, {}) != reduced_digest(other, {})
     assert reduced_digest(plain, {}) != reduced_digest(plain, {"tolerance": 1.0})
+    warmer = load_machine("recorded_spindle", ["coolant.film_factor=1.2"])
+    digests = [reduced_digest(item, {}) for item in (plain, warmer, other)]
+    family = [digest.partition("-")[0] for digest in digests]
+    assert family[0] == family[1] != family[2]
+    assert digests[0] != digests[1]
