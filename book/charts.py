@@ -10,7 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
 from spindle_fem.reporting.figures import CYCLE, INK, MUTED, new_figure, set_title, styled
-from validation.score import wilson
+from validation.asked import wilson
 
 GOOD, FAIR, SILENT, WRONG = "#1b6e3c", "#8fc3a1", "#c9d1d9", "#a3131c"
 _COUNTS = LinearSegmentedColormap.from_list("counts", ["#eef4f9", "#0b5c94"])

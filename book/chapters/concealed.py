@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from book import charts
+from book.causes import CAUSES, cause_counts, read_causes, study_seed, wrong_table
 from book.page import Chapter, Pictures
-from book.work import ROOT, Desk
-from spindle_fem.errors import BadInputError
+from book.work import Desk
 from spindle_fem.reporting.document import Bullets, Notice, Section, Table, Text
 from spindle_fem.reporting.output import replace_text
 from spindle_fem.reporting.tables import column, number, rows_of, significant
-from validation.score import held_against_asked, score_study
+from validation.asked import held_against_asked
+from validation.score import score_study
 
 TITLE = "Concealed study: an independent machine, answers hidden"
-CAUSES = ROOT / "book" / "causes.toml"
-OPEN = "not looked into yet"
 
 
 def make(desk: Desk, pictures: Pictures) -> Chapter:
@@ -29,6 +26,8 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
         "python -m validation.generate --cases 200 --seed SEED -o runs/study",
         "python -m validation.run_study runs/study runs/study/results --jobs 2 --mesh coarse",
         "python -m validation.score runs/study runs/study/results",
+        "python -m validation.run_study runs/study runs/looked_into --case case_0001 --report  # one case "
+        "with pictures",
         "make study book STUDY=runs/study",
     ]
     if not (desk.study / "answers").is_dir():
@@ -108,8 +107,8 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
                     "is what the concealed effects leave on the most affected channel after a re-fit, "
                     "over noise."
                 ),
-                _wrong_table(wrong, causes),
-                *_cause_counts(wrong, causes),
+                wrong_table(wrong, causes),
+                *cause_counts(wrong, causes),
             ],
         ),
     ]
@@ -144,33 +143,6 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
         ],
         tone="good" if not unmet else "",
     )
-
-
-def study_seed(study: Path) -> int | None:
-    """Seed that the study was drawn with; None where it is not written down."""
-    path = study / "study.json"
-    return int(json.loads(path.read_text(encoding="utf-8"))["seed"]) if path.is_file() else None
-
-
-def read_causes(path: Path, seed: int | None) -> dict[str, dict[str, str]]:
-    """Causes written by hand, by case, for one seed.
-
-    Raises
-    ------
-    BadInputError
-        A case stands there twice, or without a cause.
-    """
-    found: dict[str, dict[str, str]] = {}
-    for entry in tomllib.loads(path.read_text(encoding="utf-8")).get("case", []):
-        name = f"{path.name}: {entry.get('case', '?')} of seed {entry.get('seed', '?')}"
-        if not {"seed", "case", "kind", "cause"} <= entry.keys():
-            raise BadInputError(name, "is incomplete.", "Give seed, case, kind and cause.")
-        if entry["seed"] != seed:
-            continue
-        if entry["case"] in found:
-            raise BadInputError(name, "stands there twice.", "Keep one.")
-        found[entry["case"]] = entry
-    return found
 
 
 def _short(row: Mapping[str, Any]) -> str:
@@ -306,7 +278,20 @@ def _percent(found: Mapping[str, Any]) -> str:
 def _intervals(
     summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], pictures: Pictures
 ) -> list[Any]:
-    covered = [item for row in rows for item in row["coverage"]]
+    every = [item for row in rows for item in row["coverage"]]
+    covered = [item for item in every if item["same_extent"]]
+    other = len(every) - len(covered)
+    outside = [
+        [
+            item["case"],
+            f"{item['effect']}: {item['parameter']}".replace("_", " "),
+            significant(item["true"]),
+            significant(item["value"]),
+            f"{significant(item['low'])} to {significant(item['high'])}",
+        ]
+        for item in covered
+        if not item["inside"]
+    ]
     if not covered:
         return [Text("No rightly named effect has a parameter that can be compared yet.")]
     held = summary["interval_coverage"]
@@ -319,7 +304,11 @@ def _intervals(
         for name, value in held["by_parameter"].items()
     ]
     return [
-        Text(f"{_percent(held)} of {held['of']} stated 90 % intervals hold the truth."),
+        Text(
+            f"{_percent(held)} of {held['of']} stated 90 % intervals hold the truth. {other} more are left "
+            "out, where a factor of one bearing was stated and that of its whole set is the truth, or the "
+            "other way round."
+        ),
         pictures.add(
             "coverage",
             charts.coverage_chart(covered),
@@ -328,6 +317,17 @@ def _intervals(
         Table(
             (column("parameter"), column("estimates", number=True), column("hold the truth", number=True)),
             rows_of(listed),
+        ),
+        Table(
+            (
+                column("case"),
+                column("parameter"),
+                column("truth", number=True),
+                column("estimate", number=True),
+                column("stated 90 % interval", number=True),
+            ),
+            rows_of(outside),
+            "Intervals that miss the truth.",
         ),
     ]
 
@@ -373,48 +373,3 @@ def _times(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], pictur
         ),
         pictures.add("times", charts.times_chart(walls, 60.0), "Wall time of every case."),
     ]
-
-
-def _wrong_table(wrong: Sequence[Mapping[str, Any]], causes: Mapping[str, Mapping[str, str]]) -> Table:
-    rows = []
-    for row in wrong:
-        cause = causes.get(row["case"], {})
-        others = "; ".join(
-            f"{' + '.join(item['set']) or 'nothing'} {item['probability']:.2f}"
-            for item in row["alternatives"]
-        )
-        rows.append(
-            [
-                row["case"],
-                " + ".join(row["truth"]) or "nothing",
-                f"{row['ratio']:.1f}" if row["ratio"] is not None else "–",
-                "clear" if row["clear"] else "hard",
-                f"{row['verdict'].replace('_', ' ')}: {' + '.join(row['found']) or 'nothing'}",
-                f"{row['probability']:.2f}",
-                others,
-                cause.get("cause", OPEN),
-                cause.get("remedy", ""),
-            ]
-        )
-    columns = (
-        column("case"),
-        column("concealed"),
-        column("ratio", number=True),
-        column("", mark=True),
-        column("said"),
-        column("probability", number=True),
-        column("instead"),
-        column("cause"),
-        column("what was changed"),
-    )
-    return Table(columns, rows_of([[_spaced(cell) for cell in row] for row in rows]))
-
-
-def _spaced(text: str) -> str:
-    return text.replace("_", " ").replace("@", " at ")
-
-
-def _cause_counts(wrong: Sequence[Mapping[str, Any]], causes: Mapping[str, Mapping[str, str]]) -> list[Any]:
-    kinds = Counter(causes.get(row["case"], {}).get("kind", OPEN) for row in wrong)
-    listed = [[kind, str(count)] for kind, count in kinds.most_common()]
-    return [Table((column("kind of cause"), column("cases", number=True)), rows_of(listed))] if listed else []

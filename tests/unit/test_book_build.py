@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from book import build as building  # noqa: E402
+from book import causes  # noqa: E402
 from book.chapters import ENTRIES, bench_motor, concealed, turning_centre  # noqa: E402
 from book.page import Chapter, Entry, Pictures, render_chapter  # noqa: E402
 from book.work import Desk  # noqa: E402
@@ -135,14 +136,14 @@ def test_causes_of_one_seed(tmp_path):
     path = tmp_path / "causes.toml"
     entry = '[[case]]\nseed = {seed}\ncase = "case_0001"\nkind = "twin"\ncause = "because {seed}"\n'
     path.write_text(entry.format(seed=7) + entry.format(seed=8), encoding="utf-8")
-    assert concealed.read_causes(path, 7)["case_0001"]["cause"] == "because 7"
+    assert causes.read_causes(path, 7)["case_0001"]["cause"] == "because 7"
     path.write_text(entry.format(seed=7) * 2, encoding="utf-8")
     with pytest.raises(BadInputError, match="case_0001 of seed 7: stands there twice"):
-        concealed.read_causes(path, 7)
+        causes.read_causes(path, 7)
     path.write_text('[[case]]\nseed = 7\ncase = "case_0002"\n', encoding="utf-8")
     with pytest.raises(BadInputError, match="case_0002 of seed 7: is incomplete"):
-        concealed.read_causes(path, 7)
+        causes.read_causes(path, 7)
 
 
 def test_the_causes_that_ship_can_be_read():
-    assert isinstance(concealed.read_causes(concealed.CAUSES, 7), dict)
+    assert isinstance(causes.read_causes(causes.CAUSES, 7), dict)

@@ -7,15 +7,10 @@ import numpy as np
 import pytest
 
 from validation import riddle
+from validation.asked import held_against_asked, wilson
 from validation.machine import CHANNELS
 from validation.recorder import draw_noise
-from validation.score import (
-    by_strength,
-    effect_confusion,
-    held_against_asked,
-    ranked_sets,
-    wilson,
-)
+from validation.score import by_strength, effect_confusion, ranked_sets, same_extent
 from validation.stepping import draw_as_built
 
 
@@ -156,3 +151,11 @@ def test_confusion_of_effects_leaves_pairs_out():
         row(["c@z"], [], 0.2, verdict="unexplained"),
     ]
     assert effect_confusion(rows) == {"a": {"b": 1}, "nothing": {"nothing": 1}, "c": {"unexplained": 1}}
+
+
+def test_parameter_of_a_bearing_is_not_that_of_its_set():
+    assert not same_extent("front_bearings", "F2")
+    assert not same_extent("R1", "rear_bearings")
+    assert same_extent("front_bearings", "front_bearings")
+    assert same_extent("flange", "flange")
+    assert same_extent("housing", "SP05")
