@@ -221,7 +221,9 @@ class BrakeHeat(Law):
         before = self.memory.get("speed", 0.0)
         self.memory["speed"] = moment.speed
         kick = abs(moment.speed**2 - before**2) / 3000.0**2
-        moment.add_heat(self.place, self.heat * self.lag("heat", 400.0).follow(60.0 * kick, moment.step))
+        # An energy, whatever the step: what 600 s of the heat would be for a change to 3000 rpm.
+        power = self.heat * 600.0 * kick / moment.step
+        moment.add_heat(self.place, self.lag("heat", 400.0).follow(power, moment.step))
 
 
 @dataclass(slots=True)
