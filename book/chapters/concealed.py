@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from book import charts
 from book.causes import CAUSES, cause_counts, read_causes, study_seed, wrong_table
 from book.page import Chapter, Pictures
@@ -229,16 +231,23 @@ def _probabilities(summary: Mapping[str, Any], pictures: Pictures) -> list[Any]:
 def _alarms(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[Any]:
     null = [row for row in rows if row["consistent"]]
     alarms = [row for row in null if row["false_alarm"]]
-    lowest = sorted(row["p_value"] for row in null if row["p_value"] is not None)[:5]
-    words = (
-        f"{len(alarms)} of {len(null)} recordings of machines with nothing missing were flagged. The "
-        f"smallest p-values among them: {', '.join(significant(p, 2) for p in lowest)}."
-    )
-    return [
-        Text(words),
-        *[Bullets([f"{row['case']}: {row['verdict']}, {', '.join(row['found'])}" for row in alarms])]
-        * bool(alarms),
+    values = sorted(row["p_value"] for row in null if row["p_value"] is not None)
+    blocks: list[Any] = [
+        Text(f"{len(alarms)} of {len(null)} recordings of machines with nothing missing were flagged.")
     ]
+    if values:
+        blocks.append(
+            Text(
+                f"Their p-values: median {significant(float(np.median(values)), 2)}, smallest "
+                f"{', '.join(significant(value, 2) for value in values[:5])}. An exact p-value would "
+                "have the median 0.5; a larger one says that the test is careful, and weak effects pay."
+            )
+        )
+    if alarms:
+        blocks.append(
+            Bullets([f"{row['case']}: {row['verdict']}, {', '.join(row['found'])}" for row in alarms])
+        )
+    return blocks
 
 
 def _places(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[Any]:
