@@ -252,9 +252,11 @@ class FacetIntegrals:
 
 def integrate_facets(points: NDArray[np.float64], facets: NDArray[np.int64], order: int) -> FacetIntegrals:
     """Film matrices with unit coefficient on facets, (n_facets, 6) curved or (n_facets, 3) straight."""
-    table, geometry = triangle_table(order), triangle_table(1 if facets.shape[1] == 3 else 2)
+    table = triangle_table(order)
+    is_flat = facets.shape[1] == 3
+    geometry = triangle_table(1).gradients[:1] if is_flat else triangle_table(2).gradients
     nodes = points[facets]
-    tangents = [[nodes[:, :, i] @ geometry.gradients[:, :, k].T for i in range(3)] for k in range(2)]
+    tangents = [[nodes[:, :, i] @ geometry[:, :, k].T for i in range(3)] for k in range(2)]
     first, second = tangents
     area_element = np.sqrt(
         sum(
@@ -262,8 +264,8 @@ def integrate_facets(points: NDArray[np.float64], facets: NDArray[np.int64], ord
             for i in range(3)
         )
     )
-    return FacetIntegrals(
-        area_element @ product_table(table),
-        area_element @ (table.weights[:, None] * table.values),
-        area_element @ table.weights,
-    )
+    tables = (product_table(table), table.weights[:, None] * table.values, table.weights[:, None])
+    if is_flat:
+        tables = tuple(each.sum(axis=0, keepdims=True) for each in tables)
+    film, load, area = (area_element @ each for each in tables)
+    return FacetIntegrals(film, load, area[:, 0])

@@ -14,6 +14,7 @@ from scipy.sparse.linalg import splu
 
 from spindle_fem.conduction.multigrid import build_hierarchy
 from spindle_fem.conduction.system import ThermalSystem
+from spindle_fem.conduction.threads import row_blocks, run_blocks, unsigned, use_compiled
 from spindle_fem.errors import ConvergenceError, SpecError
 
 DIRECT_BELOW = 20_000
@@ -311,7 +312,7 @@ def _to_error(
     limit: int,
 ) -> tuple[NDArray[np.float64], int, float]:
     """Correction whose estimated error is nowhere above what is wanted, iterations, and that error."""
-    state = _Iteration(matrix, residual.copy(), first)
+    state = _iterate(matrix, residual.copy(), first)
     for iteration in range(1, limit + 1):
         state.advance()
         preconditioned = precondition(state.residual)
@@ -336,15 +337,13 @@ class _Iteration:
         self.direction = preconditioned.copy()
         self._energy = float(residual @ preconditioned)
 
-    def advance(self) -> None:
-        """Go as far along the direction as helps."""
+    def advance(self) -> float:
+        """Go as far along the direction as helps; returns the residual's norm."""
         self._image = self._matrix @ self.direction
-        curvature = float(self.direction @ self._image)
-        if not curvature > 0.0 or not np.isfinite(self._energy):
-            raise ConvergenceError("linear solver", f"the matrix is not positive definite ({curvature:.3g}).")
-        self._step = self._energy / curvature
+        self._step = self._length(float(self.direction @ self._image))
         self.unknowns += self._step * self.direction
         self.residual -= self._step * self._image
+        return float(np.linalg.norm(self.residual))
 
     def turn(self, preconditioned: NDArray[np.float64]) -> None:
         """Next direction."""
@@ -352,6 +351,51 @@ class _Iteration:
         self.direction *= -self._step * float(preconditioned @ self._image) / self._energy
         self.direction += preconditioned
         self._energy = float(self.residual @ preconditioned)
+
+    def _length(self, curvature: float) -> float:
+        if not curvature > 0.0 or not np.isfinite(self._energy):
+            raise ConvergenceError("linear solver", f"the matrix is not positive definite ({curvature:.3g}).")
+        return self._energy / curvature
+
+
+class _CompiledIteration(_Iteration):
+    """The same in compiled loops: each vector is read once a step, rows are shared by threads."""
+
+    __slots__ = ("_blocks", "_loops", "_rows")
+
+    def __init__(
+        self, matrix: sparse.csr_array, residual: NDArray[np.float64], preconditioned: NDArray[np.float64]
+    ) -> None:
+        from spindle_fem.conduction import compiled_solver
+
+        super().__init__(matrix, residual, preconditioned)
+        self._loops = compiled_solver
+        self._rows = (*unsigned(matrix.indptr, matrix.indices), matrix.data)
+        self._blocks = row_blocks(len(residual))
+        self._image = np.empty_like(residual)
+
+    def advance(self) -> float:
+        loops, blocks = self._loops, self._blocks
+        shares = run_blocks(loops.multiply_and_dot, blocks, *self._rows, self.direction, self._image)
+        self._step = self._length(sum(shares))
+        shares = run_blocks(
+            loops.advance, blocks, self._step, self.direction, self._image, self.unknowns, self.residual
+        )
+        return float(np.sqrt(sum(shares)))
+
+    def turn(self, preconditioned: NDArray[np.float64]) -> None:
+        loops, blocks = self._loops, self._blocks
+        shares = run_blocks(loops.two_dots, blocks, preconditioned, self._image, self.residual)
+        along, energy = (sum(share) for share in zip(*shares, strict=True))
+        run_blocks(loops.turn, blocks, -self._step * along / self._energy, self.direction, preconditioned)
+        self._energy = energy
+
+
+def _iterate(
+    matrix: sparse.csr_array, residual: NDArray[np.float64], preconditioned: NDArray[np.float64]
+) -> _Iteration:
+    kind = _CompiledIteration if use_compiled(len(residual)) else _Iteration
+    return kind(matrix, residual, preconditioned)
 
 
 def _conjugate_gradients(
@@ -361,10 +405,9 @@ def _conjugate_gradients(
     target: float,
     limit: int,
 ) -> tuple[NDArray[np.float64], int]:
-    state = _Iteration(matrix, load.copy(), precondition(load).astype(float))
+    state = _iterate(matrix, load.copy(), precondition(load).astype(float))
     for iteration in range(1, limit + 1):
-        state.advance()
-        if np.linalg.norm(state.residual) <= target:
+        if state.advance() <= target:
             return state.unknowns, iteration
         state.turn(precondition(state.residual))
     return state.unknowns, limit

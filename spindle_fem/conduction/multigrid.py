@@ -15,11 +15,17 @@ Sources: Adams, Brezina, Hu & Tuminaro (2003), J. Comput. Phys. 188, 593-610
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
+
+from spindle_fem.conduction.threads import use_compiled
+
+if TYPE_CHECKING:
+    from spindle_fem.conduction.multigrid_compiled import SweptHierarchy
 
 SMOOTHING_DEGREE = 2
 # The smoother damps eigenvalues from the largest down to this fraction of it.
@@ -84,8 +90,10 @@ class Hierarchy:
         return unknowns
 
 
-def build_hierarchy(matrix: sparse.csr_array, prolongation: sparse.csr_array | None) -> Hierarchy:
-    """Hierarchy of a symmetric positive definite matrix.
+def build_hierarchy(
+    matrix: sparse.csr_array, prolongation: sparse.csr_array | None
+) -> Hierarchy | SweptHierarchy:
+    """Hierarchy of a symmetric positive definite matrix; in compiled loops where they are worth it.
 
     Parameters
     ----------
@@ -93,6 +101,10 @@ def build_hierarchy(matrix: sparse.csr_array, prolongation: sparse.csr_array | N
     prolongation : (n, n_corners) csr_array or None
         From linear to quadratic temperatures; None when they are linear.
     """
+    if use_compiled(matrix.shape[0]):
+        from spindle_fem.conduction.multigrid_compiled import build_swept_hierarchy
+
+        return build_swept_hierarchy(matrix, prolongation)
     import pyamg
 
     levels = []

@@ -13,14 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from spindle_fem.conduction.elements import (
-    EDGES,
-    integrate_circumferential,
-    integrate_elements,
-    integrate_facets,
-    upper_pairs,
-)
-from spindle_fem.conduction.pattern import build_pattern
+from spindle_fem.conduction.elements import EDGES, integrate_facets
+from spindle_fem.conduction.integration import integrate_mesh
 from spindle_fem.conduction.thermal_operators import AREA_TOLERANCE, ThermalOperators, spread
 from spindle_fem.errors import MeshTagError, SpecError, UnknownSurfaceError, did_you_mean
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
@@ -65,63 +59,41 @@ def build_operators(
     if order == 2 and mesh.tetrahedra.shape[1] == 4:
         raise SpecError("order", "2 on linear elements.", "Allowed: 1, or a quadratic mesh.")
     n_unknowns = mesh.n_corners if order == 1 else len(mesh.points)
-    element_nodes = mesh.tetrahedra[:, : 4 if order == 1 else 10].astype(np.int64)
-    part_of_unknown = _parts_of_unknowns(mesh, element_nodes, n_unknowns)
-    integrals = integrate_elements(mesh.points, mesh.tetrahedra, order)
-
     surface_rows, joint_rows, facets = _stack_facets(mesh)
+    _require_joint_match(mesh, joint_rows, facets)
     facet_integrals = integrate_facets(mesh.points, facets, order)
     facet_nodes = np.ascontiguousarray(facets[:, : 3 if order == 1 else 6]).astype(np.int64)
-    _require_joint_match(mesh, joint_rows, facets)
-
-    rows, columns = upper_pairs(element_nodes.shape[1])
-    facet_i, facet_j = upper_pairs(facet_nodes.shape[1])
-    groups = [
-        (element_nodes[:, rows], element_nodes[:, columns]),
-        (facet_nodes[:, facet_i], facet_nodes[:, facet_j]),
-    ]
-    for side_a, side_b in joint_rows.values():
-        groups.append(np.broadcast_arrays(facet_nodes[side_a][:, :, None], facet_nodes[side_b][:, None, :]))
-    pattern, slots = build_pattern(n_unknowns, groups)
-    element_slots, facet_slots, *cross_slots = slots
-    part_of_slot = np.full(pattern.n_upper, -1, dtype=np.int32)
-    part_of_slot[element_slots] = np.asarray(mesh.part_of_element, dtype=np.int32)[:, None]
-    if np.any(part_of_slot[facet_slots] < 0):
-        raise MeshTagError("mesh", "a tagged triangle is no facet of any element.")
-
-    circumferential = None
-    if circumferential_parts:
-        indices = [_require_part(mesh, part) for part in circumferential_parts]
-        chosen = np.flatnonzero(np.isin(mesh.part_of_element, indices))
-        circumferential = np.bincount(
-            element_slots[chosen].ravel(),
-            weights=integrate_circumferential(mesh.points, mesh.tetrahedra[chosen], order).ravel(),
-            minlength=pattern.n_upper,
-        )
-    distinct, inverse = np.unique(facet_slots, return_inverse=True)
-    volumes = np.bincount(mesh.part_of_element, weights=integrals.volume, minlength=len(mesh.part_names))
+    integrals = integrate_mesh(
+        mesh,
+        order,
+        n_unknowns,
+        facet_nodes,
+        list(joint_rows.values()),
+        [_require_part(mesh, part) for part in circumferential_parts],
+    )
+    distinct, inverse = _distinct(integrals.facet_slots, integrals.pattern.n_upper)
     operators = ThermalOperators(
         mesh=mesh,
         order=order,
         n_unknowns=n_unknowns,
-        pattern=pattern,
-        part_of_slot=part_of_slot,
-        part_of_unknown=part_of_unknown,
-        conduction=_sum_into(element_slots, integrals.conduction, pattern.n_upper),
-        storage=_sum_into(element_slots, integrals.storage, pattern.n_upper),
-        circumferential=circumferential,
+        pattern=integrals.pattern,
+        part_of_slot=integrals.part_of_slot,
+        part_of_unknown=integrals.part_of_unknown,
+        conduction=integrals.conduction,
+        storage=integrals.storage,
+        circumferential=integrals.circumferential,
         circumferential_parts=frozenset(circumferential_parts),
-        part_load=_sum_into(element_nodes, integrals.load, n_unknowns),
-        part_volume={part: float(volumes[i]) for i, part in enumerate(mesh.part_names)},
+        part_load=integrals.load,
+        part_volume=dict(zip(mesh.part_names, integrals.part_volume.tolist(), strict=True)),
         facet_nodes=facet_nodes,
         facet_film=facet_integrals.film,
         facet_load=facet_integrals.load,
         facet_area=facet_integrals.area,
         facet_slots=distinct,
-        facet_inverse=inverse.reshape(facet_slots.shape).astype(np.int32),
+        facet_inverse=inverse,
         surface_rows=surface_rows,
         joint_rows=joint_rows,
-        joint_cross_slots=dict(zip(joint_rows, cross_slots, strict=True)),
+        joint_cross_slots=dict(zip(joint_rows, integrals.cross_slots, strict=True)),
         prolongation=None if order == 1 else prolongation_from_corners(mesh),
     )
     operators.require_measures(area_tolerance)
@@ -143,8 +115,13 @@ def prolongation_from_corners(mesh: TaggedMesh) -> sparse.csr_array:
     return matrix
 
 
-def _sum_into(slots: NDArray, values: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-    return np.bincount(slots.ravel(), weights=values.ravel(), minlength=size)
+def _distinct(slots: NDArray[np.int32], size: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Distinct values below ``size``, rising, and the place of each value among them."""
+    used = np.zeros(size, dtype=bool)
+    used[slots] = True
+    place = np.cumsum(used, dtype=np.int32)
+    place -= 1
+    return np.flatnonzero(used), place[slots]
 
 
 def _require_part(mesh: TaggedMesh, part: str) -> int:
@@ -153,22 +130,6 @@ def _require_part(mesh: TaggedMesh, part: str) -> int:
             "circumferential_parts", f'names "{part}".', did_you_mean(part, mesh.part_names)
         )
     return mesh.part_names.index(part)
-
-
-def _parts_of_unknowns(
-    mesh: TaggedMesh, element_nodes: NDArray[np.int64], n_unknowns: int
-) -> NDArray[np.int32]:
-    part_of_unknown = np.full(n_unknowns, -1, dtype=np.int32)
-    part = np.asarray(mesh.part_of_element, dtype=np.int32)[:, None]
-    part_of_unknown[element_nodes] = part
-    if np.any(part_of_unknown[element_nodes] != part):
-        raise MeshTagError(
-            "mesh", "two parts share a node.", "Parts need nodes of their own, tied by joints."
-        )
-    loose = int(np.sum(part_of_unknown < 0))
-    if loose:
-        raise MeshTagError("mesh", f"{loose} nodes belong to no element.", "Drop unused nodes.")
-    return part_of_unknown
 
 
 def _stack_facets(

@@ -1,0 +1,267 @@
+"""The integrals of a mesh on one sparsity pattern: in numpy, or by compiled loops where these are installed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from spindle_fem.conduction.elements import (
+    integrate_circumferential,
+    integrate_elements,
+    is_straight,
+    upper_pairs,
+)
+from spindle_fem.conduction.pattern import SymmetricPattern, build_pattern
+from spindle_fem.conduction.threads import fill_rows, row_blocks, run_blocks, unsigned, use_compiled
+from spindle_fem.errors import MeshQualityError, MeshTagError
+from spindle_fem.meshing.tagged_mesh import TaggedMesh
+
+# Elements integrated at once where the compiled loops do not integrate themselves.
+BATCH = 1 << 16
+# First guesses of the upper entries a row, with room for the last rows; wrong ones only cost time.
+ENTRIES_OF_LINEAR = 9.0
+ENTRIES_OF_QUADRATIC = 17.0
+
+
+@dataclass(frozen=True, slots=True)
+class MeshIntegrals:
+    """Sums over all elements, on the entries of a pattern.
+
+    Attributes
+    ----------
+    pattern : SymmetricPattern
+    part_of_unknown : (n_unknowns,) int32 ndarray
+    part_of_slot : (n_upper,) int32 ndarray
+        -1 where only a joint couples.
+    conduction, storage : (n_upper,) ndarray, [m], [m³]
+    circumferential : (n_upper,) ndarray or None, [m]
+    load : (n_unknowns,) ndarray, [m³]
+    part_volume : (n_parts,) ndarray, [m³]
+    facet_slots : (n_facets, n_upper of a facet) int32 ndarray
+    cross_slots : list of (n, k, k) int32 ndarray
+        One for each joint.
+    """
+
+    pattern: SymmetricPattern
+    part_of_unknown: NDArray[np.int32]
+    part_of_slot: NDArray[np.int32]
+    conduction: NDArray[np.float64]
+    storage: NDArray[np.float64]
+    circumferential: NDArray[np.float64] | None
+    load: NDArray[np.float64]
+    part_volume: NDArray[np.float64]
+    facet_slots: NDArray[np.int32]
+    cross_slots: list[NDArray[np.int32]]
+
+
+def integrate_mesh(
+    mesh: TaggedMesh,
+    order: int,
+    n_unknowns: int,
+    facet_nodes: NDArray[np.int64],
+    joint_sides: list[tuple[slice, slice]],
+    circumferential_parts: list[int],
+) -> MeshIntegrals:
+    """Integrate all elements of a mesh and find where facets and joints couple unknowns.
+
+    Parameters
+    ----------
+    mesh : TaggedMesh
+    order : int
+    n_unknowns : int
+    facet_nodes : (n_facets, n) int ndarray
+    joint_sides : list of (slice, slice)
+        Rows of both sides in ``facet_nodes``.
+    circumferential_parts : list of int
+
+    Raises
+    ------
+    MeshQualityError
+        Inverted elements.
+    MeshTagError
+        A node of two parts or of none, a facet of no element.
+    """
+    make = _compiled if use_compiled(n_unknowns) else _in_numpy
+    return make(mesh, order, n_unknowns, facet_nodes, joint_sides, circumferential_parts)
+
+
+def _facet_pairs(facet_nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    rows, columns = upper_pairs(facet_nodes.shape[1])
+    return facet_nodes[:, rows], facet_nodes[:, columns]
+
+
+def _cross_pairs(
+    facet_nodes: NDArray[np.int64], sides: tuple[slice, slice]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    return np.broadcast_arrays(facet_nodes[sides[0]][:, :, None], facet_nodes[sides[1]][:, None, :])
+
+
+def _require_parts(part_of_unknown: NDArray[np.int32], shared: bool) -> None:
+    if shared:
+        raise MeshTagError(
+            "mesh", "two parts share a node.", "Parts need nodes of their own, tied by joints."
+        )
+    loose = int(np.sum(part_of_unknown < 0))
+    if loose:
+        raise MeshTagError("mesh", f"{loose} nodes belong to no element.", "Drop unused nodes.")
+
+
+def _require_facets(inside: bool) -> None:
+    if not inside:
+        raise MeshTagError("mesh", "a tagged triangle is no facet of any element.")
+
+
+def _require_upright(inverted: int) -> None:
+    if inverted:
+        raise MeshQualityError("mesh", f"{inverted} elements are inverted.", "Refine or optimise the mesh.")
+
+
+# -------------------------------------------------------------------- in numpy
+def _in_numpy(
+    mesh: TaggedMesh,
+    order: int,
+    n_unknowns: int,
+    facet_nodes: NDArray[np.int64],
+    joint_sides: list[tuple[slice, slice]],
+    circumferential_parts: list[int],
+) -> MeshIntegrals:
+    element_nodes = mesh.tetrahedra[:, : 4 if order == 1 else 10].astype(np.int64)
+    part = np.asarray(mesh.part_of_element, dtype=np.int32)
+    part_of_unknown = np.full(n_unknowns, -1, dtype=np.int32)
+    part_of_unknown[element_nodes] = part[:, None]
+    _require_parts(part_of_unknown, bool(np.any(part_of_unknown[element_nodes] != part[:, None])))
+    integrals = integrate_elements(mesh.points, mesh.tetrahedra, order)
+    rows, columns = upper_pairs(element_nodes.shape[1])
+    groups = [(element_nodes[:, rows], element_nodes[:, columns]), _facet_pairs(facet_nodes)]
+    groups += [_cross_pairs(facet_nodes, sides) for sides in joint_sides]
+    pattern, (element_slots, facet_slots, *cross_slots) = build_pattern(n_unknowns, groups)
+    part_of_slot = np.full(pattern.n_upper, -1, dtype=np.int32)
+    part_of_slot[element_slots] = part[:, None]
+    _require_facets(not np.any(part_of_slot[facet_slots] < 0))
+    circumferential = None
+    if circumferential_parts:
+        chosen = np.flatnonzero(np.isin(part, circumferential_parts))
+        values = integrate_circumferential(mesh.points, mesh.tetrahedra[chosen], order)
+        circumferential = _sum_into(element_slots[chosen], values, pattern.n_upper)
+    return MeshIntegrals(
+        pattern,
+        part_of_unknown,
+        part_of_slot,
+        _sum_into(element_slots, integrals.conduction, pattern.n_upper),
+        _sum_into(element_slots, integrals.storage, pattern.n_upper),
+        circumferential,
+        _sum_into(element_nodes, integrals.load, n_unknowns),
+        np.bincount(part, weights=integrals.volume, minlength=len(mesh.part_names)),
+        facet_slots,
+        cross_slots,
+    )
+
+
+def _sum_into(slots: NDArray, values: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    return np.bincount(slots.ravel(), weights=values.ravel(), minlength=size)
+
+
+# -------------------------------------------------------------------- compiled
+def _compiled(
+    mesh: TaggedMesh,
+    order: int,
+    n_unknowns: int,
+    facet_nodes: NDArray[np.int64],
+    joint_sides: list[tuple[slice, slice]],
+    circumferential_parts: list[int],
+) -> MeshIntegrals:
+    from spindle_fem.conduction import compiled_assembly as compiled
+
+    tetrahedra = mesh.tetrahedra
+    nodes = np.ascontiguousarray(tetrahedra[:, : 4 if order == 1 else 10], dtype=np.int32).view(np.uint32)
+    part = np.asarray(mesh.part_of_element, dtype=np.int32)
+    part_of_unknown, shared = compiled.part_of_nodes(nodes, part, n_unknowns)
+    _require_parts(part_of_unknown, bool(shared))
+    crossings = [_cross_pairs(facet_nodes, sides) for sides in joint_sides]
+    pattern, upper = _compiled_pattern(nodes, n_unknowns, crossings)
+    blocks = row_blocks(n_unknowns)
+    conduction, storage = np.zeros(pattern.n_upper), np.zeros(pattern.n_upper)
+    load, volume = np.zeros(n_unknowns), np.zeros(len(mesh.part_names))
+    straight = is_straight(mesh.points, tetrahedra) if order == 1 else np.zeros(len(tetrahedra), dtype=bool)
+    if straight.any():
+        every = straight.all()
+        answers = run_blocks(
+            compiled.add_linear_elements,
+            blocks,
+            mesh.points,
+            nodes if every else nodes[straight],
+            part if every else part[straight],
+            len(mesh.part_names),
+            *upper,
+            conduction,
+            storage,
+            load,
+        )
+        _require_upright(sum(inverted for _, inverted in answers))
+        volume += sum(volumes for volumes, _ in answers)
+    rest = np.flatnonzero(~straight)
+    for start in range(0, len(rest), BATCH):
+        chosen = rest[start : start + BATCH]
+        integrals = integrate_elements(mesh.points, tetrahedra[chosen], order)
+        for values, out in ((integrals.conduction, conduction), (integrals.storage, storage)):
+            run_blocks(compiled.add_element_values, blocks, nodes[chosen], values, *upper, out)
+        load += np.bincount(nodes[chosen].ravel(), weights=integrals.load.ravel(), minlength=n_unknowns)
+        volume += np.bincount(part[chosen], weights=integrals.volume, minlength=len(volume))
+    circumferential = None
+    if circumferential_parts:
+        circumferential = np.zeros(pattern.n_upper)
+        around = np.flatnonzero(np.isin(part, circumferential_parts))
+        for start in range(0, len(around), BATCH):
+            chosen = around[start : start + BATCH]
+            values = integrate_circumferential(mesh.points, tetrahedra[chosen], order)
+            run_blocks(compiled.add_element_values, blocks, nodes[chosen], values, *upper, circumferential)
+
+    def find(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int32]:
+        slots = np.empty(rows.size, dtype=np.int32)
+        flat = unsigned(*(np.ascontiguousarray(item, dtype=np.int32).ravel() for item in (rows, columns)))
+        compiled.find_upper(*flat, *upper, slots)
+        return slots.reshape(rows.shape)
+
+    # parts share no node, so what couples two nodes of one part is an element
+    part_of_row = np.repeat(part_of_unknown, np.diff(upper[0].view(np.int32)))
+    part_of_slot = np.where(part_of_row == part_of_unknown[upper[1]], part_of_row, np.int32(-1))
+    facet_slots = find(*_facet_pairs(facet_nodes))
+    _require_facets(bool(np.all(facet_slots >= 0)) and bool(np.all(part_of_slot[facet_slots] >= 0)))
+    return MeshIntegrals(
+        pattern,
+        part_of_unknown,
+        part_of_slot,
+        conduction,
+        storage,
+        circumferential,
+        load,
+        volume,
+        facet_slots,
+        [find(*pairs) for pairs in crossings],
+    )
+
+
+def _compiled_pattern(
+    nodes: NDArray[np.uint32],
+    n_unknowns: int,
+    crossings: list[tuple[NDArray[np.int64], NDArray[np.int64]]],
+) -> tuple[SymmetricPattern, tuple[NDArray[np.uint32], NDArray[np.uint32]]]:
+    """Pattern of elements and joints, and the compressed rows of its upper triangle."""
+    from spindle_fem.conduction import compiled_assembly as compiled
+
+    low = np.concatenate([np.minimum(*pairs).ravel() for pairs in crossings] or [np.empty(0, np.int64)])
+    high = np.concatenate([np.maximum(*pairs).ravel() for pairs in crossings] or [np.empty(0, np.int64)])
+    extra = sparse.coo_array((np.ones(low.size, dtype=np.int8), (low, high)), shape=(n_unknowns, n_unknowns))
+    extra = extra.tocsr()
+    shared = (
+        nodes,
+        *unsigned(*compiled.elements_of_nodes(nodes, n_unknowns)),
+        *unsigned(extra.indptr, extra.indices),
+    )
+    guess = ENTRIES_OF_LINEAR if nodes.shape[1] == 4 else ENTRIES_OF_QUADRATIC
+    indptr, indices = fill_rows(compiled.fill_upper, n_unknowns, shared, guess, with_values=False)
+    full = compiled.expand_upper(*unsigned(indptr, indices))
+    return SymmetricPattern(n_unknowns, len(indices), *full), unsigned(indptr, indices)
