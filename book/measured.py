@@ -77,8 +77,19 @@ class Test:
         return f"{words} [{case.rstrip(']')}]" if case else words
 
 
-def run_tests(desk: Desk) -> Step:
-    """Run the verification and published tests and keep their figures.
+VERIFICATION = ("tests/verification", "tests/published")
+
+
+def run_tests(desk: Desk, paths: Sequence[str] = VERIFICATION, name: str = "tests") -> Step:
+    """Run tests, those of verification and of published values by default, and keep their figures.
+
+    Parameters
+    ----------
+    desk : Desk
+    paths : sequence of str
+        Files or folders.
+    name : str
+        Of the folder that keeps the figures.
 
     Raises
     ------
@@ -91,7 +102,7 @@ def run_tests(desk: Desk) -> Step:
             *("-m", "pytest", "-q", "-p", "book.recorder", "-p", "no:cacheprovider"),
             *("-o", "enable_assertion_pass_hook=true", "-o", "verbosity_assertions=2"),
             *("--figures", str((folder / "figures.json").resolve())),
-            *("tests/verification", "tests/published"),
+            *paths,
         ]
         # Modules compiled without the hook would stay silent.
         outside = os.environ | {"PYTHONPYCACHEPREFIX": str((folder / "compiled").resolve())}
@@ -99,12 +110,12 @@ def run_tests(desk: Desk) -> Step:
         done = subprocess.run(command, cwd=ROOT, env=outside, capture_output=True, text=True, check=False)
         if done.returncode:
             raise TestsFailedError(
-                "tests/verification, tests/published",
+                ", ".join(paths),
                 f"pytest ended with {done.returncode}:\n{done.stdout[-3000:]}{done.stderr[-1000:]}",
                 "Mend what failed; the book shows figures of tests that hold.",
             )
 
-    return desk.step("tests", make, sources=("tool", "tests"))
+    return desk.step(name, make, sources=("tool", "tests"), inputs={"paths": list(paths)})
 
 
 def read_tests(path: Path) -> list[Test]:

@@ -20,7 +20,7 @@ STAMP = "step.json"
 _SOURCES = {
     "tool": (("spindle_fem", "**/*.py"), ("geometry", "*.toml")),
     "generator": (("validation", "*.py"),),
-    "tests": (("tests", "verification/*.py"), ("tests", "published/*.py")),
+    "tests": (("tests", "**/*.py"),),
 }
 
 

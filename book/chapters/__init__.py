@@ -5,6 +5,7 @@ from book.chapters import (
     bench_motor,
     concealed,
     exact,
+    models,
     network,
     peers,
     published,
@@ -13,5 +14,16 @@ from book.chapters import (
 )
 from book.page import Entry
 
-_MODULES = (exact, balances, published, network, peers, concealed, riddle, bench_motor, turning_centre)
+_MODULES = (
+    exact,
+    balances,
+    published,
+    models,
+    network,
+    peers,
+    concealed,
+    riddle,
+    bench_motor,
+    turning_centre,
+)
 ENTRIES = tuple(Entry(module.__name__.rpartition(".")[2], module.TITLE, module.make) for module in _MODULES)
