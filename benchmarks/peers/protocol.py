@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 # Relative residual that every iterative solver is asked for; what it gives is compared in kelvin.
-RELATIVE_TOLERANCE = 1e-9
+RELATIVE_TOLERANCE = 1e-8
 
 
 @dataclass

@@ -3,26 +3,39 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import protocol
+from scipy import sparse
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from case import merged_nodes, read_case
+from case import STEP_S, divided, merged_nodes, read_case
 
-from spindle_fem.conduction.assemble import assemble_capacity, assemble_system
+from spindle_fem.conduction import threads
+from spindle_fem.conduction.assemble import assemble_capacity, assemble_load, assemble_system
+from spindle_fem.conduction.guesses import SolvedSpace
 from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear
 from spindle_fem.conduction.operators import build_operators
 from spindle_fem.conduction.problem import ConductionProblem, Film
+from spindle_fem.conduction.stage import add_scaled
+from spindle_fem.conduction.system import merged
+from spindle_fem.meshing.simple import build_box
+
+# Estimated error that each step may leave.
+STEP_TOLERANCE_K = 1e-6
 
 
 def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, np.ndarray | None]:
     """Solve the steady problem and the steps."""
+    warm_up()
     mesh, case = read_case(folder)
     start = case["start_temperature"]
     first = merged_nodes(mesh)[1]
+    record.notes["threads"] = threads.thread_count()
+    record.notes["compiled"] = threads.has_compiled()
     record.notes["mesh_kB"] = protocol.resident_kilobytes()
 
     with record.stage("assembly"):
@@ -51,7 +64,56 @@ def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, 
     record.notes |= {"iterations": solution.iterations, "residual": solution.residual}
     record.notes["peak_kB"] = protocol.peak_kilobytes()
     steady = start + (system.tie @ solution.unknowns)[first]
-    return steady, None
+    if not steps:
+        return steady, None
+    heat_factor = protocol.Problem.read(folder).heat_factor[:steps]
+    with record.stage("steps"):
+        storage = merged(assemble_capacity(problem)[0], system.tie)
+        stepped = add_scaled(storage, STEP_S, tied.matrix)
+        preconditioner = build_preconditioner(replace(tied, matrix=stepped), "multigrid")
+        loads = {factor: system.tie.T @ _load(problem, start, factor) for factor in np.unique(heat_factor)}
+        known = SolvedSpace(stepped)
+        rise = np.zeros(len(tied.load))
+        counted = 0
+        for factor in heat_factor:
+            residual = STEP_S * (loads[factor] - tied.matrix @ rise)
+            change = solve_linear(
+                stepped,
+                residual,
+                preconditioner,
+                known.guess(residual),
+                error_tolerance=STEP_TOLERANCE_K,
+            )
+            counted += change.iterations
+            if change.iterations:
+                known.add(change.unknowns)
+            rise += change.unknowns
+    record.notes["step_iterations"] = counted
+    return steady, start + (system.tie @ rise)[first]
+
+
+def _load(problem: ConductionProblem, reference: float, heat_factor: float) -> np.ndarray:
+    """Load of the problem with all heat scaled."""
+    heat = {surface: heat_factor * value for surface, value in problem.surface_heat.items()}
+    return assemble_load(replace(problem, surface_heat=heat), reference)[0]
+
+
+def warm_up() -> None:
+    """Load what is compiled, by a small problem, before clocks and memory are read."""
+    least = threads.COMPILED_ABOVE
+    threads.COMPILED_ABOVE = 0
+    mesh = divided(build_box((1.0, 1.0, 1.0), (6, 6, 6)))
+    problem = ConductionProblem(
+        build_operators(mesh, 1),
+        {"box": 1.0},
+        films=(Film("box.x0", 1.0, 300.0),),
+        volumetric_capacity={"box": 1.0},
+        adiabatic="rest",
+    )
+    system = assemble_system(problem)
+    merged(system.matrix, sparse.eye_array(len(system.load), format="csr"))
+    solve_linear(system.matrix, np.ones(len(system.load)), build_preconditioner(system, "multigrid"))
+    threads.COMPILED_ABOVE = least
 
 
 if __name__ == "__main__":

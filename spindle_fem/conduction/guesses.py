@@ -10,40 +10,92 @@ from scipy import sparse
 EARLIER_ITERATES = 2
 # Corrections from which first guesses are combined.
 CORRECTIONS = 8
+# Solutions of one matrix that are kept as a basis.
+BASIS_SIZE = 30
+# A part this small of a solution, in energy, is round-off of what is known.
+NOTHING_NEW = 1e-12
 
 
 class RecentCorrections:
     """Recent corrections of stages: the next one is nearly a combination of them.
 
-    Their products with storage and conduction are kept too, and used on when a
-    film has changed a little: they only make first guesses.
+    What they store and conduct together is kept too, and used on when a film has
+    changed a little: they only make first guesses.
     """
 
     def __init__(self) -> None:
-        self._fields: list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]] = []
+        self._fields: NDArray[np.float64] | None = None
+        self._count = 0
+        self._stored = np.zeros((CORRECTIONS, CORRECTIONS))
+        self._conducted = np.zeros((CORRECTIONS, CORRECTIONS))
 
     def add(
         self, correction: NDArray[np.float64], storage: sparse.csr_array, conduction: sparse.csr_array
     ) -> None:
         """Remember a correction that is not zero, (n,) [K]; the oldest is forgotten."""
+        if self._fields is None:
+            self._fields = np.zeros((CORRECTIONS, len(correction)))
+        place = self._count % CORRECTIONS
+        self._count += 1
         scaled = correction / np.abs(correction).max()
-        self._fields = [
-            *self._fields[1 - CORRECTIONS :],
-            (scaled, storage @ scaled, conduction @ scaled),
-        ]
+        self._fields[place] = scaled
+        for table, matrix in ((self._stored, storage), (self._conducted, conduction)):
+            table[place] = table[:, place] = self._fields @ (matrix @ scaled)
 
     def combine(self, residual: NDArray[np.float64], shift: float) -> NDArray[np.float64]:
         """Galerkin solution of ``(M + shift K) x = residual`` among the recent corrections."""
-        if not self._fields:
+        size = min(self._count, CORRECTIONS)
+        if not size:
             return np.zeros_like(residual)
-        size = len(self._fields)
-        projected, load = np.empty((size, size)), np.empty(size)
-        for row, (one, _, _) in enumerate(self._fields):
-            load[row] = one @ residual
-            for column, (_, stored, conducted) in enumerate(self._fields):
-                projected[row, column] = one @ stored + shift * (one @ conducted)
-        weights = np.linalg.lstsq(projected, load, rcond=1e-9)[0]
-        return sum(weight * one for weight, (one, _, _) in zip(weights, self._fields, strict=True))
+        fields = self._fields[:size]
+        projected = self._stored[:size, :size] + shift * self._conducted[:size, :size]
+        return np.linalg.lstsq(projected, fields @ residual, rcond=1e-9)[0] @ fields
+
+
+class SolvedSpace:
+    """Earlier solutions of one symmetric positive definite matrix, orthonormal in its energy.
+
+    The best guess among them then costs two products with the basis and none
+    with the matrix. The oldest are forgotten.
+
+    Parameters
+    ----------
+    matrix : (n, n) csr_array
+    size : int
+        Solutions that are kept.
+
+    Source: Fischer (1998), Comput. Methods Appl. Mech. Eng. 163, 193-204.
+    """
+
+    def __init__(self, matrix: sparse.csr_array, size: int = BASIS_SIZE) -> None:
+        self._matrix = matrix
+        self._basis = np.zeros((size, matrix.shape[0]))
+        self._count = self._added = 0
+
+    def guess(self, load: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Galerkin solution among what is kept, (n,)."""
+        known = self._basis[: self._count]
+        return (known @ load) @ known
+
+    def add(self, solution: NDArray[np.float64]) -> None:
+        """Keep what is new in a solution, (n,)."""
+        place = self._added % len(self._basis)
+        # the oldest goes first: what the new one has of it is to stay
+        self._basis[place] = 0.0
+        known = self._basis[: self._count]
+        image = self._matrix @ solution
+        energy = float(solution @ image)
+        shares = known @ image
+        rest = solution - shares @ known
+        image = self._matrix @ rest
+        # once more: the first time leaves round-off of the whole solution
+        rest -= (known @ image) @ known
+        left = float(rest @ (self._matrix @ rest))
+        if not left > NOTHING_NEW * energy:
+            return
+        self._basis[place] = rest / np.sqrt(left)
+        self._added += 1
+        self._count = min(self._added, len(self._basis))
 
 
 def mixed(past: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> NDArray[np.float64]:

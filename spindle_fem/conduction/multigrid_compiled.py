@@ -50,8 +50,10 @@ class SweptLevel:
     inverse : (n,) ndarray
         Inverse of the diagonal.
     prolongation, restriction : compressed rows
+    sweeps : (n_sweeps + 1,) ndarray
+        Bounds of the rows that are swept apart.
     blocks, coarse_blocks : ndarray
-        Ranges of rows of this level and the next.
+        Ranges of rows of this level and the next, for products.
     """
 
     starts: NDArray[np.uint32]
@@ -61,6 +63,7 @@ class SweptLevel:
     inverse: NDArray
     prolongation: Rows
     restriction: Rows
+    sweeps: NDArray[np.int64]
     blocks: NDArray[np.int64]
     coarse_blocks: NDArray[np.int64]
 
@@ -96,17 +99,17 @@ class SweptHierarchy:
         level = self.levels[depth]
         matrix = (level.starts, level.columns, level.values, level.diagonal)
         unknowns, left = np.empty_like(residual), np.empty_like(residual)
-        run_blocks(compiled.forward_from_zero, level.blocks, *matrix, level.inverse, residual, unknowns)
-        run_blocks(compiled.residual_after_forward, level.blocks, *matrix, unknowns, left)
+        run_blocks(compiled.forward_from_zero, level.sweeps, *matrix, level.inverse, residual, unknowns)
+        run_blocks(compiled.residual_after_forward, level.sweeps, *matrix, unknowns, left)
         coarse = np.empty(len(level.restriction[0]) - 1, dtype=PRECISION)
         run_blocks(compiled.multiply, level.coarse_blocks, *level.restriction, left, coarse)
         correction = self._descend(depth + 1, coarse)
         run_blocks(compiled.add_product, level.blocks, *level.prolongation, correction, unknowns)
         before = unknowns
-        if len(level.blocks) > 2:
+        if len(level.sweeps) > 2:
             left[:] = unknowns
             before = left
-        run_blocks(compiled.backward, level.blocks, *matrix[:3], level.inverse, residual, before, unknowns)
+        run_blocks(compiled.backward, level.sweeps, *matrix[:3], level.inverse, residual, before, unknowns)
         return unknowns
 
 
@@ -153,6 +156,7 @@ def build_swept_hierarchy(
                 inverse,
                 (*rows[:2], rows[2].astype(PRECISION)),
                 (*restriction[:2], restriction[2].astype(PRECISION)),
+                np.array([0, len(inverse)]),
                 row_blocks(len(inverse)),
                 row_blocks(size),
             )
