@@ -166,7 +166,8 @@ def comparison_of(source: str, text: str) -> Check:
             left, right = right, left
         bands = [(float(a), float(b)) for a, b in _BAND.findall(right)]
         found = [float(value) for value in re.findall(_NUMBER, left)]
-        if bands and len(bands) == len(found):
+        # What pytest or numpy cut short has no numbers to rely on.
+        if bands and len(bands) == len(found) and "..." not in text:
             shares = [
                 _share(value, reference, allowed)
                 for value, (reference, allowed) in zip(found, bands, strict=True)

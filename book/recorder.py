@@ -46,7 +46,8 @@ class Recorder:
         self.allclose = np.testing.assert_allclose
 
     def pytest_sessionstart(self) -> None:
-        """Listen to numpy's comparisons too."""
+        """Listen to numpy's comparisons too, and have arrays in explanations in full."""
+        np.set_printoptions(precision=17)
         np.testing.assert_allclose = self._listening(self.allclose)
 
     def _listening(self, compare: Any) -> Any:

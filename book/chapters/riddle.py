@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -291,7 +290,6 @@ def _truth_table(answer: dict[str, Any], content: dict[str, Any]) -> Table:
     parts = ", ".join(f"{item['effect'].replace('_', ' ')} {item['ratio']:.1f}" for item in known["each"])
     caption = (
         f"After a re-fit of the generator's own parameters the pair leaves {known['ratio']:.1f} times the "
-        f"noise on the most affected channel; left out alone: {parts}. "
-        f"{json.dumps(answer['acceptable_verdicts'])} accepted."
+        f"noise on the most affected channel; left out alone: {parts}."
     )
     return Table(columns, rows_of(rows), caption)

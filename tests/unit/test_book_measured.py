@@ -29,6 +29,7 @@ def test_rate(order):
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(order, abs=0.1)
     np.testing.assert_allclose([1.0, 2.5], [1.0, 2.0], atol=1.0, rtol=0)
     assert errors[-1] < 0.5
+    assert np.array([0.1 + 0.2, 2.0]) == pytest.approx([0.3, 2.0], abs=1e-12)
 '''
 
 
@@ -57,6 +58,11 @@ def test_limits_and_what_is_no_number():
     assert comparison_of("film.regime == regime", "'laminar' == 'laminar'").measured is None
 
 
+def test_what_was_cut_short_has_no_figure():
+    check = comparison_of("a == b", "array([0.3...004, 2.0]) == approx([0.3 ± 0.1, 2.0 ± 0.1])")
+    assert check.measured is None
+
+
 def test_exact_agreement_where_nothing_is_allowed():
     assert comparison_of("a == b", "2.0 == 2.0 ± 0.0").used == 0.0
     assert math.isinf(comparison_of("a == b", "2.1 == 2.0 ± 0.0").used)
@@ -74,7 +80,8 @@ def test_an_assertion_in_a_loop_counts_once_with_its_worst():
 def test_plugin_keeps_the_figures_of_a_run(tmp_path):
     (tmp_path / "test_sample.py").write_text(SAMPLE, encoding="utf-8")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "book.recorder", "-p", "no:cacheprovider"]
-    command += ["-o", "enable_assertion_pass_hook=true", "-c", os.devnull, "--rootdir", str(tmp_path)]
+    command += ["-o", "enable_assertion_pass_hook=true", "-o", "verbosity_assertions=2"]
+    command += ["-c", os.devnull, "--rootdir", str(tmp_path)]
     command += ["--figures", str(tmp_path / "figures.json"), str(tmp_path / "test_sample.py")]
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": str(tmp_path / "compiled")}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
@@ -83,11 +90,12 @@ def test_plugin_keeps_the_figures_of_a_run(tmp_path):
     assert test.title == "Errors fall [2]"
     assert test.rate["levels"] == [2.0, 4.0, 8.0]
     assert test.rate["errors"] == [[0.25, 0.0625, 0.015625]]
-    slope, nearest, limit = test.checks
+    slope, nearest, limit, digits = test.checks
     assert slope.reference == 2.0
     assert slope.measured == pytest.approx(2.0)
     assert (nearest.measured, nearest.reference, nearest.used, nearest.values) == (2.5, 2.0, 0.5, 2)
     assert (limit.relation, limit.measured, limit.reference) == ("<", 0.015625, 0.5)
+    assert digits.used == pytest.approx((0.1 + 0.2 - 0.3) / 1e-12)
 
 
 def test_figures_file_is_plain_json(tmp_path):
