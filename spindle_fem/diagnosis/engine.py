@@ -34,8 +34,8 @@ NUMBER_PRIOR = (0.4, 0.35, 0.2, 0.05)
 HIDDEN = 0.5
 # Sets that are tried without each of their members.
 REDUCED = 3
-# Sets in which each member is exchanged for the best other effects at its place, and how many of these.
-EXCHANGED, OTHERS = 2, 6
+# Best sets in which each member is exchanged for other effects at its place, and for how many.
+EXCHANGED, OTHERS = 1, 5
 SINGLES, PAIRS, TRIPLES = 8, 6, 3
 BEAM, ADDITIONS = 3, 6
 # A hypothesis this much less likely (natural logarithm) than the best is not extended.
@@ -116,7 +116,9 @@ class Search:
             best = self.ranked()[0]
             ranked = [h for h in self.ranked() if len(h.keys) == size and h.score > best.score - HOPELESS]
             self.progress(f"diagnosis: {size + 1} effects")
-            for hypothesis in ranked[: 1 if self._explained(best) else BEAM]:
+            # A third effect is rare: it is looked for only where two leave something.
+            beam = (size == 1) if self._explained(best) else BEAM
+            for hypothesis in ranked[:beam]:
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
         self._reduce()

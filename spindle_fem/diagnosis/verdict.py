@@ -18,9 +18,11 @@ Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambig
 
 # Laws of the catalogue are simpler than nature. Differences of likelihood count half of what they say,
 # and less the more a set explains already: an inexact law of a strong effect leaves a residual that
-# grows with the effect, and which any other effect may fit a little.
+# grows with the effect, and which any other effect may fit a little. They never count less than a
+# twentieth, or a second effect beside a strong one would stay unseen however clear it is.
 TEMPERATURE = 2.0
-INEXACT_BEYOND = 1000.0
+INEXACT_BEYOND = 300.0
+LEAST_TEMPERATURE_RATIO = 10.0
 # Below this the most probable set is named together with what else may be.
 DECIDED = 0.75
 LISTED = 0.02
@@ -101,8 +103,15 @@ def tempered(hypothesis: Hypothesis, null: Hypothesis) -> float:
     fit = hypothesis.fit
     complexity = fit.log_evidence + 0.5 * fit.misfit_with_prior
     gain = 0.5 * (null.fit.misfit_with_prior - fit.misfit_with_prior)
-    counted = INEXACT_BEYOND * np.log1p(max(gain, 0.0) / INEXACT_BEYOND) + min(gain, 0.0)
-    return float(hypothesis.log_prior + complexity + counted / TEMPERATURE)
+    return float(hypothesis.log_prior + complexity + counted(gain) / TEMPERATURE)
+
+
+def counted(gain: float) -> float:
+    """What a gain of likelihood counts for: all of it while small, a tenth of what comes on top later."""
+    ends = INEXACT_BEYOND * (LEAST_TEMPERATURE_RATIO - 1.0)
+    inside = min(max(gain, 0.0), ends)
+    beyond = max(gain - ends, 0.0) / LEAST_TEMPERATURE_RATIO
+    return float(INEXACT_BEYOND * np.log1p(inside / INEXACT_BEYOND) + beyond + min(gain, 0.0))
 
 
 def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:

@@ -15,7 +15,7 @@ from spindle_fem.diagnosis.inference import Fit, candidate_coordinates
 from spindle_fem.diagnosis.locate import Explanation, shares, stretches
 from spindle_fem.diagnosis.machine_places import centre_of
 from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.diagnosis.verdict import INEXACT_BEYOND, TEMPERATURE
+from spindle_fem.diagnosis.verdict import TEMPERATURE, counted
 from spindle_fem.effects.base import Candidate, IntervalEffect
 from spindle_fem.effects.catalogue import effect_of
 from spindle_fem.recordings.align import Recording
@@ -237,13 +237,10 @@ def component_shares(
         evidence[item.spot] = evidence.get(item.spot, 0.0) + item.log_evidence
     if not evidence:
         return {}, {}
-    counted = {
-        spot: (INEXACT_BEYOND * np.log1p(max(gain, 0.0) / INEXACT_BEYOND) + min(gain, 0.0)) / TEMPERATURE
-        for spot, gain in evidence.items()
-    }
+    weighed = {spot: counted(gain) / TEMPERATURE for spot, gain in evidence.items()}
     told: dict[str, float] = {}
     spots: dict[str, str] = {}
-    for spot, share in shares(counted).items():
+    for spot, share in shares(weighed).items():
         component = reported.get(spot, spot)
         told[component] = told.get(component, 0.0) + share
         if component not in spots or evidence[spot] > evidence[spots[component]]:

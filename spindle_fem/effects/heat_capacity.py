@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words
-from spindle_fem.effects.laws import amplitude
-from spindle_fem.effects.term import Term
+from spindle_fem.effects.laws import Complex, amplitude, relaxed, repeated, rows, shape
+from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 
 PLACES = ("housing", "flange", "nose", "drive_end", "shaft", "channel")
-# Usual size beside what the component itself holds.
-SHARE = 0.3
+# Usual size beside what the component itself holds, and, since what is mounted on a small part need not
+# be small, at least beside the largest one.
+SHARE, SHARE_OF_LARGEST = 0.3, 0.15
+BEHIND_CONTACT = "behind a contact"
 
 
 class HeatCapacityTerm(Term):
@@ -33,8 +37,48 @@ class HeatCapacityTerm(Term):
         return dict.fromkeys(self._places, parameters["capacity"] / len(self._places))
 
 
+class ContactCapacityTerm(Term):
+    """Heat capacity behind a contact: it follows the mean temperature of its places with a lag.
+
+    It begins at their temperature. Heat into the places is ``C (T_mass - T) / τ``,
+    evenly shared.
+
+    Parameters
+    ----------
+    name : str
+    places : tuple of str
+    usual : float, [J/K]
+    """
+
+    # its temperature, and whether it has one yet
+    n_states = 2
+
+    def __init__(self, name: str, places: tuple[str, ...], usual: float) -> None:
+        self.name = name
+        self.heat_places = self.reads = places
+        self.parameters = (
+            amplitude("capacity", usual, "J/K"),
+            shape("contact_time", 1200.0, 0.8, "s", low=60.0, high=50000.0),
+        )
+
+    def heat(self, context: TermContext) -> Complex:
+        """Into every place, (n, k) W."""
+        own, (mass, place) = context.parameters, self._temperatures(context)
+        heat = own["capacity"] * (mass - place) / own["contact_time"]
+        return repeated(context, heat / len(self.heat_places), len(self.heat_places))
+
+    def advance(self, context: TermContext, step: float) -> Complex:
+        """The mass follows, (2, k)."""
+        mass, place = self._temperatures(context)
+        return rows(context, relaxed(mass, place, step, context.parameters["contact_time"]), 1.0)
+
+    def _temperatures(self, context: TermContext) -> tuple[Complex, Complex]:
+        place = context.temperatures.mean(axis=0)
+        return np.where(context.state[1].real > 0.5, context.state[0], place), place
+
+
 class HeatCapacity(Effect):
-    """A fixture, tool or coolant hold-up in good contact."""
+    """A fixture, tool or coolant hold-up, in good contact or behind a joint."""
 
     name = "heat_capacity"
     kind = "parameter"
@@ -46,20 +90,31 @@ class HeatCapacity(Effect):
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Large components; nodes of a network."""
         keys = machine.spots if machine.kind == "network" else PLACES
+        largest = max(machine.capacity.values(), default=0.0)
         found = []
         for key in keys:
             if key in machine.heat and machine.capacity.get(key, 0.0) > 0.0:
-                usual = SHARE * machine.capacity[key]
-                term = HeatCapacityTerm(self.term_name(key), machine.heat[key], usual)
-                found.append(
-                    self.candidate(machine.component(key), term, amplitude="capacity", reference=usual)
-                )
+                usual = max(SHARE * machine.capacity[key], SHARE_OF_LARGEST * largest)
+                for form, kind in (("", HeatCapacityTerm), (BEHIND_CONTACT, ContactCapacityTerm)):
+                    term = kind(self.term_name(key, form), machine.heat[key], usual)
+                    found.append(
+                        self.candidate(
+                            machine.component(key),
+                            term,
+                            amplitude="capacity",
+                            reference=usual,
+                            form=form,
+                            starts=[{"contact_time": t} for t in (600.0, 2400.0)] if form else ({},),
+                        )
+                    )
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and what that is in steel."""
         size = reported["capacity"].value
+        lag = reported.get("contact_time")
+        behind = f" It follows with {lag.value / 60.0:.0f} min." if lag is not None else ""
         return (
             f"{capital(place_words(candidate.component))}: {size / 1e3:.3g} kJ/K of heat capacity is "
-            f"missing, as of {size / 470.0:.2g} kg of steel."
+            f"missing, as of {size / 470.0:.2g} kg of steel.{behind}"
         )

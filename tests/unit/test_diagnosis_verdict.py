@@ -12,8 +12,10 @@ from spindle_fem.diagnosis.engine import Hypothesis
 from spindle_fem.diagnosis.heldout import heldout_stamps
 from spindle_fem.diagnosis.inference import Coordinate, Fit
 from spindle_fem.diagnosis.verdict import (
+    LEAST_TEMPERATURE_RATIO,
     PRIOR_SIGMAS,
     TEMPERATURE,
+    counted,
     detection_p_value,
     judge,
     kind_of,
@@ -98,7 +100,18 @@ def test_differences_of_likelihood_count_by_the_temperature():
     worse = hypothesis(CHURNING, misfit=408.0)
     ranked = rank([worse, better, hypothesis(misfit=420.0, evidence=-1e4)])
     odds = ranked[0].probability / ranked[1].probability
-    assert odds == pytest.approx(np.exp(0.5 * 8.0 / TEMPERATURE), rel=0.05)
+    assert odds == pytest.approx(np.exp((counted(10.0) - counted(6.0)) / TEMPERATURE))
+    assert odds == pytest.approx(np.exp(0.5 * 8.0 / TEMPERATURE), rel=0.1)
+
+
+def test_a_gain_counts_less_beside_a_large_one_but_never_nothing():
+    small, large = counted(1.0) - counted(0.0), counted(20_001.0) - counted(20_000.0)
+    assert small == pytest.approx(1.0, rel=2e-3)
+    assert large == pytest.approx(1.0 / LEAST_TEMPERATURE_RATIO, rel=1e-6)
+    gains = np.linspace(-5.0, 6000.0, 400)
+    values = np.array([counted(gain) for gain in gains])
+    assert np.all(np.diff(values) > 0.0)
+    assert counted(-5.0) == -5.0
 
 
 def test_complexity_and_prior_count_in_full():

@@ -11,6 +11,7 @@ from spindle_fem.effects.coolant_film import TransitionTerm, reynolds_number
 from spindle_fem.effects.coolant_heating import CoolantHeatingTerm
 from spindle_fem.effects.gap_closure import GapClosureTerm
 from spindle_fem.effects.grease_churning import GreaseChurningTerm
+from spindle_fem.effects.heat_capacity import ContactCapacityTerm
 from spindle_fem.effects.heat_split import HeatSplitTerm
 from spindle_fem.effects.laws import power, relaxed, smooth_step, softplus, switched
 from spindle_fem.effects.natural_convection import NaturalConvectionTerm
@@ -78,6 +79,23 @@ def test_preload_follows_the_power_of_the_lagged_difference():
     assert slack == pytest.approx(1.0)
     moved = term.advance(context(term, temperatures=[310, 312, 303, 305], state=[1.0], **own), 600.0)
     assert moved[0, 0].real == pytest.approx(7.0 - 6.0 * np.exp(-1.0))
+
+
+def test_a_mass_behind_a_contact_takes_its_heat_and_gives_it_back():
+    """Capacity times rise, whatever the contact: an energy balance over a step of the place's temperature."""
+    term = ContactCapacityTerm("mass", ("a", "b"), 1000.0)
+    own = {"capacity": 2000.0, "contact_time": 500.0}
+    state, taken, step = np.zeros((2, 1)), 0.0, 1.0
+    cold = context(term, temperatures=(290.0, 294.0), state=state, **own)
+    assert np.abs(term.heat(cold)).max() == 0.0
+    state = term.advance(cold, step)
+    for _ in range(8000):
+        warm = context(term, temperatures=(300.0, 304.0), state=state.real, **own)
+        taken -= step * term.heat(warm).real.sum()
+        state = term.advance(warm, step)
+    assert state[0].real == pytest.approx(302.0, abs=1e-5)
+    # heat is taken at the start of each step: half a step of it too much
+    assert taken == pytest.approx(2000.0 * 10.0, rel=0.51 * step / own["contact_time"])
 
 
 def test_viscosity_is_that_of_the_data_sheet():
