@@ -11,6 +11,7 @@ import numpy as np
 
 from book import charts
 from book.causes import CAUSES, cause_counts, read_causes, study_seed, wrong_table
+from book.makeup import makeup_tables
 from book.page import Chapter, Pictures
 from book.work import Desk
 from spindle_fem.reporting.document import Bullets, Notice, Section, Table, Text
@@ -58,6 +59,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
     wrong = summary["wrong"]
     sections = [
         Section("asked", "What is asked for, and what came out", [_asked_table(asked)]),
+        Section("drawn", "What was drawn", makeup_tables(desk.study)),
         Section(
             "confusion",
             "Verdicts and effects",

@@ -106,7 +106,9 @@ def test_figures_file_is_plain_json(tmp_path):
     assert (test.file, test.title) == ("tests/a.py", "b")
 
 
-@pytest.mark.parametrize("name", ["book.measured", "book.work", "book.chapters.turning_centre"])
+@pytest.mark.parametrize(
+    "name", ["book.measured", "book.work", "book.makeup", "book.chapters.turning_centre"]
+)
 def test_examples_of_the_modules_hold(name):
     failed, tried = doctest.testmod(importlib.import_module(name))
     assert tried

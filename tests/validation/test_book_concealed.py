@@ -6,6 +6,7 @@ import pytest
 
 from book import causes
 from book.chapters import concealed
+from book.makeup import counted
 from book.page import Entry, Pictures, render_chapter
 from book.work import Desk
 
@@ -117,6 +118,20 @@ def test_every_wrong_case_stands_with_its_cause(desk, tmp_path, monkeypatch):
     _, html = page(desk, tmp_path)
     assert "they warm alike" in html
     assert causes.OPEN not in html
+
+
+def test_makeup_counts_every_case_once_by_number_of_effects(desk):
+    answers = [json.loads(path.read_text()) for path in (desk.study / "answers").iterdir()]
+    answers[0] |= {
+        "rows": {"recording": {"gaps": 2}, "calibration": {"gaps": 0}},
+        "noise": {"rounding_K": 0.05},
+        "cycle": "two_level",
+    }
+    rows = dict(counted(answers))
+    assert (rows["nothing concealed"], rows["one effect"], rows["two effects"]) == ("2", "2", "0")
+    assert rows["clear: strong, and nothing else comes near"] == "2"
+    assert (rows["with gaps"], rows["with spikes"]) == ("1", "0")
+    assert (rows["rounded to 0.05 K"], rows["load cycle: two level"]) == ("1", "1")
 
 
 def test_pictures_and_score_are_kept(desk, tmp_path):
