@@ -21,11 +21,37 @@ from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_li
 from spindle_fem.conduction.operators import build_operators
 from spindle_fem.conduction.problem import ConductionProblem, Film
 from spindle_fem.conduction.stage import add_scaled
-from spindle_fem.conduction.system import merged
+from spindle_fem.conduction.system import ThermalSystem, merged
 from spindle_fem.meshing.simple import build_box
+from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
 # Estimated error that each step may leave.
 STEP_TOLERANCE_K = 1e-6
+
+
+def problem_on(mesh: TaggedMesh, case: dict) -> ConductionProblem:
+    """Operators of a mesh and the case's coefficients on them."""
+    return ConductionProblem(
+        build_operators(mesh, 1),
+        case["conductivity"],
+        films=tuple(
+            Film(surface, coefficient, ambient)
+            for surface, (coefficient, ambient, _) in case["loads"].items()
+            if coefficient > 0.0
+        ),
+        joint_conductance=dict.fromkeys(mesh.joints, np.inf),
+        surface_heat={surface: heat for surface, (_, _, heat) in case["loads"].items() if heat},
+        volumetric_capacity=case["volumetric_capacity"],
+        adiabatic="rest",
+    )
+
+
+def thermal_system(folder: Path) -> tuple[ConductionProblem, ThermalSystem, ThermalSystem]:
+    """Problem, system and tied system of a case."""
+    mesh, case = read_case(folder)
+    problem = problem_on(mesh, case)
+    system = assemble_system(problem, case["start_temperature"])
+    return problem, system, system.tied()
 
 
 def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, np.ndarray | None]:
@@ -39,20 +65,7 @@ def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, 
     record.notes["mesh_kB"] = protocol.resident_kilobytes()
 
     with record.stage("assembly"):
-        operators = build_operators(mesh, 1)
-        problem = ConductionProblem(
-            operators,
-            case["conductivity"],
-            films=tuple(
-                Film(surface, coefficient, ambient)
-                for surface, (coefficient, ambient, _) in case["loads"].items()
-                if coefficient > 0.0
-            ),
-            joint_conductance=dict.fromkeys(mesh.joints, np.inf),
-            surface_heat={surface: heat for surface, (_, _, heat) in case["loads"].items() if heat},
-            volumetric_capacity=case["volumetric_capacity"],
-            adiabatic="rest",
-        )
+        problem = problem_on(mesh, case)
         system = assemble_system(problem, start)
         tied = system.tied()
     with record.stage("setup"):
@@ -102,7 +115,10 @@ def warm_up() -> None:
     """Load what is compiled, by a small problem, before clocks and memory are read."""
     least = threads.COMPILED_ABOVE
     threads.COMPILED_ABOVE = 0
-    mesh = divided(build_box((1.0, 1.0, 1.0), (6, 6, 6)))
+    mesh = build_box((1.0, 1.0, 1.0), (6, 6, 6))
+    # arrays as read_case gives them: compiled code is made for each kind
+    mesh = replace(divided(mesh), points=mesh.points.copy())
+    mesh = replace(mesh, tetrahedra=mesh.tetrahedra.astype(np.int32))
     problem = ConductionProblem(
         build_operators(mesh, 1),
         {"box": 1.0},

@@ -37,7 +37,7 @@ def elements_of_nodes(elements, n_nodes):
 
 @njit(**_OPTIONS)
 def fill_upper(low, high, elements, starts, members, extra_starts, extra, counts, indices):
-    """Columns of each row from the diagonal on, rising; returns their number, -1 when the space is too small."""
+    """Columns of each row from the diagonal on; returns their number, -1 when the space is too small."""
     mark = np.full(starts.size - 1, -1, dtype=np.int32)
     end = 0
     for i in range(low, high):

@@ -1,4 +1,4 @@
-"""The integrals of a mesh on one sparsity pattern: in numpy, or by compiled loops where these are installed."""
+"""The integrals of a mesh on one sparsity pattern: in numpy, or by compiled loops."""
 
 from __future__ import annotations
 

@@ -113,9 +113,7 @@ class SweptHierarchy:
         return unknowns
 
 
-def build_swept_hierarchy(
-    matrix: sparse.csr_array, prolongation: sparse.csr_array | None
-) -> SweptHierarchy:
+def build_swept_hierarchy(matrix: sparse.csr_array, prolongation: sparse.csr_array | None) -> SweptHierarchy:
     """Hierarchy of a symmetric positive definite matrix with sorted rows.
 
     Parameters

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -57,10 +58,7 @@ def run_blocks(function: Callable, bounds: NDArray[np.int64], *arguments: object
     if len(bounds) == 2:
         return [function(bounds[0], bounds[1], *arguments)]
     pool = _pool(len(bounds) - 2)
-    others = [
-        pool.submit(function, low, high, *arguments)
-        for low, high in zip(bounds[1:-1], bounds[2:], strict=True)
-    ]
+    others = [pool.submit(function, low, high, *arguments) for low, high in itertools.pairwise(bounds[1:])]
     first = function(bounds[0], bounds[1], *arguments)
     return [first, *(other.result() for other in others)]
 
