@@ -26,6 +26,7 @@ def comparisons(tests: Sequence[Test], caption: str, folded: str = "") -> Table:
                     str(count),
                     significant(check.measured, 6),
                     _reference(check),
+                    "" if check.used is None else significant(abs(check.measured - check.reference), 2),
                     "" if check.allowed is None else significant(check.allowed, 2),
                     "" if check.used is None else f"{100 * check.used:.0f} %",
                 ]
@@ -37,6 +38,7 @@ def comparisons(tests: Sequence[Test], caption: str, folded: str = "") -> Table:
         column("values", number=True),
         column("measured", number=True),
         column("reference", number=True),
+        column("off by", number=True),
         column("allowed ±", number=True),
         column("used", number=True),
     )
