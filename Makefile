@@ -49,10 +49,12 @@ study: $(READY)
 
 # The verification and validation book. STUDY=folder names another concealed study, RECORDINGS another folder of
 # real recordings; chapters without their data are left out by name. PEER_PYTHONS: interpreters with other solvers.
+# EARLIER="folder folder": studies with other seeds to show beside it.
 RECORDINGS ?= ../shared/recordings
+EARLIER ?=
 book: $(READY)
 	test -d $(STUDY)/answers || $(MAKE) --no-print-directory study
-	$(BIN)/python -m book -o reports/book --study $(STUDY) --recordings $(RECORDINGS)
+	$(BIN)/python -m book -o reports/book --study $(STUDY) --recordings $(RECORDINGS) $(addprefix --earlier ,$(EARLIER))
 
 clean:
 	rm -rf $(VENV) build dist runs .pytest_cache .ruff_cache .hypothesis

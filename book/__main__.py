@@ -21,6 +21,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--study", type=Path, default=Path("runs/study"), help="concealed study")
     parser.add_argument("--results", type=Path, default=None, help="default: STUDY/results")
     parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"))
+    parser.add_argument(
+        "--earlier",
+        type=Path,
+        action="append",
+        default=[],
+        help="earlier study to show beside; may be repeated",
+    )
     parser.add_argument("--only", action="append", default=[], help="only this chapter; may be repeated")
     parser.add_argument("--keep", action="store_true", help="use data of an earlier version of the source")
     given = parser.parse_args(arguments)
@@ -31,6 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
         given.recordings,
         keep=given.keep,
         tell=lambda text: print(text, flush=True),
+        earlier=tuple(given.earlier),
     )
     try:
         build(given.output, desk, given.only)

@@ -64,6 +64,8 @@ class Desk:
         Use data made with an earlier version of the source, and say so.
     tell : callable
         Told each step as it begins.
+    earlier : tuple of Path
+        Folders of earlier concealed studies, each with its ``results``.
     """
 
     work: Path
@@ -72,6 +74,7 @@ class Desk:
     recordings: Path
     keep: bool = False
     tell: Callable[[str], None] = print
+    earlier: tuple[Path, ...] = ()
     outdated: list[str] = field(default_factory=list)
 
     def real(self, name: str) -> Path | None:

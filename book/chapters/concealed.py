@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from book import charts
+from book.asked_tables import asked_table, earlier_table, short
 from book.causes import CAUSES, cause_counts, read_causes, study_seed, wrong_table
 from book.makeup import makeup_tables
 from book.page import Chapter, Pictures
@@ -58,7 +59,11 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
     causes = read_causes(CAUSES, seed)
     wrong = summary["wrong"]
     sections = [
-        Section("asked", "What is asked for, and what came out", [_asked_table(asked)]),
+        Section(
+            "asked",
+            "What is asked for, and what came out",
+            [asked_table(asked), *earlier_table(desk, asked)],
+        ),
         Section("drawn", "What was drawn", makeup_tables(desk.study)),
         Section(
             "confusion",
@@ -115,6 +120,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
                 *cause_counts(wrong, causes),
             ],
         ),
+        *_earlier_sections(desk),
     ]
     if summary["failed"]:
         failed = f"{len(summary['failed'])} cases ended with an error: {', '.join(summary['failed'])}."
@@ -124,7 +130,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
     met = sum(row["met"] is True for row in asked)
     outcome = (
         f"{len(rows)} concealed cases{seeded}: {met} of {len(asked)} figures asked for are met"
-        + (f"; not met: {'; '.join(_short(row) for row in unmet)}" if unmet else "")
+        + (f"; not met: {'; '.join(short(row) for row in unmet)}" if unmet else "")
         + f".{part}"
     )
     return Chapter(
@@ -149,48 +155,15 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
     )
 
 
-def _short(row: Mapping[str, Any]) -> str:
-    return f"{row['words']} {_value(row)}"
-
-
-def _value(row: Mapping[str, Any]) -> str:
-    if row["value"] is None:
-        return "–"
-    return f"{100 * row['value']:.1f} %" if row["share"] else significant(row["value"])
-
-
-def _bound(row: Mapping[str, Any]) -> str:
-    def text(value: float) -> str:
-        return f"{100 * value:.0f} %" if row["share"] else f"{value:g}"
-
-    if row["relation"] == "within":
-        return f"{text(row['bound'][0])} to {text(row['bound'][1])}"
-    return {"<=": "at most ", ">=": "at least "}[row["relation"]] + text(row["bound"])
-
-
-def _asked_table(asked: Sequence[Mapping[str, Any]]) -> Table:
-    rows = [
-        [
-            row["words"],
-            _bound(row),
-            _value(row),
-            f"{100 * row['low']:.0f}–{100 * row['high']:.0f} %" if row["low"] is not None else "",
-            str(row["of"]),
-            {True: "met", False: "not met", None: "no case"}[row["met"]],
-        ]
-        for row in asked
-    ]
-    columns = (
-        column("figure"),
-        column("asked", number=True),
-        column("found", number=True),
-        column("90 % interval of the share", number=True),
-        column("cases", number=True),
-        column("", mark=True),
-    )
-    return Table(
-        columns, rows_of(rows), "Clear: strong enough, and without a twin, by the generator's re-fit."
-    )
+def _earlier_sections(desk: Desk) -> list[Section]:
+    sections = []
+    for study in desk.earlier:
+        seed = study_seed(study)
+        wrong = score_study(study, study / "results")[0]["wrong"]
+        causes = read_causes(CAUSES, seed)
+        blocks = [wrong_table(wrong, causes), *cause_counts(wrong, causes)]
+        sections.append(Section(f"wrong-{seed}", f"Wrong cases of the earlier study, seed {seed}", blocks))
+    return sections
 
 
 def _ordered(confusion: Mapping[str, Mapping[str, int]]) -> dict[str, dict[str, int]]:
@@ -241,8 +214,8 @@ def _alarms(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> li
         blocks.append(
             Text(
                 f"Their p-values: median {significant(float(np.median(values)), 2)}, smallest "
-                f"{', '.join(significant(value, 2) for value in values[:5])}. An exact p-value would "
-                "have the median 0.5; a larger one says that the test is careful, and weak effects pay."
+                f"{', '.join(significant(value, 2) for value in values[:5])}. An exact p-value would have "
+                "the median 0.5; a larger one says that the test is careful, and weak effects pay."
             )
         )
     if alarms:

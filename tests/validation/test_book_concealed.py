@@ -1,6 +1,7 @@
 """The chapter of the concealed study on three cases made up for it."""
 
 import json
+import shutil
 
 import pytest
 
@@ -140,3 +141,15 @@ def test_pictures_and_score_are_kept(desk, tmp_path):
     wanted = {"verdicts", "effects", "strength", "calibration", "coverage", "errors", "times"}
     assert names == {f"concealed_{name}.png" for name in wanted}
     assert json.loads((desk.work / "concealed" / "score.json").read_text())["summary"]["cases"] == 3
+
+
+def test_an_earlier_study_stands_beside_with_its_own_wrong_cases(desk, tmp_path):
+    earlier = tmp_path / "earlier"
+    shutil.copytree(desk.study, earlier)
+    (earlier / "study.json").write_text(json.dumps({"seed": 3, "cases": 4}), encoding="utf-8")
+    shutil.rmtree(earlier / "results" / "case_0002")
+    desk.earlier = (earlier,)
+    _, html = page(desk, tmp_path)
+    assert "seed 3, 2 cases" in html
+    assert "Wrong cases of the earlier study, seed 3" in html
+    assert html.count("case_0003") == 2
