@@ -8,11 +8,25 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from spindle_fem.conduction import forms
+from spindle_fem.conduction import forms, threads
 from spindle_fem.conduction.operators import build_operators, spread
 from spindle_fem.conduction.skfem_mesh import load_into_skfem
 from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError, UnknownSurfaceError
 from spindle_fem.meshing.simple import build_box, build_joined_tubes, build_tube
+
+
+@pytest.fixture(autouse=True, params=["numpy", "compiled"])
+def loops(request, monkeypatch):
+    """Every test holds in numpy and in compiled loops, these by two threads."""
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+        monkeypatch.setattr(threads, "has_compiled", lambda: True)
+        monkeypatch.setattr(threads, "thread_count", lambda: 2)
+        monkeypatch.setattr(threads, "COMPILED_ABOVE", 0)
+        monkeypatch.setattr(threads, "LEAST_ROWS", 50)
+    else:
+        monkeypatch.setattr(threads, "has_compiled", lambda: False)
+
 
 MESH = build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((2, 1), 12, 2))
 ROUND_OFF = 1e-13

@@ -1,0 +1,208 @@
+"""Compiled loops give what numpy and scipy give; threads change round-off at most."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+from skfem import Basis, ElementTetP1, MeshTet
+
+from spindle_fem.conduction import forms, threads
+from spindle_fem.conduction.assemble import assemble_system
+from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear
+from spindle_fem.conduction.multigrid import Hierarchy, build_hierarchy
+from spindle_fem.conduction.operators import build_operators
+from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.conduction.skfem_mesh import ELEMENT_QUADRATURE_DEGREE
+from spindle_fem.conduction.steady import solve_steady
+from spindle_fem.conduction.system import merged
+from spindle_fem.errors import MeshQualityError, SpecError
+from spindle_fem.meshing.simple import build_box, build_joined_tubes
+
+pytest.importorskip("numba")
+ROUND_OFF = 1e-13
+TUBES = build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((3, 3), 24, 5))
+
+
+@pytest.fixture
+def loops(monkeypatch):
+    """Switch between numpy (0) and compiled loops in so many threads."""
+
+    def switch(count):
+        monkeypatch.setattr(threads, "has_compiled", lambda: count > 0)
+        monkeypatch.setattr(threads, "thread_count", lambda: count)
+        monkeypatch.setattr(threads, "COMPILED_ABOVE", 0)
+        monkeypatch.setattr(threads, "LEAST_ROWS", 50)
+
+    return switch
+
+
+def linear(mesh):
+    """A mesh of straight sides with linear elements."""
+    return replace(
+        mesh,
+        points=mesh.points[: mesh.n_corners].copy(),
+        tetrahedra=mesh.tetrahedra[:, :4].copy(),
+        surfaces={name: facets[:, :3].copy() for name, facets in mesh.surfaces.items()},
+    )
+
+
+def problem_on(operators):
+    return ConductionProblem(
+        operators,
+        {"inner": 40.0, "outer": 15.0},
+        films=(Film("outer.outer", 300.0, 290.0), Film("inner.z0", 20.0, 310.0)),
+        joint_conductance={"inner|outer": 2e3},
+        surface_heat={"inner.inner": 200.0},
+        lumped_nodes=(LumpedNode("air", (("inner.z1", 50.0), ("outer.z1", 30.0)), heat=3.0),),
+        adiabatic="rest",
+    )
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_linear_meshes_give_scikit_fem_s_matrices(loops, count):
+    loops(count)
+    mesh = linear(build_box((0.1, 0.2, 0.3), (5, 4, 6)))
+    operators = build_operators(mesh, 1)
+    basis = Basis(MeshTet(mesh.points.T.copy(), mesh.tetrahedra.T.copy()), ElementTetP1(),
+                  intorder=ELEMENT_QUADRATURE_DEGREE)  # fmt: skip
+    for form, unit in ((forms.conduction, operators.conduction), (forms.storage, operators.storage)):
+        expected = form.assemble(basis)
+        assert abs(operators.matrix(unit) - expected).max() < ROUND_OFF * abs(expected).max()
+    assert operators.part_load == pytest.approx(forms.source.assemble(basis), rel=1e-12)
+    assert operators.surface_area("box.x0") == pytest.approx(0.06, rel=1e-13)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_every_array_of_the_operators_is_the_same(loops, order):
+    loops(0)
+    plain = build_operators(TUBES, order, circumferential_parts=("inner",))
+    loops(2)
+    compiled = build_operators(TUBES, order, circumferential_parts=("inner",))
+    for name in ("indptr", "indices", "upper_of_full"):
+        assert np.array_equal(getattr(plain.pattern, name), getattr(compiled.pattern, name))
+    for name in ("part_of_slot", "part_of_unknown", "facet_slots", "facet_inverse"):
+        assert np.array_equal(getattr(plain, name), getattr(compiled, name))
+    for name in ("conduction", "storage", "circumferential", "part_load"):
+        expected = getattr(plain, name)
+        assert np.abs(getattr(compiled, name) - expected).max() < ROUND_OFF * np.abs(expected).max()
+    for joint, slots in plain.joint_cross_slots.items():
+        assert np.array_equal(slots, compiled.joint_cross_slots[joint])
+
+
+@pytest.mark.parametrize("count", [0, 2])
+def test_an_inverted_linear_element_is_refused(loops, count):
+    loops(count)
+    mesh = linear(build_box((0.1, 0.2, 0.3), (3, 3, 3)))
+    mesh.tetrahedra[7] = mesh.tetrahedra[7, [0, 1, 3, 2]]
+    with pytest.raises(MeshQualityError, match="1 elements are inverted"):
+        build_operators(mesh, 1)
+
+
+def test_quadratic_temperatures_need_a_quadratic_mesh():
+    with pytest.raises(SpecError, match="2 on linear elements"):
+        build_operators(linear(build_box((1.0, 1.0, 1.0), (1, 1, 1))), 2)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_merged_rows_are_the_triple_product(loops, count):
+    loops(count)
+    rng = np.random.default_rng(3)
+    n, size = 400, 300
+    root = sparse.random_array((n, n), density=0.02, rng=rng)
+    matrix = sparse.csr_array(root @ root.T + sparse.eye_array(n))
+    matrix.sort_indices()
+    label = np.concatenate((rng.permutation(size), rng.integers(0, size, n - size)))
+    tie = sparse.csr_array((np.ones(n), (np.arange(n), label)), shape=(n, size))
+    answer, expected = merged(matrix, tie), tie.T @ matrix @ tie
+    assert abs(answer - expected).max() < 1e-14 * abs(expected).max()
+    assert answer.has_sorted_indices
+    assert np.all(
+        np.diff(answer.indices)[np.diff(np.repeat(np.arange(size), np.diff(answer.indptr))) == 0] > 0
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_cycle_is_symmetric_positive_and_contracts(loops, order, count):
+    loops(count)
+    system = assemble_system(problem_on(build_operators(TUBES, order)))
+    hierarchy = build_hierarchy(system.matrix, system.prolongation)
+    assert not isinstance(hierarchy, Hierarchy)
+    assert len(hierarchy.levels) >= order
+    rng = np.random.default_rng(0)
+    one, other = rng.standard_normal((2, system.matrix.shape[0]))
+    answers = hierarchy.cycle(np.column_stack((one, other)))
+    # single precision
+    assert one @ answers[:, 1] == pytest.approx(other @ answers[:, 0], rel=1e-4)
+    assert one @ answers[:, 0] > 0.0
+    error = one
+    energies = [error @ (system.matrix @ error)]
+    for _ in range(6):
+        error = error - hierarchy.cycle(system.matrix @ error)
+        energies.append(error @ (system.matrix @ error))
+    assert max(np.array(energies[1:]) / energies[:-1]) < 0.6
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_solutions_are_those_of_the_direct_solver(loops, count):
+    loops(count)
+    problem = problem_on(build_operators(TUBES, 2))
+    found = solve_steady(problem, method="multigrid", relative_tolerance=1e-12)
+    exact = solve_steady(problem, method="direct")
+    assert found.temperature == pytest.approx(exact.temperature, abs=1e-8)
+    assert found.lumped_temperature == pytest.approx(exact.lumped_temperature, abs=1e-8)
+
+
+def test_iterations_are_few(loops):
+    loops(2)
+    system = assemble_system(problem_on(build_operators(TUBES, 2)))
+    preconditioner = build_preconditioner(system, "multigrid")
+    solution = solve_linear(
+        system.full_matrix(), system.full_load(), preconditioner, relative_tolerance=1e-10
+    )
+    assert solution.iterations < 30
+
+
+def test_space_for_rows_grows_until_they_fit(loops):
+    loops(2)
+    from spindle_fem.conduction.compiled_solver import product_rows
+
+    rng = np.random.default_rng(5)
+    one = sparse.random_array((600, 500), density=0.05, rng=rng).tocsr()
+    two = sparse.random_array((500, 400), density=0.05, rng=rng).tocsr()
+    given = [(*threads.unsigned(item.indptr, item.indices), item.data) for item in (one, two)]
+    starts, columns, values = threads.fill_rows(product_rows, 600, (*given[0], *given[1], 400), 0.1)
+    answer = sparse.csr_array((values, columns, starts), shape=(600, 400))
+    assert abs(answer - one @ two).max() < 1e-14
+
+
+def test_the_environment_says_how_many_threads_and_whether_to_compile(monkeypatch):
+    for name in ("SPINDLE_FEM_THREADS", "OMP_NUM_THREADS", "SPINDLE_FEM_COMPILED"):
+        monkeypatch.delenv(name, raising=False)
+    threads.thread_count.cache_clear()
+    threads.has_compiled.cache_clear()
+    try:
+        assert threads.thread_count() >= 1
+        assert threads.has_compiled()
+        monkeypatch.setenv("OMP_NUM_THREADS", "3")
+        monkeypatch.setenv("SPINDLE_FEM_COMPILED", "0")
+        threads.thread_count.cache_clear()
+        threads.has_compiled.cache_clear()
+        assert threads.thread_count() == 3
+        assert not threads.use_compiled(10**7)
+        monkeypatch.setenv("SPINDLE_FEM_THREADS", "5")
+        threads.thread_count.cache_clear()
+        assert threads.thread_count() == 5
+    finally:
+        threads.thread_count.cache_clear()
+        threads.has_compiled.cache_clear()
+
+
+def test_ranges_cover_all_rows_and_return_in_order(monkeypatch):
+    monkeypatch.setattr(threads, "thread_count", lambda: 3)
+    monkeypatch.setattr(threads, "LEAST_ROWS", 10)
+    bounds = threads.row_blocks(100)
+    assert bounds.tolist() == [0, 33, 66, 100]
+    assert threads.run_blocks(lambda low, high, add: low + high + add, bounds, 1) == [34, 100, 167]
+    assert threads.row_blocks(9).tolist() == [0, 9]
