@@ -81,43 +81,129 @@ def turn(low, high, factor, direction, preconditioned):
 
 # ------------------------------------------------------ Gauss-Seidel smoothing
 @njit(**_FAST)
-def forward_from_zero(low, high, indptr, indices, data, diagonal, inverse, right, unknowns):
-    """Forward sweep over a block of rows from zero; other blocks count as zero."""
+def forward_from_zero(low, high, starts, columns, values, diagonal, inverse, right, unknowns):
+    """Forward sweep over all rows from zero."""
     for i in range(low, high):
         total = right[i]
-        for place in range(indptr[i], diagonal[i]):
-            j = indices[place]
-            if j >= low:
-                total -= data[place] * unknowns[j]
+        for place in range(starts[i], diagonal[i]):
+            total -= values[place] * unknowns[columns[place]]
         unknowns[i] = total * inverse[i]
 
 
 @njit(**_FAST)
-def residual_after_forward(low, high, indptr, indices, data, diagonal, unknowns, out):
+def residual_after_forward(low, high, starts, columns, values, diagonal, unknowns, out):
     """Residual after :func:`forward_from_zero`: what the sweep did not see."""
     for i in range(low, high):
-        total = data.dtype.type(0.0)
-        for place in range(indptr[i], diagonal[i]):
-            j = indices[place]
-            if j >= low:
-                break
-            total -= data[place] * unknowns[j]
-        for place in range(diagonal[i] + 1, indptr[i + 1]):
-            total -= data[place] * unknowns[indices[place]]
+        total = values.dtype.type(0.0)
+        for place in range(diagonal[i] + 1, starts[i + 1]):
+            total -= values[place] * unknowns[columns[place]]
         out[i] = total
 
 
 @njit(**_FAST)
-def backward(low, high, indptr, indices, data, inverse, right, before, unknowns):
-    """Backward sweep over a block of rows; other blocks keep what they had ``before``."""
+def backward(low, high, starts, columns, values, inverse, right, unknowns):
+    """Backward sweep over all rows."""
     for i in range(high - 1, low - 1, -1):
         total = right[i]
-        for place in range(indptr[i], indptr[i + 1]):
-            j = indices[place]
-            if low <= j < high:
-                total -= data[place] * unknowns[j]
-            else:
-                total -= data[place] * before[j]
+        for place in range(starts[i], starts[i + 1]):
+            total -= values[place] * unknowns[columns[place]]
+        unknowns[i] += total * inverse[i]
+
+
+# The same by threads: each sweeps over its part of the rows, rows[low:high], and takes
+# what other parts had before. Half of the couplings with other parts is added to the
+# diagonal, which keeps the sweep convergent however strong they are.
+@njit(**_OPTIONS)
+def divide(starts, columns, values, n_parts):
+    """Connected parts of about equal size: slices of a breadth-first order from one end."""
+    n = starts.size - 1
+    order = np.empty(n, dtype=np.uint32)
+    first = 0
+    for _ in range(2):
+        seen = np.zeros(n, dtype=np.uint8)
+        end = 0
+        seed = first
+        for candidate in range(-1, n):
+            if candidate >= 0:
+                if seen[candidate]:
+                    continue
+                seed = candidate
+            seen[seed] = 1
+            order[end] = seed
+            at = end
+            end += 1
+            while at < end:
+                i = order[at]
+                at += 1
+                for place in range(starts[i], starts[i + 1]):
+                    j = columns[place]
+                    if not seen[j] and values[place] != 0.0:
+                        seen[j] = 1
+                        order[end] = j
+                        end += 1
+        # the last one reached lies at an end
+        first = order[n - 1]
+    part = np.empty(n, dtype=np.uint8)
+    for place in range(n):
+        part[order[place]] = place * n_parts // n
+    return part
+
+
+@njit(**_OPTIONS)
+def inverse_of_parts(starts, columns, values, diagonal, part, inverse):
+    """Inverse of the diagonal and half of the couplings with other parts."""
+    for i in range(diagonal.size):
+        total = values[diagonal[i]]
+        for place in range(starts[i], starts[i + 1]):
+            if part[columns[place]] != part[i]:
+                total += 0.5 * abs(values[place])
+        inverse[i] = 1.0 / total
+
+
+@njit(**_FAST)
+def forward_part(low, high, rows, part, starts, columns, values, diagonal, inverse, right, unknowns):
+    """Forward sweep over a part from zero; other parts count as zero."""
+    own = part[rows[low]]
+    for k in range(low, high):
+        i = rows[k]
+        total = right[i]
+        for place in range(starts[i], diagonal[i]):
+            j = columns[place]
+            if part[j] == own:
+                total -= values[place] * unknowns[j]
+        unknowns[i] = total * inverse[i]
+
+
+@njit(**_FAST)
+def residual_of_part(low, high, rows, part, starts, columns, values, diagonal, unknowns, out):
+    """Residual after :func:`forward_part` in every part."""
+    own = part[rows[low]]
+    for k in range(low, high):
+        i = rows[k]
+        total = shift = values.dtype.type(0.0)
+        for place in range(starts[i], diagonal[i]):
+            j = columns[place]
+            if part[j] != own:
+                total -= values[place] * unknowns[j]
+                shift += abs(values[place])
+        for place in range(diagonal[i] + 1, starts[i + 1]):
+            j = columns[place]
+            total -= values[place] * unknowns[j]
+            if part[j] != own:
+                shift += abs(values[place])
+        out[i] = total + values.dtype.type(0.5) * shift * unknowns[i]
+
+
+@njit(**_FAST)
+def backward_part(low, high, rows, part, starts, columns, values, inverse, right, before, unknowns):
+    """Backward sweep over a part; other parts keep what they had ``before``."""
+    own = part[rows[low]]
+    for k in range(high - 1, low - 1, -1):
+        i = rows[k]
+        total = right[i]
+        for place in range(starts[i], starts[i + 1]):
+            j = columns[place]
+            total -= values[place] * (unknowns[j] if part[j] == own else before[j])
         unknowns[i] += total * inverse[i]
 
 

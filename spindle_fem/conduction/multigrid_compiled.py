@@ -3,9 +3,9 @@
 A forward sweep before and a backward sweep after each coarser correction make
 the cycle symmetric. The first starts from zero and needs the left half of each
 row, the residual after it the right half, so a level costs two products where
-polynomial smoothing costs four. Threads sweep over blocks of rows and take what
-other blocks had before the sweep; the cycle is then still symmetric, and the
-same on every run with as many threads.
+polynomial smoothing costs four. Threads sweep over connected parts of the rows and
+take what other parts had before the sweep; the cycle is then still symmetric,
+and the same on every run with as many threads.
 
 Sources: Vanek, Mandel & Brezina (1996), Computing 56, 179-196 (smoothed
 aggregation); Baker, Falgout, Kolev & Yang (2011), SIAM J. Sci. Comput. 33,
@@ -50,8 +50,9 @@ class SweptLevel:
     inverse : (n,) ndarray
         Inverse of the diagonal.
     prolongation, restriction : compressed rows
-    sweeps : (n_sweeps + 1,) ndarray
-        Bounds of the rows that are swept apart.
+    part, part_rows, part_bounds : ndarray
+        Part of each row, rows by part, and the range of each part among them;
+        one part when one thread sweeps.
     blocks, coarse_blocks : ndarray
         Ranges of rows of this level and the next, for products.
     """
@@ -63,7 +64,9 @@ class SweptLevel:
     inverse: NDArray
     prolongation: Rows
     restriction: Rows
-    sweeps: NDArray[np.int64]
+    part: NDArray[np.uint8]
+    part_rows: NDArray[np.uint32]
+    part_bounds: NDArray[np.int64]
     blocks: NDArray[np.int64]
     coarse_blocks: NDArray[np.int64]
 
@@ -97,19 +100,29 @@ class SweptHierarchy:
         if depth == len(self.levels):
             return cho_solve(self.coarsest, residual.astype(np.float64)).astype(PRECISION)
         level = self.levels[depth]
-        matrix = (level.starts, level.columns, level.values, level.diagonal)
+        matrix = (level.starts, level.columns, level.values)
         unknowns, left = np.empty_like(residual), np.empty_like(residual)
-        run_blocks(compiled.forward_from_zero, level.sweeps, *matrix, level.inverse, residual, unknowns)
-        run_blocks(compiled.residual_after_forward, level.sweeps, *matrix, unknowns, left)
+        split = len(level.part_bounds) > 2
+        where = (level.part_bounds, level.part_rows, level.part) if split else (level.part_bounds,)
+        run_blocks(
+            compiled.forward_part if split else compiled.forward_from_zero,
+            *where, *matrix, level.diagonal, level.inverse, residual, unknowns,
+        )  # fmt: skip
+        run_blocks(
+            compiled.residual_of_part if split else compiled.residual_after_forward,
+            *where, *matrix, level.diagonal, unknowns, left,
+        )  # fmt: skip
         coarse = np.empty(len(level.restriction[0]) - 1, dtype=PRECISION)
         run_blocks(compiled.multiply, level.coarse_blocks, *level.restriction, left, coarse)
         correction = self._descend(depth + 1, coarse)
         run_blocks(compiled.add_product, level.blocks, *level.prolongation, correction, unknowns)
-        before = unknowns
-        if len(level.sweeps) > 2:
+        if split:
             left[:] = unknowns
-            before = left
-        run_blocks(compiled.backward, level.sweeps, *matrix[:3], level.inverse, residual, before, unknowns)
+            run_blocks(
+                compiled.backward_part, *where, *matrix, level.inverse, residual, left, unknowns
+            )  # fmt: skip
+        else:
+            run_blocks(compiled.backward, *where, *matrix, level.inverse, residual, unknowns)
         return unknowns
 
 
@@ -154,12 +167,25 @@ def build_swept_hierarchy(matrix: sparse.csr_array, prolongation: sparse.csr_arr
                 inverse,
                 (*rows[:2], rows[2].astype(PRECISION)),
                 (*restriction[:2], restriction[2].astype(PRECISION)),
-                np.array([0, len(inverse)]),
+                *_parts(fine, diagonal, inverse),
                 row_blocks(len(inverse)),
                 row_blocks(size),
             )
         )
     return SweptHierarchy(tuple(levels), cho_factor(matrix.toarray()))
+
+
+def _parts(
+    fine: Rows, diagonal: NDArray[np.uint32], inverse: NDArray
+) -> tuple[NDArray[np.uint8], NDArray[np.uint32], NDArray[np.int64]]:
+    """Part of each row, rows by part and their ranges; changes ``inverse`` for what is swept apart."""
+    count = len(row_blocks(len(inverse))) - 1
+    if count == 1:
+        return np.empty(0, np.uint8), np.empty(0, np.uint32), np.array([0, len(inverse)])
+    part = compiled.divide(*fine, count)
+    compiled.inverse_of_parts(*fine, diagonal, part, inverse)
+    rows = np.concatenate([np.flatnonzero(part == k) for k in range(count)]).astype(np.uint32)
+    return part, rows, np.concatenate(([0], np.cumsum(np.bincount(part, minlength=count))))
 
 
 def _galerkin(fine: Rows, rows: Rows, size: int) -> tuple[sparse.csr_array, Rows]:
