@@ -186,7 +186,8 @@ def solve_coupled(
 
     A fixed-point iteration with Anderson mixing over the whole field; the map
     is nearly affine, so the mixing finds the fixed point in a few solves even
-    where friction heat falls steeply with temperature.
+    where friction heat falls steeply with temperature. Where expansion changes
+    the preload, it begins from the state without expansion.
 
     Parameters
     ----------
@@ -207,7 +208,8 @@ def solve_coupled(
     Source: Walker & Ni (2011), SIAM J. Numer. Anal. 49, 1715-1735 (mixing).
     """
     operators = machine.operators
-    unknowns = np.full(operators.n_unknowns, point.ambient_temperature) if start is None else start
+    cold = np.full(operators.n_unknowns, point.ambient_temperature)
+    unknowns = cold if start is None else start
     lumped: dict[str, float] = {}
     mixing = _AndersonMixing(ANDERSON_DEPTH)
     solution: ConductionSolution | None = None
@@ -215,6 +217,16 @@ def solve_coupled(
     change = np.inf
     follows_preload = machine.spec.heat.thermal_preload and machine.spec.heat.model != "table"
     assembled: dict[str, float] = {}
+    if follows_preload:
+        loads, _ = machine.builder.at(point, machine.field_state(cold, {}))
+        assembled = {name: heat.preload for name, heat in loads.bearing_heat.items()}
+        if start is None:
+            # Cold grease makes heat that would carry the loop past the fixed point.
+            first = solve_coupled(without_expansion(machine), point, beyond=beyond)
+            solution, unknowns = first.solution, first.solution.temperature
+            lumped = dict(
+                zip(solution.problem.lumped_names, solution.lumped_temperature.tolist(), strict=True)
+            )
     given: NDArray[np.float64] | None = None
     mixed = unknowns
     names: tuple[str, ...] = ()
@@ -242,7 +254,6 @@ def solve_coupled(
         )
         hottest = float(solution.temperature.max())
         preload = {name: heat.preload for name, heat in loads.bearing_heat.items()}
-        assembled = assembled or preload
         if not np.isfinite(hottest) or hottest > RUNAWAY_TEMPERATURE:
             raise _no_steady_state(
                 machine, point, f"{loads.total_heat:.0f} W would heat it over {hottest - 273.15:.0f} °C."
@@ -275,6 +286,13 @@ def solve_coupled(
         f"field and loads still change by {change:.2g} K after {MAXIMUM_ITERATIONS} iterations.",
         "Friction heat may rise with temperature faster than it is carried away; lower speed or preload.",
     )
+
+
+def without_expansion(machine: PreparedMachine) -> PreparedMachine:
+    """The same machine with bearings that keep the size of assembly."""
+    heat = machine.spec.heat.model_copy(update={"thermal_preload": False})
+    spec = machine.spec.model_copy(update={"heat": heat})
+    return machine_on_mesh(spec, machine.mesh, machine.operators)
 
 
 def _split(

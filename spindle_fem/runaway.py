@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 
 from spindle_fem.conduction.steady import solve_steady
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
-from spindle_fem.loads.bearing_heat import BearingTemperatures, preload_runs_away
+from spindle_fem.loads.bearing_heat import (
+    BearingTemperatures,
+    HeatModel,
+    heat_model_of,
+    preload_runs_away,
+)
 from spindle_fem.loads.operating_point import OperatingPoint
 
 if TYPE_CHECKING:
@@ -41,6 +46,8 @@ class HeatResponse:
     def __init__(self, machine: PreparedMachine, point: OperatingPoint) -> None:
         self.machine = machine
         self.point = point
+        rigid = machine.spec.heat.model_copy(update={"thermal_preload": False})
+        self.without_expansion = heat_model_of(machine.spec.model_copy(update={"heat": rigid}))
         self.names = [bearing.name for _, bearing in machine.spec.bearings]
         unknowns = np.full(machine.operators.n_unknowns, point.ambient_temperature)
         loads, _ = machine.builder.at(point, machine.field_state(unknowns, {}))
@@ -77,24 +84,35 @@ class HeatResponse:
         }
 
     def settles(self, speed: float) -> bool:
-        """Whether heat and temperature reach a fixed point when they start cold."""
+        """Whether heat and temperature reach a fixed point from that without expansion."""
         point = replace(self.point, speed=speed)
-        heat = np.zeros(len(self.names))
-        assembled: dict[str, float] | None = None
+        model = self.machine.builder.heat_model
+        cold = self.temperatures(np.zeros(len(self.names)))
+        try:
+            assembled = {name: heat.preload for name, heat in model(point, cold)[0].items()}
+            heat = self._fixed_point(point, self.without_expansion, np.zeros(len(self.names)))
+            return heat is not None and self._fixed_point(point, model, heat, assembled) is not None
+        except (NoEquilibriumError, OutOfValidityError):
+            return False
+
+    def _fixed_point(
+        self,
+        point: OperatingPoint,
+        model: HeatModel,
+        heat: NDArray[np.float64],
+        assembled: dict[str, float] | None = None,
+    ) -> NDArray[np.float64] | None:
+        """Heat of every bearing that makes the temperatures that make it; None where it runs away."""
         for _ in range(MAXIMUM_STEPS):
-            try:
-                found, _ = self.machine.builder.heat_model(point, self.temperatures(heat))
-            except (NoEquilibriumError, OutOfValidityError):
-                return False
+            found, _ = model(point, self.temperatures(heat))
             preload = {name: found[name].preload for name in self.names}
-            assembled = assembled or preload
-            if preload_runs_away(preload, assembled):
-                return False
+            if assembled is not None and preload_runs_away(preload, assembled):
+                return None
             wanted = np.array([found[name].total for name in self.names])
             if np.abs(wanted - heat).max() <= HEAT_TOLERANCE * wanted.max():
-                return True
+                return heat
             heat = heat + RESPONSE_RELAXATION * (wanted - heat)
-        return False
+        return None
 
     def highest_speed(self, highest: float) -> float:
         """Largest speed below ``highest`` (rad/s) at which an equilibrium exists."""
