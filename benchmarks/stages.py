@@ -121,8 +121,8 @@ def tables(answer: dict) -> str:
     for nodes in sorted({row["nodes"] for row in answer["rows"]}):
         lines += [
             f"\n### {nodes} nodes, linear\n",
-            "| program | assembly s | set-up s | solve s | steady s | ratio | steps s | ratio | its | kB a node"
-            " | largest difference K |",
+            "| program | assembly s | set-up s | solve s | steady s | ratio | steps s | ratio | its "
+            "| kB a node | largest difference K |",
             "|---|---|---|---|---|---|---|---|---|---|---|",
         ]
         lines += [_line(row) for row in answer["rows"] if row["nodes"] == nodes]

@@ -130,8 +130,8 @@ def part_of_nodes(elements, part_of_element, n_nodes):
 
 
 @njit(**_OPTIONS)
-def add_element_values(low, high, elements, values, indptr, indices, out):
-    """Add upper element matrices (n_elements, k (k + 1) / 2) to the entries of rows in a range."""
+def add_element_values(low, high, elements, values, others, indptr, indices, out, other_out):
+    """Add two upper element matrices (n_elements, k (k + 1) / 2) each to the entries of rows in a range."""
     size = elements.shape[1]
     for e in range(elements.shape[0]):
         pair = 0
@@ -145,6 +145,7 @@ def add_element_values(low, high, elements, values, indptr, indices, out):
                     while indices[place] != j:
                         place += 1
                     out[place] += values[e, pair]
+                    other_out[place] += others[e, pair]
                 pair += 1
 
 

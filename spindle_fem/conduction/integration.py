@@ -206,18 +206,29 @@ def _compiled(
     for start in range(0, len(rest), BATCH):
         chosen = rest[start : start + BATCH]
         integrals = integrate_elements(mesh.points, tetrahedra[chosen], order)
-        for values, out in ((integrals.conduction, conduction), (integrals.storage, storage)):
-            run_blocks(compiled.add_element_values, blocks, nodes[chosen], values, *upper, out)
+        both = (integrals.conduction, integrals.storage)
+        run_blocks(
+            compiled.add_element_values, blocks, nodes[chosen], *both, *upper, conduction, storage
+        )  # fmt: skip
         load += np.bincount(nodes[chosen].ravel(), weights=integrals.load.ravel(), minlength=n_unknowns)
         volume += np.bincount(part[chosen], weights=integrals.volume, minlength=len(volume))
     circumferential = None
     if circumferential_parts:
-        circumferential = np.zeros(pattern.n_upper)
+        circumferential, unused = np.zeros((2, pattern.n_upper))
         around = np.flatnonzero(np.isin(part, circumferential_parts))
         for start in range(0, len(around), BATCH):
             chosen = around[start : start + BATCH]
             values = integrate_circumferential(mesh.points, tetrahedra[chosen], order)
-            run_blocks(compiled.add_element_values, blocks, nodes[chosen], values, *upper, circumferential)
+            run_blocks(
+                compiled.add_element_values,
+                blocks,
+                nodes[chosen],
+                values,
+                values,
+                *upper,
+                circumferential,
+                unused,
+            )
 
     def find(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int32]:
         slots = np.empty(rows.size, dtype=np.int32)

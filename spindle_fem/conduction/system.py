@@ -51,10 +51,7 @@ class ThermalSystem:
         """``[K −B; −Bᵀ D]`` as one sparse matrix."""
         if not self.n_lumped:
             return self.matrix
-        return sparse.block_array(
-            [[self.matrix, -self.exchange], [-self.exchange.T, sparse.csr_array(self.lumped_matrix)]],
-            format="csr",
-        )
+        return _bordered(self.matrix, -sparse.csr_array(self.exchange), self.lumped_matrix)
 
     def full_load(self) -> NDArray[np.float64]:
         """``[f; f_l]``."""
@@ -75,6 +72,31 @@ class ThermalSystem:
             None,
             _tied_prolongation(tie, self.prolongation),
         )
+
+
+def _bordered(
+    matrix: sparse.csr_array, border: sparse.csr_array, corner: NDArray[np.float64]
+) -> sparse.csr_array:
+    """``[A B; Bᵀ C]`` of compressed rows, without sorting A again.
+
+    Parameters
+    ----------
+    matrix : (n, n) csr_array
+    border : (n, m) csr_array
+    corner : (m, m) ndarray
+    """
+    n, m = border.shape
+    below = sparse.csr_array(sparse.hstack((border.T, sparse.csr_array(corner))))
+    ends = matrix.indptr + border.indptr
+    indptr = np.concatenate((ends, ends[-1] + below.indptr[1:])).astype(np.int32)
+    indices, data = np.empty(indptr[-1], dtype=np.int32), np.empty(indptr[-1])
+    # a row of A moves on by what the border has put before it, a row of B by all of A up to it
+    inner = np.arange(matrix.nnz) + np.repeat(border.indptr[:-1], np.diff(matrix.indptr))
+    outer = np.arange(border.nnz) + np.repeat(matrix.indptr[1:], np.diff(border.indptr))
+    for place, part, shift in ((inner, matrix, 0), (outer, border, n), (slice(ends[-1], None), below, 0)):
+        indices[place] = part.indices + shift
+        data[place] = part.data
+    return sparse.csr_array((data, indices, indptr), shape=(n + m, n + m))
 
 
 def merged(matrix: sparse.csr_array, tie: sparse.csr_array) -> sparse.csr_array:

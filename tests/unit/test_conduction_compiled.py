@@ -206,3 +206,13 @@ def test_ranges_cover_all_rows_and_return_in_order(monkeypatch):
     assert bounds.tolist() == [0, 33, 66, 100]
     assert threads.run_blocks(lambda low, high, add: low + high + add, bounds, 1) == [34, 100, 167]
     assert threads.row_blocks(9).tolist() == [0, 9]
+
+
+def test_lumped_nodes_border_the_matrix():
+    system = assemble_system(problem_on(build_operators(TUBES, 1)))
+    expected = sparse.block_array(
+        [[system.matrix, -system.exchange], [-system.exchange.T, system.lumped_matrix]]
+    ).toarray()
+    answer = system.full_matrix()
+    assert np.array_equal(answer.toarray(), expected)
+    assert answer.has_sorted_indices
