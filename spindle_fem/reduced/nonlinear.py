@@ -81,12 +81,17 @@ class DynamicTerms:
                 self.place_columns.append((count, place))
                 count += 1
         # Friction: columns of the places that a bearing heats, and their positions among the heat places.
-        self._friction: list[list[tuple[slice, list[int]]]] = []
+        # A term scales what those before it made of the same friction: their columns, by place in its own.
+        self._friction: list[list[tuple[slice, list[int], list[tuple[int, int]]]]] = []
+        made: dict[int, list[int]] = {}
         for term in terms:
             scaled = []
             for bearing in term.bearings:
                 positions = self._heat_rows(term, bearing)
-                scaled.append((slice(count, count + len(positions)), positions))
+                before = [(i, row) for i, position in enumerate(positions) for row in made.get(position, ())]
+                scaled.append((slice(count, count + len(positions)), positions, before))
+                for i, position in enumerate(positions):
+                    made.setdefault(position, []).append(count + i)
                 for position in positions:
                     self.place_columns.append((count, fast.heat_places[position]))
                     count += 1
@@ -251,10 +256,15 @@ class DynamicTerms:
                         by_parameter[rows.start + i, target] += value[rows.start + i]
             if term.bearings:
                 answers = np.asarray(term.friction(context), dtype=complex)
-                for i, (columns, positions) in enumerate(self._friction[number]):
+                for i, (columns, positions, before) in enumerate(self._friction[number]):
                     excess = answers[i, 0].real - 1.0
-                    value[columns] = excess * friction[positions]
-                    layout.spread(answers[i : i + 1], columns, friction[positions][:, None], slopes)
+                    scaled = friction[positions]
+                    for own, row in before:
+                        scaled[own] += value[row]
+                        for slope in slopes:
+                            slope[columns.start + own] += excess * slope[row]
+                    value[columns] = excess * scaled
+                    layout.spread(answers[i : i + 1], columns, scaled[:, None], slopes)
                     by_parameter[columns] += excess * friction_by[positions]
         # What shifts fluids is known: heat that a changed film moves counts from where they are now.
         for number, term in enumerate(self.terms):

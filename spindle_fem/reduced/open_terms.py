@@ -119,16 +119,13 @@ def with_open_terms(
     width = len(fast.load_names) + len(columns.names)
     found = [_widened(values, width) for values in inputs]
     found_by = [{name: _widened(values, width) for name, values in by.items()} for by in inputs_by]
-    n_heat = len(fast.heat_places)
     for term in terms:
         names = term.names()
         own = [name for name in derivatives if name in names]
         values = term.values(parameters)
         perturbed = _perturbed(term, values, own)
         memory = _memory(term, values, perturbed, drive)
-        for end, (loads, by, machine, machine_by) in enumerate(
-            zip(found, found_by, inputs, inputs_by, strict=True)
-        ):
+        for end, (loads, by) in enumerate(zip(found, found_by, strict=True)):
             context = _context(drive, perturbed, memory, at_end=bool(end))
             shape = (-1, len(drive.steps), 1 + len(own))
             if term.heat_places:
@@ -139,12 +136,13 @@ def with_open_terms(
                 factor = np.asarray(term.friction(context), dtype=complex).reshape(shape)
                 for row, bearing in enumerate(term.bearings):
                     for position in fast.heat_rows(bearing):
-                        friction = machine[:, position]
+                        # The machine's own, times what terms before this one make of it.
+                        friction = loads[:, position].copy()
+                        slopes = {name: slope[:, position].copy() for name, slope in by.items()}
                         _add(loads, by, position, (factor[row] - 1.0) * friction[:, None], own)
                         excess = factor[row, :, 0].real - 1.0
-                        for name, slope in machine_by.items():
-                            if position < min(slope.shape[1], n_heat):
-                                by[name][:, position] += excess * slope[:, position]
+                        for name, slope in slopes.items():
+                            by[name][:, position] += excess * slope
     return OpenLoads(columns.loads(), columns.loads_by(), *found, *found_by, columns.fluids())
 
 

@@ -140,8 +140,6 @@ class TransientRun:
         self.start, self.start_by = self._load_inputs(drive.start)
         self.end, self.end_by = self._load_inputs(drive.end)
         self._n_heat = len(fast.heat_places)
-        self._friction_start_by = self._friction_derivatives(self.start_by)
-        self._friction_end_by = self._friction_derivatives(self.end_by)
         known = [term for term in terms if open_loop and is_open(term)]
         opened = with_open_terms(
             fast,
@@ -153,11 +151,13 @@ class TransientRun:
             parameters,
             derivatives,
         )
-        # What terms scale is the machine's own friction: their excesses add up.
-        self.friction_start, self.friction_end = (item[:, : self._n_heat] for item in (self.start, self.end))
         self.loads, self.loads_by = opened.loads, opened.loads_by
         self.start, self.end = opened.start, opened.end
         self.start_by, self.end_by = opened.start_by, opened.end_by
+        # What dynamic terms scale: the machine's own friction times what open terms make of it.
+        self.friction_start, self.friction_end = (item[:, : self._n_heat] for item in (self.start, self.end))
+        self._friction_start_by = self._friction_derivatives(self.start_by)
+        self._friction_end_by = self._friction_derivatives(self.end_by)
         dynamic = [term for term in terms if term.is_dynamic and term not in known]
         self.dynamic = DynamicTerms(fast, drive, dynamic, parameters, derivatives) if dynamic else None
         scaled = {name for term in dynamic for name in term.coefficients}

@@ -387,12 +387,38 @@ class Plume(Term):
         return kept * context.state + (1.0 - kept) * excess
 
 
+class RunningIn(Term):
+    """Friction that fades with time, whatever the temperatures are."""
+
+    parameters = (TermParameter("extra", 0.4, 0.2), TermParameter("time", 2000.0, 0.5, "s"))
+    bearings = ("F1", "F2")
+
+    def __init__(self, name):
+        self.name = name
+
+    def friction(self, context):
+        factor = 1.0 + context.parameters["extra"] * np.exp(-context.time / context.parameters["time"])
+        return np.vstack((factor, factor))
+
+
+class LaterFriction(Friction):
+    """The same bearings once more."""
+
+    name = "later"
+
+
 TERMS = (Feedback(), Closure(), Fading(), Steady(), Friction())
+# Several that scale the friction of one bearing, with and without a look at temperatures.
+FRICTIONS = (Friction(), RunningIn("first"), LaterFriction(), RunningIn("second"))
 # Two that shift the fluid of a film, one known before the march and one not, and one that scales the film.
 SHIFTED = (Closure(), Room(), Plume())
 
 
-@pytest.mark.parametrize("terms", [TERMS, SHIFTED], ids=["everything", "shifted fluid of a scaled film"])
+@pytest.mark.parametrize(
+    "terms",
+    [TERMS, SHIFTED, FRICTIONS],
+    ids=["everything", "shifted fluid of a scaled film", "friction of friction"],
+)
 def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monkeypatch, terms):
     # Derivatives are those at Newton's last but one iterate: exact to its last change.
     monkeypatch.setattr(nonlinear, "TEMPERATURE_TOLERANCE", 1e-7)
@@ -497,19 +523,33 @@ def test_constant_heat_as_a_term_is_heat_of_the_table(fast):
     assert simulate_fast(fast, drive, 293.15, terms=(Heat(),)).temperature == pytest.approx(doubled, abs=1e-8)
 
 
-def test_scaled_friction_is_heat_of_the_table(fast):
+def scaled_by(factor, name="scaled", reads=()):
+    """A term that multiplies the friction of the front bearings; dynamic where it reads something."""
+
     class Scaled(Term):
-        name = "scaled"
         bearings = ("F1", "F2", "F3")
 
         def friction(self, context):
-            return np.full((3, context.temperatures.shape[-1]), 1.5, dtype=complex)
+            return np.full((3, context.temperatures.shape[-1]), factor, dtype=complex)
 
+    Scaled.name, Scaled.reads = name, reads
+    return Scaled()
+
+
+def test_scaled_friction_is_heat_of_the_table(fast):
     drive = drive_of(np.arange(0.0, 3600.0, 20.0), 3000.0)
     heat = {"heat.R1": 1.2}
     scaled = simulate_fast(fast, drive, 293.15, parameters={"heat.front": 1.5, **heat}).temperature
-    by_term = simulate_fast(fast, drive, 293.15, terms=(Scaled(),), parameters=heat).temperature
+    by_term = simulate_fast(fast, drive, 293.15, terms=(scaled_by(1.5),), parameters=heat).temperature
     assert by_term == pytest.approx(scaled, abs=1e-8)
+
+
+@pytest.mark.parametrize("reads", [((), ()), (("housing",), ()), (("housing",), ("housing",))])
+def test_what_scales_one_friction_multiplies(fast, reads):
+    drive = drive_of(np.arange(0.0, 3600.0, 20.0), 3000.0)
+    whole = simulate_fast(fast, drive, 293.15, parameters={"heat.front": 1.8}).temperature
+    terms = tuple(scaled_by(f, str(f), own) for f, own in zip((1.5, 1.2), reads, strict=True))
+    assert simulate_fast(fast, drive, 293.15, terms=terms).temperature == pytest.approx(whole, abs=1e-8)
 
 
 def test_heat_that_a_recording_gives_enters_where_its_name_says(fast):
