@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from book import charts
+from book.causes import CAUSES, OPEN, read_causes
 from book.diagnoses import found_blocks, next_step_blocks, own_pictures, verdict_blocks
 from book.page import Chapter, Pictures
 from book.work import Desk, read_json
@@ -175,6 +176,11 @@ def _run(folder: Path, seed: int) -> None:
     )
 
 
+def _cause(seed: int) -> str:
+    entry = read_causes(CAUSES, seed).get(riddle.NAME)
+    return f"{entry['cause']} {entry.get('remedy', '')}".strip() if entry else OPEN
+
+
 def _draws_table(draws: list[Draw]) -> Table:
     rows = []
     for draw in draws:
@@ -192,6 +198,7 @@ def _draws_table(draws: list[Draw]) -> Table:
                 "yes" if draw.score["exact"] else "no",
                 *(number(_band(draw.series[name]), 2) for name in (NOMINAL, REFITTED, FOUND)),
                 number(draw.noise, 2),
+                "" if draw.score["exact"] else _cause(draw.seed),
             ]
         )
     columns = (
@@ -205,6 +212,7 @@ def _draws_table(draws: list[Draw]) -> Table:
             column(f"{title} / K", number=True)
             for title in ("as defined", "re-fitted", "with the physics found", "noise")
         ),
+        column("cause, where it is wrong"),
     )
     return Table(columns, rows_of(rows), "Errors: root mean square at 2000 and 2500 rpm, over all channels.")
 
