@@ -84,7 +84,7 @@ def _contents(made: Sequence[tuple[Entry, Chapter]], claims: Sequence[dict[str, 
     when = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     words = f"Written {when} from the source with fingerprint {fingerprint('tool')}."
     if desk.outdated:
-        words += f" Made with an earlier version of the source: {', '.join(desk.outdated)}."
+        words += f" Made with an earlier version of the source: {', '.join(dict.fromkeys(desk.outdated))}."
     return (
         environment()
         .get_template("contents.html.j2")
