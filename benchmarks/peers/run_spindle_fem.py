@@ -90,11 +90,12 @@ def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, 
         counted = 0
         for factor in heat_factor:
             residual = STEP_S * (loads[factor] - tied.matrix @ rise)
+            guess = known.guess(residual)
             change = solve_linear(
                 stepped,
                 residual,
                 preconditioner,
-                known.guess(residual),
+                guess,
                 error_tolerance=STEP_TOLERANCE_K,
             )
             counted += change.iterations

@@ -85,7 +85,8 @@ def test_solutions_of_one_matrix_are_found_again_and_the_oldest_is_forgotten():
     solutions = RNG.normal(size=(6, 20))
     for solution in solutions:
         space.add(solution)
-        assert space.guess(matrix @ solution) == pytest.approx(solution, abs=1e-9)
+        # single precision
+        assert space.guess(matrix @ solution) == pytest.approx(solution, abs=1e-5)
     assert np.abs(space.guess(matrix @ solutions[0]) - solutions[0]).max() > 1e-3
 
 
@@ -96,4 +97,5 @@ def test_a_guess_from_solutions_leaves_nothing_along_them():
     for solution in [*solutions, solutions[0]]:
         space.add(solution)
     load = RNG.normal(size=20)
-    assert solutions @ (load - matrix @ space.guess(load)) == pytest.approx(0.0, abs=1e-9)
+    left = solutions @ (load - matrix @ space.guess(load))
+    assert np.abs(left / np.linalg.norm(solutions, axis=1)).max() < 1e-4 * np.linalg.norm(load)
