@@ -38,6 +38,8 @@ REDUCED = 3
 EXCHANGED, OTHERS = 1, 5
 SINGLES, PAIRS, TRIPLES = 8, 6, 3
 BEAM, ADDITIONS = 3, 6
+# Shares of the amplitudes that a fit begins from, one after the other until it can be simulated.
+MILDER = (1.0, 0.5, 0.2)
 # A hypothesis this much less likely (natural logarithm) than the best is not extended.
 HOPELESS = 400.0
 # An addition must promise to make the data this much likelier, its prior paid.
@@ -296,15 +298,33 @@ class Search:
 
     def _fit(self, candidates: tuple[Candidate, ...], start: Mapping[str, float]) -> None:
         """Fit a set and keep it."""
-        try:
-            fitted = self.problem.fit(candidates, start, hopeless=self._hopeless())
-        except (ConvergenceError, OutOfValidityError, SpecError):
-            # What cannot be simulated explains nothing; its neighbours are tried.
+        fitted = self._fitted(candidates, start)
+        if fitted is None:
             return
         if any(self._unseen(candidate, fitted.values) for candidate in candidates):
             return
         paid = sum(self._paid.get(_identity((c,)), 0.0) for c in candidates)
         self._keep(Hypothesis(fitted, self.log_prior(candidates) - paid))
+
+    def _fitted(self, candidates: tuple[Candidate, ...], start: Mapping[str, float]) -> Fit | None:
+        """Fit of a set; from milder amplitudes where it cannot be simulated at those of the screening.
+
+        Friction that feeds on its own heat has no state at amplitudes that are
+        too large, and first order does not know where that begins.
+        """
+        for share in MILDER:
+            values = dict(start)
+            for candidate in candidates:
+                own = candidate.amplitude
+                name = EFFECT_PREFIX + own if own in {f.name for f in candidate.factors} else own
+                if name in values:
+                    values[name] = candidate.null + share * (values[name] - candidate.null)
+            try:
+                return self.problem.fit(candidates, values, hopeless=self._hopeless())
+            except (ConvergenceError, OutOfValidityError, SpecError):
+                continue
+        # What cannot be simulated explains nothing; its neighbours are tried.
+        return None
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
         """Whether an effect is on only where nothing was recorded, neither readings nor inputs."""

@@ -13,6 +13,18 @@ EVERY = 4
 FIRST = 2
 
 
+def _words(seconds: float) -> str:
+    """A length of time in the unit that suits it.
+
+    >>> [_words(s) for s in (8.0, 960.0, 5400.0 * 3, 864000.0)]
+    ['8 s', '16 min', '4.5 h', '10 days']
+    """
+    for unit, size, from_ in (("days", 86400.0, 2.0), ("h", 3600.0, 2.0), ("min", 60.0, 2.0)):
+        if seconds >= from_ * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"
+
+
 def heldout_stamps(recording: Recording, choice: str = "blocks") -> tuple[NDArray[np.bool_], str]:
     """Stamps that are held out, and how they were chosen, in words.
 
@@ -46,7 +58,7 @@ def heldout_stamps(recording: Recording, choice: str = "blocks") -> tuple[NDArra
     share = np.clip((times - begin) / max(duration, 1e-9), 0.0, 1.0)
     if choice == "blocks":
         block = np.minimum((share * BLOCKS).astype(int), BLOCKS - 1)
-        text = f"every {EVERY}th of {BLOCKS} stretches of {duration / BLOCKS / 60.0:.0f} min"
+        text = f"every {EVERY}th of {BLOCKS} stretches of {_words(duration / BLOCKS)}"
         return block % EVERY == FIRST, text
     kind, _, amount = choice.partition(":")
     try:

@@ -60,7 +60,13 @@ class IntervalTerm(Term):
 
 
 class UnrecordedEffect(IntervalEffect):
-    """Places, intervals and reports of both."""
+    """Places, intervals and reports of both.
+
+    Spots reach round the machine, what heats or cools them need not: a sensor
+    near it sees up to twice the mean, one opposite half of it.
+    """
+
+    size_sigma = 0.45
 
     def places(self, machine: MachineView) -> tuple[str, ...]:
         """Every spot of the view."""

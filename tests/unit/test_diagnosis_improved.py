@@ -161,6 +161,19 @@ def test_stated_intervals_hold_the_value_and_the_truth(found):
     assert stated[name]["unit"] == size.unit
 
 
+def test_a_size_whose_place_is_unsure_has_a_wider_interval(found, monkeypatch):
+    outcome, _ = found
+    (candidate,) = outcome.final.candidates
+    name = next(iter(reported_parameters(outcome.final, candidate)))
+    monkeypatch.setattr(type(effect_of(candidate.effect)), "size_sigma", 0.0)
+    narrow = reported_parameters(outcome.final, candidate)[name]
+    monkeypatch.setattr(type(effect_of(candidate.effect)), "size_sigma", 0.45)
+    wide = reported_parameters(outcome.final, candidate)[name]
+    assert wide["value"] == narrow["value"]
+    assert wide["low"] < narrow["low"] <= narrow["high"] < wide["high"]
+    assert wide["high"] / wide["value"] > 0.85 * np.exp(1.645 * 0.45)
+
+
 # ------------------------------------------------------------------------ sufficiency
 def test_the_response_time_is_that_of_the_slow_mode(opened):
     """By the exact step response of two bodies."""

@@ -239,6 +239,8 @@ def test_a_fit_that_stays_above_the_noise_leaves_room_for_something_else():
     assert found.chosen.probability <= 1.0 - found.other + 1e-12
     good = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0, reduced=1.0))
     assert good.other == 0.0
+    nearly = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=440.0, reduced=1.1))
+    assert 0.02 < nearly.other < 0.1
 
 
 def test_a_shift_that_the_prior_holds_is_consistent():
