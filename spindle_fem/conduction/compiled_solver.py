@@ -110,6 +110,62 @@ def backward(low, high, starts, columns, values, inverse, right, unknowns):
         unknowns[i] += total * inverse[i]
 
 
+# The same for several columns (n, m) at once: each entry of the matrix is read once for all.
+@njit(**_FAST)
+def forward_many(starts, columns, values, diagonal, inverse, right, unknowns):
+    """:func:`forward_from_zero` for several columns."""
+    m = right.shape[1]
+    for i in range(right.shape[0]):
+        for c in range(m):
+            unknowns[i, c] = right[i, c]
+        for place in range(starts[i], diagonal[i]):
+            j, value = columns[place], values[place]
+            for c in range(m):
+                unknowns[i, c] -= value * unknowns[j, c]
+        for c in range(m):
+            unknowns[i, c] *= inverse[i]
+
+
+@njit(**_FAST)
+def residual_many(starts, columns, values, diagonal, unknowns, out):
+    """:func:`residual_after_forward` for several columns."""
+    m = out.shape[1]
+    for i in range(out.shape[0]):
+        for c in range(m):
+            out[i, c] = 0.0
+        for place in range(diagonal[i] + 1, starts[i + 1]):
+            j, value = columns[place], values[place]
+            for c in range(m):
+                out[i, c] -= value * unknowns[j, c]
+
+
+@njit(**_FAST)
+def backward_many(starts, columns, values, inverse, right, unknowns):
+    """:func:`backward` for several columns."""
+    m = right.shape[1]
+    total = np.empty(m, dtype=values.dtype)
+    for i in range(right.shape[0] - 1, -1, -1):
+        for c in range(m):
+            total[c] = right[i, c]
+        for place in range(starts[i], starts[i + 1]):
+            j, value = columns[place], values[place]
+            for c in range(m):
+                total[c] -= value * unknowns[j, c]
+        for c in range(m):
+            unknowns[i, c] += total[c] * inverse[i]
+
+
+@njit(**_FAST)
+def add_product_many(starts, columns, values, vectors, out):
+    """``out += A vectors`` for several columns."""
+    m = out.shape[1]
+    for i in range(out.shape[0]):
+        for place in range(starts[i], starts[i + 1]):
+            j, value = columns[place], values[place]
+            for c in range(m):
+                out[i, c] += value * vectors[j, c]
+
+
 # The same by threads: each sweeps over its part of the rows, rows[low:high], and takes
 # what other parts had before. Half of the couplings with other parts is added to the
 # diagonal, which keeps the sweep convergent however strong they are.

@@ -50,6 +50,9 @@ class SweptLevel:
     inverse : (n,) ndarray
         Inverse of the diagonal.
     prolongation, restriction : compressed rows
+    part_inverse : (n,) ndarray
+        The same where threads sweep apart: with half of the couplings between
+        their parts.
     part, part_rows, part_bounds : ndarray
         Part of each row, rows by part, and the range of each part among them;
         one part when one thread sweeps.
@@ -64,6 +67,7 @@ class SweptLevel:
     inverse: NDArray
     prolongation: Rows
     restriction: Rows
+    part_inverse: NDArray
     part: NDArray[np.uint8]
     part_rows: NDArray[np.uint32]
     part_bounds: NDArray[np.int64]
@@ -86,7 +90,9 @@ class SweptHierarchy:
         residual : (n,) or (n, m) float64 ndarray
         """
         if residual.ndim == 2:
-            return np.stack([self.cycle(column) for column in residual.T], axis=1)
+            scales = np.abs(residual).max(axis=0, initial=0.0)
+            scales[scales == 0.0] = 1.0
+            return scales * self._descend_many(0, (residual / scales).astype(PRECISION, order="C"))
         # scaled, so that small residuals stay inside the range of single precision
         scale = float(np.linalg.norm(residual)) / np.sqrt(len(residual)) or 1.0
         blocks = row_blocks(len(residual))
@@ -96,6 +102,22 @@ class SweptHierarchy:
         run_blocks(compiled.scaled_copy, blocks, scale, self._descend(0, single), answer)
         return answer
 
+    def _descend_many(self, depth: int, residual: NDArray) -> NDArray:
+        """The cycle for several columns, in one thread."""
+        if depth == len(self.levels):
+            return cho_solve(self.coarsest, residual.astype(np.float64)).astype(PRECISION)
+        level = self.levels[depth]
+        matrix = (level.starts, level.columns, level.values)
+        unknowns, left = np.empty_like(residual), np.empty_like(residual)
+        compiled.forward_many(*matrix, level.diagonal, level.inverse, residual, unknowns)
+        compiled.residual_many(*matrix, level.diagonal, unknowns, left)
+        coarse = np.zeros((len(level.restriction[0]) - 1, residual.shape[1]), dtype=PRECISION)
+        compiled.add_product_many(*level.restriction, left, coarse)
+        correction = np.ascontiguousarray(self._descend_many(depth + 1, coarse))
+        compiled.add_product_many(*level.prolongation, correction, unknowns)
+        compiled.backward_many(*matrix, level.inverse, residual, unknowns)
+        return unknowns
+
     def _descend(self, depth: int, residual: NDArray) -> NDArray:
         if depth == len(self.levels):
             return cho_solve(self.coarsest, residual.astype(np.float64)).astype(PRECISION)
@@ -103,10 +125,11 @@ class SweptHierarchy:
         matrix = (level.starts, level.columns, level.values)
         unknowns, left = np.empty_like(residual), np.empty_like(residual)
         split = len(level.part_bounds) > 2
+        inverse = level.part_inverse if split else level.inverse
         where = (level.part_bounds, level.part_rows, level.part) if split else (level.part_bounds,)
         run_blocks(
             compiled.forward_part if split else compiled.forward_from_zero,
-            *where, *matrix, level.diagonal, level.inverse, residual, unknowns,
+            *where, *matrix, level.diagonal, inverse, residual, unknowns,
         )  # fmt: skip
         run_blocks(
             compiled.residual_of_part if split else compiled.residual_after_forward,
@@ -119,10 +142,10 @@ class SweptHierarchy:
         if split:
             left[:] = unknowns
             run_blocks(
-                compiled.backward_part, *where, *matrix, level.inverse, residual, left, unknowns
+                compiled.backward_part, *where, *matrix, inverse, residual, left, unknowns
             )  # fmt: skip
         else:
-            run_blocks(compiled.backward, *where, *matrix, level.inverse, residual, unknowns)
+            run_blocks(compiled.backward, *where, *matrix, inverse, residual, unknowns)
         return unknowns
 
 
@@ -177,15 +200,16 @@ def build_swept_hierarchy(matrix: sparse.csr_array, prolongation: sparse.csr_arr
 
 def _parts(
     fine: Rows, diagonal: NDArray[np.uint32], inverse: NDArray
-) -> tuple[NDArray[np.uint8], NDArray[np.uint32], NDArray[np.int64]]:
-    """Part of each row, rows by part and their ranges; changes ``inverse`` for what is swept apart."""
+) -> tuple[NDArray, NDArray[np.uint8], NDArray[np.uint32], NDArray[np.int64]]:
+    """Inverse for what is swept apart, part of each row, rows by part and their ranges."""
     count = len(row_blocks(len(inverse))) - 1
     if count == 1:
-        return np.empty(0, np.uint8), np.empty(0, np.uint32), np.array([0, len(inverse)])
+        return inverse, np.empty(0, np.uint8), np.empty(0, np.uint32), np.array([0, len(inverse)])
     part = compiled.divide(*fine, count)
+    inverse = np.empty_like(inverse)
     compiled.inverse_of_parts(*fine, diagonal, part, inverse)
     rows = np.concatenate([np.flatnonzero(part == k) for k in range(count)]).astype(np.uint32)
-    return part, rows, np.concatenate(([0], np.cumsum(np.bincount(part, minlength=count))))
+    return inverse, part, rows, np.concatenate(([0], np.cumsum(np.bincount(part, minlength=count))))
 
 
 def _galerkin(fine: Rows, rows: Rows, size: int) -> tuple[sparse.csr_array, Rows]:

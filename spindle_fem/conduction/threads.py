@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Loading compiled code takes as long as it saves on so many unknowns.
-COMPILED_ABOVE = 20_000
+COMPILED_ABOVE = 40_000
 # A block of fewer rows costs more to hand over than it saves.
 LEAST_ROWS = 15_000
 

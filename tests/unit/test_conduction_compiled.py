@@ -9,7 +9,7 @@ from skfem import Basis, ElementTetP1, MeshTet
 
 from spindle_fem.conduction import forms, threads
 from spindle_fem.conduction.assemble import assemble_system
-from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear
+from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear, solve_many
 from spindle_fem.conduction.multigrid import Hierarchy, build_hierarchy
 from spindle_fem.conduction.operators import build_operators
 from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
@@ -216,3 +216,21 @@ def test_lumped_nodes_border_the_matrix():
     answer = system.full_matrix()
     assert np.array_equal(answer.toarray(), expected)
     assert answer.has_sorted_indices
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_several_right_hand_sides_are_solved_as_one_by_one(loops, count):
+    loops(count)
+    system = assemble_system(problem_on(build_operators(TUBES, 2)))
+    preconditioner = build_preconditioner(system, "multigrid")
+    loads = np.random.default_rng(2).standard_normal((len(system.full_load()), 30))
+    matrix = system.full_matrix()
+    found = solve_many(matrix, loads, preconditioner, relative_tolerance=1e-10)
+    left = loads - matrix @ found
+    assert np.linalg.norm(left, axis=0).max() < 1e-7 * np.linalg.norm(loads)
+    hierarchy = build_hierarchy(system.matrix, system.prolongation)
+    columns = np.random.default_rng(3).standard_normal((system.matrix.shape[0], 3))
+    many = hierarchy.cycle(columns)
+    one = hierarchy.cycle(columns[:, 1])
+    # by two threads the parts take what the others had before
+    assert np.abs(many[:, 1] - one).max() < (1e-5 if count == 1 else 0.2) * np.abs(one).max()
