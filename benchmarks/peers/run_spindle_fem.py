@@ -25,6 +25,7 @@ from spindle_fem.conduction.system import ThermalSystem, merged
 from spindle_fem.meshing.simple import build_box
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
+
 # Estimated error that each step may leave.
 STEP_TOLERANCE_K = 1e-6
 
@@ -91,16 +92,10 @@ def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, 
         for factor in heat_factor:
             residual = STEP_S * (loads[factor] - tied.matrix @ rise)
             guess = known.guess(residual)
-            change = solve_linear(
-                stepped,
-                residual,
-                preconditioner,
-                guess,
-                error_tolerance=STEP_TOLERANCE_K,
-            )
+            change = solve_linear(stepped, residual, preconditioner, guess, error_tolerance=STEP_TOLERANCE_K)
             counted += change.iterations
             if change.iterations:
-                known.add(change.unknowns)
+                known.add(change.unknowns, guess)
             rise += change.unknowns
     record.notes["step_iterations"] = counted
     return steady, start + (system.tie @ rise)[first]

@@ -79,13 +79,15 @@ class SolvedSpace:
         scale = float(np.abs(load).max(initial=0.0)) or 1.0
         return scale * ((known @ (load / scale).astype(np.float32)) @ known).astype(float)
 
-    def add(self, solution: NDArray[np.float64]) -> None:
-        """Keep what is new in a solution, (n,)."""
+    def add(self, solution: NDArray[np.float64], guess: NDArray[np.float64] | None = None) -> None:
+        """Keep what is new in a solution, (n,); its guess from here, when given, saves finding what is not."""
         place = self._added % len(self._basis)
         # the oldest goes first: what the new one has of it is to stay
         self._basis[place] = 0.0
         known = self._basis[: self._count]
-        rest = solution / (float(np.abs(solution).max(initial=0.0)) or 1.0)
+        # while nothing is forgotten, what the guess left is all that is new
+        rest = solution if guess is None or self._count == len(self._basis) else solution - guess
+        rest = rest / (float(np.abs(rest).max(initial=0.0)) or 1.0)
         whole = None
         for _ in range(2):
             image = self._matrix @ rest
