@@ -25,7 +25,6 @@ from spindle_fem.conduction.system import ThermalSystem, merged
 from spindle_fem.meshing.simple import build_box
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
-
 # Estimated error that each step may leave.
 STEP_TOLERANCE_K = 1e-6
 

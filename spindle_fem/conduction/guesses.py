@@ -80,7 +80,7 @@ class SolvedSpace:
         return scale * ((known @ (load / scale).astype(np.float32)) @ known).astype(float)
 
     def add(self, solution: NDArray[np.float64], guess: NDArray[np.float64] | None = None) -> None:
-        """Keep what is new in a solution, (n,); its guess from here, when given, saves finding what is not."""
+        """Keep what is new in a solution, (n,); its guess from here, when given, tells what is not."""
         place = self._added % len(self._basis)
         # the oldest goes first: what the new one has of it is to stay
         self._basis[place] = 0.0
