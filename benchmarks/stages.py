@@ -1,6 +1,6 @@
 """Every stage of the pipeline, and the same discrete problem in other programs, in one run.
 
-    python benchmarks/stages.py [--sizes 50000 200000 800000] [--repeats 3] [--steps 100]
+    python benchmarks/stages.py [--sizes 68000 200000 800000] [--repeats 3] [--steps 100]
         [--python OTHER_INTERPRETER ...] [--programs NAME ...] [--no-pipeline] [-o runs/benchmark]
 
 Programs that are not installed in any of the interpreters are left out by name.
@@ -29,7 +29,7 @@ from spindle_fem.coupling import prepare_machine
 from spindle_fem.spec.load import load_machine
 
 MACHINE = "wu_tan_2016"
-SIZES = (50_000, 200_000, 800_000)
+SIZES = (68_000, 200_000, 800_000)
 # Nodes of the divided mesh at size factors of the coarse preset (gmsh 4.15); between them a power law.
 KNOWN = ((67_716, 1.3), (139_781, 0.68), (218_985, 0.54))
 REDUCED_BELOW = 300_000
