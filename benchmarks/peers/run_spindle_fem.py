@@ -59,7 +59,6 @@ def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, 
     warm_up()
     mesh, case = read_case(folder)
     start = case["start_temperature"]
-    first = merged_nodes(mesh)[1]
     record.notes["threads"] = threads.thread_count()
     record.notes["compiled"] = threads.has_compiled()
     record.notes["mesh_kB"] = protocol.resident_kilobytes()
@@ -76,6 +75,7 @@ def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, 
         )
     record.notes |= {"iterations": solution.iterations, "residual": solution.residual}
     record.notes["peak_kB"] = protocol.peak_kilobytes()
+    first = merged_nodes(mesh)[1]
     steady = start + (system.tie @ solution.unknowns)[first]
     if not steps:
         return steady, None

@@ -92,7 +92,11 @@ def fill_rows(
     starts = np.cumsum(counts, dtype=np.int32)
     if len(blocks) == 1:
         return starts, *blocks[0]
-    return starts, *(np.concatenate(pieces) for pieces in zip(*blocks, strict=True))
+    # one kind after the other, so that only that one is there twice
+    joined = []
+    while blocks[0]:
+        joined.append(np.concatenate([parts.pop(0) for parts in blocks]))
+    return starts, *joined
 
 
 def unsigned(*arrays: NDArray) -> tuple[NDArray[np.uint32], ...]:
