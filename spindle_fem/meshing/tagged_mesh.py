@@ -47,7 +47,7 @@ class TaggedMesh:
         ``r cos θ = y, r sin θ = -x`` (right-handed about +z).
     n_corners : int
         Number of leading points that are element corners.
-    tetrahedra : (n_elements, 10) int64 ndarray
+    tetrahedra : (n_elements, 10) int64 ndarray; (n_elements, 4) for a linear mesh
         Corners 0–3, then middles of edges 01, 12, 02, 03, 13, 23 (the order
         of scikit-fem's quadratic tetrahedron); positive volume.
     part_names : tuple of str
