@@ -20,6 +20,8 @@ from .stepping import Path, draw_as_built, run
 
 UNSEEN_RATIO, UNSEEN_CHI2 = 0.3, 20.0
 CLEAR_RATIO, CLEAR_CHI2 = 1.0, 120.0
+# No effect moves a reading by more, K; what does is an explicit law that its steps cannot follow.
+LARGEST_CHANGE = 300.0
 # A mimic that leaves less than this cannot be told from the truth.
 TWIN_RATIO, TWIN_CHI2 = 0.4, 14.0
 _HEAVY = ("thermal_preload", "gap_closure", "grease_churning", "unrecorded_heat_source", "starvation")
@@ -172,6 +174,24 @@ def _draw_effects(
     return effects, target
 
 
+def _draw_stable(
+    wanted: list[str], study: Study, plain: Path, plan: Plan, rng: np.random.Generator
+) -> tuple[list[Concealed], float]:
+    """Effects whose explicit laws stay finite in the steps of the identification, too.
+
+    Raises
+    ------
+    ArithmeticError
+        None of several draws does.
+    """
+    for _ in range(8):
+        effects, target = _draw_effects(wanted, study, plain, plan, rng)
+        change = study.diagnosed_only(study.simulate([e.machine or e.sensor for e in effects]))
+        if np.isfinite(change).all() and np.abs(change).max() < LARGEST_CHANGE:
+            return effects, target
+    raise ArithmeticError(f"{', '.join(wanted)}: no draw stays finite.")
+
+
 def _verdict_of(effects: list[Concealed]) -> str:
     kinds = {e.kind for e in effects}
     for kind in ("missing_physics", "parameter", "sensor"):
@@ -270,7 +290,7 @@ def make_case(
     calibration = draw_drive(rng) if rng.random() < 0.5 else None
     plain = run(model, plan.drive, as_built)
     study = Study(model, plan, calibration, as_built, noise) if wanted else None
-    effects, target = _draw_effects(wanted, study, plain, plan, rng) if study else ([], 0.0)
+    effects, target = _draw_stable(wanted, study, plain, plan, rng) if study else ([], 0.0)
     readings = _apply(model, plan, as_built, effects)
     inputs = folder / "inputs" / name
     rows = {"recording": record(inputs, "recording", name, plan, readings, noise, rng)}
