@@ -40,8 +40,9 @@ SINGLES, PAIRS, TRIPLES = 8, 6, 3
 BEAM, ADDITIONS = 3, 6
 # Shares of the amplitudes that a fit begins from, one after the other until it can be simulated.
 MILDER = (1.0, 0.5, 0.2)
-# A hypothesis this much less likely (natural logarithm) than the best is not extended.
-HOPELESS = 400.0
+# A hypothesis this much less likely (natural logarithm) than the best is not extended, but for one effect
+# that explains a fair share of what the best does: half of a strong pair leaves a lot.
+HOPELESS, FAIR_SHARE = 400.0, 0.55
 # An addition must promise to make the data this much likelier, its prior paid.
 ENOUGH_GAIN = 4.0
 # So many singles are fitted however little they promise.
@@ -116,17 +117,33 @@ class Search:
             self._extend(null, screened, intervals, 3, TRIPLES)
         for size in range(1, LARGEST_SET):
             best = self.ranked()[0]
-            ranked = [h for h in self.ranked() if len(h.keys) == size and h.score > best.score - HOPELESS]
+            worst = best.score - self._reach(size)
+            ranked = [h for h in self.ranked() if len(h.keys) == size and h.score > worst]
             self.progress(f"diagnosis: {size + 1} effects")
             # A third effect is rare: it is looked for only where two leave something.
             beam = (size == 1) if self._explained(best) else BEAM
-            for hypothesis in ranked[:beam]:
+            for hypothesis in self._different(ranked)[:beam]:
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
         self._reduce()
         self._exchange()
         self._widen()
         return self.ranked()
+
+    def _different(self, ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The best hypothesis of each combination of effects.
+
+        One effect at several places, and what is on in intervals as heat or as
+        loss, are much the same start for a search.
+        """
+        found: dict[tuple[str, ...], Hypothesis] = {}
+        for item in ranked:
+            names = (
+                "intervals" if isinstance(self.effects[c.effect], IntervalEffect) else c.effect
+                for c in item.fit.candidates
+            )
+            found.setdefault(tuple(sorted(names)), item)
+        return list(found.values())
 
     def _exchange(self) -> None:
         """Try other effects in the place of each member of the best sets.
@@ -163,6 +180,11 @@ class Search:
                     values = hypothesis.fit.values
                     start = values | _renamed_values(candidate, wider, values)
                     self._fit(tuple(members), start)
+
+    def _families(self) -> dict[str, str]:
+        """Bearing set of every bearing: what all of a set has, one of its bearings has not once more."""
+        named = {g: self.view.component(g) for g in self.view.groups}
+        return {bearing: named[g] for g in self.view.groups for bearing in self.view.sets[g]}
 
     def _groups_of(self, component: str) -> list[str]:
         """Bearing sets that a bearing belongs to."""
@@ -220,8 +242,11 @@ class Search:
 
     def screened(self, fit: Fit) -> tuple[Screened, dict[int, OnOff]]:
         """Candidates, and intervals at every spot, against what a fit leaves."""
-        present = fit.keys
-        allowed = [c for c in self.candidates if (c.effect, c.component) not in present]
+        families = self._families()
+        present = {(effect, families.get(component, component)) for effect, component in fit.keys}
+        allowed = [
+            c for c in self.candidates if (c.effect, families.get(c.component, c.component)) not in present
+        ]
         times, residual = self._residual(fit)
         variants = variants_of(
             [replace(c, starts=self.effects[c.effect].starts_from(c, times, residual)) for c in allowed]
@@ -232,7 +257,7 @@ class Search:
                 variant = Variant(candidate, {})
                 intervals[id(candidate)] = found
                 variants.append(variant)
-        found = screen(self.problem, fit, variants, self.weights)
+        found = screen(self.problem, fit, variants, self.weights, families)
         self._screenings[_identity(fit.candidates)] = found
         return found, intervals
 
@@ -320,7 +345,7 @@ class Search:
                 if name in values:
                     values[name] = candidate.null + share * (values[name] - candidate.null)
             try:
-                return self.problem.fit(candidates, values, hopeless=self._hopeless())
+                return self.problem.fit(candidates, values, hopeless=self._hopeless(len(candidates)))
             except (ConvergenceError, OutOfValidityError, SpecError):
                 continue
         # What cannot be simulated explains nothing; its neighbours are tried.
@@ -340,9 +365,16 @@ class Search:
         )
         return hidden > HIDDEN * sum(end - start for start, end in intervals)
 
-    def _hopeless(self) -> float:
-        """Misfit beyond which a hypothesis does not matter."""
-        return self.ranked()[0].fit.misfit_with_prior + 2.0 * HOPELESS
+    def _hopeless(self, size: int) -> float:
+        """Misfit beyond which a set of some size does not matter."""
+        return self.ranked()[0].fit.misfit_with_prior + 2.0 * self._reach(size)
+
+    def _reach(self, size: int) -> float:
+        """How much less likely than the best a set may be and still matter."""
+        if size > 1:
+            return HOPELESS
+        gain = self.ranked()[0].score - self.found[_identity(())].score
+        return max(HOPELESS, (1.0 - FAIR_SHARE) * gain)
 
     def _keep(self, hypothesis: Hypothesis) -> None:
         self.found[_identity(hypothesis.fit.candidates)] = hypothesis

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,8 @@ class Screened:
     signs : (m,) ndarray
         1: the amplitude cannot be negative; 0: it can.
     log_prior : (m,) ndarray
+    families : mapping of component to str
+        Bearing set of a bearing: one effect is looked for once in each family.
     """
 
     variants: tuple[Variant, ...]
@@ -47,6 +49,7 @@ class Screened:
     spread: Array
     signs: Array
     log_prior: Array
+    families: Mapping[str, str] = field(default_factory=dict)
 
     def singles(self) -> Array:
         """Logarithm of the evidence of every variant alone over nothing, priors included, (m,)."""
@@ -128,9 +131,13 @@ class Screened:
         return [(index, self.amplitudes([index])[index]) for index in found.values()]
 
     def _distinct(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Sets of different candidates, no two of one effect at one place."""
-        names = {key: i for i, key in enumerate(dict.fromkeys(v.key for v in self.variants))}
-        label = np.array([names[v.key] for v in self.variants])[sets]
+        """Sets of different candidates, no two of one effect at one place or in one family."""
+        keys = [
+            (effect, self.families.get(component, component))
+            for effect, component in (v.key for v in self.variants)
+        ]
+        names = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+        label = np.array([names[key] for key in keys])[sets]
         keep = np.ones(len(sets), dtype=bool)
         for i in range(sets.shape[1]):
             for j in range(i):
@@ -160,7 +167,13 @@ def log_priors(variants: Sequence[Variant], weights: Mapping[str, float]) -> Arr
     )
 
 
-def screen(problem: Problem, fit: Fit, variants: Sequence[Variant], weights: Mapping[str, float]) -> Screened:
+def screen(
+    problem: Problem,
+    fit: Fit,
+    variants: Sequence[Variant],
+    weights: Mapping[str, float],
+    families: Mapping[str, str],
+) -> Screened:
     """Answers of all variants about a fit, and their inner products.
 
     Parameters
@@ -170,6 +183,8 @@ def screen(problem: Problem, fit: Fit, variants: Sequence[Variant], weights: Map
         What the model already holds.
     variants : sequence of Variant
     weights : mapping of effect to float
+    families : mapping of component to str
+        As :class:`Screened` has them.
     """
     known = {c.name for c in fit.coordinates}
     values = fit.values
@@ -182,7 +197,8 @@ def screen(problem: Problem, fit: Fit, variants: Sequence[Variant], weights: Map
     gram, data, total = linear.gram(columns)
     spread = np.array([_spread(v) for v in variants])
     signs = np.array([_one_sided(v) for v in variants])
-    return Screened(tuple(variants), gram, data, total, spread, signs, log_priors(variants, weights))
+    priors = log_priors(variants, weights)
+    return Screened(tuple(variants), gram, data, total, spread, signs, priors, families)
 
 
 def _spread(variant: Variant) -> float:
