@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 from functools import cache
 from importlib.util import find_spec
 
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 COMPILED_ABOVE = 40_000
 # A block of fewer rows costs more to hand over than it saves.
 LEAST_ROWS = 15_000
+_ONE: ContextVar[bool] = ContextVar("one_thread", default=False)
 
 
 @cache
@@ -29,9 +32,24 @@ def use_compiled(n_unknowns: int) -> bool:
     return n_unknowns >= COMPILED_ABOVE and has_compiled()
 
 
-@cache
 def thread_count() -> int:
-    """Threads of compiled loops: ``SPINDLE_FEM_THREADS``, else ``OMP_NUM_THREADS``, else the cores given."""
+    """Threads of compiled loops: one within :func:`one_thread`, else what the machine gives."""
+    return 1 if _ONE.get() else _given_threads()
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Compiled loops with one thread: the order of sums, and so the last digits, depend on their number."""
+    token = _ONE.set(True)
+    try:
+        yield
+    finally:
+        _ONE.reset(token)
+
+
+@cache
+def _given_threads() -> int:
+    """``SPINDLE_FEM_THREADS``, else ``OMP_NUM_THREADS``, else the cores given."""
     for name in ("SPINDLE_FEM_THREADS", "OMP_NUM_THREADS"):
         given = os.environ.get(name, "")
         if given.isdigit() and int(given) > 0:

@@ -17,6 +17,7 @@ from spindle_fem import __version__
 from spindle_fem.cache import cache_directory
 from spindle_fem.checks import require_checks
 from spindle_fem.conduction.operators import ThermalOperators, build_operators
+from spindle_fem.conduction.threads import one_thread
 from spindle_fem.coupling import machine_on_mesh
 from spindle_fem.design.designs import Design
 from spindle_fem.design.fast.heat import mechanical_key
@@ -203,7 +204,7 @@ def evaluate_tasks(tasks: Sequence[DesignTask], question: Question) -> list[Row]
     Every design is solved from a cold start and with one thread of the linear
     algebra, so that no row depends on what was solved before it.
     """
-    with threadpool_limits(1):
+    with threadpool_limits(1), one_thread():
         return [evaluate(task, question) for task in tasks]
 
 
@@ -246,7 +247,7 @@ def _without_answers(task: DesignTask, question: Question, status: str, reason: 
 
 def solve_task(task: DesignTask) -> ThermalResult:
     """The whole result of a possible design, as its row was made from; for pictures."""
-    with threadpool_limits(1):
+    with threadpool_limits(1), one_thread():
         return solve_checked(task)
 
 

@@ -180,22 +180,22 @@ def test_space_for_rows_grows_until_they_fit(loops):
 def test_the_environment_says_how_many_threads_and_whether_to_compile(monkeypatch):
     for name in ("SPINDLE_FEM_THREADS", "OMP_NUM_THREADS", "SPINDLE_FEM_COMPILED"):
         monkeypatch.delenv(name, raising=False)
-    threads.thread_count.cache_clear()
+    threads._given_threads.cache_clear()
     threads.has_compiled.cache_clear()
     try:
         assert threads.thread_count() >= 1
         assert threads.has_compiled()
         monkeypatch.setenv("OMP_NUM_THREADS", "3")
         monkeypatch.setenv("SPINDLE_FEM_COMPILED", "0")
-        threads.thread_count.cache_clear()
+        threads._given_threads.cache_clear()
         threads.has_compiled.cache_clear()
         assert threads.thread_count() == 3
         assert not threads.use_compiled(10**7)
         monkeypatch.setenv("SPINDLE_FEM_THREADS", "5")
-        threads.thread_count.cache_clear()
+        threads._given_threads.cache_clear()
         assert threads.thread_count() == 5
     finally:
-        threads.thread_count.cache_clear()
+        threads._given_threads.cache_clear()
         threads.has_compiled.cache_clear()
 
 
@@ -234,3 +234,11 @@ def test_several_right_hand_sides_are_solved_as_one_by_one(loops, count):
     one = hierarchy.cycle(columns[:, 1])
     # by two threads the parts take what the others had before
     assert np.abs(many[:, 1] - one).max() < (1e-5 if count == 1 else 0.2) * np.abs(one).max()
+
+
+def test_one_thread_is_what_it_says_whatever_the_machine_has(monkeypatch):
+    monkeypatch.setattr(threads, "_given_threads", lambda: 4)
+    assert len(threads.row_blocks(10 * threads.LEAST_ROWS)) == 5
+    with threads.one_thread():
+        assert threads.row_blocks(10 * threads.LEAST_ROWS).tolist() == [0, 10 * threads.LEAST_ROWS]
+    assert threads.thread_count() == 4

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from spindle_fem import __version__
 from spindle_fem.cache import source_digest
+from spindle_fem.conduction.threads import one_thread
 from spindle_fem.coupling import machine_on_mesh
 from spindle_fem.design.evaluate import (
     FILM_HIGH,
@@ -71,7 +72,7 @@ def answer_group(group: GroupTask, question: Question) -> list[Row]:
     Every design that gets no row is for the full solve: outside the model's
     range, with too large an error, or of a machine that the model refuses.
     """
-    with threadpool_limits(1):
+    with threadpool_limits(1), one_thread():
         try:
             model, rows, tables = model_of(group, question)
         except SpindleFemError:
