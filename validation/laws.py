@@ -5,6 +5,7 @@ and exponent at their plain values serves as a mimic when it is asked what else 
 recording. Temperatures °C, times s, heat W.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -44,7 +45,7 @@ class Lag:
 
 
 @dataclass(slots=True)
-class Law:
+class Law(ABC):
     """Base: forgets its memory at the start of a run."""
 
     memory: dict[str, object] = field(default_factory=dict, init=False, repr=False)
@@ -57,9 +58,9 @@ class Law:
         """Delay kept under a key."""
         return self.memory.setdefault(key, Lag(constant))
 
+    @abstractmethod
     def act(self, moment: Moment) -> None:
         """Change the moment."""
-        raise NotImplementedError
 
 
 @dataclass(slots=True)
