@@ -236,10 +236,10 @@ def solve_coupled(
             physics = NO_CHANGE if beyond is None else beyond(point, unknowns, lumped)
             loads, coolant = machine.builder.at(point, machine.field_state(unknowns, lumped), physics)
         except (NoEquilibriumError, OutOfValidityError) as error:
-            if given is None or (not follows_preload and retreats == MAXIMUM_RETREATS):
-                raise
-            if follows_preload:
+            if follows_preload and (given is not None or start is None):
                 raise _no_steady_state(machine, point, str(error)) from error
+            if given is None or retreats == MAXIMUM_RETREATS:
+                raise
             # Cold grease makes more heat than the machine will ever see: go half the way back.
             retreats += 1
             mixing = _AndersonMixing(ANDERSON_DEPTH)
