@@ -273,7 +273,9 @@ class FastModel:
         if key not in self._sums:
             if len(self._sums) * self.model.size**2 >= MOST_SUMS:
                 self._sums.clear()
-            self._sums[key] = np.tensordot(values[chosen], self.model.operators[chosen], axes=1)
+            found = np.tensordot(values[chosen], self.model.operators[chosen], axes=1)
+            found.setflags(write=False)
+            self._sums[key] = found
         return self._sums[key]
 
     def _fluid_column(self, coefficient: str) -> int:

@@ -101,7 +101,6 @@ def test_differences_of_likelihood_count_by_the_temperature():
     ranked = rank([worse, better, hypothesis(misfit=420.0, evidence=-1e4)])
     odds = ranked[0].probability / ranked[1].probability
     assert odds == pytest.approx(np.exp((counted(10.0) - counted(6.0)) / TEMPERATURE))
-    assert odds == pytest.approx(np.exp(0.5 * 8.0 / TEMPERATURE), rel=0.1)
 
 
 def test_a_gain_counts_less_beside_a_large_one_but_never_nothing():
