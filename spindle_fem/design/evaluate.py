@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,9 +23,10 @@ from spindle_fem.coupling import machine_on_mesh
 from spindle_fem.design.designs import Design
 from spindle_fem.design.fast.heat import mechanical_key
 from spindle_fem.design.fast.inputs import refusal, structure_digest
+from spindle_fem.design.morphing import lattice_assembly, move_mesh, moved_digest
 from spindle_fem.design.outputs import derived_values, value_of
-from spindle_fem.design.table import FAILED, FULL, IMPOSSIBLE, OK, Row
-from spindle_fem.errors import FaultsError, SpecError, SpindleFemError
+from spindle_fem.design.table import FAILED, FULL, IMPOSSIBLE, MOVED, NEW, OK, Row
+from spindle_fem.errors import FaultsError, GeometryError, MeshQualityError, SpecError, SpindleFemError
 from spindle_fem.geometry.assembly import AssemblyGeometry, build_assembly
 from spindle_fem.loads.channel_cells import ChannelCells
 from spindle_fem.loads.coolant_loop import CoolantLoop
@@ -40,6 +42,8 @@ from spindle_fem.solve import solve_prepared
 from spindle_fem.spec.inherit import apply_overrides
 from spindle_fem.spec.load import validate
 from spindle_fem.spec.model import MachineSpec
+
+LOGGER = logging.getLogger(__name__)
 
 # Tables of a definition that shape the mesh; designs that agree in them share it.
 _SHAPING = ("part", "bearing_types", "bearing_set", "channel", "surface", "remaining_surfaces", "mesh")
@@ -62,11 +66,14 @@ class Question:
     backend : {"auto", "full", "reduced"}
         What may answer: full solves, or also the projected model of a group
         of designs; with "auto" where the group is large enough to pay.
+    mesh : {"new", "moved"}
+        Whether a mesh may be moved from that of a machine with a channel near by.
     """
 
     outputs: tuple[str, ...]
     film_uncertainty: bool
     backend: str = "auto"
+    mesh: str = NEW
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -95,6 +102,8 @@ class DesignTask:
         that agree in it can share one. Empty where none can answer the design.
     mechanics : str
         Key of what makes heat, for designs that have a structure.
+    source : str
+        Hash of the mesh that the design's own is to be moved from, where it is.
     """
 
     design: Design
@@ -104,6 +113,7 @@ class DesignTask:
     reason: str = ""
     structure: str = ""
     mechanics: str = ""
+    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +121,7 @@ class _Shape:
     geometry: str
     joints: tuple[str, ...]
     reason: str = ""
+    source: str = ""
 
 
 class TaskBuilder:
@@ -137,7 +148,7 @@ class TaskBuilder:
         dump = spec.model_dump(mode="json", by_alias=True, exclude_none=True)
         shape = _digest(_without_marks({key: dump.get(key) for key in _SHAPING}))
         if shape not in self._geometries:
-            self._geometries[shape] = _examine_geometry(spec)
+            self._geometries[shape] = _examine_geometry(spec, self._question.mesh)
         found = self._geometries[shape]
         machine = _without_marks({key: value for key, value in dump.items() if key not in _NOT_IN_KEY})
         key = self._key(machine)
@@ -151,7 +162,9 @@ class TaskBuilder:
         if self._question.backend != "full" and not refusal(spec):
             structure = _digest([found.geometry, structure_digest(dump)])
             mechanics = mechanical_key(spec, OperatingPoint.of(spec), machine)
-        return DesignTask(design, key, spec, found.geometry, structure=structure, mechanics=mechanics)
+        return DesignTask(
+            design, key, spec, found.geometry, structure=structure, mechanics=mechanics, source=found.source
+        )
 
     def _impossible(self, design: Design, error: SpindleFemError) -> DesignTask:
         # Without a machine to hash, the key is that of the definition and what the design changes.
@@ -159,19 +172,30 @@ class TaskBuilder:
         return DesignTask(design, key, None, "", reason_of(error))
 
     def _key(self, machine: Any) -> str:
-        asked = [self._question.outputs, self._question.film_uncertainty, self._question.backend]
+        question = self._question
+        asked = [question.outputs, question.film_uncertainty, question.backend, question.mesh]
         return _digest([__version__, asked, machine])[:24]
 
 
-def _examine_geometry(spec: MachineSpec) -> _Shape:
+def _examine_geometry(spec: MachineSpec, mesh: str) -> _Shape:
     try:
         assembly = build_assembly(spec)
-        sizes = build_sizes(
-            assembly, spec.mesh.preset, size_factor=spec.mesh.size_factor, overrides=spec.mesh.size
-        )
+        digest = _mesh_digest(spec, assembly)
     except SpindleFemError as error:
         return _Shape("", (), reason_of(error))
-    return _Shape(f"{mesh_digest(assembly, sizes)}/{spec.mesh.order}", assembly.joint_names)
+    near = lattice_assembly(spec) if mesh == MOVED else None
+    source = ""
+    if near is not None:
+        source = _mesh_digest(*near)
+        digest = moved_digest(source, assembly)
+    return _Shape(f"{digest}/{spec.mesh.order}", assembly.joint_names, source=source)
+
+
+def _mesh_digest(spec: MachineSpec, assembly: AssemblyGeometry) -> str:
+    sizes = build_sizes(
+        assembly, spec.mesh.preset, size_factor=spec.mesh.size_factor, overrides=spec.mesh.size
+    )
+    return mesh_digest(assembly, sizes)
 
 
 def _digest(content: Any) -> str:
@@ -194,8 +218,9 @@ def reason_of(error: BaseException) -> str:
     return " ".join(text.removeprefix("design: ").split())
 
 
-# The mesh and operators that this process used last: tasks come sorted by geometry.
+# The mesh and operators that this process used last, and the mesh that was moved last: tasks come sorted.
 _LAST: dict[str, tuple[TaggedMesh, ThermalOperators]] = {}
+_LAST_SOURCE: dict[str, TaggedMesh] = {}
 
 
 def evaluate_tasks(tasks: Sequence[DesignTask], question: Question) -> list[Row]:
@@ -236,12 +261,12 @@ def row_of(task: DesignTask, question: Question, result: ThermalResult) -> Row:
                 path + ending: value for path, value in _values(at_end, spec, question.outputs).items()
             }
     head = _without_answers(task, question, OK, "")
-    return {**head, **answers, "backend": FULL}
+    return {**head, **answers, "backend": FULL, "mesh": how_meshed(task, result.mesh.digest)}
 
 
 def _without_answers(task: DesignTask, question: Question, status: str, reason: str) -> Row:
     head = {"design": task.design.number, **task.design.values, "key": task.key}
-    empty = dict.fromkeys((*question.columns, "backend", "error_estimate_K"))
+    empty = dict.fromkeys((*question.columns, "backend", "error_estimate_K", "mesh"))
     return {**head, **empty, "geometry": task.geometry[:12], "status": status, "reason": reason}
 
 
@@ -265,7 +290,7 @@ def solve_checked(task: DesignTask, film_ratio: NDArray[np.float64] | None = Non
     SpindleFemError
         The solve or a check fails.
     """
-    machine = machine_on_mesh(task.spec, *shared_operators(task.spec, task.geometry))
+    machine = machine_on_mesh(task.spec, *shared_operators(task))
     if film_ratio is not None:
         machine.builder.coolant_loop = _BandLoop(task.spec, machine.builder.cells, film_ratio)
     result = solve_prepared(machine)
@@ -290,18 +315,37 @@ def _values(result: ThermalResult, spec: MachineSpec, outputs: Iterable[str]) ->
     return {path: value_of(summary, path) for path in outputs}
 
 
-def shared_operators(spec: MachineSpec, geometry: str) -> tuple[TaggedMesh, ThermalOperators]:
-    """Mesh and operators of a geometry, those used last without any work."""
-    if geometry not in _LAST:
+def shared_operators(task: DesignTask) -> tuple[TaggedMesh, ThermalOperators]:
+    """Mesh and operators of a possible design, those used last without any work."""
+    if task.geometry not in _LAST:
         _LAST.clear()  # a normal mesh with its operators takes hundreds of megabytes
-        assembly = build_assembly(spec)
-        mesh = _meshed(assembly, spec, geometry)
-        _LAST[geometry] = mesh, build_operators(mesh, spec.mesh.order)
-    return _LAST[geometry]
+        mesh = _mesh_of(task)
+        _LAST[task.geometry] = mesh, build_operators(mesh, task.spec.mesh.order)
+    return _LAST[task.geometry]
 
 
-def _meshed(assembly: AssemblyGeometry, spec: MachineSpec, geometry: str) -> TaggedMesh:
-    with _one_at_a_time(geometry.partition("/")[0]):
+def how_meshed(task: DesignTask, digest: str) -> str:
+    """``moved`` or ``new``, from the hash of the mesh that a design was solved on."""
+    return MOVED if task.source and digest == task.geometry.partition("/")[0] else NEW
+
+
+def _mesh_of(task: DesignTask) -> TaggedMesh:
+    """A mesh moved from its source where that is planned and passes every check, else a new one."""
+    target = build_assembly(task.spec)
+    if task.source:
+        spec, assembly = lattice_assembly(task.spec)
+        try:
+            if task.source not in _LAST_SOURCE:
+                _LAST_SOURCE.clear()
+                _LAST_SOURCE[task.source] = _meshed(spec, assembly)
+            return move_mesh(_LAST_SOURCE[task.source], assembly, target)
+        except (GeometryError, MeshQualityError) as error:
+            LOGGER.info("design %d is meshed anew: %s", task.design.number, error.what)
+    return _meshed(task.spec, target)
+
+
+def _meshed(spec: MachineSpec, assembly: AssemblyGeometry) -> TaggedMesh:
+    with _one_at_a_time(_mesh_digest(spec, assembly)):
         return build_mesh(
             assembly,
             preset=spec.mesh.preset,

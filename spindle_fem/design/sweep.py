@@ -31,7 +31,7 @@ from spindle_fem.spec.model import MachineSpec
 
 # Rows that stand in the table for designs of a study, besides parameters and outputs.
 _HEAD = ("design",)
-_TAIL = ("status", "reason", "feasible", "backend", "error_estimate_K", "geometry", "key")
+_TAIL = ("status", "reason", "feasible", "backend", "error_estimate_K", "mesh", "geometry", "key")
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +189,7 @@ def prepare_study(machine: str | Path, study: str | Path, overrides: Iterable[st
         limits = limits_of(read, where)
     if faults:
         raise FaultsError(where, faults)
-    question = Question(read.judged, read.study.film_uncertainty, read.study.backend)
+    question = Question(read.judged, read.study.film_uncertainty, read.study.backend, read.study.mesh)
     builder = TaskBuilder(content, question)
     designs = plan_designs(read, axes, where)
     compared = reference_designs(read, axes, content, where, len(designs) + 1)

@@ -21,6 +21,8 @@ STATUSES = (OK, FAILED, IMPOSSIBLE)
 
 # What answered a design: a solve of the whole field, or the projected model of its group.
 FULL, REDUCED = "full", "reduced"
+# Its mesh: made for it, or moved from that of a machine whose channel is near.
+NEW, MOVED = "new", "moved"
 
 Row = dict[str, Any]
 

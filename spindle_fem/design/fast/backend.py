@@ -21,6 +21,7 @@ from spindle_fem.design.evaluate import (
     SOLVE_ERRORS,
     DesignTask,
     Question,
+    how_meshed,
     row_of,
     shared_operators,
     solve_checked,
@@ -143,6 +144,7 @@ def _answer(
                 "reason": "",
                 "backend": REDUCED,
                 "error_estimate_K": float(f"{error[row]:.3g}"),
+                "mesh": how_meshed(task, model.mesh_digest),
             }
         )
     return rows
@@ -196,7 +198,7 @@ def model_of(group: GroupTask, question: Question) -> tuple[SteadyModel, list[Ro
     found = SteadyModel.load(path)
     if found is not None:
         return found, [], tables
-    mesh, operators = shared_operators(first.spec, first.geometry)
+    mesh, operators = shared_operators(first)
     machine = machine_on_mesh(first.spec, mesh, operators)
     model, solver = build_steady_model(
         machine, [task.spec for task in group.plan], film_band=question.film_uncertainty

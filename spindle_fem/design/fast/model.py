@@ -62,6 +62,7 @@ class SteadyModel:
     surface_area : mapping of surface to float, [m²]
     mesh_numbers : mapping of str to float
         ``nodes``, ``elements``, ``min_quality``.
+    mesh_digest : str
     contacts : tuple of str
     gap_radii : mapping of gap to (float, float), [m]
     ranges : (n_c + 1, 2) ndarray
@@ -98,6 +99,7 @@ class SteadyModel:
     gap_radii: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     surface_area: Mapping[str, float] = field(default_factory=dict)
     mesh_numbers: Mapping[str, float] = field(default_factory=dict)
+    mesh_digest: str = ""
     worst_estimate: float = float("nan")
     checked_error: float = float("nan")
     calibration: float = 1.0
@@ -191,4 +193,5 @@ def project(machine: PreparedMachine, affine: AffineSystem, basis: Array, one: A
             "elements": mesh.n_elements,
             "min_quality": mesh.min_quality,
         },
+        mesh_digest=mesh.digest,
     )
