@@ -115,7 +115,7 @@ def diagnose_recordings(
     effects = catalogue()
     weights = {name: WEIGHTS.get(name, 1.0) for name in effects}
     places = sorted(
-        {p for spot in view.spots.values() for p in spot}
+        {p for named in (view.spots, view.sides) for own in named.values() for p in own}
         | {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)}
     )
     known = [p for p in places if p in fast.model.place_names]

@@ -19,6 +19,7 @@ from spindle_fem.recordings.align import Recording
 from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import heat_of_table, standard_inputs
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.probe_places import ACROSS, UP
 from spindle_fem.spec.model import MachineSpec, NaturalFilm
 
 Array = NDArray[np.float64]
@@ -40,7 +41,8 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
     recording : Recording
     """
     spec = fast.spec
-    layout = Layout(spec, set(fast.model.place_names))
+    places = set(fast.model.place_names)
+    layout = Layout(spec, places)
     sets = {f"{group.name}_bearings": tuple(b.name for b in group.bearing) for group in spec.bearing_set}
     sets |= {name: (name,) for name in fast.bearings}
     sides = {side: {name: f"{name}.{side}_ring" for name in fast.bearings} for side in ("inner", "outer")}
@@ -74,6 +76,11 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
         lowest_speed=lowest_speed(speed),
         seats=seats,
         spots=spots,
+        sides={
+            spot: (UP + place, ACROSS + place)
+            for spot, (place, *more) in spots.items()
+            if not more and {UP + place, ACROSS + place} <= places
+        },
         reported=reported,
         walls=walls,
         fluids=fluids,

@@ -21,8 +21,8 @@ def first_order_lag(times: Array, values: ArrayLike, time_constant: ArrayLike) -
         Increasing, not uniform.
     values : (N, k) array_like
         May be complex.
-    time_constant : (k,) array_like, [s]
-        May be complex; 0 follows at once.
+    time_constant : (k,) or (N - 1, k) array_like, [s]
+        Of the whole, or of every step. May be complex; 0 follows at once.
 
     Returns
     -------
@@ -34,10 +34,10 @@ def first_order_lag(times: Array, values: ArrayLike, time_constant: ArrayLike) -
     True
     """
     x = np.asarray(values, dtype=complex)
-    tau = np.broadcast_to(np.asarray(time_constant, dtype=complex), x.shape[1:])
     if len(times) < 2:
         return x.copy()
     step = np.diff(times)[:, None]
+    tau = np.broadcast_to(np.asarray(time_constant, dtype=complex), (len(step), *x.shape[1:]))
     slope = np.diff(x, axis=0) / step
     prompt = tau.real <= PROMPT * step
     keep = np.where(prompt, 0.0, np.exp(-step / np.where(prompt, 1.0, tau)))

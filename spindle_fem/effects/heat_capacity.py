@@ -9,6 +9,7 @@ import numpy as np
 from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.laws import Complex, amplitude, relaxed, repeated, rows, shape
 from spindle_fem.effects.term import Term, TermContext
+from spindle_fem.effects.unrecorded import sides_of
 from spindle_fem.effects.view import MachineView
 
 PLACES = ("housing", "flange", "nose", "drive_end", "shaft", "channel")
@@ -16,6 +17,7 @@ PLACES = ("housing", "flange", "nose", "drive_end", "shaft", "channel")
 # be small, at least beside the largest one.
 SHARE, SHARE_OF_LARGEST = 0.3, 0.15
 BEHIND_CONTACT = "behind a contact"
+ON_A_SIDE = "behind a contact on a side"
 
 
 class HeatCapacityTerm(Term):
@@ -38,34 +40,40 @@ class HeatCapacityTerm(Term):
 
 
 class ContactCapacityTerm(Term):
-    """Heat capacity behind a contact: it follows the mean temperature of its places with a lag.
+    """Heat capacity behind a contact: it follows the temperature of its places with a lag.
 
     It begins at their temperature. Heat into the places is ``C (T_mass - T) / τ``,
-    evenly shared.
+    evenly shared; where a place has sides the body may sit on one of them.
 
     Parameters
     ----------
     name : str
     places : tuple of str
     usual : float, [J/K]
+    sides : tuple of str
+        First harmonics of the place, as for :class:`spindle_fem.effects.unrecorded.IntervalTerm`.
     """
 
     # its temperature, and whether it has one yet
     n_states = 2
 
-    def __init__(self, name: str, places: tuple[str, ...], usual: float) -> None:
-        self.name = name
-        self.heat_places = self.reads = places
+    def __init__(self, name: str, places: tuple[str, ...], usual: float, sides: tuple[str, ...] = ()) -> None:
+        self.name, self._even = name, len(places)
+        self.heat_places = self.reads = (*places, *sides)
         self.parameters = (
             amplitude("capacity", usual, "J/K"),
             shape("contact_time", 1200.0, 0.8, "s", low=60.0, high=50000.0),
+            *sides_of(sides),
         )
 
     def heat(self, context: TermContext) -> Complex:
         """Into every place, (n, k) W."""
         own, (mass, place) = context.parameters, self._temperatures(context)
         heat = own["capacity"] * (mass - place) / own["contact_time"]
-        return repeated(context, heat / len(self.heat_places), len(self.heat_places))
+        even = repeated(context, heat / self._even, self._even)
+        if len(self.heat_places) == self._even:
+            return even
+        return np.concatenate((even, rows(context, 2.0 * own["up"] * heat, 2.0 * own["across"] * heat)))
 
     def advance(self, context: TermContext, step: float) -> Complex:
         """The mass follows, (2, k)."""
@@ -73,7 +81,10 @@ class ContactCapacityTerm(Term):
         return rows(context, relaxed(mass, place, step, context.parameters["contact_time"]), 1.0)
 
     def _temperatures(self, context: TermContext) -> tuple[Complex, Complex]:
-        place = context.temperatures.mean(axis=0)
+        own, found = context.parameters, context.temperatures
+        place = found[: self._even].mean(axis=0)
+        if len(found) > self._even:
+            place = place + 2.0 * (own["up"] * found[-2] + own["across"] * found[-1])
         return np.where(context.state[1].real > 0.5, context.state[0], place), place
 
 
@@ -107,6 +118,21 @@ class HeatCapacity(Effect):
                             starts=[{"contact_time": t} for t in (600.0, 2400.0)] if form else ({},),
                         )
                     )
+        housing = "housing" if "housing" in machine.capacity else None
+        for spot, sides in machine.sides.items():
+            if housing is not None and machine.component(spot) == housing:
+                usual = SHARE * machine.capacity[housing]
+                term = ContactCapacityTerm(self.term_name(spot, ON_A_SIDE), machine.spots[spot], usual, sides)
+                found.append(
+                    self.candidate(
+                        housing,
+                        term,
+                        amplitude="capacity",
+                        reference=usual,
+                        form=machine.form(spot, ON_A_SIDE),
+                        starts=[{"contact_time": 600.0, "up": 0.3}, {"contact_time": 2400.0, "up": 0.3}],
+                    )
+                )
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

@@ -8,12 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, IntervalEffect, Intervals, Reported
-from spindle_fem.effects.laws import Complex, linear, shape, switched
+from spindle_fem.effects.laws import Complex, linear, repeated, rows, shape, switched
 from spindle_fem.effects.term import Term, TermContext, TermParameter
 from spindle_fem.effects.view import MachineView
 
 # Of the edges where the lag is short, s.
 EDGE_WIDTH = 20.0
+# 1 σ of the first harmonic of heat around the axis, beside its mean: 2 is all of it along one line.
+UNEVEN = 1.0
 # 1 σ of an edge that a search found, s, and of the factors that one interval has beside the common size.
 EDGE_SIGMA = 300.0
 JITTER = 0.1
@@ -26,11 +28,25 @@ class IntervalTerm(Term):
     ----------
     name : str
     size : TermParameter
+    places : tuple of str
+        Where it acts, evenly.
+    sides : tuple of str
+        First harmonics of the place around the axis, along y and along -x, where it has them: then
+        it acts with ``1 + 2 (up cos + across sin)`` of its mean, both free.
     intervals : sequence of (float, float), [s]
     """
 
-    def __init__(self, name: str, size: TermParameter, intervals: Intervals) -> None:
+    def __init__(
+        self,
+        name: str,
+        size: TermParameter,
+        places: tuple[str, ...],
+        sides: tuple[str, ...],
+        intervals: Intervals,
+    ) -> None:
         self.name, self._number = name, len(intervals)
+        self.heat_places = (*places, *sides)
+        self._even = len(places)
         # Edges stay nearer to their own interval than to what is beside it.
         edges: list[TermParameter] = []
         for number, (start, end) in enumerate(intervals, 1):
@@ -47,7 +63,22 @@ class IntervalTerm(Term):
             if len(intervals) > 1
             else ()
         )
-        self.parameters = (size, shape("lag", 200.0, 0.7, "s", low=2.0, high=7200.0), *edges, *factors)
+        uneven = sides_of(sides)
+        self.parameters = (
+            size,
+            shape("lag", 200.0, 0.7, "s", low=2.0, high=7200.0),
+            *uneven,
+            *edges,
+            *factors,
+        )
+
+    def spread(self, context: TermContext, heat: Complex) -> Complex:
+        """Heat (k,) over the heat places, (n, k)."""
+        even = repeated(context, heat / self._even, self._even)
+        if len(self.heat_places) == self._even:
+            return even
+        own = context.parameters
+        return np.concatenate((even, rows(context, 2.0 * own["up"] * heat, 2.0 * own["across"] * heat)))
 
     def share(self, context: TermContext) -> Complex:
         """How far it is on, (k,)."""
@@ -57,6 +88,12 @@ class IntervalTerm(Term):
             on = switched(context.time, own[f"start_{number}"], own[f"end_{number}"], own["lag"], EDGE_WIDTH)
             found = found + (own[f"factor_{number}"] * on if self._number > 1 else on)
         return found
+
+
+def sides_of(sides: tuple[str, ...]) -> tuple[TermParameter, ...]:
+    """Parameters of what acts more on one side than on the other; none where the place has no sides."""
+    names = ("up", "across") if sides else ()
+    return tuple(linear(name, 0.0, 0.5 * UNEVEN, low=-1.0, high=1.0) for name in names)
 
 
 class UnrecordedEffect(IntervalEffect):

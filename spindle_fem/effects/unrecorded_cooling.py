@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.effects.base import Candidate, Intervals, Reported, place_words, quantity
-from spindle_fem.effects.laws import Complex, amplitude, fluid_temperature, repeated
+from spindle_fem.effects.laws import Complex, amplitude, fluid_temperature
 from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.unrecorded import IntervalTerm, UnrecordedEffect, interval_words
 from spindle_fem.effects.view import MachineView
@@ -22,19 +22,31 @@ class CoolingTerm(IntervalTerm):
         Input of the surroundings, or their temperature [K].
     usual : float, [W/K]
     intervals : sequence of (float, float), [s]
+    sides : tuple of str
     """
 
     def __init__(
-        self, name: str, places: tuple[str, ...], fluid: str | float, usual: float, intervals: Intervals
+        self,
+        name: str,
+        places: tuple[str, ...],
+        fluid: str | float,
+        usual: float,
+        intervals: Intervals,
+        sides: tuple[str, ...] = (),
     ) -> None:
-        super().__init__(name, amplitude("conductance", usual, "W/K"), intervals)
-        self.heat_places = self.reads = places
-        self._fluid = fluid
+        super().__init__(name, amplitude("conductance", usual, "W/K"), places, sides, intervals)
+        self.reads = self.heat_places
+        self._fluid, self._places = fluid, len(places)
 
     def heat(self, context: TermContext) -> Complex:
         """Of every place, (n, k) W."""
-        size = context.parameters["conductance"] * self.share(context) / len(self.heat_places)
-        return -size * (context.temperatures - fluid_temperature(context, self._fluid))
+        size = context.parameters["conductance"] * self.share(context)
+        fluid = fluid_temperature(context, self._fluid)
+        if len(self.heat_places) == self._places:
+            return -size / self._places * (context.temperatures - fluid)
+        own, (mean, up, across) = context.parameters, context.temperatures
+        here = mean + 2.0 * (own["up"] * up + own["across"] * across)
+        return self.spread(context, -size * (here - fluid))
 
 
 class LossTerm(IntervalTerm):
@@ -46,16 +58,22 @@ class LossTerm(IntervalTerm):
     places : tuple of str
     usual : float, [W]
     intervals : sequence of (float, float), [s]
+    sides : tuple of str
     """
 
-    def __init__(self, name: str, places: tuple[str, ...], usual: float, intervals: Intervals) -> None:
-        super().__init__(name, amplitude("heat", usual, "W"), intervals)
-        self.heat_places = places
+    def __init__(
+        self,
+        name: str,
+        places: tuple[str, ...],
+        usual: float,
+        intervals: Intervals,
+        sides: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(name, amplitude("heat", usual, "W"), places, sides, intervals)
 
     def heat(self, context: TermContext) -> Complex:
         """Of every place, (n, k) W."""
-        each = -context.parameters["heat"] * self.share(context) / len(self.heat_places)
-        return repeated(context, each, len(self.heat_places))
+        return self.spread(context, -context.parameters["heat"] * self.share(context))
 
 
 class UnrecordedCooling(UnrecordedEffect):
@@ -77,11 +95,12 @@ class UnrecordedCooling(UnrecordedEffect):
 
     def term(self, machine: MachineView, spot: str, intervals: Intervals, form: str) -> Term:
         """Loss at a spot."""
-        places, usual, own = machine.spots[spot], self.usual(machine, form), tuple(intervals)
+        places, sides = machine.spots[spot], machine.sides.get(spot, ())
+        usual, own = self.usual(machine, form), tuple(intervals)
         if form == "heat":
-            return LossTerm(self.term_name(spot, form), places, usual, own)
+            return LossTerm(self.term_name(spot, form), places, usual, own, sides)
         fluid = "ambient" if "ambient" in machine.inputs else machine.reference_temperature
-        return CoolingTerm(self.term_name(spot), places, fluid, usual, own)
+        return CoolingTerm(self.term_name(spot), places, fluid, usual, own, sides)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and how often."""

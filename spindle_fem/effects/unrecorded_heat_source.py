@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.effects.base import Candidate, Intervals, Reported, capital, place_words, quantity
-from spindle_fem.effects.laws import Complex, amplitude, repeated
+from spindle_fem.effects.laws import Complex, amplitude
 from spindle_fem.effects.term import TermContext
 from spindle_fem.effects.unrecorded import IntervalTerm, UnrecordedEffect, interval_words
 from spindle_fem.effects.view import MachineView
 
 
 class HeatSourceTerm(IntervalTerm):
-    """Heat spread evenly over places.
+    """Heat spread over places.
 
     Parameters
     ----------
@@ -20,16 +20,22 @@ class HeatSourceTerm(IntervalTerm):
     places : tuple of str
     usual : float, [W]
     intervals : sequence of (float, float), [s]
+    sides : tuple of str
     """
 
-    def __init__(self, name: str, places: tuple[str, ...], usual: float, intervals: Intervals) -> None:
-        super().__init__(name, amplitude("heat", usual, "W"), intervals)
-        self.heat_places = places
+    def __init__(
+        self,
+        name: str,
+        places: tuple[str, ...],
+        usual: float,
+        intervals: Intervals,
+        sides: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(name, amplitude("heat", usual, "W"), places, sides, intervals)
 
     def heat(self, context: TermContext) -> Complex:
         """Of every place, (n, k) W."""
-        each = context.parameters["heat"] * self.share(context) / len(self.heat_places)
-        return repeated(context, each, len(self.heat_places))
+        return self.spread(context, context.parameters["heat"] * self.share(context))
 
 
 class UnrecordedHeatSource(UnrecordedEffect):
@@ -51,7 +57,11 @@ class UnrecordedHeatSource(UnrecordedEffect):
     def term(self, machine: MachineView, spot: str, intervals: Intervals, form: str) -> HeatSourceTerm:
         """Heat at a spot."""
         return HeatSourceTerm(
-            self.term_name(spot), machine.spots[spot], self.usual(machine, form), tuple(intervals)
+            self.term_name(spot),
+            machine.spots[spot],
+            self.usual(machine, form),
+            tuple(intervals),
+            machine.sides.get(spot, ()),
         )
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

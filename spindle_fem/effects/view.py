@@ -128,6 +128,8 @@ class MachineView:
     seats : tuple of Seat
     spots : mapping of str to tuple of str
         Places where heat may come and go unrecorded, by a name of their own.
+    sides : mapping of str to (str, str)
+        First harmonics around the axis, along y and along -x, of the spots that have them.
     reported : mapping of str to str
         Component that a finding names for a spot, source or link; itself where absent.
     walls : mapping of coefficient to str
@@ -186,6 +188,7 @@ class MachineView:
     lowest_speed: float = 0.0
     seats: tuple[Seat, ...] = ()
     spots: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    sides: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     reported: Mapping[str, str] = field(default_factory=dict)
     walls: Mapping[str, str] = field(default_factory=dict)
     fluids: Mapping[str, str | float] = field(default_factory=dict)

@@ -22,7 +22,15 @@ from spindle_fem.errors import SpecError
 from spindle_fem.loads.build import FieldState
 from spindle_fem.loads.joints import group_of_contacts
 from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.reduced.probe_places import near_places, probe_positions, probe_slopes
+from spindle_fem.reduced.probe_places import (
+    ACROSS,
+    UP,
+    harmonics,
+    near_places,
+    probe_positions,
+    probe_slopes,
+    sided_names,
+)
 from spindle_fem.spec.model import MachineSpec
 
 Array = NDArray[np.float64]
@@ -325,6 +333,8 @@ def _places(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> Ite
     def padded(vector: Array) -> Array:
         return np.concatenate((vector, np.zeros(size - len(vector)))) / vector.sum()
 
+    sided = dict.fromkeys(sided_names(spec))
+
     for index, part in enumerate(mesh.part_names):
         own = np.where(operators.part_of_unknown == index, operators.part_load, 0.0)
         yield part, padded(own)
@@ -333,7 +343,10 @@ def _places(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> Ite
             vector = np.where(inside, own, 0.0)
             # Quadratic corner functions integrate to less than zero: a thin slice may have no volume left.
             if vector.sum() > 1e-3 * own.sum():
-                yield f"{part}.{segment.name}", padded(vector)
+                name = f"{part}.{segment.name}"
+                yield name, padded(vector)
+                if name in sided:
+                    sided[name] = vector / vector.sum()
     for surface, rows in operators.surface_rows.items():
         if not surface.endswith(".adiabatic"):
             yield surface, padded(operators.facet_vector(np.ones(rows.stop - rows.start), rows))
@@ -351,6 +364,10 @@ def _places(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> Ite
         yield f"{bearing.name}.balls", vector
     for name, near in near_places(operators, [probe for probe in spec.probe if probe.kind == "point"]):
         yield name, padded(near)
+    for name, mean in sided.items():
+        if mean is not None:
+            for prefix, harmonic in zip((UP, ACROSS), harmonics(operators, mean), strict=True):
+                yield prefix + name, np.concatenate((harmonic, np.zeros(size - len(harmonic))))
 
 
 def contact_group_names(spec: MachineSpec, contacts: tuple[str, ...]) -> dict[str, str]:

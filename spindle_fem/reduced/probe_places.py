@@ -1,4 +1,4 @@
-"""What the reduced model knows of the neighbourhood of each point probe.
+"""What the reduced model knows of the neighbourhood of each point probe, and of the sides of standing parts.
 
 A patch of the probe's own part around it, where an unmodelled source may sit,
 and how the reading changes when the probe sits a little elsewhere.
@@ -15,11 +15,13 @@ from scipy import sparse
 from spindle_fem.conduction.evaluate import locate_points, probe_matrix
 from spindle_fem.conduction.operators import ThermalOperators
 from spindle_fem.errors import GeometryError
-from spindle_fem.spec.model import Probe
+from spindle_fem.spec.model import MachineSpec, Probe
 
 Array = NDArray[np.float64]
 
 NEAR = "near."
+# First harmonics around the axis of a standing place: along y, where a probe's angle is 0, and along -x.
+UP, ACROSS = "up.", "across."
 # Root mean square distance from the probe, in space, of a patch that no wall cuts.
 STANDARD_DISTANCE = 20e-3
 DISPLACEMENT = 0.5e-3
@@ -55,6 +57,37 @@ def near_places(operators: ThermalOperators, probes: Sequence[Probe]) -> Iterato
             weight = operators.prolongation @ weight
         vector = operators.part_storage(probe.part) @ weight
         yield NEAR + probe.name, vector / vector.sum()
+
+
+def sided_names(spec: MachineSpec) -> tuple[str, ...]:
+    """Places that have sides: segments of standing parts with more than one."""
+    return tuple(
+        f"{part.name}.{segment.name}"
+        for part in spec.part
+        if not part.rotating and len(part.segment) > 1
+        for segment in part.segment
+    )
+
+
+def harmonics(operators: ThermalOperators, mean: Array) -> tuple[Array, Array]:
+    """First harmonics of a place around the axis.
+
+    Parameters
+    ----------
+    operators : ThermalOperators
+    mean : (n_unknowns,) ndarray
+        Weights of the place's mean; their sum is 1.
+
+    Returns
+    -------
+    (n_unknowns,) ndarray, (n_unknowns,) ndarray
+        The same weights times the cosine and the sine of the angle from y: of
+        a field ``T`` the means of ``T cos`` and ``T sin``. As a load, 1 W of
+        it moves heat from one side to the other and adds nothing.
+    """
+    x, y = operators.mesh.points[: operators.n_unknowns, :2].T
+    radius = np.maximum(np.hypot(x, y), np.finfo(float).tiny)
+    return mean * y / radius, -mean * x / radius
 
 
 def probe_slopes(operators: ThermalOperators, probes: Sequence[Probe]) -> sparse.csr_array:

@@ -20,6 +20,7 @@ from spindle_fem.effects.speed_heat import SpeedHeatTerm
 from spindle_fem.effects.starvation import StarvationTerm
 from spindle_fem.effects.term import TermContext
 from spindle_fem.effects.thermal_preload import NAME, ThermalPreloadTerm
+from spindle_fem.effects.unrecorded_cooling import CoolingTerm
 from spindle_fem.effects.unrecorded_heat_source import HeatSourceTerm
 from spindle_fem.effects.view import ChannelFlow, FrictionTable
 from spindle_fem.effects.viscosity_heat import ViscosityHeatTerm, Walther
@@ -272,6 +273,26 @@ def test_an_unrecorded_source_gives_its_heat_while_on():
     own = {"heat": 40.0, "factor_2": 0.9, "lag": 100.0}
     total = [term.heat(context(term, time=t, **own)).real.sum() for t in (0.0, 2700.0, 5500.0, 8700.0, 2e4)]
     assert total == pytest.approx([0.0, 40.0, 0.0, 36.0, 0.0], abs=1e-4)
+
+
+def test_what_heats_one_side_gives_the_same_heat_there():
+    term = HeatSourceTerm("t", ("a",), 50.0, ((1000.0, 3000.0),), ("up.a", "across.a"))
+    own = {"heat": 40.0, "up": 0.5, "across": -0.25, "lag": 100.0}
+    heat = term.heat(context(term, time=2700.0, **own)).real[:, 0]
+    # A pattern 1 + 2 (up cos + across sin): the mean is the heat, half a squared cosine is left of each side.
+    angle = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    pattern = heat[0] + heat[1] * np.cos(angle) + heat[2] * np.sin(angle)
+    assert pattern.mean() == pytest.approx(40.0, abs=1e-4)
+    assert (pattern * np.cos(angle)).mean() == pytest.approx(0.5 * 40.0, abs=1e-4)
+    assert (pattern * np.sin(angle)).mean() == pytest.approx(-0.25 * 40.0, abs=1e-4)
+
+
+def test_a_loss_of_one_side_follows_the_temperature_there():
+    term = CoolingTerm("t", ("a",), 290.0, 5.0, ((1000.0, 3000.0),), ("up.a", "across.a"))
+    own = {"conductance": 3.0, "up": 1.0, "across": 0.0, "lag": 100.0}
+    # Field 300 + 10 cos: means of T, T cos, T sin.
+    heat = term.heat(context(term, time=2700.0, temperatures=[300.0, 5.0, 0.0], **own)).real[:, 0]
+    assert heat == pytest.approx([-60.0, -120.0, 0.0], abs=1e-3)
 
 
 def test_edges_of_neighbouring_intervals_cannot_cross():

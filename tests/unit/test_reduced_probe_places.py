@@ -7,7 +7,7 @@ from spindle_fem.conduction.evaluate import probe_matrix
 from spindle_fem.conduction.operators import build_operators
 from spindle_fem.errors import GeometryError
 from spindle_fem.meshing.simple import build_joined_tubes
-from spindle_fem.reduced.probe_places import near_places, probe_positions, probe_slopes
+from spindle_fem.reduced.probe_places import harmonics, near_places, probe_positions, probe_slopes
 from spindle_fem.spec.model import Probe
 
 # Two tubes, radii 100, 150 and 200 mm, 100 mm long.
@@ -47,6 +47,18 @@ def test_a_neighbourhood_spreads_over_some_20_mm():
     spread = np.sqrt(vector @ np.sum(offset**2, axis=1))
     # The walls, 25 mm away inside and outside, cut the Gaussian's tails.
     assert 0.018 < spread < 0.0215
+
+
+def test_harmonics_of_a_place_tell_which_side_is_warmer(operators):
+    mean = np.where(operators.part_of_unknown == MESH.part_names.index("outer"), operators.part_load, 0.0)
+    up, across = harmonics(operators, mean / mean.sum())
+    x, y, _ = MESH.points[: operators.n_unknowns].T
+    angle = np.arctan2(-x, y)
+    radius = np.hypot(x, y)
+    field = 300.0 + 8.0 * np.cos(angle) - 6.0 * np.sin(angle) + 5.0 * np.cos(2.0 * angle) + radius
+    assert up @ field == pytest.approx(4.0, abs=1e-6)
+    assert across @ field == pytest.approx(-3.0, abs=1e-6)
+    assert [up.sum(), across.sum()] == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
 def test_slopes_of_a_linear_field_are_its_gradient():
