@@ -1,56 +1,36 @@
-"""What a design whose channel is deeper would gain by moving the mesh of another one.
+"""What moving meshes saves in a sweep of channel geometries, and what it does to the temperatures.
 
-    python benchmarks/morphing.py [--preset normal] [--changes 1 2 4]
+    python benchmarks/morphing.py [--machine recorded_spindle] [--preset normal] [--random 0]
 
-Prints where the processor time of one design goes, and for each change of
-depth (mm, both ways) the worst element of the moved mesh beside that of a new
-one, and how far the temperatures on both lie apart, beside what a mesh of 1.5
-times the element size changes.
-
-The mesh is moved radially: what lies between the channel's floor and the
-body's outside is stretched, in full along the channel and less and less
-beyond its end. Ports would need more, so the machine has none.
+For each design: processor seconds of a new mesh and of moving that of the
+design's lattice point (``spindle_fem.design.morphing``), the worst element of
+both, and how far the temperatures on both lie apart; beside it what a mesh of
+1.5 times the element size changes. With ``--random``, that many designs drawn
+around the machine's channel after those below.
 """
 
 from __future__ import annotations
 
 import argparse
-import cProfile
-import pstats
 import time
-from dataclasses import replace
 
 import numpy as np
 
 from spindle_fem.conduction.operators import build_operators
 from spindle_fem.coupling import machine_on_mesh, prepare_machine
+from spindle_fem.design.channel_map import MOVABLE
+from spindle_fem.design.morphing import LATTICE, lattice_assembly, lattice_machine, move_mesh
+from spindle_fem.errors import MeshQualityError, SpindleFemError
 from spindle_fem.geometry.assembly import build_assembly
 from spindle_fem.meshing.build import build_mesh
-from spindle_fem.meshing.quality import sampled_quality
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.solve import solve_prepared
 from spindle_fem.spec.load import load_machine
 from spindle_fem.spec.model import MachineSpec
 
-FADE = 0.06
-
-
-def moved(mesh: TaggedMesh, spec: MachineSpec, depth: float) -> TaggedMesh:
-    """The mesh with its channel deeper or shallower."""
-    channel = spec.channel
-    floor, roof = channel.inner_radius, channel.inner_radius + channel.depth
-    body = next(part for part in spec.part if part.name == channel.part)
-    end = channel.z_start + channel.pitch * channel.turns + channel.width
-    beside = [s for s in body.segment if s.z[0] < end and s.z[1] > channel.z_start]
-    outside = min(s.outer_diameter / 2.0 for s in beside if s.outer_diameter / 2.0 > roof)
-    x, y, z = mesh.points.T
-    radius = np.hypot(x, y)
-    share = np.interp(radius, [floor, roof, outside], [0.0, 1.0, 0.0])
-    share *= np.clip((end + FADE - z) / FADE, 0.0, 1.0)
-    scale = 1.0 + (depth - channel.depth) * share / np.maximum(radius, 1e-9)
-    points = np.column_stack((x * scale, y * scale, z))
-    return replace(mesh, points=points)
+# Shares of a lattice step by which the channel differs from the machine's own; each alone, then together.
+SHARES = (0.3, 0.5, -0.3, -0.48)
 
 
 def same_numbers(first: ThermalResult, second: ThermalResult) -> float:
@@ -66,47 +46,89 @@ def same_numbers(first: ThermalResult, second: ThermalResult) -> float:
     return float(np.abs(found).max())
 
 
+def solved_on(spec: MachineSpec, mesh: TaggedMesh) -> tuple[ThermalResult, float]:
+    """Result on a mesh and the processor seconds from there on."""
+    begin = time.process_time()
+    result = solve_prepared(machine_on_mesh(spec, mesh, build_operators(mesh, spec.mesh.order)))
+    return result, time.process_time() - begin
+
+
+def compare(spec: MachineSpec, meshes: dict[str, TaggedMesh]) -> tuple[float, float, float] | None:
+    """One line of the table; seconds of a new mesh, of moving one, and of the rest of a design."""
+    target = build_assembly(spec)
+    values = ", ".join(f"{name} {getattr(spec.channel, name) * 1e3:5.2f}" for name in MOVABLE)
+    begin = time.process_time()
+    fresh = build_mesh(target, spec.mesh.preset, use_cache=False)
+    meshing = time.process_time() - begin
+    near = lattice_assembly(spec)
+    if near is None:
+        what = "lies on the lattice" if lattice_machine(spec) is None else "has no lattice point to move from"
+        print(f"{values} mm {what}")
+        return None
+    source, assembly = near
+    point = ", ".join(f"{getattr(source.channel, name) * 1e3:g}" for name in MOVABLE)
+    if point not in meshes:
+        meshes[point] = build_mesh(assembly, spec.mesh.preset)
+    begin = time.process_time()
+    try:
+        moved = move_mesh(meshes[point], assembly, target)
+    except MeshQualityError as error:
+        print(f"{values} mm from {point}: meshed anew, {error.what}")
+        return None
+    moving = time.process_time() - begin
+    (exact, rest), (other, _) = solved_on(spec, fresh), solved_on(spec, moved)
+    print(
+        f"{values} mm from {point}: new {meshing:5.2f} s, moved {moving:4.2f} s; worst minSICN "
+        f"new {fresh.min_quality:.3f}, moved {moved.min_quality:.3f}; "
+        f"temperatures {same_numbers(exact, other):.4f} K apart",
+        flush=True,
+    )
+    return meshing, moving, rest
+
+
+def designs(spec: MachineSpec, number: int) -> list[dict[str, float]]:
+    """Channels: each dimension alone, all together, then random ones; some may be impossible."""
+    own = {name: getattr(spec.channel, name) for name in MOVABLE}
+    found = [own | {name: own[name] + share * LATTICE[name]} for name in MOVABLE for share in SHARES]
+    found += [{name: value + share * LATTICE[name] for name, value in own.items()} for share in SHARES]
+    random = np.random.default_rng(1)
+    for _ in range(number):
+        factors = random.uniform((0.5, 0.6, 0.85), (2.2, 1.3, 1.1))
+        found.append(
+            {name: value * factor for (name, value), factor in zip(own.items(), factors, strict=True)}
+        )
+    return found
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--machine", default="recorded_spindle")
     parser.add_argument("--preset", default="normal")
-    parser.add_argument("--changes", type=float, nargs="+", default=[1.0, 2.0, 4.0])
+    parser.add_argument("--random", type=int, default=0)
     options = parser.parse_args()
-    base = load_machine(options.machine, [f"mesh.preset={options.preset}"])
-    profile = cProfile.Profile()
-    clock = [time.process_time()]
-    profile.enable()
-    mesh = build_mesh(build_assembly(base), options.preset, use_cache=False)
-    profile.disable()
-    clock.append(time.process_time())
-    operators = build_operators(mesh, base.mesh.order)
-    clock.append(time.process_time())
-    first = solve_prepared(machine_on_mesh(base, mesh, operators))
-    clock.append(time.process_time())
-    meshing, assembly, solving = np.diff(clock)
-    total = clock[-1] - clock[0]
-    print(f"{options.machine}, {options.preset}: mesh {meshing:.2f} s, operators {assembly:.2f} s, "
-          f"solve {solving:.2f} s; meshing is {meshing / total:.0%} of a design")  # fmt: skip
-    pstats.Stats(profile).sort_stats("cumtime").print_stats("gmsh|meshing", 14)
+    overrides = [f"mesh.preset={options.preset}"]
+    base = load_machine(options.machine, overrides)
+    first = solve_prepared(prepare_machine(base))
     coarser = solve_prepared(prepare_machine(base, size_factor=1.5))
-    print(f"a mesh of 1.5 times the size changes {same_numbers(first, coarser):.3f} K")
-    for change in [sign * value for value in options.changes for sign in (1.0, -1.0)]:
-        depth = base.channel.depth + 1e-3 * change
-        spec = load_machine(options.machine, [f"mesh.preset={options.preset}", f"channel.depth={depth} m"])
-        fresh = build_mesh(build_assembly(spec), options.preset)
-        begin = time.process_time()
-        other = replace(moved(mesh, base, depth), cad_area=fresh.cad_area, cad_volume=fresh.cad_volume)
-        worst = float(sampled_quality(other.points[other.tetrahedra]).min())
-        spent = time.process_time() - begin
-        results = []
-        for one in (other, fresh):
-            machine = machine_on_mesh(spec, one, build_operators(one, spec.mesh.order))
-            results.append(solve_prepared(machine))
-        print(
-            f"depth {depth * 1e3:4.1f} mm: moved in {spent:.2f} s, worst minSICN {worst:.3f} "
-            f"(new mesh {fresh.min_quality:.3f}), temperatures apart {same_numbers(*results):.3f} K"
-        )
+    print(f"a mesh of 1.5 times the element size changes {same_numbers(first, coarser):.4f} K")
+    meshes: dict[str, TaggedMesh] = {}
+    seconds = []
+    for values in designs(base, options.random):
+        changes = [f"channel.{name}={value:.6g} m" for name, value in values.items()]
+        try:
+            spec = load_machine(options.machine, [*overrides, *changes])
+            build_assembly(spec)
+        except SpindleFemError:
+            continue
+        found = compare(spec, meshes)
+        if found is not None:
+            seconds.append(found)
+    new, moved, rest = np.mean(seconds, axis=0)
+    print(
+        f"{len(seconds)} designs: a new mesh {new:.2f} s, a moved one {moved:.2f} s, all else {rest:.2f} s; "
+        f"a design takes {(moved + rest) / (new + rest):.0%} of its time once its lattice point is meshed"
+    )
 
 
 if __name__ == "__main__":

@@ -184,10 +184,13 @@ class ChannelMap:
         radius, turned, across = places[0][near], turned[near], across[near]
         axial = places[2][near] - source.z
         # In full inside the drilling, nothing at the side walls of the channel and at the reach.
-        wall = 0.5 * self.source.definition.width + np.maximum(radius - roof, 0.0)
+        definition = self.source.definition
+        wall = 0.5 * definition.width + np.maximum(radius - roof, 0.0)
+        # Farthest from the centre line that the drilling comes: that line rises along its width.
+        side = source.radius * np.hypot(1.0, definition.pitch / (2.0 * np.pi * floor))
         weight = np.minimum(
             (port.reach - np.hypot(across, axial)) / (port.reach - source.radius),
-            (wall - np.abs(clearance[near])) / (wall - source.radius),
+            (wall - np.abs(clearance[near])) / (wall - side),
         )
         weight = np.minimum(weight, (radius - floor) / (source.start_radius - floor)).clip(0.0, 1.0)
         scale = target.radius / source.radius

@@ -43,7 +43,7 @@ Indices = NDArray[np.int64]
 
 # Steps of the lattice, m: a mesh is moved by half of one at most (docs/design_studies.md tells what was
 # measured). The pitch moves the channel's end once a turn, so its step is divided where there are many.
-LATTICE: Mapping[str, float] = MappingProxyType({"depth": 5.0e-3, "width": 2.0e-3, "pitch": 1.0e-3})
+LATTICE: Mapping[str, float] = MappingProxyType({"depth": 2.5e-3, "width": 2.0e-3, "pitch": 1.0e-3})
 _TURNS_OF_WHOLE_STEP = 5
 _MODULES = ("design/morphing", "design/channel_map", "design/channel_measures")
 _ON_FACE = 5.0e-6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -111,24 +112,39 @@ def worker_count(jobs: int) -> int:
 
 
 def chunks_of(tasks: Sequence[DesignTask], workers: int) -> list[list[DesignTask]]:
-    """Tasks in pieces of one geometry each, small enough that every worker gets some."""
+    """Tasks in pieces of one mesh each, made or moved from, small enough that every worker gets some.
+
+    Where meshes are moved, the first piece of every one comes before the
+    second of any, so that workers do not wait for the same one to be made.
+    """
     size = max(1, min(CHUNK, len(tasks) // (2 * workers)))
     chunks: list[list[DesignTask]] = []
     for task in _sorted(tasks):
         last = chunks[-1] if chunks else []
-        if last and last[0].geometry == task.geometry and len(last) < size:
+        if last and _mesh_of(last[0]) == _mesh_of(task) and len(last) < size:
             last.append(task)
         else:
             chunks.append([task])
-    return chunks
+    seen: Counter[str] = Counter()
+    turns = []
+    for chunk in chunks:
+        turns.append(seen[chunk[0].source] if chunk[0].source else 0)
+        seen[chunk[0].source] += 1
+    return [chunks[place] for place in sorted(range(len(chunks)), key=turns.__getitem__)]
+
+
+def _mesh_of(task: DesignTask) -> str:
+    """The mesh that a design begins with: its own, or the one that is moved."""
+    return task.source or task.geometry
 
 
 def _sorted(tasks: Sequence[DesignTask]) -> list[DesignTask]:
-    """By geometry, geometries and designs in the order of the study."""
+    """By mesh, then geometry; meshes, geometries and designs in the order of the study."""
     first: dict[str, int] = {}
     for position, task in enumerate(tasks):
+        first.setdefault(_mesh_of(task), position)
         first.setdefault(task.geometry, position)
-    return sorted(tasks, key=lambda task: first[task.geometry])
+    return sorted(tasks, key=lambda task: (first[_mesh_of(task)], first[task.geometry]))
 
 
 def _in_processes(

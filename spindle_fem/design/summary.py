@@ -9,7 +9,7 @@ from spindle_fem.design.files import SWEEP_SCHEMA
 from spindle_fem.design.judge import Ranking, rank
 from spindle_fem.design.outputs import unit_of
 from spindle_fem.design.sensitivity import neighbours, sensitivities
-from spindle_fem.design.table import FAILED, FULL, IMPOSSIBLE, OK, REDUCED, Row
+from spindle_fem.design.table import FAILED, FULL, IMPOSSIBLE, MOVED, NEW, OK, REDUCED, Row
 from spindle_fem.results.summary import package_versions
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> d
         "impossible": statuses.count(IMPOSSIBLE),
         "feasible": sum(row["feasible"] == "yes" for row in rows),
         "geometries": len({row["geometry"] for row in rows if row["geometry"]}),
+        "meshes": {how: sum(row["mesh"] == how for row in rows) for how in (NEW, MOVED)},
         "reused_rows": reused,
         "backends": _backends(rows),
         "optimum": None if ranking is None else _optimum(prepared, rows, ranking),
