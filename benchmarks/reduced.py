@@ -1,9 +1,10 @@
-"""The fast model: its error over the step test, and its times as ratios within one run.
+"""The fast model: its error against the full model, and its times.
 
-    python benchmarks/reduced.py [--preset coarse] [--order 1] [--parameters 30]
+    python benchmarks/reduced.py [--machine recorded_spindle] [--preset coarse] [--order 2] [--whole]
 
-The full model's transient is the reference; times are medians of several
-runs, in process time so that other load on the machine counts little.
+The full model is the reference: the step test 0-4500 rpm by 500, 40 min each or, with ``--whole``,
+each until the probes have settled, then switched off for 4 h; and steady designs. Times are medians of
+several runs, in process time so that other load on the machine counts little.
 """
 
 from __future__ import annotations
@@ -12,24 +13,33 @@ import argparse
 import statistics
 import time
 from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
-from spindle_fem.coupling import prepare_machine
+from spindle_fem.coupling import PreparedMachine, prepare_machine
 from spindle_fem.effects.term import Term, TermParameter
-from spindle_fem.network.history import InputHistory
+from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.adjoint import fast_gradient
-from spindle_fem.reduced.build import build_reduced_model
 from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import STANDARD, make_drive
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.transient import simulate_fast
-from spindle_fem.spec.load import load_machine
-from spindle_fem.transients.run import TransientOptions, simulate_full
+from spindle_fem.reduced.start import Start
+from spindle_fem.reduced.steady import SteadyDesigns
+from spindle_fem.reduced.transient import TransientRun, simulate_fast
+from spindle_fem.simulate import fast_model_for
+from spindle_fem.solve import solve_prepared
+from spindle_fem.spec.load import load_machine, read_toml
+from spindle_fem.spec.model import MachineSpec
+from spindle_fem.spec.parameters import with_parameters
+from spindle_fem.transients.study import StudyResult, run_study, study_of
 
 RPM = np.pi / 30.0
 HELD = np.array([True, True, False, False, True])
 REPEATS = 5
+STEP_TEST = Path(__file__).parents[1] / "studies" / "step_test.toml"
+SWITCHED_OFF = {"name": "switched off", "speed": "0 rpm", "thrust": "0 N", "duration": "4 h"}
 
 
 class ThermalPreload(Term):
@@ -85,65 +95,155 @@ def inputs(times: np.ndarray, speed: np.ndarray | float, spec) -> np.ndarray:
     return np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), times.shape) for c in columns])
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--machine", default="recorded_spindle")
-    parser.add_argument("--preset", default="coarse")
-    parser.add_argument("--order", type=int, default=1)
-    parser.add_argument("--parameters", type=int, default=30)
-    options = parser.parse_args()
-    overrides = [f"mesh.preset={options.preset}", f"mesh.order={options.order}"]
-    spec = load_machine(options.machine, overrides)
-    machine = prepare_machine(spec)
-    begin = time.process_time()
-    model = build_reduced_model(machine)
-    built = time.process_time() - begin
-    fast = FastModel(model, spec)
-    checked = model.errors["probes"]
-    print(f"{model.n_full} unknowns -> {model.size}, built in {built:.1f} s, checked {checked:.2g} K")
+def step_test(machine: PreparedMachine, *, whole: bool) -> StudyResult:
+    """The step test by the full model, and the cool-down after it."""
+    content = read_toml(STEP_TEST)
+    content["error"] = "0.01 K"
+    if not whole:
+        for phase in content["phase"]:
+            phase["duration"] = "40 min"
+    content["phase"].append(SWITCHED_OFF)
+    return run_study(machine, study_of(content))
 
-    times = np.arange(0.0, 10 * 2400.0 + 1.0, 10.0)
-    values = inputs(times, np.minimum(np.floor(times / 2400.0), 9) * 500.0 * RPM, spec)
-    samples = times[::6]
-    begin = time.process_time()
-    full = simulate_full(
-        machine,
-        InputHistory(times, STANDARD, values, HELD),
-        sample_times=samples,
-        options=TransientOptions(error=0.01),
+
+def fast_step_test(fast: FastModel, result: StudyResult) -> tuple[np.ndarray, np.ndarray]:
+    """The same by the fast model in steps of 10 s, (n, c) K, and which samples belong to the cool-down."""
+    samples = result.joined("times")
+    times = np.union1d(np.arange(0.0, samples[-1], 10.0), samples)
+    owner = np.searchsorted([phase.start for phase in result.phases], times, side="right") - 1
+    points = [result.phases[i].point for i in owner]
+    values = np.array(
+        [
+            (p.speed, p.thrust, p.ambient_temperature, p.coolant_inlet_temperature, p.coolant_flow)
+            for p in points
+        ]
     )
-    full_time = time.process_time() - begin
-    start = spec.operation.ambient_temperature
-    drive = make_drive(times, STANDARD, values, HELD)
-    run = simulate_fast(fast, drive, start)
-    for probe in full.probes:
-        error = np.abs(run.temperature[::6, fast.channels.index(probe)] - full.reading(probe)).max()
-        print(f"  step test 0-4500 rpm, {probe}: {error:.2g} K")
-    fast_time = median_time(lambda: simulate_fast(fast, drive, start))
-    print(f"  full model {full_time:.1f} s; fast model {fast_time:.3f} s")
+    drive = make_drive(times, STANDARD, values, np.ones(len(STANDARD), dtype=bool))
+    run = simulate_fast(fast, drive, points[0].ambient_temperature)
+    at = np.searchsorted(times, samples)
+    return run.temperature[at], samples > result.phases[-1].start
 
+
+def report_step_test(fast: FastModel, machine: PreparedMachine, *, whole: bool) -> None:
+    """Errors of the fast model at every probe."""
+    begin = time.process_time()
+    result = step_test(machine, whole=whole)
+    spent = time.process_time() - begin
+    for phase in result.phases:
+        length, steps = (phase.end - phase.start) / 3600.0, len(phase.transient.steps.sizes)
+        told = "" if phase.settled is None else ", settled" if phase.settled else ", NOT settled"
+        print(f"  {phase.name:>12}: {length:.2f} h, {steps} steps{told}")
+    found, off = fast_step_test(fast, result)
+    full = result.joined("readings")
+    for column, probe in enumerate(result.phases[0].transient.probes):
+        error = np.abs(found[:, fast.channels.index(probe)] - full[:, column])
+        rise = np.ptp(full[:, column])
+        off_error, on_error = error[off].max(), error[~off].max()
+        print(f"  {probe:>12}: steps {on_error:.2g} K, cool-down {off_error:.2g} K, of {rise:.1f} K")
+    imbalance = max(phase.transient.energy.imbalance_relative for phase in result.phases)
+    print(f"  full model {spent:.0f} s for {full.shape[0] / 60:.1f} h, heat closed to {imbalance:.1g}")
+
+
+def report_designs(fast: FastModel, spec: MachineSpec, number: int) -> None:
+    """Steady designs: time one by one and together, error against the full model."""
+    point = OperatingPoint.of(spec)
+    names = tuple(free_parameters(spec))
+    begin = time.process_time()
+    designs = SteadyDesigns(fast, point, names)
+    made = time.process_time() - begin
+    print(f"steady designs, {len(names)} parameters, {len(designs.loads)} loads: {designs.size} vectors, "
+          f"made in {made:.2f} s, "
+          f"checked {designs.checked_error:.2g} K against the fast model")  # fmt: skip
+    rng = np.random.default_rng(5)
+    logs = designs.limits / 3.0 * np.clip(rng.normal(size=(1000, len(names))), -2.9, 2.9)
+    row = inputs(np.zeros(1), point.speed, spec)
+    loads = np.array(
+        [
+            fast.load_inputs(STANDARD, row, fast.table.factors(dict(zip(names, np.exp(log), strict=True))))[
+                0
+            ][0]
+            for log in logs
+        ]
+    )
+    amounts = designs.amounts(loads)
+    alone = median_time(
+        lambda: [designs.temperatures(log, own) for log, own in zip(logs, amounts, strict=True)]
+    )
+    together = median_time(lambda: designs.many(logs, amounts))
+    print(f"  one by one {1e3 * alone:.0f} us each, together {1e3 * together:.0f} us")
+    worst = 0.0
+    for log, own in zip(logs[:number], amounts, strict=False):
+        other = with_parameters(spec, dict(zip(names, np.exp(log).tolist(), strict=True)))
+        full = solve_prepared(prepare_machine(other)).probes
+        found = designs.temperatures(log, own)
+        worst = max(worst, *(abs(found[fast.channels.index(name)] - value) for name, value in full.items()))
+    print(f"  against {number} full solutions: {worst:.2g} K")
+
+
+def report_times(fast: FastModel, spec: MachineSpec, number: int) -> None:
+    """4 h at 10 s: steps, derivatives, gradient, nonlinear terms."""
+    start = spec.operation.ambient_temperature
     times = np.arange(0.0, 4 * 3600.0 + 1.0, 10.0)
     speeds = np.array([0.0, 3000.0, 1500.0, 4000.0])[np.minimum(times // 3600.0, 3).astype(int)]
     drive = make_drive(times, STANDARD, inputs(times, speeds * RPM, spec), HELD)
     shared = list(free_parameters(spec))
-    single = [f"joint.{name}" for name in model.contacts] + [f"heat.{name}" for name in fast.bearings]
-    names = tuple((shared + single)[: options.parameters])
+    single = [f"joint.{name}" for name in fast.model.contacts] + [f"heat.{name}" for name in fast.bearings]
+    names = tuple((shared + single)[:number])
     factors = dict.fromkeys(names, 1.01)
+    own = fast.own_terms(drive)
+
+    def run(**options: object) -> Callable[[], object]:
+        return lambda: simulate_fast(fast, drive, start, parameters=factors, **options)
+
+    plain, derived = median_time(run()), median_time(run(derivatives=names))
+    ready, state = TransientRun(fast, drive, factors, (), own), Start.of(start, fast.model.one)
+    march = median_time(lambda: ready.march(state))
     terms = (ThermalPreload(), GapClosure())
-    plain = median_time(lambda: simulate_fast(fast, drive, start, parameters=factors))
-    derived = median_time(lambda: simulate_fast(fast, drive, start, parameters=factors, derivatives=names))
-    nonlinear = median_time(lambda: simulate_fast(fast, drive, start, parameters=factors, terms=terms))
-    both = median_time(
-        lambda: simulate_fast(fast, drive, start, parameters=factors, terms=terms, derivatives=names)
-    )
-    print(f"4 h at 10 s, {len(names)} live parameters: {plain:.3f} s, {1e6 * plain / 1440:.0f} us a step")
+    nonlinear, both = median_time(run(terms=terms)), median_time(run(terms=terms, derivatives=names))
+    steps = len(drive.steps)
+    print(f"4 h at 10 s, {len(names)} live parameters: {plain:.3f} s; a step {1e6 * march / steps:.1f} us, "
+          f"operators and all {1e6 * plain / steps:.1f} us")  # fmt: skip
     print(f"  with all derivatives {derived:.3f} s, {derived / plain:.1f} times")
-    ones = np.ones((times.size, len(fast.channels)))
-    adjoint = median_time(lambda: fast_gradient(fast, drive, start, ones, names, parameters=factors))
-    print(f"  gradient of a misfit (adjoint) {adjoint:.3f} s, {adjoint / plain:.1f} times")
+    if not any(term.is_dynamic for term in own):
+        ones = np.ones((times.size, len(fast.channels)))
+        adjoint = median_time(lambda: fast_gradient(fast, drive, start, ones, names, parameters=factors))
+        print(f"  gradient of a misfit (adjoint) {adjoint:.3f} s, {adjoint / plain:.1f} times")
     print(f"  with two nonlinear terms {nonlinear:.3f} s")
-    print(f"  and all derivatives {both:.3f} s, {both / nonlinear:.1f} times")
+    print(f"  and all derivatives, so the gradient of the misfit: {both:.3f} s, {both / nonlinear:.1f} times")
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--machine", default="recorded_spindle")
+    parser.add_argument("--preset", default="coarse")
+    parser.add_argument("--order", type=int, default=2)
+    parser.add_argument("--parameters", type=int, default=30)
+    parser.add_argument("--designs", type=int, default=3, help="Steady designs solved in full beside.")
+    parser.add_argument("--whole", action="store_true", help="Each step of the test until settled.")
+    parser.add_argument("--times-only", action="store_true", help="No full transient.")
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE")
+    options = parser.parse_args()
+    overrides = [f"mesh.preset={options.preset}", f"mesh.order={options.order}", *options.set]
+    spec = load_machine(options.machine, overrides)
+    # A model for all speeds and thrusts of the step test and the cool-down.
+    driven = {"speed": 4500.0 * RPM, "thrust": (0.0, spec.operation.thrust)}
+    asked = [
+        SimpleNamespace(input_names=(name,), inputs=np.atleast_2d(values).T)
+        for name, values in driven.items()
+    ]
+    begin = time.process_time()
+    fast = fast_model_for(spec, asked)
+    built = time.process_time() - begin
+    model, checked = fast.model, fast.model.errors["probes"]
+    print(f"{model.n_full} unknowns -> {model.size}, made or read in {built:.1f} s, checked {checked:.2g} K")
+    report_times(fast, spec, options.parameters)
+    if not fast.extra_terms:
+        report_designs(fast, spec, options.designs)
+    if not options.times_only:
+        report_step_test(fast, prepare_machine(spec), whole=options.whole)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from spindle_fem.loads.coolant_loop import CoolantLoop
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
 from spindle_fem.reduced.coolant import CoolantMaps, coolant_maps, film_derivative
+from spindle_fem.reduced.directions import ConductingDirections
 from spindle_fem.reduced.drive import Drive, heat_of_table
 from spindle_fem.reduced.model import ReducedModel
 from spindle_fem.reduced.natural import natural_film_terms
@@ -77,6 +78,7 @@ class FastModel:
         self.model = model
         self.spec = spec
         self.extra_terms = tuple(extra_terms)
+        self.directions = ConductingDirections(model)
         self.table: CoefficientTable = model.table(spec)
         self.bearings = tuple(bearing.name for _, bearing in spec.bearings)
         self.channels = tuple(probe.name for probe in spec.probe)
@@ -205,7 +207,7 @@ class FastModel:
         for column, place in enumerate(self.heat_places):
             loads[:, column] = model.place(place)
         for name in model.fluid_names:
-            loads[:, self._fluid_column(name)] += (
+            loads[:, self.fluid_column(name)] += (
                 values[self._positions[name]] * model.fluid_load[self._fluid_rows[name]]
             )
         for place, conductance in conductances.items():
@@ -229,7 +231,7 @@ class FastModel:
                 by = np.zeros_like(loads)
                 for name in films:
                     load = model.fluid_load[self._fluid_rows[name]]
-                    by[:, self._fluid_column(name)] += values[self._positions[name]] * load
+                    by[:, self.fluid_column(name)] += values[self._positions[name]] * load
                 loads_by[parameter] = by
         if self.loop is not None:
             film, rate, friction = self.channel_film(point, factors, changes)
@@ -278,7 +280,8 @@ class FastModel:
             self._sums[key] = found
         return self._sums[key]
 
-    def _fluid_column(self, coefficient: str) -> int:
+    def fluid_column(self, coefficient: str) -> int:
+        """Load input that is the fluid of a film."""
         surface = coefficient.removeprefix("film.")
         film = next(f for f in self.spec.film if surface in f.surface)
         if film.temperature == "ambient":

@@ -24,6 +24,7 @@ from spindle_fem.recordings.simulate_network import (
     magnitude_history,
     require_compatible,
 )
+from spindle_fem.reduced.directions import ConductingDirections
 from spindle_fem.reduced.drive import LARGEST_STEP, STANDARD, Drive, inputs_on_steps
 from spindle_fem.reduced.exact_step import build_exact_propagator
 from spindle_fem.reduced.fast_model import NO_CHANGES, ClassOperators
@@ -94,6 +95,7 @@ class NetworkFastModel:
         self.ambient_boundary = "ambient" if "ambient" in names else names[0] if len(names) == 1 else None
         self._boundary_of = boundary_of_links(network)
         self.model = network_as_reduced(network, tuple(self._boundary_of))
+        self.directions = ConductingDirections(self.model)
         self._conductance = {
             f"{LINK}{name}": float(value)
             for name, value in zip(network.link_names, network.link_conductance, strict=True)

@@ -7,12 +7,13 @@ so that Newton's method works on ``q`` alone and the step stays implicit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from scipy.linalg.lapack import dgesv
 
 from spindle_fem.effects.term import COOLANT_INLET, Term
@@ -23,13 +24,45 @@ from spindle_fem.reduced.term_layout import Evaluation, Layout
 
 Array = NDArray[np.float64]
 
-# In the energy-orthonormal basis an eigenvalue is a share of the stored energy's dissipation.
-RANK_TOLERANCE = 1e-3
 # Newton's last change; its square, in relative terms, is the error that is left.
 TEMPERATURE_TOLERANCE = 1e-4
 MOST_ITERATIONS = 25
 NO_SHIFTS: Mapping[str, tuple[float, Array]] = MappingProxyType({})
 NO_SHIFT = (0.0, None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Moved:
+    """Heat that a term moves by scaling one coefficient.
+
+    Attributes
+    ----------
+    coefficient : str
+    sensed, columns : slice
+        Its directions among the sensed temperatures, and among what is added.
+    spectrum : (k,) ndarray
+        What the unit coefficient conducts in each direction.
+    uniform : (k,) ndarray
+        Coordinates of the uniform field of 1 K.
+    fluid_scale : float
+        Product of the factors on its fluid's temperature.
+    fluid_targets : list of int
+        Asked parameters among these factors.
+    fluid_rows : list of int
+        Added quantities that shift its fluid.
+    diagonal : slice
+        Derivatives of its columns to its own directions, among all of them row by row.
+    """
+
+    coefficient: str
+    sensed: slice
+    columns: slice
+    spectrum: Array
+    uniform: Array
+    fluid_scale: float
+    fluid_targets: list[int]
+    fluid_rows: list[int]
+    diagonal: slice
 
 
 class DynamicTerms:
@@ -71,8 +104,7 @@ class DynamicTerms:
             self._reads.append(slice(start, len(rows)))
         self._heat: list[slice] = []
         self.place_columns: list[tuple[int, str]] = []
-        self._moved: list[list[tuple[str, slice, slice]]] = []
-        self._spectra: dict[str, Array] = {}
+        scaled_coefficients: list[list[tuple[str, slice, slice, Array]]] = []
         count = 0
         for term in terms:
             self._heat.append(slice(count, count + len(term.heat_places)))
@@ -100,22 +132,20 @@ class DynamicTerms:
         for term in terms:
             moved = []
             for coefficient in term.coefficients:
-                vectors, spectrum = self._factorised(term, coefficient)
+                vectors, spectrum = self._directions(term, coefficient)
                 sensed = slice(len(rows), len(rows) + vectors.shape[1])
                 columns = slice(count, count + vectors.shape[1])
                 rows.extend(vectors.T)
-                self._spectra[coefficient] = spectrum
                 self._moved_columns.append((columns, vectors))
-                moved.append((coefficient, sensed, columns))
+                moved.append((coefficient, sensed, columns, spectrum))
                 count += vectors.shape[1]
-            self._moved.append(moved)
+            scaled_coefficients.append(moved)
         self.n_added = count
         self.sense = np.array(rows).reshape(-1, model.size)
         sizes = [term.n_states for term in terms]
         ends = np.cumsum([0, *sizes])
         self._states = [slice(ends[i], ends[i + 1]) for i in range(len(terms))]
         self.n_states = int(ends[-1])
-        self._uniform = self.sense @ model.one
         self._layouts = []
         self._shifted: list[list[tuple[int, str]]] = []
         for number, term in enumerate(terms):
@@ -128,17 +158,34 @@ class DynamicTerms:
             self._shifted.append(
                 [(i, fluids[place]) for i, place in enumerate(term.heat_places) if place in fluids]
             )
-        self._fluids: dict[str, tuple[float, list[int]]] = {}
-        for coefficient in self._spectra:
-            own = fast.fluid_parameters(coefficient)
-            scale = float(np.prod([values.get(name, 1.0) for name in own]))
-            self._fluids[coefficient] = (scale, [i for i, n in enumerate(self.derivatives) if n in own])
-        # Rows that shift the fluid of a film which a term also scales.
-        self._fluid_rows: dict[str, list[int]] = {}
-        for row, place in self.place_columns:
-            film = fast.fluid_places.get(place)
-            if film in self._spectra:
-                self._fluid_rows.setdefault(film, []).append(row)
+        self._moved = [[self._moved_by(*item, values) for item in items] for items in scaled_coefficients]
+        self._strengths: dict[tuple[str, float], Array] = {}
+
+    def _moved_by(
+        self, coefficient: str, sensed: slice, columns: slice, spectrum: Array, values: Mapping[str, float]
+    ) -> _Moved:
+        fast, n_sensed = self.fast, len(self.sense)
+        own = fast.fluid_parameters(coefficient)
+        first = columns.start * n_sensed + sensed.start
+        return _Moved(
+            coefficient,
+            sensed,
+            columns,
+            spectrum,
+            self.sense[sensed] @ fast.model.one,
+            float(np.prod([values.get(name, 1.0) for name in own])),
+            [i for i, name in enumerate(self.derivatives) if name in own],
+            [row for row, place in self.place_columns if fast.fluid_places.get(place) == coefficient],
+            slice(first, first + len(spectrum) * n_sensed, n_sensed + 1),
+        )
+
+    def _strength(self, item: _Moved, value: float) -> Array:
+        """What a coefficient of some value conducts in each direction, (k,) W/K."""
+        key = (item.coefficient, value)
+        found = self._strengths.get(key)
+        if found is None:
+            found = self._strengths[key] = value * item.spectrum
+        return found
 
     def _require_place(self, term: Term, place: str) -> None:
         model = self.fast.model
@@ -161,8 +208,7 @@ class DynamicTerms:
             )
         return list(self.fast.heat_rows(bearing))
 
-    def _factorised(self, term: Term, coefficient: str) -> tuple[Array, Array]:
-        """``K_i = Q D Qᵀ`` with the directions in which it conducts anything."""
+    def _directions(self, term: Term, coefficient: str) -> tuple[Array, Array]:
         model = self.fast.model
         if coefficient not in model.coefficient_names:
             raise SpecError(
@@ -170,10 +216,7 @@ class DynamicTerms:
                 f'scales "{coefficient}" by temperature.',
                 did_you_mean(coefficient, model.coefficient_names),
             )
-        matrix = model.operators[model.coefficient_names.index(coefficient)]
-        spectrum, vectors = eigh(matrix)
-        kept = spectrum > RANK_TOLERANCE * spectrum[-1]
-        return vectors[:, kept], spectrum[kept]
+        return self.fast.directions.of(coefficient)
 
     def columns(self, inlet_load: Array) -> Array:
         """What every added quantity puts in, (r, m); ``inlet_load`` is that of 1 K of the coolant's inlet."""
@@ -272,25 +315,24 @@ class DynamicTerms:
                 continue
             layout = self._layouts[number]
             answers = np.asarray(term.factor(contexts[number]), dtype=complex)
-            for i, (coefficient, own_sensed, columns) in enumerate(self._moved[number]):
-                strength = coefficients[coefficient] * self._spectra[coefficient]
-                uniform = self._uniform[own_sensed]
-                scale, moves = self._fluids[coefficient]
-                fluid = scale * self.fast.fluid_temperature(coefficient, inputs)
+            for i, item in enumerate(self._moved[number]):
+                coefficient, columns = item.coefficient, item.columns
+                strength, uniform = self._strength(item, coefficients[coefficient]), item.uniform
+                fluid = item.fluid_scale * self.fast.fluid_temperature(coefficient, inputs)
                 shift, shift_by = shifts.get(coefficient, NO_SHIFT)
-                flow = strength * ((fluid + shift) * uniform - sensed[own_sensed])
+                flow = strength * ((fluid + shift) * uniform - sensed[item.sensed])
                 excess = answers[i, 0].real - 1.0
                 value[columns] = excess * flow
-                by_sensed[columns, own_sensed].flat[:: len(strength) + 1] -= excess * strength
+                by_sensed.reshape(-1)[item.diagonal] -= excess * strength
                 for target in touched.get(coefficient, ()):
                     by_parameter[columns, target] += value[columns]
-                for target in moves:
+                for target in item.fluid_targets:
                     by_parameter[columns, target] += excess * strength * fluid * uniform
                 if shift_by is not None:
                     by_parameter[columns] += np.outer(excess * strength * uniform, shift_by)
-                for row in self._fluid_rows.get(coefficient, ()):
+                for row in item.fluid_rows:
                     # These rows are shifts times the coefficient, and so are their derivatives.
-                    share = self._spectra[coefficient] * uniform
+                    share = item.spectrum * uniform
                     flow = flow + share * value[row]
                     value[columns] += excess * share * value[row]
                     moved = (excess * share)[:, None]
@@ -320,7 +362,7 @@ class DynamicTerms:
 
 
 def solve_added(
-    evaluate: object, base: Array, response: Array, guess: Array, where: str
+    evaluate: Callable[[Array], Evaluation], base: Array, response: Array, guess: Array, time: float
 ) -> tuple[Array, Evaluation]:
     """Added quantities ``q = N(base + response q)`` by Newton's method.
 
@@ -332,7 +374,7 @@ def solve_added(
         Sensed temperatures without them.
     response : (n_y, m) ndarray
     guess : (m,) ndarray
-    where : str
+    time : float, [s]
         For the message.
 
     Raises
@@ -343,20 +385,21 @@ def solve_added(
     diagonal = slice(None, None, len(guess) + 1)
     for _ in range(MOST_ITERATIONS):
         found = evaluate(base + response @ added)
-        matrix = -(found.by_sensed @ response)
-        matrix.flat[diagonal] += 1.0
+        matrix = found.by_sensed @ response
+        np.negative(matrix, out=matrix)
+        matrix.reshape(-1)[diagonal] += 1.0
         # Straight to the factorisation: numpy's checks would cost more than these few unknowns.
         *_, change, singular = dgesv(matrix, found.value - added, overwrite_a=True)
         if singular:
             break
         added = added + change
         moved = float(np.abs(response @ change).max()) if response.size else 0.0
-        if not np.isfinite(moved):
+        if not math.isfinite(moved):
             break
         if moved <= TEMPERATURE_TOLERANCE:
             return added, found
     raise ConvergenceError(
-        where,
+        f"t = {time:.0f} s",
         "the terms of the fast model find no common state.",
         "Their heat may rise faster with temperature than it can flow away; take smaller steps.",
     )

@@ -84,7 +84,7 @@ class Layout:
             time,
             inputs,
             self.temperatures + sensed[self.reads, None],
-            self.state + states[self.states, None],
+            self.state + states[self.states, None] if self.state.size else self.state,
             self.parameters,
         )
 
@@ -93,8 +93,9 @@ class Layout:
     ) -> None:
         """Add complex answers, times what they multiply in each row, to the derivatives."""
         by_sensed, by_state, by_parameter = slopes
-        found = scale * (answers.imag / COMPLEX_STEP)
-        by_sensed[rows, self.reads] += found[:, 1 : self.split]
+        found = answers.imag * (scale / COMPLEX_STEP)
+        if self.split > 1:
+            by_sensed[rows, self.reads] += found[:, 1 : self.split]
         if self.end > self.split:
             by_state[rows, self.states] += found[:, self.split : self.end]
         for i, target in enumerate(self.targets):

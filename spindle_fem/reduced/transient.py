@@ -160,6 +160,9 @@ class TransientRun:
         self._friction_end_by = self._friction_derivatives(self.end_by)
         dynamic = [term for term in terms if term.is_dynamic and term not in known]
         self.dynamic = DynamicTerms(fast, drive, dynamic, parameters, derivatives) if dynamic else None
+        # Looked up step by step: lists are faster than arrays for that.
+        self._grid, self._class = drive.grid.tolist(), drive.step_class.tolist()
+        self._inputs = (drive.start.tolist(), drive.end.tolist()) if dynamic else ([], [])
         scaled = {name for term in dynamic for name in term.coefficients}
         self._shifts = opened.shifts(scaled, derivatives)
 
@@ -205,7 +208,7 @@ class TransientRun:
         tracks = None
         if self.dynamic is None:
             advance = [self.propagators[key].advance for key in self.groups]
-            for step, group in enumerate(self.group_of_step):
+            for step, group in enumerate(self.group_of_step.tolist()):
                 if step in given:
                     states[step] = start.states[given[step]]
                 np.dot(advance[group], states[step], out=states[step + 1])
@@ -215,17 +218,16 @@ class TransientRun:
         return states, tracks
 
     # ------------------------------------------------------------------ terms
-    def _term_inputs(self, values: Array) -> dict[str, float]:
-        return dict(zip(self.drive.names, values.tolist(), strict=True))
+    def _term_inputs(self, step: int, *, at_end: bool) -> dict[str, float]:
+        return dict(zip(self.drive.names, self._inputs[at_end][step], strict=True))
 
     def _evaluator(self, step: int, *, at_end: bool, memory: Array) -> Callable[[Array], Evaluation]:
         """Added quantities at one end of a step as a function of the sensed temperatures."""
-        drive, number = self.drive, int(self.drive.step_class[step])
         return partial(
             self.dynamic.evaluate,
-            float(drive.grid[step + 1] if at_end else drive.grid[step]),
-            self._term_inputs(drive.end[step] if at_end else drive.start[step]),
-            self.built.coefficients[number],
+            self._grid[step + at_end],
+            self._term_inputs(step, at_end=at_end),
+            self.built.coefficients[self._class[step]],
             self.built.touched,
             states=memory,
             friction=(self.friction_end if at_end else self.friction_start)[step],
@@ -241,46 +243,46 @@ class TransientRun:
         from_start = [self.propagators[k].from_start @ c for k, c in zip(keys, columns, strict=True)]
         from_end = [self.propagators[k].from_end @ c for k, c in zip(keys, columns, strict=True)]
         answer = [dynamic.sense @ matrix for matrix in from_end]
-        lengths, goes_on = drive.steps, self._goes_on()
+        lengths, goes_on = drive.steps.tolist(), self._goes_on().tolist()
         tracks = Tracks(columns, from_start, from_end, answer, dynamic, len(lengths))
-        advance = [self.propagators[key].advance for key in keys]
+        # One product a step: what follows from the state and from what was added, and what is sensed of it.
+        known = np.hstack((response, response @ dynamic.sense.T))
+        follows = []
+        for key, added in zip(keys, from_start, strict=True):
+            both = np.hstack((self.propagators[key].advance, added))
+            follows.append(np.vstack((both, dynamic.sense @ both)))
+        size = states.shape[1]
+        now = np.empty(size + dynamic.n_added)
         memory = dynamic.initial_states()
-        for step, group in enumerate(self.group_of_step):
+        for step, group in enumerate(self.group_of_step.tolist()):
             if step in given:
                 states[step] = start.states[given[step]]
-            sensed = dynamic.sense @ states[step]
             if goes_on[step] and step not in given:
                 # Nothing jumps between the steps: what held at the end of the last still does.
-                last = tracks.end[-1]
-                begin = Evaluation(
-                    tracks.added_end[step - 1], last.by_sensed, last.by_state, last.by_parameter
-                )
-                guess = 2.0 * begin.value - tracks.added_start[step - 1]
+                begin, first = tracks.end[-1], tracks.added_end[step - 1]
+                guess = 2.0 * first - tracks.added_start[step - 1]
             else:
-                begin = self._evaluator(step, at_end=False, memory=memory)(sensed)
-                guess = begin.value
+                begin = self._evaluator(step, at_end=False, memory=memory)(dynamic.sense @ states[step])
+                guess = first = begin.value
             tracks.begin.append(begin)
             if step + 1 in given:
                 # A gap: nothing is known of it, and what comes after it is given.
-                tracks.bridge(step, begin)
+                tracks.bridge(step, begin, first)
                 continue
             if dynamic.n_states:
-                inputs = self._term_inputs(drive.start[step])
-                moved = dynamic.advance(float(drive.grid[step]), float(lengths[step]), inputs, sensed, memory)
+                inputs, sensed = self._term_inputs(step, at_end=False), dynamic.sense @ states[step]
+                moved = dynamic.advance(self._grid[step], lengths[step], inputs, sensed, memory)
                 memory = moved[0]
                 tracks.moved.append(moved)
-            base = advance[group] @ states[step] + response[step]
-            base += from_start[group] @ begin.value
-            added, end = solve_added(
-                self._evaluator(step, at_end=True, memory=memory),
-                dynamic.sense @ base,
-                answer[group],
-                guess,
-                f"t = {drive.grid[step + 1]:.0f} s",
-            )
+            now[:size], now[size:] = states[step], first
+            base = follows[group] @ now
+            base += known[step]
+            evaluator = self._evaluator(step, at_end=True, memory=memory)
+            added, end = solve_added(evaluator, base[size:], answer[group], guess, self._grid[step + 1])
             tracks.end.append(end)
-            tracks.added_start[step], tracks.added_end[step] = begin.value, added
-            states[step + 1] = base + from_end[group] @ added
+            tracks.added_start[step], tracks.added_end[step] = first, added
+            np.dot(from_end[group], added, out=states[step + 1])
+            states[step + 1] += base[:size]
         return tracks
 
     def _goes_on(self) -> NDArray[np.bool_]:
@@ -488,10 +490,10 @@ class Tracks:
         self.end: list[Evaluation] = []
         self.moved: list[tuple[Array, Array, Array, Array]] = []
 
-    def bridge(self, step: int, begin: Evaluation) -> None:
+    def bridge(self, step: int, begin: Evaluation, added: Array) -> None:
         """Keep what held before a gap for the step that leads over it."""
         self.end.append(begin)
-        self.added_start[step] = self.added_end[step] = begin.value
+        self.added_start[step] = self.added_end[step] = added
         if self.dynamic.n_states:
             # Never used: the memory stays as it is.
             self.moved.append((np.zeros(0),) * 4)
