@@ -168,15 +168,16 @@ class Effect(ABC):
         In plain words, for reports: "the grease thins as it warms".
     check : str
         What a maintenance engineer should look at when it is found.
-    size_sigma : float
-        1 σ of the logarithm of its size that no fit knows of; widens the interval that a finding states.
+    law_sigma : mapping of str to float
+        1 σ of the logarithm of what a finding states, by name, that a fit of so simple a law cannot
+        know of; widens the stated interval.
     """
 
     name: str
     kind: Kind
     title: str
     check: str
-    size_sigma: float = 0.0
+    law_sigma: Mapping[str, float] = MappingProxyType({})
 
     def candidates(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Every form at every place of a machine; none where the definition already has it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -67,6 +68,8 @@ class ChillerCycling(Effect):
         "Chiller: log the inlet temperature every few seconds; hysteresis of its controller, tank volume, "
         "compressor starts per hour."
     )
+    # A controller's switching wanders with the load.
+    law_sigma = MappingProxyType({"period": 0.01})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Sine and sawtooth at the channel; coolants of a network."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +67,8 @@ class CoolantBypass(Effect):
         "O-rings between sleeve and body, relief valve, crossed hoses; measure the flow at the outlet and "
         "compare the pressure drop with that of the full flow."
     )
+    # The share changes with the flow and the oil's viscosity.
+    law_sigma = MappingProxyType({"fraction": 0.05})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """The outlet sensor sits before the flows join, or behind."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.laws import RPM
@@ -27,6 +28,8 @@ class DriveHeat(Effect):
         "Belt tension and pulley temperature, coupling, motor flange: compare their temperatures with the "
         "rear bearings after an hour at constant speed; run uncoupled if possible."
     )
+    # It enters at more than one place.
+    law_sigma = MappingProxyType({"heat_at_3000rpm": 0.1})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Lagging, or at once; nodes of a network with something turning."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -51,6 +52,8 @@ class MountSink(Effect):
         "Temperature of the machine frame beside the flange: a contact thermometer over one shift; "
         "hydraulic unit, motor or coolant tank on the same casting."
     )
+    # A frame is not at one temperature.
+    law_sigma = MappingProxyType({"temperature_above_ambient": 0.1})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """The flange's film to the frame; boundary links of a network."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.laws import RPM
@@ -26,6 +27,8 @@ class SealFriction(Effect):
         "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the "
         "spindle by hand with and without the seal."
     )
+    # A lip wears in.
+    law_sigma = MappingProxyType({"heat_per_1000rpm": 0.1})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Both shaft ends; every node of a network that has something turning."""

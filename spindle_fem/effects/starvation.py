@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words, quantity
@@ -67,6 +69,8 @@ class Starvation(Effect):
         "Grease quantity, age and bleeding; ramp the speed slowly through the onset and watch drag torque, "
         "temperature and noise; compare with freshly greased bearings."
     )
+    # Replenishment fails over a range of speeds.
+    law_sigma = MappingProxyType({"onset_speed": 0.03})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Sets, single bearings and sources."""

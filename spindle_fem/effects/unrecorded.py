@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -103,7 +104,7 @@ class UnrecordedEffect(IntervalEffect):
     near it sees up to twice the mean, one opposite half of it.
     """
 
-    size_sigma = 0.45
+    law_sigma = MappingProxyType({"heat": 0.45, "conductance": 0.45})
 
     def places(self, machine: MachineView) -> tuple[str, ...]:
         """Every spot of the view."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.laws import RPM
@@ -28,6 +29,8 @@ class Windage(Effect):
         "Parts that stir air (clamping unit, fan, bolt heads, rotor), gap widths; measure the power at "
         "the highest speed without load, and at half of it: an eighth should be left."
     )
+    # Part of it reaches the housing, and the exponent changes with the regime.
+    law_sigma = MappingProxyType({"heat_at_4500rpm": 0.1})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """The shaft; every node of a network that has something turning."""

@@ -165,9 +165,9 @@ def test_a_size_whose_place_is_unsure_has_a_wider_interval(found, monkeypatch):
     outcome, _ = found
     (candidate,) = outcome.final.candidates
     name = next(iter(reported_parameters(outcome.final, candidate)))
-    monkeypatch.setattr(type(effect_of(candidate.effect)), "size_sigma", 0.0)
+    monkeypatch.setattr(type(effect_of(candidate.effect)), "law_sigma", {})
     narrow = reported_parameters(outcome.final, candidate)[name]
-    monkeypatch.setattr(type(effect_of(candidate.effect)), "size_sigma", 0.45)
+    monkeypatch.setattr(type(effect_of(candidate.effect)), "law_sigma", {name: 0.45})
     wide = reported_parameters(outcome.final, candidate)[name]
     assert wide["value"] == narrow["value"]
     assert wide["low"] < narrow["low"] <= narrow["high"] < wide["high"]
