@@ -1,10 +1,12 @@
 """Designs an hour of a study, and what sharing meshes, processes and a projected model brings.
 
     python benchmarks/sweep.py [MACHINE] [--preset normal] [--depths 40] [--temperatures 1] [--jobs 2]
+                               [--mesh new]
     python benchmarks/sweep.py recorded_spindle --reduced 1000 [--checks 20] [--preset normal]
 
 A grid of channel depths (each a mesh of its own) by oil temperatures (which
 share it), in an empty mesh cache; with ``--serial`` once more in one process.
+``--mesh moved`` moves meshes between depths that are near.
 
 With ``--reduced``, that many designs of films, oil and flow through the
 projected model: its set-up, the designs through it, and its error at designs
@@ -34,6 +36,7 @@ path = "channel.depth"
 path = "coolant.inlet_temperature"
 {temperatures}
 [study]
+mesh = "{mesh}"
 outputs = ["temperature.max_degC", "derived.largest_ring_difference_K", "coolant.pressure_drop_Pa"]
 """
 
@@ -127,6 +130,7 @@ def main() -> None:
     parser.add_argument("--depths", type=int, default=40)
     parser.add_argument("--temperatures", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--mesh", choices=["new", "moved"], default="new")
     parser.add_argument("--serial", action="store_true", help="Also in one process, for the ratio.")
     parser.add_argument("--reduced", type=int, default=0, help="Designs through the projected model instead.")
     parser.add_argument("--checks", type=int, default=20, help="Of them with a full solve beside.")
@@ -137,13 +141,18 @@ def main() -> None:
     text = STUDY.format(
         depths=_axis(5.0, 24.5, arguments.depths, "mm"),
         temperatures=_axis(15.0, 40.0, arguments.temperatures, "degC"),
+        mesh=arguments.mesh,
     )
     with tempfile.TemporaryDirectory() as work:
         study = Path(work) / "study.toml"
         study.write_text(text, encoding="utf-8")
         seconds, rows = timed_sweep(arguments.machine, study, arguments.preset, arguments.jobs)
         solved = sum(row["status"] == "ok" for row in rows)
-        print(f"{arguments.machine}, {arguments.preset}: {solved} of {len(rows)} designs solved")
+        moved = sum(row["mesh"] == "moved" for row in rows)
+        print(
+            f"{arguments.machine}, {arguments.preset}: {solved} of {len(rows)} designs solved, "
+            f"{moved} on a moved mesh"
+        )
         print(f"{arguments.jobs} processes: {seconds:8.1f} s  {seconds / len(rows):6.2f} s a design")
         if arguments.serial:
             alone, again = timed_sweep(arguments.machine, study, arguments.preset, 1)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +61,58 @@ class FilmChart:
     best: tuple[float, float]
     best_value: float
     paper_value: float
+
+
+@dataclass(frozen=True, slots=True)
+class PumpLimits:
+    """What a study allows the pump, infinite where it says nothing.
+
+    Attributes
+    ----------
+    pressure_drop : float, [Pa]
+    pumping_power : float, [W]
+    """
+
+    pressure_drop: float = np.inf
+    pumping_power: float = np.inf
+
+    @property
+    def given(self) -> bool:
+        """Whether there is any."""
+        return bool(np.isfinite(min(self.pressure_drop, self.pumping_power)))
+
+    def demand(self, chart: FilmChart) -> NDArray[np.float64]:
+        """What the pump must do over what it may, pressure or power, the larger; 1 is its limit.
+
+        Same shape as the chart, (n_depths, n_temperatures).
+        """
+        return np.maximum(chart.pressure_drop / self.pressure_drop, chart.pumping_power / self.pumping_power)
+
+    def best(self, chart: FilmChart) -> tuple[float, float, float] | None:
+        """Depth, oil temperature and value of the largest coefficient that the pump allows; None if none."""
+        allowed = np.where(self.demand(chart) <= 1.0, chart.chart.value, -np.inf)
+        row, column = np.unravel_index(int(np.argmax(allowed)), allowed.shape)
+        if not np.isfinite(allowed[row, column]):
+            return None
+        return float(DEPTHS[row]), float(TEMPERATURES[column]), float(allowed[row, column])
+
+
+def pump_limits(constraints: Iterable[Mapping[str, Any]]) -> PumpLimits:
+    """Limits of the pump among those of a study.
+
+    Parameters
+    ----------
+    constraints : iterable of mapping
+        As in ``sweep.json``: ``output``, ``min``, ``max``.
+
+    >>> pump_limits([{"output": "coolant.pressure_drop_Pa", "min": None, "max": 5e5}])
+    PumpLimits(pressure_drop=500000.0, pumping_power=inf)
+    """
+    found = {"coolant.pressure_drop_Pa": np.inf, "coolant.pumping_power_W": np.inf}
+    for item in constraints:
+        if item["output"] in found and item["max"] is not None:
+            found[item["output"]] = min(found[item["output"]], float(item["max"]))
+    return PumpLimits(*found.values())
 
 
 def film_study(spec: MachineSpec) -> tuple[FilmChart, ...]:

@@ -11,7 +11,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from spindle_fem.design.files import MACHINE_FILE, SUMMARY_FILE, SWEEP_SCHEMA
-from spindle_fem.design.film_study import MODELS, FilmChart, film_study
+from spindle_fem.design.film_study import FilmChart, film_study, pump_limits
 from spindle_fem.design.table import read_results
 from spindle_fem.errors import BadInputError
 from spindle_fem.reporting import sweep_charts, sweep_film
@@ -22,7 +22,6 @@ from spindle_fem.reporting.document import (
     Notice,
     Section,
     Table,
-    Text,
     illustration_of,
 )
 from spindle_fem.reporting.figures import save_png
@@ -30,11 +29,10 @@ from spindle_fem.reporting.output import replace_text, require_complete
 from spindle_fem.reporting.page import render_page
 from spindle_fem.reporting.sweep_best import best_designs
 from spindle_fem.reporting.sweep_scales import Scale, scale_of_column
-from spindle_fem.reporting.tables import column, number, rows_of, significant
+from spindle_fem.reporting.tables import column, rows_of
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.spec.load import validate
 from spindle_fem.spec.model import MachineSpec
-from spindle_fem.units import ZERO_CELSIUS_K
 
 Row = Mapping[str, Any]
 FIGURE_FOLDER = "figures"
@@ -51,9 +49,10 @@ _CAPTIONS = {
     "sensitivities": "Which parameter each output depends on, over the whole space of the study.",
     "film_maps": "The paper's Figure 22 and the same by correlations of a helical duct, each row on one "
     "scale. White line: laminar to turbulent, by the paper at Re 2300 on the depth, in a helical duct where "
-    "Schmidt puts it, some 8000 on the hydraulic diameter. The paper names neither velocity nor flow; what "
-    "it would choose depends on it.",
-    "pump_maps": "What the pump must do for it, through the channel alone.",
+    "Schmidt puts it, some 8000 on the hydraulic diameter. Dashed: the pump's limit of the study, for the "
+    "channel alone; hatched is what lies beyond. The paper names neither velocity nor flow; what it would "
+    "choose depends on it.",
+    "pump_maps": "What the pump must do for it, through the channel alone; dashed is the study's limit.",
 }
 
 
@@ -170,8 +169,9 @@ def draw_figures(
             summary["sensitivities"][:MOST_PANELS], names
         )
     if films:
-        figures["film_maps"] = sweep_film.film_maps(films)
-        figures["pump_maps"] = sweep_film.pump_maps(films)
+        limits = pump_limits(summary["constraints"])
+        figures["film_maps"] = sweep_film.film_maps(films, limits)
+        figures["pump_maps"] = sweep_film.pump_maps(films, limits)
     return figures
 
 
@@ -245,7 +245,8 @@ def _sections(
         ]
         sections.append(Section("sensitivity", "What matters", [pictures["sensitivities"], Bullets(said)]))
     if films:
-        blocks = [*_film_words(films), pictures["film_maps"], pictures["pump_maps"]]
+        words = sweep_film.film_words(films, pump_limits(summary["constraints"]))
+        blocks = [*words, pictures["film_maps"], pictures["pump_maps"]]
         sections.append(Section("film", "The paper's choice of depth and oil temperature", blocks))
     sections.append(Section("table", "All designs", _table(rows, parameters, outputs)))
     versions = rows_of([[name, text] for name, text in summary["versions"].items()])
@@ -311,30 +312,6 @@ def _optimum(
         Table(heads, rows_of(cells), "The best designs, those to compare with, and the nearest ones solved.")
     )
     return blocks
-
-
-def _film_words(films: Sequence[FilmChart]) -> list[Any]:
-    heads = (
-        column("equations"), column("held"), column("largest at: depth / mm", number=True),
-        column("oil / °C", number=True), column("W/(m²·K)", number=True),
-        column("at 19 mm, 31 °C", number=True), column("share of the largest", number=True),
-    )  # fmt: skip
-    cells = [
-        [
-            MODELS[item.model], sweep_film.held_text(item), number(item.best[0] * 1e3, 1),
-            number(item.best[1] - ZERO_CELSIUS_K, 1), significant(item.best_value),
-            significant(item.paper_value),
-            f"{item.paper_value / item.best_value:.0%}",
-        ]
-        for item in films
-    ]  # fmt: skip
-    text = (
-        "The paper chose 19 mm and 31 °C from its map of the film coefficient. The velocity held here is the "
-        "one at which that point lies on the paper's laminar–turbulent line; the flow is the machine's own. "
-        "A film map says nothing of the bearings: hotter oil also lifts the whole machine, which only the "
-        "solved designs show."
-    )
-    return [Text(text), Table(heads, rows_of(cells))]
 
 
 def _columns(parameters: Sequence[Scale], outputs: Sequence[Scale]) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ from spindle_fem.solve import solve_prepared
 from spindle_fem.spec.load import load_machine
 
 MACHINE = "small_two_start"
-QUICK = ("mesh.preset=coarse", "mesh.size_factor=4.0", "mesh.order=1", "heat.model=palmgren")
+QUICK = ("mesh.preset=coarse", "mesh.order=1", "heat.model=palmgren")
 GRID = """
 schema = "spindle-fem/study/1"
 [[parameter]]

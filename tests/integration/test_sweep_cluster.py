@@ -12,7 +12,7 @@ from spindle_fem.errors import BadInputError
 
 distributed = pytest.importorskip("distributed")
 
-QUICK = ("mesh.preset=coarse", "mesh.size_factor=4.0", "mesh.order=1", "heat.model=palmgren")
+QUICK = ("mesh.preset=coarse", "mesh.order=1", "heat.model=palmgren")
 STUDY = """
 schema = "spindle-fem/study/1"
 [[parameter]]

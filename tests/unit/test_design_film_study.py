@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from spindle_fem.design.film_study import PAPER_DEPTH, film_study
+from spindle_fem.design.film_study import PAPER_DEPTH, PumpLimits, film_study, pump_limits
+from spindle_fem.reporting.sweep_film import film_maps, film_words
 from spindle_fem.spec.load import load_machine
 
 
@@ -66,3 +67,67 @@ def test_the_line_is_where_each_model_leaves_laminar_flow(charts):
 
 def test_machine_without_a_channel_has_no_map():
     assert film_study(load_machine("uncooled")) == ()
+
+
+def test_limits_of_a_study_that_concern_the_pump():
+    """The tightest of each kind; limits of other outputs, and lower ones, say nothing of the pump."""
+    constraints = [
+        {"output": "coolant.pressure_drop_Pa", "min": None, "max": 5e5},
+        {"output": "coolant.pressure_drop_Pa", "min": 1e4, "max": 4e5},
+        {"output": "coolant.pumping_power_W", "min": 10.0, "max": None},
+        {"output": "temperature.max_degC", "min": None, "max": 50.0},
+    ]
+    assert pump_limits(constraints) == PumpLimits(4e5)
+    assert pump_limits(constraints).given
+    assert not pump_limits(constraints[2:]).given
+
+
+def test_what_the_pump_may_do_bounds_the_best_film(charts):
+    """At constant flow thin channels have the largest film and the largest pressure drop."""
+    item = charts["helical", "flow"]
+    limits = PumpLimits(pressure_drop=1e5)
+    assert limits.demand(item) == pytest.approx(item.pressure_drop / 1e5)
+    depth, temperature, value = limits.best(item)
+    assert depth > item.best[0]
+    assert value < item.best_value
+    row = int(np.argmin(np.abs(item.chart.depth - depth)))
+    column = int(np.argmin(np.abs(item.chart.temperature - temperature)))
+    assert item.pressure_drop[row, column] <= 1e5 < item.pressure_drop[row - 1, column]
+    # The tighter of two limits counts.
+    power = PumpLimits(1e5, float(item.pumping_power[row, column]) / 2.0)
+    assert power.demand(item)[row, column] == pytest.approx(2.0)
+    assert PumpLimits(pumping_power=1e-6).best(item) is None
+    assert PumpLimits().best(item) == (*item.best, item.best_value)
+
+
+def dashed(collection):
+    return any(pattern is not None for _, pattern in collection.get_linestyle() or ())
+
+
+def test_the_map_shows_the_pumps_limit(charts):
+    films = list(charts.values())
+    limits = PumpLimits(pressure_drop=5e5)
+    plain, limited = film_maps(films), film_maps(films, limits)
+
+    def drawn(figure):
+        return [sum(dashed(item) for item in axes.collections) for axes in figure.axes[:4]]
+
+    def words(figure):
+        return [text.get_text() for axes in figure.axes[:4] for text in axes.texts]
+
+    assert drawn(plain) == [0, 0, 0, 0]
+    inside = [limits.demand(item).min() < 1.0 < limits.demand(item).max() for item in films]
+    assert any(inside)
+    assert drawn(limited) == [int(here) for here in inside]
+    legend = [text.get_text() for text in limited.axes[0].get_legend().get_texts()]
+    assert "the pump's limit" in legend
+    nothing = film_maps(films, PumpLimits(pumping_power=1e-3))
+    assert sum("beyond the pump everywhere" in text for text in words(nothing)) == 4
+    assert not any("beyond the pump" in text for text in words(limited))
+
+
+def test_the_table_tells_the_largest_film_that_the_pump_allows(charts):
+    films = list(charts.values())
+    _, plain = film_words(films)
+    _, limited = film_words(films, PumpLimits(pressure_drop=1e5))
+    assert len(limited.columns) == len(plain.columns) + 1
