@@ -211,6 +211,10 @@ def rebuild(folder: Path) -> Path:
         from spindle_fem.reporting.diagnosis_report import write_diagnosis_report
 
         return write_diagnosis_report(place)
+    if (place / "simulation.json").is_file():
+        from spindle_fem.reporting.simulation_report import write_simulation_report
+
+        return write_simulation_report(place)
     if (place / "sweep.json").is_file():
         from spindle_fem.reporting.sweep_report import rebuild_sweep_report
 

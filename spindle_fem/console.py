@@ -177,7 +177,9 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
     for channel in content["channels"]:
         table.add_row(channel["channel"], _number(channel["rmse_K"], 3), _number(channel["noise_K"], 3))
     console.print(table)
-    console.print(f"Files: {folder}")
+    for line in (*content["defects_text"], *content["notes"]):
+        console.print(line, style="dim", markup=False)
+    console.print(f"Report: {folder / 'report.html'}")
 
 
 def print_diagnosis(content: dict[str, Any], folder: Path) -> None:

@@ -35,6 +35,7 @@ from spindle_fem.reduced.film_heat import (
 )
 from spindle_fem.reduced.network_model import NetworkFastModel
 from spindle_fem.reporting.output import output_folder, replace_text
+from spindle_fem.reporting.simulation_report import write_simulation_report
 from spindle_fem.results.summary import package_versions
 from spindle_fem.spec import network as network_spec
 from spindle_fem.spec.load import find_machine, load_machine, read_definition, write_machine
@@ -52,6 +53,8 @@ class Simulation:
 
     Attributes
     ----------
+    machine : str
+        Its name.
     recording : Recording
     predicted : (N, c) ndarray, [K]
     half_width : (N, c) ndarray, [K]
@@ -66,6 +69,7 @@ class Simulation:
         Size and checked error of the reduced model; empty for a network.
     """
 
+    machine: str
     recording: Recording
     predicted: Array
     half_width: Array
@@ -95,8 +99,8 @@ def simulate_machine(
         Folder or manifest.
     folder : str or Path
         Gets ``simulated.csv``, ``simulation.json``, ``error_table.csv``,
-        ``figures/residual_<channel>.png`` and, when calibrated,
-        ``calibrated_machine.toml``.
+        ``figures/residual_<channel>.png``, ``report.html`` and, when
+        calibrated, ``calibrated_machine.toml``.
     calibrate : iterable of str or Path
         Recordings that may move the uncertain parameters first.
     overrides : iterable of str
@@ -249,7 +253,7 @@ def _simulate_geometry(
         "checked_error_K": dict(fast.model.errors),
         "mesh_preset": spec.mesh.preset,
     }
-    return _simulation(recording, predictor, predicted, sensitivity, result, text, notes, model)
+    return _simulation(spec.name, recording, predictor, predicted, sensitivity, result, text, notes, model)
 
 
 def _outside_range(predictor: MachinePredictor, parameters: Mapping[str, float]) -> tuple[str, ...]:
@@ -297,7 +301,7 @@ def _simulate_network(
         }
         text = network_spec.write_network_machine(network_spec.with_parameters(spec, values))
     notes = _effect_notes(effects)
-    return _simulation(recording, predictor, predicted, sensitivity, result, text, notes, {})
+    return _simulation(spec.name, recording, predictor, predicted, sensitivity, result, text, notes, {})
 
 
 def _effect_notes(effects: ActiveEffects) -> list[str]:
@@ -305,6 +309,7 @@ def _effect_notes(effects: ActiveEffects) -> list[str]:
 
 
 def _simulation(
+    machine: str,
     recording: Recording,
     predictor: Predictor,
     predicted: Array,
@@ -315,8 +320,9 @@ def _simulation(
     model: Mapping[str, Any],
 ) -> Simulation:
     half_width = _half_width(recording, predictor, sensitivity, result)
+    comparison = compare(recording, predicted)
     return Simulation(
-        recording, predicted, half_width, compare(recording, predicted), result, text, tuple(notes), model
+        machine, recording, predicted, half_width, comparison, result, text, tuple(notes), model
     )
 
 
@@ -363,7 +369,9 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
     summary |= {
         "recording": recording.name,
         "notes": list(simulation.notes),
+        "machine": simulation.machine,
         "defects": recording.defects.to_json(),
+        "defects_text": recording.defects.lines(),
         "reduced_model": dict(simulation.model),
         "calibration": None
         if simulation.calibration is None
@@ -375,6 +383,7 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
         replace_text(folder / "calibrated_machine.toml", simulation.machine_text)
     summary["wall_time_s"] = time.perf_counter() - started
     replace_text(folder / "simulation.json", json.dumps(summary, indent=1) + "\n")
+    write_simulation_report(folder)
     return summary
 
 

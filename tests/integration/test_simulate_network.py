@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from spindle_fem.commands import rebuild
+from spindle_fem.console import print_simulation
 from spindle_fem.errors import BadInputError, RecordingError
 from spindle_fem.simulate import simulate_machine
 
@@ -119,6 +121,41 @@ def test_a_calibrated_network_predicts_another_recording(files, tmp_path):
     assert {"channel", "rmse_K", "noise_K"} <= set(written["channels"][0])
     errors = pd.read_csv(tmp_path / "fitted" / "error_table.csv")
     assert set(errors["condition"]) >= {"all", "heating", "cooling"}
+
+
+def test_the_report_says_errors_parameters_and_what_was_wrong_with_the_file(files, tmp_path, capsys):
+    machine, first, second = files
+    holey = tmp_path / "holey"
+    holey.mkdir()
+    (holey / "recording.toml").write_text(MANIFEST)
+    frame = pd.read_csv(second / "made.csv")
+    frame.loc[40:44, "B"] = np.nan
+    frame.loc[100, "W"] += 30.0
+    pd.concat([frame, frame.iloc[[7]]]).to_csv(holey / "made.csv", index=False)
+    folder = tmp_path / "out"
+    content = simulate_machine(machine, holey, folder, calibrate=[first])
+    html = (folder / "report.html").read_text()
+    for text in (
+        "two lumps",
+        "conductance.winding|body",
+        "W: 1 spikes",
+        "B: 5 empty cells",
+        "1 with a repeated stamp",
+        "heating",
+        f"{content['channels'][0]['rmse_K']:.3f}",
+        "beyond the robust limit",
+    ):
+        assert text in html, text
+    assert html.count("data:image/webp;base64,") == 2
+    assert "http" not in html.replace("http://www.w3.org", "")
+    # The same page from the files alone.
+    (folder / "report.html").unlink()
+    assert rebuild(folder) == folder / "report.html"
+    assert (folder / "report.html").read_text() == html
+    print_simulation(content, folder)
+    shown = capsys.readouterr().out
+    assert "B: 5 empty cells" in shown
+    assert "report.html" in shown
 
 
 def test_overrides_reach_the_network(files, tmp_path):
