@@ -37,6 +37,10 @@ REDUCTION = 0.02
 # A preconditioner of other coefficients or steps serves until it takes so many times the iterations
 # that it took when new for the same decades of error.
 STALE_FACTOR = 1.6
+# Share of a change that the next iteration of a stage leaves, while nothing is known of it.
+UNKNOWN_CONTRACTION = 1.0
+# A contraction that is better than before is believed only so far.
+SLOWEST_GAIN = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +128,7 @@ class StageSolver:
         self._kept = _Kept()
         self._recent = RecentCorrections()
         self._shift = 0.0
-        self._current: Stage | None = None
+        self._contraction = UNKNOWN_CONTRACTION
         self.linear_iterations = 0
         self.matrix_builds = 0
         self.preconditioner_builds = 0
@@ -196,6 +200,10 @@ class StageSolver:
         self._kept.slope = None
         self._kept.before = None
 
+    def forget_contraction(self) -> None:
+        """Drop what is known of the iteration: other inputs, another coupling."""
+        self._contraction = UNKNOWN_CONTRACTION
+
     def flows(self, stage: Stage) -> BoundaryFlows:
         """Heat across the boundary at a stage."""
         n = self._operators.n_unknowns
@@ -264,7 +272,11 @@ class StageSolver:
             )
             defect = following - unknowns
             change = float(np.abs(defect).max())
-            if not iterate or change <= self._control.nonlinear:
+            if attempt == 1:
+                # the first two changes are of the plain iteration: nothing is mixed yet
+                first_change = float(np.abs(past[0][1]).max())
+                self._contraction = max(change / first_change, SLOWEST_GAIN * self._contraction)
+            if not iterate or self._is_left(change) <= self._control.nonlinear:
                 return self._stage(problem, following, load)
             past = [*past[-EARLIER_ITERATES:], (following, defect)]
             unknowns = mixed(past)
@@ -273,6 +285,13 @@ class StageSolver:
             f"a stage still changes by {change:.3g} K after {MAX_STAGE_ITERATIONS} iterations.",
             "Shorten the steps or check the temperature-dependent inputs.",
         )
+
+    def _is_left(self, change: float) -> float:
+        """What further iterations would change at most, K, where the last one changed so much."""
+        if not self._control.trust_contraction or self._contraction >= UNKNOWN_CONTRACTION:
+            return change
+        share = self._contraction / (1.0 - self._contraction) + REDUCTION
+        return min(share, 1.0) * change
 
     def _solve(
         self,

@@ -184,6 +184,10 @@ class StepControl:
     nonlinear_tolerance : float or None, [K]
         Change at which that iteration ends; a hundredth of the tolerance when
         None.
+    trust_contraction : bool
+        Whether it may end before, where the change times what the iteration
+        lately left of a change is as small: one solve a stage fewer. Heat of
+        temperature-dependent inputs is then that of fields so much further apart.
     method : {"direct", "multigrid"} or None
     """
 
@@ -193,6 +197,7 @@ class StepControl:
     linear_tolerance: float | None = None
     temperature_dependent: bool = False
     nonlinear_tolerance: float | None = None
+    trust_contraction: bool = False
     method: Method | None = None
 
     def __post_init__(self) -> None:
@@ -246,6 +251,7 @@ def integrate(
     *,
     control: StepControl = DEFAULT_CONTROL,
     breakpoints: Sequence[float] = (),
+    restarts: Sequence[float] = (),
     outputs: sparse.sparray | None = None,
     sample_times: ArrayLike = (),
     observer: Callable[[ThermalState], bool] | None = None,
@@ -263,6 +269,8 @@ def integrate(
     control : StepControl
     breakpoints : sequence of float, [s]
         Times where inputs jump; steps end there.
+    restarts : sequence of float, [s]
+        Those of them after which steps begin as at the start.
     outputs : (n_outputs, n) or (n_outputs, n + m) sparse array, optional
         Rows to sample, for example of ``probe_matrix``.
     sample_times : (n_samples,) array_like, [s]
@@ -288,9 +296,10 @@ def integrate(
     solver = StageSolver(inputs, start, control)
     rows = solver.output_rows(outputs)
     samples = np.full((len(times), rows.shape[0]), np.nan)
-    stops = np.unique([t for t in breakpoints if start.time < t < end_time] + [end_time])
-    span = end_time - start.time
-    step = start.step or control.first_step or 1e-4 * span
+    marks = [t for t in (*breakpoints, *restarts) if start.time < t < end_time]
+    stops, anew = np.unique([*marks, end_time]), frozenset(restarts)
+    first_step = control.first_step or 1e-4 * (end_time - start.time)
+    step = start.step or first_step
     ledger = _Ledger(ends=[start.time])
     content_before = solver.heat_content(start)
     state = start
@@ -327,6 +336,9 @@ def integrate(
         solver.accept(stages, size)
         if end in stops:
             solver.forget_slope()
+        if end in anew:
+            step = first_step
+            solver.forget_contraction()
         state = solver.state_after(stages, end, step)
         if observer is not None and observer(state):
             break

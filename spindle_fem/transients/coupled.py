@@ -5,13 +5,15 @@ latest temperatures and is solved again until they agree, so the coupled
 scheme keeps the second order of the time steps. Coefficients of the matrix
 (films, ball contacts) are only renewed when they have moved by more than a
 small share: the matrix then serves many steps. Heat and surrounding
-temperatures are always those of the temperatures themselves.
+temperatures are always those of the temperatures themselves. A step begins with
+what its predecessor ended with, unless an input jumps or a term is switched.
 """
 
 from __future__ import annotations
 
 import bisect
 import copy
+import math
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass, replace
 
@@ -25,17 +27,20 @@ from spindle_fem.coolant.marching import march_enthalpy
 from spindle_fem.coupling import PreparedMachine
 from spindle_fem.errors import NoEquilibriumError, NoSteadyStateError, OutOfValidityError
 from spindle_fem.loads.bearing_heat import BearingTemperatures, HeatModel
+from spindle_fem.loads.build import FieldState
 from spindle_fem.loads.coolant_loop import CoolantState
 from spindle_fem.loads.model import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import CHANNEL_FILM
-from spindle_fem.transients.history import OperatingHistory
+from spindle_fem.transients.history import FIELD_OF, OperatingHistory
 from spindle_fem.transients.terms import NO_PHYSICS, FieldTerms, Physics
 
 Array = NDArray[np.float64]
 
 # Bearings this close to their last temperatures make the same heat: some microwatts.
 SAME_TEMPERATURE_K = 1.0e-6
+# The end of a step is asked for an instant before it: time and inputs are then apart by rounding.
+SAME = 1.0e-12
 
 
 class HeatInMemory:
@@ -76,6 +81,14 @@ class Evaluation:
     point: OperatingPoint
     loads: Loads
     coolant: CoolantState | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """What was asked for last."""
+
+    evaluation: Evaluation
+    problem: ConductionProblem
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +137,9 @@ class CoupledInputs:
         memory: Array | None = None,
     ) -> None:
         self._physics, self._memory = physics, memory
+        self._switches = frozenset(physics.breakpoints())
+        self._latest: _Answer | None = None
+        self._ended: _Answer | None = None
         self._steps: list[_ChannelStep] = []
         self.terms: FieldTerms | None = None
         builder = copy.copy(machine.builder)
@@ -139,7 +155,8 @@ class CoupledInputs:
 
     def lumped_names(self, start: Array) -> tuple[str, ...]:
         """Names of the lumped nodes, in the order of their unknowns."""
-        return tuple(node.name for node in self._loads(self.history.inputs.times[0], start, {})[1].lumped)
+        first = float(self.history.inputs.times[0])
+        return tuple(node.name for node in self._loads(first, self.history.at(first), start, {})[1].lumped)
 
     def __call__(self, time: float, state: ThermalState) -> ConductionProblem:
         """Problem at a time and a state.
@@ -151,21 +168,25 @@ class CoupledInputs:
         """
         if self._names is None:
             self._begin(time, state)
+        point = self.history.at(time)
+        if self._goes_on(time, point):
+            self._asked.append(replace(self._ended.evaluation, time=time, point=point))
+            return self._ended.problem
         lumped = dict(zip(self._names, state.lumped_temperature.tolist(), strict=True))
         change = NO_CHANGE
         if self.terms is not None:
-            now = self.history.at(time)
-            change = self.terms.at(time, now, state.temperature, state.lumped_temperature)
+            change = self.terms.at(time, point, state.temperature, state.lumped_temperature)
             change = replace(change, coefficients=self._factors(change))
-        point, loads, coolant = self._loads(time, state.temperature, lumped, change)
+        field, loads, coolant = self._loads(time, point, state.temperature, lumped, change)
         loads = replace(loads, films=self._films(loads), lumped=self._lumped(loads))
         if coolant is not None:
-            inlet = point.coolant_inlet_temperature + change.inlet
-            coolant = self._coolant(inlet, coolant, state.temperature)
+            coolant = self._coolant(point.coolant_inlet_temperature + change.inlet, coolant, field)
             loads = replace(loads, films={**loads.films, **self._channel_films(coolant)})
         self.evaluations += 1
+        problem = self.machine.problem(loads)
         self._asked.append(Evaluation(time, point, loads, coolant))
-        return self.machine.problem(loads)
+        self._latest = _Answer(self._asked[-1], problem)
+        return problem
 
     def stages_of_step(self, begin: float) -> tuple[Evaluation, Evaluation, Evaluation]:
         """Evaluations of the three stages of the step that was just accepted; forgets older ones.
@@ -187,6 +208,7 @@ class CoupledInputs:
 
     def accept(self, state: ThermalState, stages: tuple[Evaluation, Evaluation, Evaluation]) -> None:
         """Let the terms remember the end of an accepted step with these stages."""
+        self._ended = self._latest
         if self.terms is not None:
             self._steps.append(_ChannelStep.of(stages[0].time, state.time, stages[0].loads, stages[-1].loads))
             before = self.history.at(float(np.nextafter(state.time, -np.inf)))
@@ -216,10 +238,21 @@ class CoupledInputs:
             now = self.history.at(time)
             self.terms.begin(time, now, state.temperature, state.lumped_temperature, self._memory)
 
+    def _goes_on(self, time: float, point: OperatingPoint) -> bool:
+        """Whether a step begins here as the last one ended."""
+        if self._ended is None or time in self._switches:
+            return False
+        last = self._ended.evaluation
+        return math.isclose(time, last.time, rel_tol=SAME) and _same_inputs(point, last.point)
+
     def _loads(
-        self, time: float, temperature: Array, lumped: Mapping[str, float], change: LoadChange = NO_CHANGE
-    ) -> tuple[OperatingPoint, Loads, CoolantState | None]:
-        point = self.history.at(time)
+        self,
+        time: float,
+        point: OperatingPoint,
+        temperature: Array,
+        lumped: Mapping[str, float],
+        change: LoadChange = NO_CHANGE,
+    ) -> tuple[FieldState, Loads, CoolantState | None]:
         try:
             field = self.machine.field_state(temperature, lumped)
             loads, coolant = self.machine.builder.at(point, field, change)
@@ -228,7 +261,7 @@ class CoupledInputs:
                 f"{self.machine.spec.name} after {time / 3600.0:.2f} h",
                 f"no loads at {point.speed * 30.0 / np.pi:.0f} rpm with these temperatures: {error}",
             ) from error
-        return point, loads, coolant
+        return field, loads, coolant
 
     def _keep(self, key: tuple[str, ...], fresh: Array) -> Array:
         """The kept coefficient where the fresh one is as good, else the fresh one."""
@@ -270,7 +303,7 @@ class CoupledInputs:
             for node in loads.lumped
         )
 
-    def _coolant(self, inlet: float, fresh: CoolantState, temperature: Array) -> CoolantState:
+    def _coolant(self, inlet: float, fresh: CoolantState, field: FieldState) -> CoolantState:
         """The march with the coefficients that the matrix has, so that walls and coolant agree."""
         kept = self._keep(("channel",), fresh.film_coefficient)
         if kept is fresh.film_coefficient:
@@ -280,7 +313,7 @@ class CoupledInputs:
             inlet,
             fresh.march.mass_flow,
             fresh.march.march.specific_heat_capacity,
-            builder.wall_temperature(self.machine.field_state(temperature, {})),
+            builder.wall_temperature(field),
             builder.cells.cell_area,
             kept,
             fresh.march.march.pumping_heat,
@@ -298,6 +331,13 @@ class CoupledInputs:
             surface: FilmLoad(surface, self._channel[1][surface], bulk[index])
             for surface, index in cells.facet_cell.items()
         }
+
+
+def _same_inputs(one: OperatingPoint, other: OperatingPoint) -> bool:
+    """Whether two operating points are the same but for rounding."""
+    return one.extra_heat == other.extra_heat and all(
+        math.isclose(getattr(one, name), getattr(other, name), rel_tol=SAME) for name in FIELD_OF.values()
+    )
 
 
 def coolant_heat(stages: tuple[Evaluation, Evaluation, Evaluation], step: float) -> tuple[float, float]:

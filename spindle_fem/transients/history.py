@@ -74,18 +74,24 @@ class OperatingHistory:
         values["speed"] = abs(values["speed"])
         return OperatingPoint(**values)
 
-    def _resolution(self, column: int) -> float:
+    def _resolution(self, column: int, temperature: float = TEMPERATURE_RESOLUTION) -> float:
         name = self.inputs.names[column]
         if name not in RELATIVE_RESOLUTION:
-            return TEMPERATURE_RESOLUTION
+            return temperature
         largest = float(np.abs(self.inputs.values[:, column]).max())
         return RELATIVE_RESOLUTION[name] * max(largest, 1.0e-9)
 
-    def breakpoints(self) -> Array:
-        """Times [s] at which a step has to end for the inputs to be followed within their resolution."""
+    def breakpoints(self, temperature: float = TEMPERATURE_RESOLUTION) -> Array:
+        """Times [s] at which a step has to end for the inputs to be followed within their resolution.
+
+        Parameters
+        ----------
+        temperature : float, [K]
+            Resolution of temperatures; the others have their own.
+        """
         found = [np.zeros(0)]
         for column in range(len(self.inputs.names)):
-            values, resolution = self.inputs.values[:, column], self._resolution(column)
+            values, resolution = self.inputs.values[:, column], self._resolution(column, temperature)
             pick = _jumps if self.inputs.held[column] else _corners
             found.append(self.inputs.times[pick(self.inputs.times, values, resolution)])
         return np.unique(np.concatenate(found))

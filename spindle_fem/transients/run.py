@@ -3,182 +3,34 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.conduction.transient import StepControl, ThermalState, TransientResult, integrate
+from spindle_fem.conduction.transient import (
+    EnergyAccount,
+    ThermalState,
+    TransientResult,
+    integrate,
+)
 from spindle_fem.coupling import RUNAWAY_TEMPERATURE, CoupledState, PreparedMachine
 from spindle_fem.errors import EnergyBalanceError, NoSteadyStateError, SpecError
 from spindle_fem.network.history import InputHistory
 from spindle_fem.transients.coupled import CoupledInputs, coolant_heat
 from spindle_fem.transients.history import OperatingHistory
 from spindle_fem.transients.readings import ReadingRows
+from spindle_fem.transients.records import (
+    DEFAULT_OPTIONS,
+    MachineEnergy,
+    MachineTransient,
+    StepRecord,
+    TransientOptions,
+)
 from spindle_fem.transients.terms import NO_PHYSICS, Physics, with_factors
 from spindle_fem.units import kelvin_to_celsius
 
 Array = NDArray[np.float64]
-ENERGY_TOLERANCE = 1.0e-8
-
-
-@dataclass(frozen=True, slots=True)
-class TransientOptions:
-    """How accurately a transient is followed.
-
-    Attributes
-    ----------
-    error : float, [K]
-        Largest estimated error of one time step at any node.
-    coupling_tolerance : float, [K]
-        Change at which loads and temperatures of a stage agree.
-    coefficient_tolerance : float, [-]
-        Relative change of a film or contact coefficient that renews the
-        matrix; 0 renews it at every stage.
-    first_step : float, [s]
-        After the start and after every jump of the inputs.
-    fixed_step : float or None, [s]
-        Steps of one size without control, for convergence studies.
-    """
-
-    error: float = 0.05
-    coupling_tolerance: float = 3.0e-8
-    coefficient_tolerance: float = 5.0e-4
-    first_step: float = 0.1
-    fixed_step: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("error", "coupling_tolerance", "first_step"):
-            if not getattr(self, name) > 0.0:
-                raise SpecError(
-                    f"transient options: {name}", f"{getattr(self, name)!r}.", "Allowed: above 0."
-                )
-        if not self.coefficient_tolerance >= 0.0:
-            raise SpecError(
-                "transient options: coefficient_tolerance",
-                f"{self.coefficient_tolerance!r}.",
-                "Allowed: 0 or more.",
-            )
-
-    def control(self) -> StepControl:
-        """Step control of the integrator."""
-        return StepControl(
-            tolerance=None if self.fixed_step else self.error,
-            first_step=self.fixed_step or self.first_step,
-            temperature_dependent=True,
-            nonlinear_tolerance=self.coupling_tolerance,
-            linear_tolerance=0.2 * self.coupling_tolerance,
-        )
-
-
-DEFAULT_OPTIONS = TransientOptions()
-
-
-@dataclass(frozen=True, slots=True)
-class MachineEnergy:
-    """Heat over a transient, [J].
-
-    Attributes
-    ----------
-    heat_in : float
-        Friction and other sources in the machine, friction in the coolant included.
-    heat_out : mapping of str to float
-        Through each film to the air and ``coolant``: what the coolant carried
-        away, by its own enthalpy.
-    stored : float
-        Change of the heat content of parts and balls.
-    """
-
-    heat_in: float
-    heat_out: Mapping[str, float]
-    stored: float
-
-    @property
-    def imbalance_relative(self) -> float:
-        """Heat in − heat out − stored, relative to the heat that was moved."""
-        moved = 0.5 * (abs(self.heat_in) + abs(self.stored) + sum(map(abs, self.heat_out.values())))
-        imbalance = self.heat_in - sum(self.heat_out.values()) - self.stored
-        return abs(imbalance) / moved if moved else 0.0
-
-    def __add__(self, other: MachineEnergy) -> MachineEnergy:
-        names = dict.fromkeys((*self.heat_out, *other.heat_out))
-        out = {name: self.heat_out.get(name, 0.0) + other.heat_out.get(name, 0.0) for name in names}
-        return MachineEnergy(self.heat_in + other.heat_in, out, self.stored + other.stored)
-
-
-@dataclass(frozen=True, slots=True)
-class StepRecord:
-    """State of the machine at the end of every accepted step.
-
-    Attributes
-    ----------
-    times, sizes, errors : (n_steps,) ndarray, [s], [s], [K]
-    hottest, coldest : (n_steps,) ndarray, [K]
-    speed : (n_steps,) ndarray, [rad/s]
-        At the end of the step, before a jump there.
-    bearing_heat : (n_steps, n_bearings) ndarray, [W]
-    preload : (n_steps, n_bearings) ndarray, [N]
-        NaN where the heat model has none.
-    coolant_heat : (n_steps,) ndarray, [W]
-        Mean over the step.
-    """
-
-    times: Array
-    sizes: Array
-    errors: Array
-    hottest: Array
-    coldest: Array
-    speed: Array
-    bearing_heat: Array
-    preload: Array
-    coolant_heat: Array
-
-
-@dataclass(frozen=True, slots=True)
-class MachineTransient:
-    """A machine from start to end.
-
-    Attributes
-    ----------
-    times : (n,) ndarray, [s]
-        Sample times.
-    probes : tuple of str
-    readings : (n, n_probes) ndarray, [K]
-    bearings : tuple of str
-    inner, outer, balls : (n, n_bearings) ndarray, [K]
-        Raceway means and ball rows.
-    steps : StepRecord
-    energy : MachineEnergy
-    state : ThermalState
-        At the end, to go on from.
-    counts : mapping of str to int
-        ``rejected``, ``linear_iterations``, ``matrix_builds``, ``evaluations``.
-    cpu_seconds : float
-    stopped : bool
-        Whether the stop condition ended it, not the end time.
-    memory : ndarray or None
-        What terms remember at the end.
-    """
-
-    times: Array
-    probes: tuple[str, ...]
-    readings: Array
-    bearings: tuple[str, ...]
-    inner: Array
-    outer: Array
-    balls: Array
-    steps: StepRecord
-    energy: MachineEnergy
-    state: ThermalState
-    counts: Mapping[str, int]
-    cpu_seconds: float
-    stopped: bool = False
-    memory: Array | None = None
-
-    def reading(self, probe: str) -> Array:
-        """Readings of one probe, (n,) [K]."""
-        return self.readings[:, self.probes.index(probe)]
 
 
 def start_at(machine: PreparedMachine, history: OperatingHistory, temperature: float) -> ThermalState:
@@ -259,8 +111,8 @@ def simulate_full(
     NoSteadyStateError
         The temperatures run away.
     EnergyBalanceError
-        Heat stored, in and out differ by more than 1e-8, the coolant's
-        enthalpy included.
+        Heat stored, in and out differ by more than 1e-8, or than what the
+        coupling tolerance allows, the coolant's enthalpy included.
     """
     began = clock.process_time()
     machine, physics = with_factors(machine, physics)
@@ -272,9 +124,19 @@ def simulate_full(
     samples = np.asarray(inputs.times if sample_times is None else sample_times, dtype=float)
     end = float(max(inputs.times[-1], samples.max(initial=-np.inf), max(breakpoints, default=-np.inf)))
     marks = np.concatenate(
-        (history.breakpoints(), np.asarray(breakpoints, dtype=float), np.array(physics.breakpoints()))
+        (
+            history.breakpoints(options.input_resolution),
+            np.asarray(breakpoints, dtype=float),
+            np.array(physics.breakpoints()),
+        )
     )
-    source = CoupledInputs(machine, history, options.coefficient_tolerance, physics, memory)
+    source = CoupledInputs(
+        machine,
+        history,
+        options.coefficient_tolerance,
+        physics,
+        memory,
+    )
     names = source.lumped_names(start.temperature)
     if len(start.lumped_temperature) != len(names):
         raise SpecError(
@@ -282,26 +144,23 @@ def simulate_full(
         )
     rows = ReadingRows.of(machine, names)
     restarts = history.restarts()
-    edges = [start.time, *restarts[(restarts > start.time) & (restarts < end)].tolist(), end]
-    legs: list[_Leg] = []
-    state = start
-    for stop_time in edges[1:]:
-        inside = (samples >= state.time) & (samples < stop_time)
-        if stop_time == end:
-            inside |= samples == end
-        leg = _Leg(machine, source, state, stop)
-        leg.run(stop_time, options, marks, rows, samples[inside])
-        legs.append(leg)
-        # the last step's size says nothing after a jump
-        state = leg.result.state if stop_time == end else replace(leg.result.state, step=0.0)
-        progress(f"{state.time / 3600.0:.2f} h, {kelvin_to_celsius(leg.hottest[-1]):.1f} °C")
-        if leg.stopped:
-            break
-    return _joined(source, rows, legs, clock.process_time() - began)
+    run = _Run(machine, source, start, stop, frozenset((*restarts.tolist(), end)), progress)
+    result = integrate(
+        source,
+        start,
+        end,
+        control=options.control(),
+        breakpoints=marks.tolist(),
+        restarts=restarts.tolist(),
+        outputs=rows.rows,
+        sample_times=samples[samples >= start.time],
+        observer=run.observe,
+    )
+    return run.result(result, rows, options, clock.process_time() - began)
 
 
-class _Leg:
-    """One stretch without large jumps."""
+class _Run:
+    """What is noted of every accepted step."""
 
     def __init__(
         self,
@@ -309,33 +168,20 @@ class _Leg:
         source: CoupledInputs,
         start: ThermalState,
         stop: Callable[[ThermalState], bool] | None,
+        told: frozenset[float],
+        progress: Callable[[str], None],
     ) -> None:
-        self.machine, self.source, self.start, self.stop = machine, source, start, stop
+        self.machine, self.source, self.stop = machine, source, stop
+        self._told, self._progress = told, progress
         self.hottest: list[float] = []
         self.coldest: list[float] = []
         self.ends: list[tuple] = []
-        self.coolant: list[tuple[float, float]] = []
+        self.coolant: list[tuple[float, float, float]] = []
         self.stopped = False
         self._time = start.time
-        self.result: TransientResult
-        self.sample_times: Array
 
-    def run(
-        self, end: float, options: TransientOptions, marks: Array, rows: ReadingRows, samples: Array
-    ) -> None:
-        self.result = integrate(
-            self.source,
-            self.start,
-            end,
-            control=options.control(),
-            breakpoints=marks[(marks > self.start.time) & (marks < end)].tolist(),
-            outputs=rows.rows,
-            sample_times=samples,
-            observer=self._observe,
-        )
-        self.sample_times = samples
-
-    def _observe(self, state: ThermalState) -> bool:
+    def observe(self, state: ThermalState) -> bool:
+        """Note a step; True ends the run."""
         stages = self.source.stages_of_step(self._time)
         self.source.accept(state, stages)
         size = state.time - self._time
@@ -354,11 +200,66 @@ class _Leg:
                 f"the temperatures run away: {kelvin_to_celsius(self.hottest[-1]):.0f} °C.",
                 "Lower the speed or the preload, or cool more.",
             )
+        if state.time in self._told:
+            self._progress(f"{state.time / 3600.0:.2f} h, {kelvin_to_celsius(self.hottest[-1]):.1f} °C")
         self.stopped = self.stop is not None and self.stop(state)
         return self.stopped
 
-    def energy(self) -> MachineEnergy:
-        account, cells = self.result.energy, self.machine.builder.cells
+    def result(
+        self, found: TransientResult, rows: ReadingRows, options: TransientOptions, seconds: float
+    ) -> MachineTransient:
+        """The machine from start to end.
+
+        Raises
+        ------
+        EnergyBalanceError
+        """
+        reached = found.state.time
+        times, outputs = found.times[found.times <= reached], found.samples[found.times <= reached]
+        energy = self._energy(found.energy)
+        if energy.imbalance_relative > options.energy_tolerance:
+            raise EnergyBalanceError(
+                "transient",
+                f"heat stored, in and out differ by {energy.imbalance_relative:.2e}, coolant included.",
+                f"Allowed: {options.energy_tolerance:.0e}; lower coupling_tolerance.",
+            )
+        inner, outer, balls = rows.bearing_temperatures(outputs)
+        steps = StepRecord(
+            times=found.step_times[1:],
+            sizes=np.diff(found.step_times),
+            errors=found.step_errors,
+            hottest=np.array(self.hottest),
+            coldest=np.array(self.coldest),
+            speed=np.array([item[0] for item in self.ends]),
+            bearing_heat=np.array([item[1] for item in self.ends]),
+            preload=np.array([item[2] for item in self.ends]),
+            coolant_heat=np.array([(rise - pumping) / size for rise, pumping, size in self.coolant]),
+        )
+        counts = {
+            name: getattr(found, name)
+            for name in ("rejected", "linear_iterations", "matrix_builds", "preconditioner_builds")
+        }
+        source = self.source
+        return MachineTransient(
+            times=times,
+            probes=rows.probes,
+            readings=rows.probe_readings(outputs, times, source.coolant_at),
+            bearings=rows.bearings,
+            inner=inner,
+            outer=outer,
+            balls=balls,
+            steps=steps,
+            energy=energy,
+            state=found.state,
+            counts={**counts, "evaluations": source.evaluations},
+            cpu_seconds=seconds,
+            stopped=self.stopped,
+            memory=None if source.terms is None else source.terms.memory,
+        )
+
+    def _energy(self, account: EnergyAccount) -> MachineEnergy:
+        """Heat over the run, the coolant's by its own enthalpy."""
+        cells = self.machine.builder.cells
         own = () if cells is None else cells.surfaces
         out = {name: heat for name, heat in account.films.items() if name not in own}
         heat_in = account.heat_in
@@ -366,54 +267,3 @@ class _Leg:
             out["coolant"] = sum(rise for rise, _, _ in self.coolant)
             heat_in += sum(pumping for _, pumping, _ in self.coolant)
         return MachineEnergy(heat_in, out, account.stored)
-
-
-def _joined(source: CoupledInputs, rows: ReadingRows, legs: list[_Leg], seconds: float) -> MachineTransient:
-    reached = legs[-1].result.state.time
-    times = np.concatenate([leg.sample_times for leg in legs])
-    outputs = np.concatenate([leg.result.samples for leg in legs])
-    times, outputs = times[times <= reached], outputs[times <= reached]
-    energy = legs[0].energy()
-    for leg in legs[1:]:
-        energy = energy + leg.energy()
-    if energy.imbalance_relative > ENERGY_TOLERANCE:
-        raise EnergyBalanceError(
-            "transient",
-            f"heat stored, in and out differ by {energy.imbalance_relative:.2e}, coolant included.",
-            f"Allowed: {ENERGY_TOLERANCE:.0e}; lower coupling_tolerance.",
-        )
-    inner, outer, balls = rows.bearing_temperatures(outputs)
-    step_times = [leg.result.step_times for leg in legs]
-    ends = [item for leg in legs for item in leg.ends]
-    taken = np.array([(rise - pumping) / size for leg in legs for rise, pumping, size in leg.coolant])
-    steps = StepRecord(
-        times=np.concatenate([item[1:] for item in step_times]),
-        sizes=np.concatenate([np.diff(item) for item in step_times]),
-        errors=np.concatenate([leg.result.step_errors for leg in legs]),
-        hottest=np.array([value for leg in legs for value in leg.hottest]),
-        coldest=np.array([value for leg in legs for value in leg.coldest]),
-        speed=np.array([item[0] for item in ends]),
-        bearing_heat=np.array([item[1] for item in ends]),
-        preload=np.array([item[2] for item in ends]),
-        coolant_heat=taken,
-    )
-    counts = {
-        name: sum(getattr(leg.result, name) for leg in legs)
-        for name in ("rejected", "linear_iterations", "matrix_builds")
-    }
-    return MachineTransient(
-        times=times,
-        probes=rows.probes,
-        readings=rows.probe_readings(outputs, times, source.coolant_at),
-        bearings=rows.bearings,
-        inner=inner,
-        outer=outer,
-        balls=balls,
-        steps=steps,
-        energy=energy,
-        state=legs[-1].result.state,
-        counts={**counts, "evaluations": source.evaluations},
-        cpu_seconds=seconds,
-        stopped=legs[-1].stopped,
-        memory=None if source.terms is None else source.terms.memory,
-    )

@@ -25,6 +25,7 @@ from spindle_fem.network.history import InputHistory
 from spindle_fem.solve import solve_prepared
 from spindle_fem.spec.load import load_machine
 from spindle_fem.transient_run import run_transient_study
+from spindle_fem.transients.coupled import CoupledInputs
 from spindle_fem.transients.history import OperatingHistory
 from spindle_fem.transients.run import MachineEnergy, TransientOptions, simulate_full, start_from
 from spindle_fem.transients.study import load_study, run_study, study_of, time_to_stay_within
@@ -228,6 +229,27 @@ def test_jump_is_right_continuous(quick):
     assert sizes[0] < 1.0 < sizes[-1]
 
 
+def test_a_step_begins_with_what_the_last_one_ended_with(quick, monkeypatch):
+    """Loads at the start of a step are asked for only where the run starts and where inputs jump."""
+    asked = []
+    true = CoupledInputs._loads
+
+    def loads(self, time, *rest):
+        asked.append(time)
+        return true(self, time, *rest)
+
+    monkeypatch.setattr(CoupledInputs, "_loads", loads)
+    times = [0.0, 600.0, 1200.0]
+    options = TransientOptions(
+        error=0.5, first_step=20.0, coupling_tolerance=1e-3, coefficient_tolerance=5e-3
+    )
+    inputs = held(times, speed=np.array([1500.0, 3000.0, 3000.0]) * RPM)
+    run = simulate_full(quick, inputs, breakpoints=[900.0], options=options)
+    begins = {0.0, *run.steps.times.tolist()}
+    assert 900.0 in begins
+    assert begins & set(asked) == {0.0, 600.0}
+
+
 def test_held_and_linear_inputs():
     spec = load_machine("wu_tan_2016", SMALL)
     history = InputHistory(
@@ -263,6 +285,7 @@ def test_noise_makes_no_breakpoints():
     )
     assert history.breakpoints().size == 0
     assert history.restarts().size == 0
+    assert history.breakpoints(temperature=0.02).size > 0
 
 
 def test_unknown_input_is_refused(quick):
@@ -271,11 +294,22 @@ def test_unknown_input_is_refused(quick):
 
 
 @pytest.mark.parametrize(
-    "bad", [{"error": 0.0}, {"coupling_tolerance": -1.0}, {"coefficient_tolerance": -1.0}]
+    "bad",
+    [
+        {"error": 0.0},
+        {"coupling_tolerance": -1.0},
+        {"coefficient_tolerance": -1.0},
+        {"input_resolution": 0.0},
+    ],
 )
 def test_impossible_options_are_refused(bad):
     with pytest.raises(SpecError, match=next(iter(bad))):
         TransientOptions(**bad)
+
+
+def test_what_the_energy_may_miss_goes_with_the_coupling():
+    assert TransientOptions().energy_tolerance == 1.0e-8
+    assert TransientOptions(coupling_tolerance=1.0e-2).energy_tolerance == pytest.approx(1.0e-3)
 
 
 @pytest.mark.slow

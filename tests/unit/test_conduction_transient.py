@@ -69,6 +69,15 @@ def test_jump_at_a_breakpoint_acts_from_there_on():
     assert result.energy.imbalance_relative < 1e-10
 
 
+def test_steps_begin_anew_after_a_restart():
+    control = StepControl(tolerance=0.05, first_step=0.5)
+    result = integrate(PROBLEM, START, 5e4, restarts=(3e4,), control=control)
+    sizes, begins = np.diff(result.step_times), result.step_times[:-1]
+    assert 3e4 in begins
+    assert sizes[begins == 3e4] == 0.5
+    assert sizes[begins < 3e4].max() > 1000.0
+
+
 def test_energy_closes_with_a_perfect_joint_and_a_node_without_capacity():
     node = replace(PROBLEM.lumped_nodes[0], capacity=0.0)
     problem = replace(PROBLEM, joint_conductance={"inner|outer": PERFECT_CONTACT}, lumped_nodes=(node,))
@@ -103,6 +112,28 @@ def test_inputs_that_look_at_the_temperature_are_iterated():
         for tolerance in (0.05, 0.0005)
     ]
     np.testing.assert_allclose(results[0], results[1], rtol=0, atol=0.1)
+
+
+def test_a_trusted_contraction_saves_solves_and_keeps_the_tolerance():
+    """A film that follows the mean temperature: a weak coupling, known after the first step."""
+    asked = []
+
+    def inputs(time, state):
+        asked.append(time)
+        film = 20.0 + 0.5 * (state.temperature.mean() - 293.15)
+        return replace(PROBLEM, films=(Film("outer.outer", film, 293.15),))
+
+    def run(**settings):
+        asked.clear()
+        control = StepControl(tolerance=None, first_step=200.0, temperature_dependent=True, **settings)
+        return integrate(inputs, START, 20000.0, control=control).state.temperature, len(asked)
+
+    exact, _ = run(nonlinear_tolerance=1e-9)
+    plain, calls = run(nonlinear_tolerance=1e-3)
+    trusting, fewer = run(nonlinear_tolerance=1e-3, trust_contraction=True)
+    assert fewer < 0.85 * calls
+    assert np.abs(plain - exact).max() < 1e-3
+    assert np.abs(trusting - exact).max() < 1e-3
 
 
 def test_samples_lie_on_the_path():
