@@ -1,0 +1,58 @@
+"""Calibrations of a machine with geometry whose parameters are known: stated intervals hold the truth."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.calibration.coverage import coverage_study
+from spindle_fem.calibration.predictor import MachinePredictor
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.simulate import fast_model_for
+from spindle_fem.spec.load import load_machine
+
+PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
+CHANNEL = '[[channel]]\ncolumn = "{0}"\nrole = "temperature"\nprobe = "{0}"\nunit = "degC"\nsigma = 0.1\n'
+INPUT = '[[channel]]\ncolumn = "{0}"\nrole = "input"\ndrives = "{0}"\nunit = "{1}"\nhold = "{2}"\n'
+INPUTS = (
+    ("speed", "rpm", "previous"),
+    ("thrust", "N", "previous"),
+    ("ambient", "degC", "linear"),
+    ("coolant_inlet", "degC", "linear"),
+)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """Seven hours of four speeds and standstill, a reading every half minute; the study puts readings in."""
+    folder = tmp_path_factory.mktemp("made")
+    times = np.arange(0.0, 7.0 * 3600.0, 30.0)
+    steps = np.array([3000.0, 1500.0, 4500.0, 0.0, 2500.0])
+    frame = pd.DataFrame({"time": times, "speed": steps[np.minimum(times // 5400.0, 4).astype(int)]})
+    frame["thrust"] = 1750.0
+    frame["ambient"] = 20.0 + np.sin(times / 5000.0)
+    frame["coolant_inlet"] = 17.0 + 0.3 * np.cos(times / 1500.0)
+    noise = np.random.default_rng(0).normal(0.0, 0.1, (times.size, len(PROBES)))
+    frame[list(PROBES)] = 20.0 + noise
+    frame.to_csv(folder / "made.csv", index=False)
+    head = 'schema = "spindle-fem/recording/1"\nname = "made"\ndata = "made.csv"\n'
+    head += 'time = {column = "time", unit = "s"}\n'
+    text = "".join(
+        [head, *(CHANNEL.format(name) for name in PROBES), *(INPUT.format(*item) for item in INPUTS)]
+    )
+    (folder / "recording.toml").write_text(text)
+    return read_recording(folder)
+
+
+@pytest.mark.slow
+def test_a_hundred_spindles_drawn_from_their_prior(recording, record_property):
+    """Nine in ten intervals of all parameters, and no parameter far from that."""
+    fast = fast_model_for(load_machine("recorded_spindle", ["mesh.preset=coarse"]), [recording])
+    found = coverage_study(lambda items: MachinePredictor(fast, items), (recording,), 100, seed=6)
+    for name, share in found.by_parameter().items():
+        narrower = np.median(found.sigma_share[:, found.names.index(name)])
+        record_property(name, share)
+        print(f"{name:28s} {share:.2f}  interval {narrower:.2f} of the prior's")
+    print(f"all {found.inside.mean():.3f}")
+    assert 0.85 <= found.inside.mean() <= 0.95
+    # A hundred cases: 0.9 within three standard errors.
+    assert all(0.81 <= share <= 0.99 for share in found.by_parameter().values())
