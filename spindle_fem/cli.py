@@ -261,11 +261,12 @@ def diagnose(
         str,
         typer.Option(
             "--full-model",
-            metavar="off|coarse|own",
+            metavar="auto|off|coarse|own",
             help="Run both fits again by the full finite-element model: on the coarse mesh with linear "
-            "temperatures (minutes a recording) or on the machine's own mesh (much longer).",
+            "temperatures (auto: unless it takes very many time steps) or on the machine's own mesh "
+            "(much longer).",
         ),
-    ] = "off",
+    ] = "auto",
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:

@@ -31,6 +31,7 @@ def diagnose_case(inputs: Path, result: Path, machine: str, overrides: tuple[str
             result,
             calibrate=[calibration] if calibration.exists() else [],
             overrides=overrides,
+            full_model="off",
             report=report,
         )
     except Exception as error:  # noqa: BLE001 - a study goes on and counts its failures

@@ -17,28 +17,37 @@ from numpy.typing import NDArray
 
 from spindle_fem.coupling import PreparedMachine, prepare_machine
 from spindle_fem.diagnosis.core import Diagnosis
-from spindle_fem.diagnosis.findings import predictions_at_stamps, rmse
+from spindle_fem.diagnosis.findings import channel_errors, channel_noise, predictions_at_stamps, rmse
 from spindle_fem.diagnosis.inference import Fit
 from spindle_fem.diagnosis.machines import DiagnosedMachine
-from spindle_fem.diagnosis.plant import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX, STEP, Plant
+from spindle_fem.diagnosis.plant import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX, Plant
 from spindle_fem.effects.base import Candidate
-from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError, SpecError
+from spindle_fem.errors import SpecError, SpindleFemError
 from spindle_fem.network.history import InputHistory
 from spindle_fem.reduced.drive import Drive
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.transients.history import OperatingHistory
-from spindle_fem.transients.run import MachineTransient, TransientOptions, simulate_full, start_at
+from spindle_fem.transients.records import MachineTransient, TransientOptions
+from spindle_fem.transients.run import simulate_full, start_at
 from spindle_fem.transients.terms import Physics
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-OFF, COARSE, OWN = "off", "coarse", "own"
-CHOICES = (OFF, COARSE, OWN)
+OFF, AUTO, COARSE, OWN = "off", "auto", "coarse", "own"
+CHOICES = (AUTO, OFF, COARSE, OWN)
 COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
-# Steps of the reduced model's length share their matrix; probes read within 0.003 K of what steps of at
-# most 0.05 K error give at a quarter of the time (recorded spindle, start and stop).
-OPTIONS = TransientOptions(fixed_step=STEP, coupling_tolerance=1.0e-6, coefficient_tolerance=5.0e-3)
+# Tolerances in terms of the noise of the quietest channel. In a duty cycle of the recorded spindle with
+# 75 jumps, readings then stay within a fifth of the noise, a twentieth on average, of what far smaller
+# ones give.
+STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 10.0, 0.1, 2.0
+# A coarse mesh is not as good as the best sensors, and loads must follow the field even for the worst, K.
+QUIETEST, LOUDEST = 0.02, 0.2
+FIRST_STEP = 30.0
+COEFFICIENT_TOLERANCE = 5.0e-3
+# Unasked, both fits are run where that takes about as long as the search: so many time steps a fit.
+MOST_STEPS = 800
+STEPS_AFTER_JUMP = 3
 
 #: What the reduced model adds to its readings to first order: places of probes, and what gaps hide.
 FIRST_ORDER = (PROBE_PREFIX, JUMP_PREFIX, GAP_PREFIX)
@@ -46,6 +55,8 @@ FIRST_ORDER_NOTE = (
     "where probes sit within their holes, and what happened within gaps, as the reduced model has them"
 )
 NETWORK_REASON = "The machine is a network: it has no finite-element model."
+
+Keep = Callable[[str, tuple[Array, ...]], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +76,7 @@ class FullFit:
 
 
 def require_choice(choice: str) -> str:
-    """Refuse what is none of the choices of a mesh.
+    """Refuse what is none of the choices.
 
     Raises
     ------
@@ -88,8 +99,9 @@ def full_model_errors(
     diagnosis: Diagnosis,
     machine: DiagnosedMachine,
     *,
-    mesh: str = COARSE,
-    options: TransientOptions = OPTIONS,
+    mesh: str = AUTO,
+    options: TransientOptions | None = None,
+    keep: Keep = lambda name, predicted: None,
     progress: Progress = lambda stage: None,
 ) -> dict[str, Any]:
     """Errors of the full model with nothing missing and with what was found.
@@ -99,21 +111,26 @@ def full_model_errors(
     diagnosis : Diagnosis
     machine : DiagnosedMachine
         The same.
-    mesh : {"off", "coarse", "own"}
+    mesh : {"auto", "off", "coarse", "own"}
         ``coarse``: the coarse preset, linear temperatures; ``own``: the
-        definition's mesh.
-    options : TransientOptions
-        How accurately time is followed.
+        definition's mesh; ``auto``: coarse unless the machine is a network or
+        the recordings need very many time steps.
+    options : TransientOptions, optional
+        How accurately time is followed; :func:`options_for` when absent.
+    keep : callable
+        Gets ``before`` or ``after`` and its predictions.
     progress : callable
 
     Returns
     -------
     dict
-        ``mesh`` (as asked), ``reason`` (why nothing was run, else None), and
-        what was run: ``preset``, ``order``, ``unknowns``, ``before`` and
-        ``after`` (``train_rmse_K``, ``heldout_rmse_K``, ``steps``,
-        ``seconds``), ``differences`` (largest difference of full and reduced
-        model at each channel), ``first_order`` (what the reduced model supplied).
+        ``mesh`` (as asked or chosen), ``reason`` (why nothing was run, else
+        None), and what was run: ``preset``, ``order``, ``unknowns``,
+        ``step_error_K``, ``before`` and ``after`` (``train_rmse_K``,
+        ``heldout_rmse_K``, ``channels``, ``steps``, ``seconds``),
+        ``differences`` (largest difference of full and reduced model at each
+        channel: ``before_K``, ``after_K`` and, of what the fits differ by,
+        ``change_K``), ``first_order`` (what the reduced model supplied).
 
     Raises
     ------
@@ -124,37 +141,87 @@ def full_model_errors(
     if mesh == OFF:
         return nothing_run(mesh, "It was not asked for.")
     if machine.is_network:
-        return nothing_run(mesh, NETWORK_REASON)
+        return nothing_run(OFF if mesh == AUTO else mesh, NETWORK_REASON)
     plant = diagnosis.plant
     heated = sorted({n for drive in plant.drives for n in drive.names if n.startswith("heat.")})
     if heated:
         return nothing_run(
             mesh, f"The recording gives {', '.join(heated)}, which the full model does not take."
         )
+    options = options_for(plant) if options is None else options
+    if mesh == AUTO:
+        steps = expected_steps(plant, options)
+        if steps > MOST_STEPS:
+            return nothing_run(
+                mesh, f"It would take some {steps} time steps a fit; --full-model coarse runs them."
+            )
+        mesh = COARSE
+    try:
+        return _both_fits(diagnosis, machine, mesh, options, keep, progress)
+    except SpindleFemError as error:
+        return nothing_run(mesh, f"It could not be run: {error}")
+
+
+def options_for(plant: Plant) -> TransientOptions:
+    """How accurately time is followed: as accurately as the quietest channel can tell."""
+    levels = [
+        channel_noise(plant, recording, channel)
+        for recording in plant.recordings
+        for channel in range(len(recording.temperature_names))
+    ]
+    noise = float(np.clip(min(levels), QUIETEST, LOUDEST))
+    return TransientOptions(
+        error=STEP_ERROR * noise,
+        coupling_tolerance=COUPLING_ERROR * noise,
+        input_resolution=INPUT_RESOLUTION * noise,
+        coefficient_tolerance=COEFFICIENT_TOLERANCE,
+        first_step=FIRST_STEP,
+        trust_contraction=True,
+        method="multigrid",
+    )
+
+
+def expected_steps(plant: Plant, options: TransientOptions) -> int:
+    """Time steps that the inputs ask for at least, over all recordings."""
+    steps = 0
+    for drive in plant.drives:
+        history = OperatingHistory.of(plant.fast.spec, inputs_of_drive(drive))
+        steps += len(history.breakpoints(options.input_resolution))
+        steps += STEPS_AFTER_JUMP * len(history.restarts())
+    return steps
+
+
+def _both_fits(
+    diagnosis: Diagnosis,
+    machine: DiagnosedMachine,
+    mesh: str,
+    options: TransientOptions,
+    keep: Keep,
+    progress: Progress,
+) -> dict[str, Any]:
+    plant = diagnosis.plant
     progress("full model: mesh")
     prepared = prepare_machine(spec_on(machine.spec, mesh))
-    found: dict[str, Any] = {}
-    differences: list[dict[str, Any]] = []
     fits = {"before": diagnosis.null, "after": diagnosis.final}
+    found: dict[str, dict[str, Any]] = {}
+    apart: dict[str, list[Array]] = {}
+    last: tuple[Fit, FullFit] | None = None
     for name, fit in fits.items():
-        if name == "after" and fit.candidates == () and fit.values == diagnosis.null.values:
-            found[name] = dict(found["before"])
-            differences = [row | {"after_K": row["before_K"]} for row in differences]
-            break
         progress(f"full model: {name}")
         began = time.perf_counter()
-        try:
-            full = run_fit(prepared, plant, fit, options)
-        except (NoSteadyStateError, ConvergenceError, EnergyBalanceError) as error:
-            return nothing_run(mesh, f"The run {name} did not end: {error}")
+        # Where nothing was found, both fits are one.
+        full = last[1] if last and _is_same(fit, last[0]) else run_fit(prepared, plant, fit, options)
+        last = (fit, full)
+        keep(name, full.predicted)
         found[name] = {
             "train_rmse_K": rmse(plant, full.predicted, heldout=False),
             "heldout_rmse_K": rmse(plant, full.predicted, heldout=True),
+            "channels": channel_errors(plant, full.predicted),
             "steps": full.steps,
             "seconds": time.perf_counter() - began,
         }
-        own = _differences(plant, full.predicted, predictions_at_stamps(plant, fit), f"{name}_K")
-        differences = [a | b for a, b in zip(differences, own, strict=True)] if differences else own
+        reduced = predictions_at_stamps(plant, fit)
+        apart[name] = [a - b for a, b in zip(full.predicted, reduced, strict=True)]
     supplied = any(n.startswith(FIRST_ORDER) for fit in fits.values() for n in fit.values)
     return {
         "mesh": mesh,
@@ -162,8 +229,9 @@ def full_model_errors(
         "preset": prepared.spec.mesh.preset,
         "order": prepared.spec.mesh.order,
         "unknowns": int(prepared.operators.n_unknowns),
+        "step_error_K": options.error,
         **found,
-        "differences": differences,
+        "differences": _differences(plant, apart),
         "first_order": FIRST_ORDER_NOTE if supplied else None,
     }
 
@@ -175,7 +243,7 @@ def spec_on(spec: MachineSpec, mesh: str) -> MachineSpec:
     return spec.model_copy(update={"mesh": spec.mesh.model_copy(update=COARSE_MESH)})
 
 
-def run_fit(machine: PreparedMachine, plant: Plant, fit: Fit, options: TransientOptions = OPTIONS) -> FullFit:
+def run_fit(machine: PreparedMachine, plant: Plant, fit: Fit, options: TransientOptions) -> FullFit:
     """Run all recordings through the full model with the parameters and candidates of a fit.
 
     Raises
@@ -236,6 +304,10 @@ def physics_of_fit(plant: Plant, number: int, fit: Fit) -> Physics:
 
 
 # -------------------------------------------------------------------- details
+def _is_same(one: Fit, other: Fit) -> bool:
+    return one.candidates == other.candidates and one.values == other.values
+
+
 def _acting(candidates: Sequence[Candidate], number: int) -> tuple[Candidate, ...]:
     return tuple(item for item in candidates if item.recording in (None, number))
 
@@ -269,16 +341,19 @@ def _first_order(plant: Plant, number: int, fit: Fit) -> Array | float:
     return moved - still
 
 
-def _differences(
-    plant: Plant, full: Sequence[Array], reduced: Sequence[Array], key: str
-) -> list[Mapping[str, Any]]:
+def _differences(plant: Plant, apart: Mapping[str, Sequence[Array]]) -> list[Mapping[str, Any]]:
+    """Largest difference of full and reduced model at each channel, and of how much the fits differ."""
     several = len(plant.recordings) > 1
+    change = [after - before for before, after in zip(apart["before"], apart["after"], strict=True)]
     return [
         {
             "channel": name,
             **({"recording": recording.name} if several else {}),
-            key: float(np.abs(a[:, column] - b[:, column]).max()),
+            **{
+                f"{key}_K": float(np.abs(values[number][:, column]).max())
+                for key, values in {**apart, "change": change}.items()
+            },
         }
-        for recording, a, b in zip(plant.recordings, full, reduced, strict=True)
+        for number, recording in enumerate(plant.recordings)
         for column, name in enumerate(recording.temperature_names)
     ]

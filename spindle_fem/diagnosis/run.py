@@ -20,7 +20,7 @@ from spindle_fem.diagnosis.findings import (
     rmse,
     states_of,
 )
-from spindle_fem.diagnosis.full_model import OFF, full_model_errors, nothing_run, require_choice
+from spindle_fem.diagnosis.full_model import AUTO, OFF, full_model_errors, nothing_run, require_choice
 from spindle_fem.diagnosis.improved import improved_machine
 from spindle_fem.diagnosis.machines import DiagnosedMachine, open_machine
 from spindle_fem.diagnosis.next_measurement import next_measurement
@@ -45,7 +45,7 @@ def diagnose(
     overrides: Iterable[str] = (),
     *,
     heldout: str = "blocks",
-    full_model: str = OFF,
+    full_model: str = AUTO,
     report: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -59,16 +59,18 @@ def diagnose(
         To be explained; what is found acts in all of them.
     folder : str or Path
         Gets ``diagnosis.json``, ``improved_machine.toml``, ``states.csv``,
-        ``before.csv`` and ``after.csv`` (predictions), ``diagnosis.nc``,
-        ``figures/*.png`` and ``report.html``.
+        ``before.csv`` and ``after.csv`` (predictions), the same of the full
+        model as ``before_full_model.csv`` and ``after_full_model.csv``,
+        ``diagnosis.nc``, ``figures/*.png`` and ``report.html``.
     calibrate : iterable of str or Path
         Recordings of the same machine with nothing missing.
     overrides : iterable of str
         ``path=value`` texts.
     heldout : str
         ``blocks`` or ``last:0.4``: readings that the fit does not see.
-    full_model : {"off", "coarse", "own"}
-        Mesh on which both fits are run again by the full model.
+    full_model : {"auto", "off", "coarse", "own"}
+        Mesh on which both fits are run again by the full model; ``auto`` is
+        the coarse one unless that would take very many time steps.
     report : bool
         Whether to write figures and the report too.
     progress : callable, optional
@@ -93,13 +95,21 @@ def diagnose(
         reason = says_too_little(opened)
         if reason:
             content = _unexplained(opened, reason)
-            content["fit"]["full_model"] = nothing_run(full_model, "Nothing was fitted.")
+            content["fit"]["full_model"] = nothing_run(
+                OFF if full_model == AUTO else full_model, "Nothing was fitted."
+            )
         else:
             diagnosis = diagnose_recordings(opened, heldout=heldout, progress=tell)
             tell("writing")
             content = _write(diagnosis, opened, place, report=report, progress=tell)
             content["fit"]["full_model"] = full_model_errors(
-                diagnosis, opened, mesh=full_model, progress=tell
+                diagnosis,
+                opened,
+                mesh=full_model,
+                keep=lambda name, predicted: _write_predictions(
+                    diagnosis, place, f"{name}_full_model", predicted
+                ),
+                progress=tell,
             )
         content["wall_time_s"] = time.perf_counter() - started
         replace_text(place / "diagnosis.json", json.dumps(_plain(content), indent=1) + "\n")
@@ -116,11 +126,8 @@ def _write(
 ) -> dict[str, Any]:
     judgement, plant = diagnosis.judgement, diagnosis.plant
     before, after = (predictions_at_stamps(plant, fit) for fit in (diagnosis.null, diagnosis.final))
-    several = len(plant.recordings) > 1
-    for number, recording in enumerate(plant.recordings):
-        label = f"_{number + 1}" if several else ""
-        write_simulated(place / f"before{label}.csv", recording, before[number])
-        write_simulated(place / f"after{label}.csv", recording, after[number])
+    _write_predictions(diagnosis, place, "before", before)
+    _write_predictions(diagnosis, place, "after", after)
     findings = findings_of(diagnosis, judgement.chosen, split=True)
     alternatives = [
         {"findings": findings_of(diagnosis, item, split=False), "probability": item.probability}
@@ -176,6 +183,14 @@ def _write(
 
         diagnosis_dataset(diagnosis, before, after).to_netcdf(place / "diagnosis.nc")
     return content
+
+
+def _write_predictions(diagnosis: Diagnosis, place: Path, name: str, predicted: Sequence[np.ndarray]) -> None:
+    """What every channel should read beside what it read, a file a recording."""
+    recordings = diagnosis.plant.recordings
+    for number, recording in enumerate(recordings):
+        label = f"_{number + 1}" if len(recordings) > 1 else ""
+        write_simulated(place / f"{name}{label}.csv", recording, predicted[number])
 
 
 def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, float]:

@@ -26,7 +26,7 @@ def full_model_sections(content: Mapping[str, Any]) -> list[Section]:
     title = "The full model, before and after"
     if found["reason"] is not None:
         return [Section("full_model", title, [Notice(found["reason"])])]
-    return [Section("full_model", title, [Text(_words(found)), *_tables(content["fit"], found)])]
+    return [Section("full_model", title, [Text(_words(found)), *_tables(content, found)])]
 
 
 def _words(found: Mapping[str, Any]) -> str:
@@ -34,12 +34,22 @@ def _words(found: Mapping[str, Any]) -> str:
     text = (
         f"The same physics and parameters on the {found['preset']} mesh, {order} temperatures, "
         f"{found['unknowns']} of them, iterated with the loads through {found['before']['steps']} time steps "
-        f"before and {found['after']['steps']} after."
+        f"before and {found['after']['steps']} after, each within {found['step_error_K']:.2g} K at any node."
+    )
+    text += (
+        " Its mesh is not that of the fast model: readings are up to "
+        f"{_largest(found, 'after_K'):.2g} K apart. On what the two fits differ by, both models agree within "
+        f"{_largest(found, 'change_K'):.2g} K."
     )
     return text + (f" Not of the mesh but added: {found['first_order']}." if found["first_order"] else "")
 
 
-def _tables(fit: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]:
+def _largest(found: Mapping[str, Any], key: str) -> float:
+    return max(row[key] for row in found["differences"])
+
+
+def _tables(content: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]:
+    fit = content["fit"]
     errors = [
         [
             f"{name}, {model}",
@@ -50,13 +60,28 @@ def _tables(fit: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]:
         for name in ("before", "after")
         for model, values in (("fast model", fit[name]), ("full model", found[name]))
     ]
+    errors.append(["noise", number(fit["noise_K"], 3), number(fit["noise_K"], 3), ""])
     several = any("recording" in row for row in found["differences"])
+    both = {
+        "before": (content["mismatch"]["channels"], found["before"]["channels"]),
+        "after": (fit["channels_after"], found["after"]["channels"]),
+    }
+    channels = [
+        [
+            *([row.get("recording", "")] if several else []),
+            row["channel"],
+            *(number(model[index]["rmse_K"], 3) for models in both.values() for model in models),
+            number(row["noise_K"], 3),
+        ]
+        for index, row in enumerate(found["after"]["channels"])
+    ]
     differences = [
         [
             *([row.get("recording", "")] if several else []),
             row["channel"],
             number(row["before_K"], 3),
             number(row["after_K"], 3),
+            number(row["change_K"], 3),
         ]
         for row in found["differences"]
     ]
@@ -75,8 +100,23 @@ def _tables(fit: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]:
             (
                 *([column("recording")] if several else []),
                 column("channel"),
+                *(
+                    column(f"{name}, {model} / K", number=True)
+                    for name in both
+                    for model in ("fast model", "full model")
+                ),
+                column("noise / K", number=True),
+            ),
+            rows_of(channels),
+            "Root mean square error of each channel over all its readings.",
+        ),
+        Table(
+            (
+                *([column("recording")] if several else []),
+                column("channel"),
                 column("before / K", number=True),
                 column("after / K", number=True),
+                column("of what they differ by / K", number=True),
             ),
             rows_of(differences),
             "Largest difference of the full model from the fast one at each channel.",

@@ -27,6 +27,7 @@ def diagnosed(name, folder):
         folder,
         [earlier] if earlier.exists() else (),
         ("mesh.preset=coarse",),
+        full_model="off",
         report=False,
     )
 

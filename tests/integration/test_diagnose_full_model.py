@@ -11,7 +11,7 @@ import pytest
 
 from spindle_fem.coupling import prepare_machine
 from spindle_fem.diagnosis import full_model
-from spindle_fem.diagnosis.full_model import OPTIONS, full_model_errors, inputs_of_drive, spec_on
+from spindle_fem.diagnosis.full_model import full_model_errors, inputs_of_drive, options_for, spec_on
 from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.diagnosis.view import view_of
 from spindle_fem.effects.catalogue import candidates_for, effect_of
@@ -78,7 +78,9 @@ def test_the_full_model_confirms_what_was_found(tmp_path, monkeypatch):
     plant = Plant(fast, [blank], [np.ones(TIMES.size, dtype=bool)])
     drive = plant.drives[0]
     physics = Physics(source.terms, {source.amplitude: HEAT}, {})
-    run = simulate_full(true, inputs_of_drive(drive), sample_times=TIMES, options=OPTIONS, physics=physics)
+    run = simulate_full(
+        true, inputs_of_drive(drive), sample_times=TIMES, options=options_for(plant), physics=physics
+    )
     readings = np.column_stack([run.reading(name) for name in PROBES]) - 273.15
     readings[:, 1] += OFFSET
     held = (TIMES > 600.0) & (TIMES < 900.0)
@@ -91,18 +93,38 @@ def test_the_full_model_confirms_what_was_found(tmp_path, monkeypatch):
         final=SimpleNamespace(candidates=(source, lying), values={**MACHINE, **effects}),
     )
     machine = SimpleNamespace(is_network=False, spec=spec)
-    found = full_model_errors(diagnosis, machine, mesh="coarse")
+    kept = {}
+    found = full_model_errors(diagnosis, machine, keep=kept.__setitem__)
     assert found["reason"] is None
+    assert found["mesh"] == "coarse"
     assert (found["preset"], found["order"]) == ("coarse", 1)
     assert found["unknowns"] == coarse.operators.n_unknowns
     # Stamps are points of the reduced model's grid: nothing is lost by straight lines between.
     for kind in ("train_rmse_K", "heldout_rmse_K"):
         assert found["before"][kind] > 1.0
         assert found["after"][kind] < 0.005
+    for kind in ("before", "after"):
+        assert [row["channel"] for row in found[kind]["channels"]] == list(PROBES)
+        assert kept[kind][0].shape == (TIMES.size, len(PROBES))
     assert [row["channel"] for row in found["differences"]] == list(PROBES)
     # The lumped spindle is another machine: its differences are large, and finite.
     assert all(0.0 < row[key] < 100.0 for row in found["differences"] for key in ("before_K", "after_K"))
-    (section,) = full_model_sections(
-        {"fit": {"before": found["before"], "after": found["after"], "full_model": found}}
-    )
-    assert [block.kind for block in section.blocks] == ["text", "table", "table"]
+    fast = {"train_rmse_K": 2.0, "heldout_rmse_K": 3.0}
+    channels = [{"channel": name, "rmse_K": 2.5, "noise_K": 0.1} for name in PROBES]
+    content = {
+        "mismatch": {"channels": channels},
+        "fit": {
+            "before": fast,
+            "after": fast,
+            "noise_K": 0.1,
+            "channels_after": channels,
+            "full_model": found,
+        },
+    }
+    (section,) = full_model_sections(content)
+    assert [block.kind for block in section.blocks] == ["text", "table", "table", "table"]
+    total, by_channel = section.blocks[1:3]
+    names = [row["cells"][0] for row in total.rows]
+    assert names == [f"{a}, {b} model" for a in ("before", "after") for b in ("fast", "full")] + ["noise"]
+    assert [row["cells"][0] for row in by_channel.rows] == list(PROBES)
+    assert by_channel.rows[0]["cells"][-1] == "0.100"

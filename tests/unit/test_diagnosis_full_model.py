@@ -10,9 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from spindle_fem.diagnosis import full_model
+from spindle_fem.diagnosis.findings import predictions_at_stamps
 from spindle_fem.diagnosis.full_model import (
+    expected_steps,
     full_model_errors,
     inputs_of_drive,
+    options_for,
     physics_of_fit,
     require_choice,
     spec_on,
@@ -20,7 +24,7 @@ from spindle_fem.diagnosis.full_model import (
 from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.diagnosis.view import view_of
 from spindle_fem.effects.catalogue import candidates_for, effect_of
-from spindle_fem.errors import SpecError
+from spindle_fem.errors import MeshQualityError, SpecError
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reporting.diagnosis_full_model import full_model_sections
@@ -146,6 +150,84 @@ def test_a_network_has_no_full_model(plant):
     assert section.blocks[0].text == found["reason"]
 
 
+def test_unasked_a_network_says_nothing_of_a_full_model(plant):
+    machine = SimpleNamespace(is_network=True, spec=None)
+    found = full_model_errors(diagnosis_of(plant, fit_of((), {}), fit_of((), {})), machine, mesh="auto")
+    assert found == {"mesh": "off", "reason": "The machine is a network: it has no finite-element model."}
+
+
+def test_time_is_followed_as_well_as_the_quietest_channel_can_tell(plant):
+    options = options_for(plant)
+    assert (options.error, options.coupling_tolerance, options.input_resolution) == pytest.approx(
+        (1.0, 0.01, 0.2), rel=1e-3
+    )
+    recording = plant.recordings[0]
+    loud = SimpleNamespace(recordings=(replace(recording, sigma=10.0 * recording.sigma),))
+    assert options_for(loud).error == 2.0
+    quiet = SimpleNamespace(recordings=(recording, replace(recording, sigma=0.3 * recording.sigma)))
+    assert options_for(quiet).error == pytest.approx(0.3, rel=0.01)
+
+
+def test_unasked_a_full_model_of_very_many_steps_is_not_run(plant, monkeypatch):
+    """Two jumps, an oscillation of the ambient; a limit below what these need."""
+    steps = expected_steps(plant, options_for(plant))
+    assert steps >= 8
+    monkeypatch.setattr(full_model, "MOST_STEPS", steps - 1)
+    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
+    found = full_model_errors(diagnosis_of(plant, fit_of((), {}), fit_of((), {})), machine, mesh="auto")
+    assert found["mesh"] == "auto"
+    assert found["reason"] == f"It would take some {steps} time steps a fit; --full-model coarse runs them."
+
+
+def test_a_mesh_that_fails_is_said_and_costs_no_diagnosis(plant, monkeypatch):
+    def fail(spec):
+        raise MeshQualityError("mesh", "inverted.", "Mesh finer.")
+
+    monkeypatch.setattr(full_model, "prepare_machine", fail)
+    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
+    found = full_model_errors(diagnosis_of(plant, fit_of((), {}), fit_of((), {})), machine)
+    assert found == {"mesh": "coarse", "reason": "It could not be run: mesh: inverted. Mesh finer."}
+
+
+def test_where_nothing_was_found_one_run_is_both(plant, monkeypatch):
+    runs, kept = [], {}
+
+    def run_fit(machine, plant, fit, options):
+        runs.append(fit)
+        return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7)
+
+    prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
+    monkeypatch.setattr(full_model, "run_fit", run_fit)
+    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
+    nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
+    same = full_model_errors(diagnosis_of(plant, nothing, nothing), machine, keep=kept.__setitem__)
+    assert len(runs) == 1
+    assert kept.keys() == {"before", "after"}
+    assert same["after"]["channels"] == same["before"]["channels"]
+    assert all(row["before_K"] == row["after_K"] == row["change_K"] == 0.0 for row in same["differences"])
+    other = full_model_errors(diagnosis_of(plant, nothing, heat), machine)
+    assert len(runs) == 3
+    assert other["after"]["train_rmse_K"] != other["before"]["train_rmse_K"]
+
+
+def test_a_difference_of_the_meshes_is_not_one_of_what_was_found(plant, monkeypatch):
+    """A full model that reads 0.4 K more throughout, and 0.1 K more of what the fits differ by."""
+    nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
+
+    def run_fit(machine, plant, fit, options):
+        beside = 0.4 if fit is nothing else 0.5
+        return full_model.FullFit(tuple(item + beside for item in predictions_at_stamps(plant, fit)), 7)
+
+    prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
+    monkeypatch.setattr(full_model, "run_fit", run_fit)
+    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
+    found = full_model_errors(diagnosis_of(plant, nothing, heat), machine)
+    for row in found["differences"]:
+        assert [row[f"{key}_K"] for key in ("before", "after", "change")] == pytest.approx([0.4, 0.5, 0.1])
+
+
 def test_recorded_heat_is_said_to_be_beyond_the_full_model(plant):
     drive = plant.drives[0]
     heated = SimpleNamespace(drives=(replace(drive, names=(*drive.names, "heat.motor")),))
@@ -155,5 +237,5 @@ def test_recorded_heat_is_said_to_be_beyond_the_full_model(plant):
 
 
 def test_another_mesh_is_refused():
-    with pytest.raises(SpecError, match=r"'fine'.*Allowed: off, coarse, own"):
+    with pytest.raises(SpecError, match=r"'fine'.*Allowed: auto, off, coarse, own"):
         require_choice("fine")
