@@ -30,13 +30,16 @@ LARGEST_SET = 3
 EXPLAINED = 1.03
 #: Prior probability of 0, 1, 2 and 3 effects.
 NUMBER_PRIOR = (0.4, 0.35, 0.2, 0.05)
+# Beyond this the parameters have taken what they cannot explain, and first order about them misleads.
+DISTORTED = 1.2
 # An interval that lies in gaps of the recording by more than this share explains what nobody saw.
 HIDDEN = 0.5
 # Sets that are tried without each of their members.
 REDUCED = 3
 # Best sets in which each member is exchanged for other effects at its place, and for how many.
 EXCHANGED, OTHERS = 1, 5
-SINGLES, PAIRS, TRIPLES = 8, 6, 3
+# Sets that are fitted from each start: single effects from one start and from each of two, pairs, triples.
+SINGLES, PAIRS, TRIPLES = (8, 5), 6, 3
 BEAM, ADDITIONS = 3, 6
 # Shares of the amplitudes that a fit begins from, one after the other until it can be simulated.
 MILDER = (1.0, 0.5, 0.2)
@@ -109,12 +112,19 @@ class Search:
         null = self.problem.fit()
         self._keep(Hypothesis(null, float(np.log(NUMBER_PRIOR[0]))))
         self.progress("diagnosis: screening")
-        screened, intervals = self.screened(null)
-        self._extend(null, screened, intervals, 1, SINGLES, always=ALWAYS)
+        starts = [(null, *self.screened(null))]
+        if null.reduced_misfit > DISTORTED**2:
+            # What is missing has pulled the parameters far off; as they are known they are nearer the truth.
+            known = self.problem.fit(iterations=0)
+            starts.append((known, *self.screened(known, null)))
+        # The last start is the best one.
+        for fit, screened, intervals in reversed(starts):
+            self._extend(fit, screened, intervals, 1, SINGLES[len(starts) - 1], always=ALWAYS)
         if not self._explained(self.ranked()[0]):
             self.progress("diagnosis: 2 effects")
-            self._extend(null, screened, intervals, 2, PAIRS)
-            self._extend(null, screened, intervals, 3, TRIPLES)
+            for fit, screened, intervals in reversed(starts):
+                self._extend(fit, screened, intervals, 2, PAIRS)
+                self._extend(fit, screened, intervals, 3, TRIPLES)
         for size in range(1, LARGEST_SET):
             best = self.ranked()[0]
             worst = best.score - self._reach(size)
@@ -240,8 +250,11 @@ class Search:
             additions = [(screened.variants[i], amplitudes[i]) for i in members]
             self._try(fit, additions, intervals)
 
-    def screened(self, fit: Fit) -> tuple[Screened, dict[int, OnOff]]:
-        """Candidates, and intervals at every spot, against what a fit leaves."""
+    def screened(self, fit: Fit, trust: Fit | None = None) -> tuple[Screened, dict[int, OnOff]]:
+        """Candidates, and intervals at every spot, against what a fit leaves.
+
+        ``trust`` is the fit that gains count from where that is another one.
+        """
         families = self._families()
         present = {(effect, families.get(component, component)) for effect, component in fit.keys}
         allowed = [
@@ -253,12 +266,13 @@ class Search:
         )
         intervals = {}
         if not any(isinstance(self.effects[c.effect], IntervalEffect) for c in fit.candidates):
-            for found, candidate in self._interval_candidates(fit):
+            for found, candidate in self._interval_candidates(fit, trust):
                 variant = Variant(candidate, {})
                 intervals[id(candidate)] = found
                 variants.append(variant)
-        found = screen(self.problem, fit, variants, self.weights, families)
-        self._screenings[_identity(fit.candidates)] = found
+        found = screen(self.problem, fit, variants, self.weights, families, trust)
+        if trust is None:
+            self._screenings[_identity(fit.candidates)] = found
         return found, intervals
 
     def _residual(self, fit: Fit) -> tuple[Array, Array]:
@@ -271,7 +285,7 @@ class Search:
         known = recording.usable & plant.use[0][:, None]
         return recording.times, np.where(known, recording.temperature - at_stamps, np.nan)
 
-    def _interval_candidates(self, fit: Fit) -> Iterable[tuple[OnOff, Candidate]]:
+    def _interval_candidates(self, fit: Fit, trust: Fit | None) -> Iterable[tuple[OnOff, Candidate]]:
         patterns = [
             (effect, Pattern(spot, self.view.spots[spot], effect.name == "unrecorded_cooling"))
             for effect in self.interval_effects
@@ -281,7 +295,7 @@ class Search:
         found: list[tuple[IntervalEffect, OnOff]] = []
         for recording in range(len(self.problem.plant.recordings)):
             answers: list[Onsets] = onset_answers(
-                self.problem, fit, [pattern for _, pattern in patterns], recording
+                self.problem, fit, [pattern for _, pattern in patterns], recording, trust=trust
             )
             stop = float(self.problem.plant.drives[recording].grid[-1])
             for (effect, pattern), onsets in zip(patterns, answers, strict=True):

@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
+from spindle_fem.conduction.threads import one_thread, thread_count
 from spindle_fem.coupling import PreparedMachine, prepare_machine
 from spindle_fem.diagnosis.core import Diagnosis
 from spindle_fem.diagnosis.findings import channel_errors, channel_noise, predictions_at_stamps, rmse
@@ -69,10 +71,13 @@ class FullFit:
         What every channel of every recording should read, at its stamps.
     steps : int
         Time steps over all recordings.
+    seconds : float, [s]
+        That it took.
     """
 
     predicted: tuple[Array, ...]
     steps: int
+    seconds: float
 
 
 def require_choice(choice: str) -> str:
@@ -203,24 +208,25 @@ def _both_fits(
     progress("full model: mesh")
     prepared = prepare_machine(spec_on(machine.spec, mesh))
     fits = {"before": diagnosis.null, "after": diagnosis.final}
+    if _is_same(*fits.values()):
+        progress("full model: before, which is after")
+        runs = dict.fromkeys(fits, run_fit(prepared, plant, diagnosis.null, options))
+    elif mesh == COARSE and thread_count() > 1:
+        runs = _side_by_side(prepared, plant, fits, options, progress)
+    else:
+        runs = _one_by_one(prepared, plant, fits, options, progress)
     found: dict[str, dict[str, Any]] = {}
     apart: dict[str, list[Array]] = {}
-    last: tuple[Fit, FullFit] | None = None
-    for name, fit in fits.items():
-        progress(f"full model: {name}")
-        began = time.perf_counter()
-        # Where nothing was found, both fits are one.
-        full = last[1] if last and _is_same(fit, last[0]) else run_fit(prepared, plant, fit, options)
-        last = (fit, full)
+    for name, full in runs.items():
         keep(name, full.predicted)
         found[name] = {
             "train_rmse_K": rmse(plant, full.predicted, heldout=False),
             "heldout_rmse_K": rmse(plant, full.predicted, heldout=True),
             "channels": channel_errors(plant, full.predicted),
             "steps": full.steps,
-            "seconds": time.perf_counter() - began,
+            "seconds": full.seconds,
         }
-        reduced = predictions_at_stamps(plant, fit)
+        reduced = predictions_at_stamps(plant, fits[name])
         apart[name] = [a - b for a, b in zip(full.predicted, reduced, strict=True)]
     supplied = any(n.startswith(FIRST_ORDER) for fit in fits.values() for n in fit.values)
     return {
@@ -250,6 +256,7 @@ def run_fit(machine: PreparedMachine, plant: Plant, fit: Fit, options: Transient
     ------
     NoSteadyStateError, ConvergenceError, EnergyBalanceError
     """
+    began = time.perf_counter()
     predicted, steps = [], 0
     for number, recording in enumerate(plant.recordings):
         run = _run(machine, plant, number, fit, options)
@@ -257,7 +264,7 @@ def run_fit(machine: PreparedMachine, plant: Plant, fit: Fit, options: Transient
         on_grid = _readings(plant, number, fit, run)
         grid = plant.drives[number].grid
         predicted.append(np.array([np.interp(recording.times, grid, column) for column in on_grid.T]).T)
-    return FullFit(tuple(predicted), steps)
+    return FullFit(tuple(predicted), steps, time.perf_counter() - began)
 
 
 def inputs_of_drive(drive: Drive) -> InputHistory:
@@ -304,6 +311,48 @@ def physics_of_fit(plant: Plant, number: int, fit: Fit) -> Physics:
 
 
 # -------------------------------------------------------------------- details
+def _one_by_one(
+    machine: PreparedMachine,
+    plant: Plant,
+    fits: Mapping[str, Fit],
+    options: TransientOptions,
+    progress: Progress,
+) -> dict[str, FullFit]:
+    found = {}
+    for name, fit in fits.items():
+        progress(f"full model: {name}")
+        found[name] = run_fit(machine, plant, fit, options)
+    return found
+
+
+def _side_by_side(
+    machine: PreparedMachine,
+    plant: Plant,
+    fits: Mapping[str, Fit],
+    options: TransientOptions,
+    progress: Progress,
+) -> dict[str, FullFit]:
+    """Each fit in a process of its own; in this one, and said, where a process ends before its time."""
+    from joblib import Parallel, delayed, parallel_config
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    progress(f"full model: {' and '.join(fits)}")
+    try:
+        with parallel_config(backend="loky", inner_max_num_threads=1):
+            answers = Parallel(n_jobs=len(fits))(
+                delayed(_run_alone)(machine.spec, plant, fit, options) for fit in fits.values()
+            )
+    except TerminatedWorkerError:
+        progress("full model: a process ended before its time")
+        return _one_by_one(machine, plant, fits, options, progress)
+    return dict(zip(fits, answers, strict=True))
+
+
+def _run_alone(spec: MachineSpec, plant: Plant, fit: Fit, options: TransientOptions) -> FullFit:
+    with threadpool_limits(1), one_thread():
+        return run_fit(prepare_machine(spec), plant, fit, options)
+
+
 def _is_same(one: Fit, other: Fit) -> bool:
     return one.candidates == other.candidates and one.values == other.values
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from spindle_fem.calibration.noise import SlowError, Whitener
 from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Observation, Plant, Prediction
@@ -354,59 +353,3 @@ def _bounded_step(
         move[outside] = np.clip(target, low, high)[outside] - position[outside]
         free &= ~outside
     return move
-
-
-@dataclass(frozen=True, slots=True)
-class LinearProblem:
-    """A problem about one of its fits: data = J u + sum of columns, u known as the belief says.
-
-    Attributes
-    ----------
-    problem : Problem
-    data : (n,) ndarray
-        Whitened data less what the fit predicts without any departure of its coordinates.
-    jacobian : (n, p) ndarray
-        In coordinates whose prior is a unit normal.
-    """
-
-    data: Array
-    jacobian: Array
-    weight: Array
-
-    @classmethod
-    def about(cls, problem: Problem, fit: Fit) -> LinearProblem:
-        """Linearised about a fit."""
-        predicted = problem.predict(fit.candidates, fit.coordinates, fit.position)
-        jacobian = problem.whitened([p.sensitivity for p in predicted])
-        residual = problem.data - problem.whitened([p.temperature for p in predicted])
-        n_machine = len(problem.belief.coordinates)
-        root = np.eye(len(fit.coordinates))
-        root[:n_machine, :n_machine] = problem.belief.root
-        mean = np.concatenate((problem.belief.mean, np.zeros(len(fit.coordinates) - n_machine)))
-        # The tails that a robust fit discounts are discounted here too.
-        weight = np.sqrt(np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12)))
-        unit = np.linalg.solve(root.T, jacobian.T).T
-        return cls(weight * (residual + jacobian @ (fit.position - mean)), weight[:, None] * unit, weight)
-
-    def gram(self, columns: Array) -> tuple[Array, Array, float]:
-        """Inner products in which what the coordinates can absorb does not count.
-
-        Parameters
-        ----------
-        columns : (n, m) ndarray
-            Whitened.
-
-        Returns
-        -------
-        (m, m) ndarray, of the columns; (m,) ndarray, with the data; float, of the data
-        """
-        n = self.jacobian.shape[1]
-        lower = np.linalg.cholesky(np.eye(n) + self.jacobian.T @ self.jacobian)
-        columns = self.weight[:, None] * columns
-        seen = solve_triangular(lower, self.jacobian.T @ columns, lower=True)
-        data = solve_triangular(lower, self.jacobian.T @ self.data, lower=True)
-        return (
-            columns.T @ columns - seen.T @ seen,
-            columns.T @ self.data - seen.T @ data,
-            float(self.data @ self.data - data @ data),
-        )

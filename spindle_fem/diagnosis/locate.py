@@ -20,7 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.diagnosis.inference import Fit, LinearProblem, Problem
+from spindle_fem.diagnosis.inference import Fit, Problem
+from spindle_fem.diagnosis.linear import LinearProblem
 from spindle_fem.diagnosis.screening import BaseRun
 
 Array = NDArray[np.float64]
@@ -117,7 +118,13 @@ class OnOff:
 
 
 def onset_answers(
-    problem: Problem, fit: Fit, patterns: Sequence[Pattern], recording: int, *, number: int = ONSETS
+    problem: Problem,
+    fit: Fit,
+    patterns: Sequence[Pattern],
+    recording: int,
+    *,
+    number: int = ONSETS,
+    trust: Fit | None = None,
 ) -> list[Onsets]:
     """Inner products of all spots' answers about a fit.
 
@@ -130,11 +137,13 @@ def onset_answers(
         The one in which heat comes and goes.
     number : int
         Instants.
+    trust : Fit or None
+        As :meth:`LinearProblem.about` has it.
     """
     base = BaseRun(problem.plant, recording, fit.values, fit.candidates)
     grid = base.drive.grid
     onsets = np.linspace(grid[0], grid[-1], number + 1)[:-1]
-    linear = LinearProblem.about(problem, fit)
+    linear = LinearProblem.about(problem, fit, trust)
     found = []
     chunk = max(1, 320 // number)
     for first in range(0, len(patterns), chunk):

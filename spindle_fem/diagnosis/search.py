@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.diagnosis.inference import Fit, LinearProblem, Problem
+from spindle_fem.diagnosis.inference import Fit, Problem
+from spindle_fem.diagnosis.linear import BoxedColumns, LinearProblem
 from spindle_fem.diagnosis.screening import BaseRun, Variant
 
 Array = NDArray[np.float64]
@@ -16,6 +17,9 @@ Array = NDArray[np.float64]
 # An effect more must make the data so much likelier (natural logarithm) to be looked at.
 SMALLEST_GAIN = 3.0
 KEPT_FOR_TRIPLES = 40
+# Where bounds matter: sets of several effects that are solved within them, by their gain without bounds, and
+# the single effects whose pairs all are.
+WITHIN_BOUNDS, GOOD_MEMBERS = 120, 24
 # Places of one effect (of one combination of effects) that are looked at together.
 MOST_PLACES = 2
 
@@ -40,6 +44,11 @@ class Screened:
     log_prior : (m,) ndarray
     families : mapping of component to str
         Bearing set of a bearing: one effect is looked for once in each family.
+    boxed : BoxedColumns or None
+        Where bounds of the machine's own coordinates matter: gains of the most promising sets are then
+        found within them.
+    base : float
+        Cost that these gains count from.
     """
 
     variants: tuple[Variant, ...]
@@ -50,10 +59,26 @@ class Screened:
     signs: Array
     log_prior: Array
     families: Mapping[str, str] = field(default_factory=dict)
+    boxed: BoxedColumns | None = None
+    base: float = 0.0
 
     def singles(self) -> Array:
         """Logarithm of the evidence of every variant alone over nothing, priors included, (m,)."""
-        return self._gain(np.arange(len(self.variants))[:, None])
+        sets = np.arange(len(self.variants))[:, None]
+        return self._gain(sets) if self.boxed is None else self._gain_within(sets)
+
+    def _gain_within(self, sets: NDArray[np.int64]) -> Array:
+        """Gain of sets (k, s) with the machine's coordinates between their bounds."""
+        one_sided = self.signs != 0.0
+        costs = np.array([self.boxed.cost(members, self.spread, one_sided) for members in sets])
+        return 0.5 * (self.base - costs) - self._price(sets)
+
+    def _price(self, sets: NDArray[np.int64]) -> Array:
+        """What the amplitudes' room and the priors cost."""
+        spread = self.spread[sets]
+        scaled = spread[:, :, None] * self.gram[sets[:, :, None], sets[:, None, :]] * spread[:, None, :]
+        _, log_det = np.linalg.slogdet(scaled + np.eye(sets.shape[1]))
+        return 0.5 * log_det - np.log(2.0) * self.signs[sets].sum(axis=1) - self.log_prior[sets].sum(axis=1)
 
     def _gain(self, sets: NDArray[np.int64]) -> Array:
         """The same for sets of equal size (k, s)."""
@@ -64,11 +89,8 @@ class Screened:
         scaled = spread[:, :, None] * gram * spread[:, None, :] + np.eye(size)
         right = spread * data
         solution = np.linalg.solve(scaled, right[:, :, None])[:, :, 0]
-        _, log_det = np.linalg.slogdet(scaled)
-        gain = 0.5 * np.sum(right * solution, axis=1) - 0.5 * log_det
-        signs = self.signs[sets]
-        allowed = np.all((signs == 0.0) | (solution >= 0.0), axis=1)
-        gain = gain + np.log(2.0) * signs.sum(axis=1) + self.log_prior[sets].sum(axis=1)
+        gain = 0.5 * np.sum(right * solution, axis=1) - self._price(sets)
+        allowed = np.all((self.signs[sets] == 0.0) | (solution >= 0.0), axis=1)
         return np.where(allowed, gain, -np.inf)
 
     def amplitudes(self, members: Sequence[int]) -> dict[int, float]:
@@ -102,6 +124,9 @@ class Screened:
         if sets.size == 0:
             return []
         gain = np.concatenate([self._gain(chunk) for chunk in np.array_split(sets, 1 + len(sets) // 100_000)])
+        if self.boxed is not None:
+            sets = self._promising(sets, gain)
+            gain = self._gain_within(sets)
         found: dict[frozenset[tuple[str, str]], tuple[tuple[int, ...], float]] = {}
         places: dict[tuple[str, ...], int] = {}
         for index in np.argsort(-gain):
@@ -117,6 +142,18 @@ class Screened:
             if len(found) == number:
                 break
         return list(found.values())
+
+    def _promising(self, sets: NDArray[np.int64], gain: Array) -> NDArray[np.int64]:
+        """Sets worth a bounded solution: the best without bounds, and those of good members."""
+        if sets.shape[1] == 1:
+            return sets
+        good = np.zeros(len(self.variants), dtype=bool)
+        good[np.argsort(-self.singles())[:GOOD_MEMBERS]] = True
+        chosen = np.zeros(len(sets), dtype=bool)
+        chosen[np.argsort(-gain, kind="stable")[:WITHIN_BOUNDS]] = True
+        if sets.shape[1] == 2:
+            chosen |= good[sets].all(axis=1)
+        return sets[chosen]
 
     def best_at(self, places: Collection[str], but: Collection[str], number: int) -> list[tuple[int, float]]:
         """Best variant of each effect and form at some places, with its amplitude, some effects left out."""
@@ -173,6 +210,7 @@ def screen(
     variants: Sequence[Variant],
     weights: Mapping[str, float],
     families: Mapping[str, str],
+    trust: Fit | None = None,
 ) -> Screened:
     """Answers of all variants about a fit, and their inner products.
 
@@ -185,6 +223,9 @@ def screen(
     weights : mapping of effect to float
     families : mapping of component to str
         As :class:`Screened` has them.
+    trust : Fit or None
+        Fit without the variants that gains count from, and whose residuals tell which readings went
+        astray; None for the first one.
     """
     known = {c.name for c in fit.coordinates}
     values = fit.values
@@ -193,12 +234,16 @@ def screen(
         base = BaseRun(problem.plant, number, {k: v for k, v in values.items() if k in known}, fit.candidates)
         on_grid.append(base.responses(variants))
     columns = problem.whitened(on_grid)
-    linear = LinearProblem.about(problem, fit)
+    linear = LinearProblem.about(problem, fit, trust)
     gram, data, total = linear.gram(columns)
     spread = np.array([_spread(v) for v in variants])
     signs = np.array([_one_sided(v) for v in variants])
     priors = log_priors(variants, weights)
-    return Screened(tuple(variants), gram, data, total, spread, signs, priors, families)
+    boxed = linear.boxed(columns) if linear.box.matters or trust is not None else None
+    base = linear.box.cost
+    if trust is not None:
+        base = float(np.sum((linear.weight * trust.residual) ** 2)) + trust.misfit_with_prior - trust.misfit
+    return Screened(tuple(variants), gram, data, total, spread, signs, priors, families, boxed, base)
 
 
 def _spread(variant: Variant) -> float:

@@ -13,12 +13,12 @@ from spindle_fem.calibration.noise import ChannelBins, SlowError, Whitener, like
 from spindle_fem.diagnosis.inference import (
     Belief,
     Coordinate,
-    LinearProblem,
     Problem,
     _bounded_step,
     _huber,
     candidate_coordinates,
 )
+from spindle_fem.diagnosis.linear import LinearProblem
 from spindle_fem.diagnosis.network_view import view_of_network
 from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Plant, even_drive
 from spindle_fem.diagnosis.prepare import calibrate, machine_coordinates, slow_error_of

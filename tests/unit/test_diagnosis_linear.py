@@ -1,0 +1,54 @@
+"""First order about a fit: quadratic forms with bounds, against a plain search over the same form."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from spindle_fem.diagnosis.linear import Box, BoxedColumns
+
+GENERATOR = np.random.default_rng(5)
+READINGS, COORDINATES, COLUMNS = 60, 4, 5
+
+
+def problem(room):
+    jacobian = GENERATOR.normal(size=(READINGS, COORDINATES))
+    residual = GENERATOR.normal(size=READINGS) + jacobian @ np.array([2.0, -1.0, 0.5, 0.0])
+    root = np.eye(COORDINATES) + 0.2 * np.triu(GENERATOR.normal(size=(COORDINATES, COORDINATES)), 1)
+    departure = root @ GENERATOR.normal(0.0, 0.3, COORDINATES)
+    box = Box(
+        jacobian,
+        residual,
+        jacobian.T @ jacobian + root.T @ root,
+        jacobian.T @ residual - root.T @ departure,
+        float(residual @ residual + departure @ departure),
+        np.full(COORDINATES, -room),
+        np.full(COORDINATES, room),
+    )
+    columns = GENERATOR.normal(size=(READINGS, COLUMNS))
+    boxed = BoxedColumns(box, jacobian.T @ columns, columns.T @ columns, columns.T @ residual)
+    return box, boxed, columns, root, departure
+
+
+@pytest.mark.parametrize("room", [0.3, 1.0, 50.0])
+@pytest.mark.parametrize("members", [(2,), (0, 3), (1, 2, 4)])
+def test_the_least_cost_within_bounds_is_the_true_one(room, members):
+    box, boxed, columns, root, departure = problem(room)
+    spread = np.array([0.5, 1.0, 2.0, 0.3, 1.0])
+    one_sided = np.array([True, False, True, False, True])
+    own = list(members)
+
+    def cost(x):
+        moves, amplitudes = x[:COORDINATES], x[COORDINATES:]
+        left = box.residual - box.jacobian @ moves - columns[:, own] @ amplitudes
+        prior = root @ moves + departure
+        return left @ left + prior @ prior + np.sum((amplitudes / spread[own]) ** 2)
+
+    bounds = [(-room, room)] * COORDINATES + [(0.0, None) if one_sided[i] else (None, None) for i in own]
+    start = np.zeros(COORDINATES + len(own))
+    found = minimize(cost, start, bounds=bounds, method="L-BFGS-B", options={"ftol": 1e-15, "gtol": 1e-10})
+    assert boxed.cost(members, spread, one_sided) == pytest.approx(found.fun, rel=1e-7)
+
+
+def test_bounds_matter_only_where_they_hold_something_back():
+    assert problem(0.3)[0].matters
+    assert not problem(50.0)[0].matters
