@@ -91,9 +91,9 @@ class StudySettings(SpecModel):
     backend: Literal["auto", "full", "reduced"] = "auto"
     """What answers designs that share a mesh: a solve of each, or one projected model of all with an
     error estimate; "auto" takes it where enough designs share it."""
-    mesh: Literal["new", "moved"] = "new"
-    """Whether designs whose channel has another depth, width or pitch get a mesh of their own, or one that is
-    moved from that of the nearest point of a fixed lattice of these three."""
+    mesh: Literal["moved", "new"] = "moved"
+    """How designs whose channel has another depth, width or pitch get their mesh: moved from that of the
+    nearest point of a fixed lattice of these three where that keeps areas, volumes and elements, or new."""
     film_uncertainty: Flag = False
     """Solve each design also at the low and the high film coefficient of the channel."""
 

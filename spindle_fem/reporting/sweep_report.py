@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from spindle_fem.design.files import MACHINE_FILE, SUMMARY_FILE, SWEEP_SCHEMA
 from spindle_fem.design.film_study import FilmChart, film_study, pump_limits
-from spindle_fem.design.table import read_results
+from spindle_fem.design.table import MOVED, read_results
 from spindle_fem.errors import BadInputError
 from spindle_fem.reporting import sweep_charts, sweep_film
 from spindle_fem.reporting.document import (
@@ -217,7 +217,7 @@ def _sections(
 ) -> list[Section]:
     counts = [
         ("designs", "designs"), ("ok", "solved"), ("feasible", "keep every limit"), ("failed", "failed"),
-        ("impossible", "impossible"), ("geometries", "geometries meshed"),
+        ("impossible", "impossible"), ("geometries", "geometries"),
     ]  # fmt: skip
     cards = Cards([{"value": str(summary[key]), "name": name} for key, name in counts])
     sections = [Section("overview", "Overview", [cards, *_limits(summary, outputs)])]
@@ -339,7 +339,7 @@ def _table(rows: Sequence[Row], parameters: Sequence[Scale], outputs: Sequence[S
             *_cells(row, parameters, outputs),
             row["status"],
             words[row["feasible"]],
-            _backend(row),
+            answered_by(row),
             row["reason"] or "",
         ]
         for row in rows
@@ -349,12 +349,13 @@ def _table(rows: Sequence[Row], parameters: Sequence[Scale], outputs: Sequence[S
     ]
 
 
-def _backend(row: Row) -> str:
-    """What answered a design, with the error estimate where that is not a full solve."""
+def answered_by(row: Row) -> str:
+    """What answered a design, with the error estimate of a reduced answer, and whether its mesh was moved."""
     if row["backend"] is None:
         return "–"
     error = row["error_estimate_K"]
-    return row["backend"] if error is None else f"{row['backend']}, within {1e3 * error:.2g} mK"
+    answered = row["backend"] if error is None else f"{row['backend']}, within {1e3 * error:.2g} mK"
+    return f"{answered}, moved mesh" if row["mesh"] == MOVED else answered
 
 
 def _explorer(

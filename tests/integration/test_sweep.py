@@ -35,6 +35,7 @@ low = "15 degC"
 high = "25 degC"
 number = 2
 [study]
+mesh = "new"
 outputs = ["temperature.max_degC", "bearings.B1.ring_difference_K", "coolant.regime"]
 [[constraint]]
 output = "coolant.pressure_drop_Pa"

@@ -213,3 +213,10 @@ def test_the_study_that_ships_is_valid():
     optimum = prepared.tasks[prepared.references["the paper's optimum"] - 1].spec
     assert optimum.channel.depth == pytest.approx(0.019)
     assert optimum.coolant.inlet_temperature == pytest.approx(304.15)
+
+
+def test_how_designs_are_meshed_is_one_of_two_words(write):
+    assert load_study(write(DEPTHS + OUTPUTS)).study.mesh == "moved"
+    assert load_study(write(DEPTHS + OUTPUTS + 'mesh = "new"\n')).study.mesh == "new"
+    with pytest.raises(FaultsError, match=r'study\.mesh.*"stretched".*moved, new'):
+        load_study(write(DEPTHS + OUTPUTS + 'mesh = "stretched"\n'))

@@ -17,6 +17,7 @@ from spindle_fem.design.table import (
     read_results,
 )
 from spindle_fem.errors import BadInputError
+from spindle_fem.reporting.sweep_report import answered_by
 
 COLUMNS = ("design", "channel.depth", "temperature.max_degC", "status", "reason", "key")
 
@@ -89,3 +90,12 @@ def test_no_number_is_no_cell():
     assert format_cell(math.nan) == ""
     assert parse_cell("1_000") == "1_000"
     assert parse_cell("inf") == "inf"
+
+
+def test_the_report_tells_what_answered_and_whose_mesh_it_had():
+    row = {"backend": "full", "error_estimate_K": None, "mesh": "new"}
+    assert answered_by(row) == "full"
+    assert answered_by(row | {"mesh": "moved"}) == "full, moved mesh"
+    reduced = row | {"backend": "reduced", "error_estimate_K": 0.004, "mesh": "moved"}
+    assert answered_by(reduced) == "reduced, within 4 mK, moved mesh"
+    assert answered_by(dict.fromkeys(row)) == "–"
