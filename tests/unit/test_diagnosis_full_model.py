@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from spindle_fem.diagnosis import full_model
 from spindle_fem.diagnosis.findings import predictions_at_stamps
@@ -194,11 +195,12 @@ def test_where_nothing_was_found_one_run_is_both(plant, monkeypatch):
 
     def run_fit(machine, plant, fit, options):
         runs.append(fit)
-        return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7)
+        return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7, 1.0)
 
     prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
     monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model, "run_fit", run_fit)
+    monkeypatch.setattr(full_model, "thread_count", lambda: 1)
     machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
     nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
     same = full_model_errors(diagnosis_of(plant, nothing, nothing), machine, keep=kept.__setitem__)
@@ -211,17 +213,43 @@ def test_where_nothing_was_found_one_run_is_both(plant, monkeypatch):
     assert other["after"]["train_rmse_K"] != other["before"]["train_rmse_K"]
 
 
+def test_a_process_that_ends_before_its_time_is_said_and_done_without(plant, monkeypatch):
+    class Killed:
+        def __init__(self, n_jobs):
+            assert n_jobs == 2
+
+        def __call__(self, tasks):
+            raise TerminatedWorkerError("A process was killed.")
+
+    def run_fit(machine, plant, fit, options):
+        return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7, 1.0)
+
+    prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
+    monkeypatch.setattr(full_model, "run_fit", run_fit)
+    monkeypatch.setattr(full_model, "thread_count", lambda: 2)
+    monkeypatch.setattr("joblib.Parallel", Killed)
+    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
+    nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
+    said = []
+    found = full_model_errors(diagnosis_of(plant, nothing, heat), machine, progress=said.append)
+    assert "full model: a process ended before its time" in said
+    assert said[-2:] == ["full model: before", "full model: after"]
+    assert found["after"]["train_rmse_K"] != found["before"]["train_rmse_K"]
+
+
 def test_a_difference_of_the_meshes_is_not_one_of_what_was_found(plant, monkeypatch):
     """A full model that reads 0.4 K more throughout, and 0.1 K more of what the fits differ by."""
     nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
 
     def run_fit(machine, plant, fit, options):
         beside = 0.4 if fit is nothing else 0.5
-        return full_model.FullFit(tuple(item + beside for item in predictions_at_stamps(plant, fit)), 7)
+        return full_model.FullFit(tuple(item + beside for item in predictions_at_stamps(plant, fit)), 7, 1.0)
 
     prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
     monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model, "run_fit", run_fit)
+    monkeypatch.setattr(full_model, "thread_count", lambda: 1)
     machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
     found = full_model_errors(diagnosis_of(plant, nothing, heat), machine)
     for row in found["differences"]:
