@@ -312,7 +312,16 @@ def integrate(
         # two equal steps to a stop rather than one full and a sliver
         size = left if allowed >= left * (1.0 - 1e-9) else (0.5 * left if 2.0 * allowed > left else allowed)
         end = stop if size == left else state.time + size
-        stages = solver.take_step(state, end, size)
+        try:
+            stages = solver.take_step(state, end, size)
+        except ConvergenceError:
+            # What is stored outweighs what follows the field the more, the shorter the step.
+            rejections += 1
+            if control.tolerance is None or rejections > MAX_REJECTIONS:
+                raise
+            ledger.rejected += 1
+            step = 0.5 * size
+            continue
         error = solver.step_error(stages, size)
         if control.tolerance is not None and error > control.tolerance:
             ledger.rejected += 1
