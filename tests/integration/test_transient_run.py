@@ -12,6 +12,7 @@ import pytest
 
 from spindle_fem.conduction.transient import ThermalState
 from spindle_fem.coupling import prepare_machine, solve_coupled
+from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.errors import (
     BadInputError,
     EnergyBalanceError,
@@ -29,6 +30,7 @@ from spindle_fem.transients.coupled import CoupledInputs
 from spindle_fem.transients.history import OperatingHistory
 from spindle_fem.transients.run import MachineEnergy, TransientOptions, simulate_full, start_from
 from spindle_fem.transients.study import load_study, run_study, study_of, time_to_stay_within
+from spindle_fem.transients.terms import Physics
 
 SMALL = ["mesh.preset=coarse", "mesh.order=1"]
 RPM = np.pi / 30.0
@@ -248,6 +250,29 @@ def test_a_step_begins_with_what_the_last_one_ended_with(quick, monkeypatch):
     begins = {0.0, *run.steps.times.tolist()}
     assert 900.0 in begins
     assert begins & set(asked) == {0.0, 600.0}
+
+
+class Switched(Term):
+    """100 W into the housing from 60 s on."""
+
+    name = "switched"
+    parameters = (TermParameter("start_1", 60.0, unit="s", logarithmic=False),)
+    heat_places = ("housing",)
+
+    def heat(self, context):
+        return np.full((1, 1), 100.0 if context.time >= 60.0 else 0.0, dtype=complex)
+
+
+def test_a_term_is_switched_at_its_instant_though_no_input_jumps(quick):
+    """All of its heat from the start of the step that begins there is in the account."""
+    options = TransientOptions(fixed_step=60.0, coupling_tolerance=1e-3, coefficient_tolerance=5e-3)
+    inputs = held([0.0, 120.0], speed=0.0)
+    with_it, without = (
+        simulate_full(quick, inputs, options=options, physics=physics)
+        for physics in (Physics((Switched(),)), Physics())
+    )
+    added = with_it.energy.heat_in - without.energy.heat_in
+    assert added == pytest.approx(100.0 * 60.0, rel=1e-6)
 
 
 def test_held_and_linear_inputs():
