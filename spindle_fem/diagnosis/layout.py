@@ -96,9 +96,14 @@ class Layout:
                 found["nose"] = (self.segment_place(self.shaft, min(ahead, key=lambda s: s.z[0]).name),)
             if behind:
                 found["drive_end"] = (self.segment_place(self.shaft, max(behind, key=lambda s: s.z[1]).name),)
-            gaps = [g.rotating for g in self.spec.gap if g.rise > 0.0 or g.kind != "power_law"]
-            gaps = [name for name in gaps if self._part_of(name) == self.shaft.name and name in self.places]
-            found["shaft_gap"] = tuple(gaps) or found["shaft"]
+            gaps = [g for g in self.spec.gap if g.rise > 0.0 or g.kind != "power_law"]
+            gaps = [
+                g for g in gaps if self._part_of(g.rotating) == self.shaft.name and g.rotating in self.places
+            ]
+            found["shaft_gap"] = tuple(g.rotating for g in gaps) or found["shaft"]
+            standing = tuple(name for g in gaps for name in g.standing if name in self.places)
+            if standing:
+                found["standing_gap"] = standing
         if self.housing is not None:
             found["housing"] = (self.housing.name,)
             if self.flange:

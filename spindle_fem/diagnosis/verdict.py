@@ -27,6 +27,8 @@ LEAST_TEMPERATURE_RATIO = 10.0
 DECIDED = 0.75
 LISTED = 0.02
 SIGNIFICANT = 0.01
+# Below this nothing missing is ruled out, however much any one set pays for its complexity.
+RULED_OUT = 0.001
 # A residual this much above the noise after the best set: something else is there.
 UNEXPLAINED_MISFIT = 1.6
 # Right sets leave what the noise does, to a few hundredths (concealed study); a best set that leaves more
@@ -187,6 +189,8 @@ def judge(
     ranked = rank(hypotheses)
     p_value = detection_p_value(hypotheses, trials)
     empty = next(item for item in ranked if not item.fit.candidates)
+    if p_value < RULED_OUT:
+        ranked = _without(ranked, empty)
     chosen = ranked[0]
     if p_value > SIGNIFICANT or not chosen.fit.candidates or within_prior(chosen.fit, calibrated):
         if np.sqrt(empty.fit.reduced_misfit) <= UNEXPLAINED_MISFIT or within_prior(chosen.fit, calibrated):
@@ -210,6 +214,15 @@ def judge(
     if chosen.probability < DECIDED * (1.0 - other):
         return Judgement("ambiguous", p_value, chosen, alternatives, other, "several sets explain the data")
     return Judgement(kind_of(chosen.fit.candidates), p_value, chosen, alternatives, other, "")
+
+
+def _without(ranked: Sequence[Ranked], empty: Ranked) -> list[Ranked]:
+    """Sets of something, their probabilities alone."""
+    rest = [item for item in ranked if item is not empty]
+    total = sum(item.probability for item in rest)
+    if not total > 0.0:
+        return list(ranked)
+    return [Ranked(item.best, item.probability / total) for item in rest]
 
 
 def _alike(item: Ranked, chosen: Ranked, overlapping: Mapping[str, frozenset[str]]) -> bool:

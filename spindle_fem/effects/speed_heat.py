@@ -7,6 +7,9 @@ import numpy as np
 from spindle_fem.effects.laws import Complex, amplitude, linear, power, relaxed, repeated, shape
 from spindle_fem.effects.term import Term, TermContext
 
+# Before any data: value and standard deviation.
+SHARE_BESIDE = (0.15, 0.15)
+
 
 class SpeedHeatTerm(Term):
     """Heat ``P (n / n0)^m``, spread evenly over its places, lagging where asked.
@@ -23,6 +26,8 @@ class SpeedHeatTerm(Term):
         Value and standard deviation; fixed where that is 0.
     lag : float
         Time constant before any data, [s]; none when 0.
+    beside : tuple of str
+        Places that take an unknown share of the heat; none of it where there are none.
     """
 
     def __init__(
@@ -33,8 +38,10 @@ class SpeedHeatTerm(Term):
         size: tuple[str, float, float],
         exponent: tuple[float, float],
         lag: float = 0.0,
+        beside: tuple[str, ...] = (),
     ) -> None:
-        self.name, self.heat_places, self._speed = name, places, speed
+        self.name, self.heat_places, self._speed = name, (*places, *beside), speed
+        self._own, self._beside = len(places), len(beside)
         self._heat, usual, self._reference = size
         self.parameters = (
             amplitude(self._heat, usual, "W"),
@@ -43,6 +50,8 @@ class SpeedHeatTerm(Term):
         if lag > 0.0:
             self.parameters += (shape("lag", lag, 0.8, "s", low=5.0, high=20000.0),)
             self.n_states = 1
+        if beside:
+            self.parameters += (linear("share_beside", *SHARE_BESIDE, low=0.0, high=0.9),)
 
     def _share(self, context: TermContext) -> Complex:
         relative = np.abs(context.inputs[self._speed]) / self._reference
@@ -51,8 +60,16 @@ class SpeedHeatTerm(Term):
     def heat(self, context: TermContext) -> Complex:
         """Heat of every place, (n, k) W."""
         share = context.state[0] if self.n_states else self._share(context)
-        each = context.parameters[self._heat] * share / len(self.heat_places)
-        return repeated(context, each, len(self.heat_places))
+        total = context.parameters[self._heat] * share
+        if not self._beside:
+            return repeated(context, total / self._own, self._own)
+        away = context.parameters["share_beside"]
+        return np.concatenate(
+            (
+                repeated(context, (1.0 - away) * total / self._own, self._own),
+                repeated(context, away * total / self._beside, self._beside),
+            )
+        )
 
     def advance(self, context: TermContext, step: float) -> Complex:
         """Lagged power of the speed, (1, k)."""

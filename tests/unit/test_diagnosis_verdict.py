@@ -177,6 +177,19 @@ def test_nothing_missing_is_consistent():
     assert found.other == 0.0
 
 
+def test_complexity_alone_does_not_make_an_impossible_recording_consistent():
+    dear, none = candidate("grease_churning"), hypothesis(misfit=460.0, log_prior=-0.5)
+    # The dear set pays more for its parameters than it gains, tempered: probably nothing, were it possible.
+    found = [none, hypothesis(dear, misfit=400.0, evidence=-200.0 - 30.0)]
+    assert rank(found)[0].fit is none.fit
+    said = verdict(*found)
+    assert said.p_value < 1e-3
+    assert (said.verdict, said.chosen.probability) == ("missing_physics", pytest.approx(1.0))
+    # What chance makes in so many trials is nothing.
+    less = [none, hypothesis(dear, misfit=440.0, evidence=-220.0 - 30.0)]
+    assert verdict(*less).verdict == "consistent"
+
+
 def test_a_misfit_that_nothing_explains_is_unexplained():
     null, useless = hypothesis(misfit=4e3, reduced=10.0), hypothesis(PRELOAD, misfit=4e3, reduced=10.0)
     found = verdict(null, useless)

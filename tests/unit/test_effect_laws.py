@@ -275,6 +275,14 @@ def test_an_unrecorded_source_gives_its_heat_while_on():
     assert total == pytest.approx([0.0, 40.0, 0.0, 36.0, 0.0], abs=1e-4)
 
 
+def test_heat_beside_a_gap_is_shared_by_both_walls():
+    size = ("heat_at_4500rpm", 50.0, 471.0)
+    term = SpeedHeatTerm("t", ("a", "b"), "speed", size, (3.0, 0.15), beside=("c",))
+    own = {"heat_at_4500rpm": 80.0, "exponent": 3.0, "share_beside": 0.25}
+    heat = term.heat(context(term, inputs={"speed": 471.0}, **own)).real[:, 0]
+    assert heat == pytest.approx([30.0, 30.0, 20.0])
+
+
 def test_what_heats_one_side_gives_the_same_heat_there():
     term = HeatSourceTerm("t", ("a",), 50.0, ((1000.0, 3000.0),), ("up.a", "across.a"))
     own = {"heat": 40.0, "up": 0.5, "across": -0.25, "lag": 100.0}
