@@ -39,6 +39,8 @@ MAXIMUM_RETREATS = 10
 # A linear residual this small against the last change of the field costs no extra iteration of the loop.
 LINEAR_PER_KELVIN = 1.0e-4
 LOOSEST_LINEAR_TOLERANCE = 1.0e-5
+#: Relative residual that a coupled solution may leave of its linear equations.
+LINEAR_RESIDUAL_LIMIT = 1.0e-9
 
 Progress = Callable[[str], None]
 Beyond = Callable[[OperatingPoint, NDArray[np.float64], Mapping[str, float]], LoadChange]
@@ -269,6 +271,7 @@ def solve_coupled(
         heat = loads.total_heat
         settled = abs(heat - heat_before) <= HEAT_TOLERANCE * max(abs(heat), 1.0e-12)
         settled = settled and coolant_mismatch(machine, solution, coolant) <= COOLANT_TOLERANCE
+        settled = settled and solution.residual <= LINEAR_RESIDUAL_LIMIT
         if settled and change < FIELD_TOLERANCE * max(1.0, hottest - point.coldest):
             return CoupledState(solution, loads, coolant, iteration, change)
         heat_before = heat

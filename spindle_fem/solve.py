@@ -11,6 +11,7 @@ from spindle_fem import checks
 from spindle_fem.conduction.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.coupling import (
     FIELD_TOLERANCE,
+    LINEAR_RESIDUAL_LIMIT,
     Clock,
     CoupledState,
     PreparedMachine,
@@ -33,8 +34,6 @@ from spindle_fem.results.thermal_result import (
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.transients.terms import steady_physics, with_factors
 from spindle_fem.validity import CodedWarning
-
-LINEAR_RESIDUAL_LIMIT = 1.0e-9
 
 
 def solve(
