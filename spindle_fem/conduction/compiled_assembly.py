@@ -17,8 +17,8 @@ _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 # ------------------------------------------------------------------- pattern
 @njit(**_OPTIONS)
-def elements_of_nodes(elements, n_nodes):
-    """Elements at each node, compressed: (n_nodes + 1,) starts and element numbers."""
+def elements_of_nodes(elements, n_nodes, members):
+    """Element times its nodes plus the node's place in it, of each node after the other; returns starts."""
     starts = np.zeros(n_nodes + 1, dtype=np.int32)
     for e in range(elements.shape[0]):
         for k in range(elements.shape[1]):
@@ -26,94 +26,202 @@ def elements_of_nodes(elements, n_nodes):
     for i in range(n_nodes):
         starts[i + 1] += starts[i]
     place = starts[:-1].copy()
-    members = np.empty(elements.size, dtype=np.int32)
     for e in range(elements.shape[0]):
         for k in range(elements.shape[1]):
             node = elements[e, k]
-            members[place[node]] = e
+            members[place[node]] = e * elements.shape[1] + k
             place[node] += 1
-    return starts, members
+    return starts
 
 
 @njit(**_OPTIONS)
 def fill_upper(low, high, elements, starts, members, extra_starts, extra, counts, indices):
     """Columns of each row from the diagonal on; returns their number, -1 when the space is too small."""
-    mark = np.full(starts.size - 1, -1, dtype=np.int32)
+    size = np.uint32(elements.shape[1])
+    last = np.zeros(starts.size, dtype=np.uint32)
+    seen = np.empty(256, dtype=np.uint32)
     end = 0
-    for i in range(low, high):
-        begin = end
-        # no row is longer than all nodes of its elements
-        most = 1 + (starts[i + 1] - starts[i]) * elements.shape[1] + extra_starts[i + 1] - extra_starts[i]
-        if begin + most > indices.size:
+    for i in range(np.uint32(low), np.uint32(high)):
+        most = (starts[i + 1] - starts[i]) * size + extra_starts[i + 1] - extra_starts[i]
+        # one place more is written to
+        if end + most + 2 > indices.size:
             return -1
-        indices[begin] = i
-        end = begin + 1
+        if most > seen.size:
+            seen = np.empty(2 * most, dtype=np.uint32)
+        count = np.uint32(0)
         for place in range(starts[i], starts[i + 1]):
-            e = members[place]
+            e = members[place] // size
             for k in range(elements.shape[1]):
-                j = elements[e, k]
-                if j > i and mark[j] != i:
-                    mark[j] = i
-                    end = _insert(indices, begin, end, j)
-        for place in range(extra_starts[i], extra_starts[i + 1]):
-            j = extra[place]
-            if mark[j] != i:
-                mark[j] = i
-                end = _insert(indices, begin, end, j)
-        counts[i + 1] = end - begin
+                seen[count] = elements[e, k]
+                last[elements[e, k]] = count
+                count += np.uint32(1)
+        count = _see_extra(extra_starts[i], extra_starts[i + 1], extra, seen, last, count)
+        indices[end] = i
+        kept = _keep_right(i, seen, last, count)
+        _rank(seen, kept, indices, end + 1)
+        counts[i + 1] = 1 + kept
+        end += 1 + kept
     return end
 
 
 @njit(**_OPTIONS)
-def _insert(indices, begin, end, column):
-    place = end
-    while place > begin and indices[place - 1] > column:
-        indices[place] = indices[place - 1]
-        place -= 1
-    indices[place] = column
-    return end + 1
+def _see_extra(begin, end, extra, seen, last, count):
+    for place in range(begin, end):
+        seen[count] = extra[place]
+        last[extra[place]] = count
+        count += np.uint32(1)
+    return count
+
+
+# No branch of these depends on a column: mispredicted ones would take longer than all the rest.
+@njit(**_OPTIONS)
+def _keep_right(i, seen, last, count):
+    """Distinct columns right of i to the front, ``last`` tells where each was seen last; their number."""
+    kept = 0
+    for k in range(count):
+        j = seen[k]
+        seen[kept] = j
+        kept += (j > i) & (last[j] == k)
+    return kept
 
 
 @njit(**_OPTIONS)
-def expand_upper(indptr, indices):
-    """Full compressed rows of an upper triangle: starts, columns, upper entry of each."""
+def _rank(seen, kept, indices, begin):
+    """Write distinct columns in rising order."""
+    for k in range(kept):
+        column = seen[k]
+        rank = begin
+        for other in range(kept):
+            rank += seen[other] < column
+        indices[rank] = column
+
+
+@njit(**_OPTIONS)
+def full_starts(indptr, indices):
+    """Where each full row of an upper triangle begins."""
     n = indptr.size - 1
-    full_starts = np.zeros(n + 1, dtype=np.int32)
+    starts = np.zeros(n + 1, dtype=np.int32)
     for i in range(n):
-        full_starts[i + 1] += indptr[i + 1] - indptr[i]
-        for place in range(indptr[i] + 1, indptr[i + 1]):
-            full_starts[indices[place] + 1] += 1
+        starts[i + 1] += indptr[i + 1] - indptr[i]
+        for place in range(indptr[i] + np.uint32(1), indptr[i + 1]):
+            starts[indices[place] + np.uint32(1)] += 1
     for i in range(n):
-        full_starts[i + 1] += full_starts[i]
-    place_of = full_starts[:-1].copy()
-    columns = np.empty(full_starts[n], dtype=np.int32)
-    slots = np.empty(full_starts[n], dtype=np.int32)
-    # rows in order: what lies left of the diagonal arrives in a row before its own entries
-    for i in range(n):
-        for place in range(indptr[i], indptr[i + 1]):
-            j = indices[place]
-            columns[place_of[i]] = j
-            slots[place_of[i]] = place
-            place_of[i] += 1
-            if j != i:
-                columns[place_of[j]] = i
-                slots[place_of[j]] = place
-                place_of[j] += 1
-    return full_starts, columns, slots
+        starts[i + 1] += starts[i]
+    return starts
 
 
 @njit(**_OPTIONS)
-def find_upper(rows, columns, indptr, indices, slots):
-    """Upper entry of each pair of nodes, in either order; -1 where the pattern has none."""
-    for index in range(rows.size):
-        i, j = rows[index], columns[index]
-        if j < i:
-            i, j = j, i
-        slots[index] = -1
-        for place in range(indptr[i], indptr[i + 1]):
-            if indices[place] == j:
-                slots[index] = place
-                break
+def expand_upper(low, high, indptr, indices, starts, columns, slots):
+    """Columns of the full rows in a range, and the upper entry of each."""
+    place_of = np.empty(high - low, dtype=np.uint32)
+    for i in range(low, high):
+        place_of[i - low] = starts[i]
+    low, high = np.uint32(low), np.uint32(high)
+    # rows in order: what lies left of the diagonal arrives in a row before its own entries
+    for i in range(high):
+        for place in range(indptr[i], indptr[i + np.uint32(1)]):
+            j = indices[place]
+            if j >= low and j < high:
+                at = place_of[j - low]
+                columns[at] = i
+                slots[at] = place
+                place_of[j - low] = at + np.uint32(1)
+        if i >= low:
+            at = place_of[i - low]
+            for place in range(indptr[i] + np.uint32(1), indptr[i + np.uint32(1)]):
+                columns[at] = indices[place]
+                slots[at] = place
+                at += np.uint32(1)
+
+
+@njit(**_OPTIONS)
+def _find(i, j, indptr, indices):
+    if j < i:
+        i, j = j, i
+    for place in range(indptr[i], indptr[i + 1]):
+        if indices[place] == j:
+            return np.int64(place)
+    return -1
+
+
+@njit(**_OPTIONS)
+def find_facets(low, high, nodes, indptr, indices, slots):
+    """Upper entry of each two nodes of facets, (n, k (k + 1) / 2); -1 where the pattern has none."""
+    for facet in range(low, high):
+        pair = 0
+        for a in range(nodes.shape[1]):
+            for b in range(a, nodes.shape[1]):
+                slots[facet, pair] = _find(nodes[facet, a], nodes[facet, b], indptr, indices)
+                pair += 1
+
+
+@njit(**_OPTIONS)
+def find_crossings(low, high, one, other, indptr, indices, slots):
+    """Upper entry of each node of one facet with each of the other, (n, k, k)."""
+    for facet in range(low, high):
+        for a in range(one.shape[1]):
+            for b in range(other.shape[1]):
+                slots[facet, a, b] = _find(one[facet, a], other[facet, b], indptr, indices)
+
+
+@njit(**_OPTIONS)
+def distinct(values, size):
+    """Distinct values below a size, rising, and the place of each value among them."""
+    place = np.zeros(size, dtype=np.int32)
+    for index in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            place[values[index, k]] = 1
+    count = 0
+    for value in range(size):
+        used = place[value]
+        place[value] = count
+        count += used
+    found = np.empty(count, dtype=np.int64)
+    answer = np.empty(values.shape, dtype=np.int32)
+    for index in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            answer[index, k] = place[values[index, k]]
+            found[answer[index, k]] = values[index, k]
+    return found, answer
+
+
+@njit(**_OPTIONS)
+def integrate_flat_facets(low, high, points, facets, film, load, area):
+    """Straight triangles of a range: upper film matrices, loads and areas."""
+    for facet in range(low, high):
+        p0, p1, p2 = facets[facet, 0], facets[facet, 1], facets[facet, 2]
+        ox, oy, oz = points[p0, 0], points[p0, 1], points[p0, 2]
+        ax, ay, az = points[p1, 0] - ox, points[p1, 1] - oy, points[p1, 2] - oz
+        bx, by, bz = points[p2, 0] - ox, points[p2, 1] - oy, points[p2, 2] - oz
+        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        size = 0.5 * np.sqrt(x * x + y * y + z * z)
+        area[facet] = size
+        load[facet, 0] = load[facet, 1] = load[facet, 2] = size / 3.0
+        film[facet, 0] = film[facet, 3] = film[facet, 5] = size / 6.0
+        film[facet, 1] = film[facet, 2] = film[facet, 4] = size / 12.0
+
+
+@njit(**_OPTIONS)
+def add_films(active, coefficient, film, slots, upper):
+    """Add each active facet's film matrix times its coefficient to the upper entries."""
+    for facet in active:
+        for pair in range(film.shape[1]):
+            upper[slots[facet, pair]] += coefficient[facet] * film[facet, pair]
+
+
+@njit(**_OPTIONS)
+def scale_by_part(low, high, part_of_slot, factors, unit, out):
+    """``out = factor of the part · unit``; zero where there is no part."""
+    for place in range(low, high):
+        part = part_of_slot[place]
+        out[place] = factors[part] * unit[place] if part >= 0 else 0.0
+
+
+@njit(**_OPTIONS)
+def gather(low, high, values, places, out):
+    """``out = values[places]`` on a range."""
+    for index in range(low, high):
+        out[index] = values[places[index]]
 
 
 @njit(**_OPTIONS)
@@ -150,20 +258,16 @@ def add_element_values(low, high, elements, values, others, indptr, indices, out
 
 
 @njit(**_OPTIONS)
-def add_linear_elements(
-    low, high, points, elements, part_of_element, n_parts, indptr, indices, conduction, storage, load
-):
-    """Unit conduction, storage and load of straight linear tetrahedra, for rows in a range.
+def integrate_linear(low, high, points, elements, part_of_element, n_parts, values):
+    """Straight linear tetrahedra of a range: off-diagonal conduction and volume, (n_elements, 7).
 
-    Returns the volume of each part, of elements whose first node is in the
-    range, and how many of these are inverted.
+    Pairs of nodes come as 01, 23, 02, 13, 03, 12. Returns the volume of each part
+    and how many elements are inverted.
     """
     volume = np.zeros(n_parts)
     inverted = 0
-    for e in range(elements.shape[0]):
+    for e in range(low, high):
         p0, p1, p2, p3 = elements[e, 0], elements[e, 1], elements[e, 2], elements[e, 3]
-        if not (low <= p0 < high or low <= p1 < high or low <= p2 < high or low <= p3 < high):
-            continue
         ox, oy, oz = points[p0, 0], points[p0, 1], points[p0, 2]
         ax, ay, az = points[p1, 0] - ox, points[p1, 1] - oy, points[p1, 2] - oz
         bx, by, bz = points[p2, 0] - ox, points[p2, 1] - oy, points[p2, 2] - oz
@@ -174,51 +278,104 @@ def add_linear_elements(
         g3x, g3y, g3z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
         g0x, g0y, g0z = -g1x - g2x - g3x, -g1y - g2y - g3y, -g1z - g2z - g3z
         determinant = ax * g1x + ay * g1y + az * g1z
-        if low <= p0 < high:
-            inverted += determinant <= 0.0
-            volume[part_of_element[e]] += determinant / 6.0
-            load[p0] += determinant / 24.0
-        if low <= p1 < high:
-            load[p1] += determinant / 24.0
-        if low <= p2 < high:
-            load[p2] += determinant / 24.0
-        if low <= p3 < high:
-            load[p3] += determinant / 24.0
+        inverted += determinant <= 0.0
+        volume[part_of_element[e]] += determinant / 6.0
         scale = 1.0 / (6.0 * determinant)
-        own, other = determinant / 60.0, determinant / 120.0
-        if low <= p0 < high:
-            at = indptr[p0]
-            conduction[at] += scale * (g0x * g0x + g0y * g0y + g0z * g0z)
-            storage[at] += own
-        if low <= p1 < high:
-            at = indptr[p1]
-            conduction[at] += scale * (g1x * g1x + g1y * g1y + g1z * g1z)
-            storage[at] += own
-        if low <= p2 < high:
-            at = indptr[p2]
-            conduction[at] += scale * (g2x * g2x + g2y * g2y + g2z * g2z)
-            storage[at] += own
-        if low <= p3 < high:
-            at = indptr[p3]
-            conduction[at] += scale * (g3x * g3x + g3y * g3y + g3z * g3z)
-            storage[at] += own
-        for row, column, value in (
-            (p0, p1, g0x * g1x + g0y * g1y + g0z * g1z),
-            (p0, p2, g0x * g2x + g0y * g2y + g0z * g2z),
-            (p0, p3, g0x * g3x + g0y * g3y + g0z * g3z),
-            (p1, p2, g1x * g2x + g1y * g2y + g1z * g2z),
-            (p1, p3, g1x * g3x + g1y * g3y + g1z * g3z),
-            (p2, p3, g2x * g3x + g2y * g3y + g2z * g3z),
-        ):
-            if column < row:
-                row, column = column, row
-            if low <= row < high:
-                at = indptr[row] + 1
-                while indices[at] != column:
-                    at += 1
-                conduction[at] += scale * value
-                storage[at] += other
+        values[e, 0] = scale * (g0x * g1x + g0y * g1y + g0z * g1z)
+        values[e, 1] = scale * (g2x * g3x + g2y * g3y + g2z * g3z)
+        values[e, 2] = scale * (g0x * g2x + g0y * g2y + g0z * g2z)
+        values[e, 3] = scale * (g1x * g3x + g1y * g3y + g1z * g3z)
+        values[e, 4] = scale * (g0x * g3x + g0y * g3y + g0z * g3z)
+        values[e, 5] = scale * (g1x * g2x + g1y * g2y + g1z * g2z)
+        values[e, 6] = determinant / 6.0
     return volume, inverted
+
+
+@njit(**_OPTIONS)
+def fill_linear_rows(
+    low, high, elements, starts, members, values, part, extra_starts, extra, load,
+    counts, indices, part_of_slot, conduction, storage,
+):  # fmt: skip
+    """Upper rows of straight linear elements: columns from the diagonal on and all that goes with them.
+
+    ``members`` and ``values`` are those of :func:`elements_of_nodes` and
+    :func:`integrate_linear`. Columns of joints get nothing but their place. Returns
+    the entries, -1 when the space is too small.
+    """
+    one, two, three = np.uint32(1), np.uint32(2), np.uint32(3)
+    # conduction and storage by column; those left of the diagonal are summed too and never looked at
+    sums = np.zeros((starts.size, 2))
+    last = np.zeros(starts.size, dtype=np.uint32)
+    seen = np.empty(256, dtype=np.uint32)
+    end = 0
+    for i in range(np.uint32(low), np.uint32(high)):
+        most = 3 * (starts[i + 1] - starts[i]) + extra_starts[i + 1] - extra_starts[i]
+        # one place more is written to
+        if end + most + 2 > indices.size:
+            return -1
+        if most > seen.size:
+            seen = np.empty(2 * most, dtype=np.uint32)
+        around = volume = 0.0
+        count = np.uint32(0)
+        for place in range(starts[i], starts[i + 1]):
+            e, own = members[place] >> two, members[place] & three
+            volume += values[e, 6]
+            share = values[e, 6] / 20.0
+            # own and another node of an element give the place of their pair without a branch
+            j = elements[e, own ^ one]
+            value = values[e, own >> one]
+            around -= value
+            sums[j, 0] += value
+            sums[j, 1] += share
+            seen[count] = j
+            last[j] = count
+            j = elements[e, own ^ two]
+            value = values[e, two + (own & one)]
+            around -= value
+            sums[j, 0] += value
+            sums[j, 1] += share
+            seen[count + one] = j
+            last[j] = count + one
+            j = elements[e, own ^ three]
+            value = values[e, two + two + ((own ^ (own >> one)) & one)]
+            around -= value
+            sums[j, 0] += value
+            sums[j, 1] += share
+            seen[count + two] = j
+            last[j] = count + two
+            count += three
+        count = _see_extra(extra_starts[i], extra_starts[i + 1], extra, seen, last, count)
+        begin = end
+        indices[begin] = i
+        kept = _keep_right(i, seen, last, count)
+        _rank(seen, kept, indices, begin + 1)
+        end += 1 + kept
+        conduction[begin], storage[begin] = around, volume / 10.0
+        load[i] = 0.25 * volume
+        part_of_slot[begin] = part[i]
+        for place in range(begin + 1, end):
+            j = indices[place]
+            conduction[place], storage[place] = sums[j, 0], sums[j, 1]
+            part_of_slot[place] = part[i] if part[j] == part[i] else -1
+            sums[j, 0] = sums[j, 1] = 0.0
+        counts[i + 1] = end - begin
+    return end
+
+
+@njit(**_OPTIONS)
+def group(label, size):
+    """Which members each label has: (size + 1,) starts and members, rising."""
+    starts = np.zeros(size + 1, dtype=np.int32)
+    for i in range(label.size):
+        starts[label[i] + np.uint32(1)] += 1
+    for k in range(size):
+        starts[k + 1] += starts[k]
+    place = starts[:-1].copy()
+    members = np.empty(label.size, dtype=np.int32)
+    for i in range(label.size):
+        members[place[label[i]]] = i
+        place[label[i]] += 1
+    return starts, members
 
 
 @njit(**_OPTIONS)

@@ -13,6 +13,8 @@ import numpy as np
 from numba import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+# Entries in every row of a prolongation.
+WIDTH = 4
 _FAST = {**_OPTIONS, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 
 
@@ -79,188 +81,134 @@ def turn(low, high, factor, direction, preconditioned):
         direction[i] = preconditioned[i] + factor * direction[i]
 
 
-# ------------------------------------------------------ Gauss-Seidel smoothing
+# ------------------------------------------------------ polynomial smoothing
+# Every pass is one product with what belongs to it: d is a direction, r a residual, x the unknowns.
 @njit(**_FAST)
-def forward_from_zero(low, high, starts, columns, values, diagonal, inverse, right, unknowns):
-    """Forward sweep over all rows from zero."""
+def begin_scaled(low, high, scale, factor, inverse, residual, right, direction):
+    """``b = scale r`` in the precision of b, and ``d = factor D⁻¹ b``."""
+    for i in range(low, high):
+        value = right.dtype.type(scale * residual[i])
+        right[i] = value
+        direction[i] = factor * inverse[i] * value
+
+
+@njit(**_FAST)
+def begin(low, high, factor, inverse, right, direction):
+    """``d = factor D⁻¹ b``."""
+    for i in range(low, high):
+        direction[i] = factor * inverse[i] * right[i]
+
+
+@njit(**_FAST)
+def go_on(low, high, starts, columns, values, inverse, right, direction, keep, add, left, following):
+    """``r = b − A d`` and the next direction ``keep d + add D⁻¹ r``."""
     for i in range(low, high):
         total = right[i]
-        for place in range(starts[i], diagonal[i]):
-            total -= values[place] * unknowns[columns[place]]
-        unknowns[i] = total * inverse[i]
+        for place in range(starts[i], starts[i + 1]):
+            total -= values[place] * direction[columns[place]]
+        left[i] = total
+        following[i] = keep * direction[i] + add * inverse[i] * total
 
 
 @njit(**_FAST)
-def residual_after_forward(low, high, starts, columns, values, diagonal, unknowns, out):
-    """Residual after :func:`forward_from_zero`: what the sweep did not see."""
+def end_from_zero(
+    low, high, starts, columns, values, right, left, first, second, weight, other, unknowns, rest
+):
+    """``x = weight d₁ + other d₂`` and ``b − A x`` where ``r = b − A d₁`` is known."""
     for i in range(low, high):
         total = values.dtype.type(0.0)
-        for place in range(diagonal[i] + 1, starts[i + 1]):
-            total -= values[place] * unknowns[columns[place]]
-        out[i] = total
+        for place in range(starts[i], starts[i + 1]):
+            total += values[place] * second[columns[place]]
+        rest[i] = right[i] - weight * (right[i] - left[i]) - other * total
+        unknowns[i] = weight * first[i] + other * second[i]
 
 
 @njit(**_FAST)
-def backward(low, high, starts, columns, values, inverse, right, unknowns):
-    """Backward sweep over all rows."""
-    for i in range(high - 1, low - 1, -1):
+def begin_again(low, high, starts, columns, values, inverse, right, unknowns, factor, left, direction):
+    """``r = b − A x`` and ``d = factor D⁻¹ r``."""
+    for i in range(low, high):
         total = right[i]
         for place in range(starts[i], starts[i + 1]):
             total -= values[place] * unknowns[columns[place]]
-        unknowns[i] += total * inverse[i]
+        left[i] = total
+        direction[i] = factor * inverse[i] * total
+
+
+@njit(**_FAST)
+def end(
+    low,
+    high,
+    starts,
+    columns,
+    values,
+    inverse,
+    left,
+    direction,
+    weight,
+    other,
+    keep,
+    add,
+    unknowns,
+    scale,
+    out,
+):
+    """``out = scale (x + weight d + other (keep d + add D⁻¹ (r − A d)))``."""
+    for i in range(low, high):
+        total = left[i]
+        for place in range(starts[i], starts[i + 1]):
+            total -= values[place] * direction[columns[place]]
+        following = keep * direction[i] + add * inverse[i] * total
+        out[i] = scale * (unknowns[i] + weight * direction[i] + other * following)
+
+
+@njit(**_FAST)
+def add_prolonged(low, high, columns, values, vector, out):
+    """``out += P vector`` with as many entries in every row, (n, WIDTH)."""
+    for i in range(low, high):
+        total = values[i, 0] * vector[columns[i, 0]]
+        for k in range(1, WIDTH):
+            total += values[i, k] * vector[columns[i, k]]
+        out[i] += total
 
 
 # The same for several columns (n, m) at once: each entry of the matrix is read once for all.
 @njit(**_FAST)
-def forward_many(starts, columns, values, diagonal, inverse, right, unknowns):
-    """:func:`forward_from_zero` for several columns."""
-    m = right.shape[1]
-    for i in range(right.shape[0]):
-        for c in range(m):
-            unknowns[i, c] = right[i, c]
-        for place in range(starts[i], diagonal[i]):
-            j, value = columns[place], values[place]
-            for c in range(m):
-                unknowns[i, c] -= value * unknowns[j, c]
-        for c in range(m):
-            unknowns[i, c] *= inverse[i]
-
-
-@njit(**_FAST)
-def residual_many(starts, columns, values, diagonal, unknowns, out):
-    """:func:`residual_after_forward` for several columns."""
+def multiply_many(low, high, starts, columns, values, vectors, out):
+    """``out = A vectors`` on a range of rows."""
     m = out.shape[1]
-    for i in range(out.shape[0]):
+    for i in range(low, high):
         for c in range(m):
             out[i, c] = 0.0
-        for place in range(diagonal[i] + 1, starts[i + 1]):
-            j, value = columns[place], values[place]
-            for c in range(m):
-                out[i, c] -= value * unknowns[j, c]
-
-
-@njit(**_FAST)
-def backward_many(starts, columns, values, inverse, right, unknowns):
-    """:func:`backward` for several columns."""
-    m = right.shape[1]
-    total = np.empty(m, dtype=values.dtype)
-    for i in range(right.shape[0] - 1, -1, -1):
-        for c in range(m):
-            total[c] = right[i, c]
-        for place in range(starts[i], starts[i + 1]):
-            j, value = columns[place], values[place]
-            for c in range(m):
-                total[c] -= value * unknowns[j, c]
-        for c in range(m):
-            unknowns[i, c] += total[c] * inverse[i]
-
-
-@njit(**_FAST)
-def add_product_many(starts, columns, values, vectors, out):
-    """``out += A vectors`` for several columns."""
-    m = out.shape[1]
-    for i in range(out.shape[0]):
         for place in range(starts[i], starts[i + 1]):
             j, value = columns[place], values[place]
             for c in range(m):
                 out[i, c] += value * vectors[j, c]
 
 
-# The same by threads: each sweeps over its part of the rows, rows[low:high], and takes
-# what other parts had before. Half of the couplings with other parts is added to the
-# diagonal, which keeps the sweep convergent however strong they are.
-@njit(**_OPTIONS)
-def divide(starts, columns, values, n_parts):
-    """Connected parts of about equal size: slices of a breadth-first order from one end."""
-    n = starts.size - 1
-    order = np.empty(n, dtype=np.uint32)
-    first = 0
-    for _ in range(2):
-        seen = np.zeros(n, dtype=np.uint8)
-        end = 0
-        seed = first
-        for candidate in range(-1, n):
-            if candidate >= 0:
-                if seen[candidate]:
-                    continue
-                seed = candidate
-            seen[seed] = 1
-            order[end] = seed
-            at = end
-            end += 1
-            while at < end:
-                i = order[at]
-                at += 1
-                for place in range(starts[i], starts[i + 1]):
-                    j = columns[place]
-                    if not seen[j] and values[place] != 0.0:
-                        seen[j] = 1
-                        order[end] = j
-                        end += 1
-        # the last one reached lies at an end
-        first = order[n - 1]
-    part = np.empty(n, dtype=np.uint8)
-    for place in range(n):
-        part[order[place]] = place * n_parts // n
-    return part
-
-
-@njit(**_OPTIONS)
-def inverse_of_parts(starts, columns, values, diagonal, part, inverse):
-    """Inverse of the diagonal and half of the couplings with other parts."""
-    for i in range(diagonal.size):
-        total = values[diagonal[i]]
+@njit(**_FAST)
+def step_many(low, high, starts, columns, values, inverse, right, vectors, keep, add, left, following):
+    """``r = b − A d`` and ``keep d + add D⁻¹ r`` on a range of rows."""
+    m = right.shape[1]
+    for i in range(low, high):
+        for c in range(m):
+            left[i, c] = right[i, c]
         for place in range(starts[i], starts[i + 1]):
-            if part[columns[place]] != part[i]:
-                total += 0.5 * abs(values[place])
-        inverse[i] = 1.0 / total
+            j, value = columns[place], values[place]
+            for c in range(m):
+                left[i, c] -= value * vectors[j, c]
+        factor = add * inverse[i]
+        for c in range(m):
+            following[i, c] = keep * vectors[i, c] + factor * left[i, c]
 
 
 @njit(**_FAST)
-def forward_part(low, high, rows, part, starts, columns, values, diagonal, inverse, right, unknowns):
-    """Forward sweep over a part from zero; other parts count as zero."""
-    own = part[rows[low]]
-    for k in range(low, high):
-        i = rows[k]
-        total = right[i]
-        for place in range(starts[i], diagonal[i]):
-            j = columns[place]
-            if part[j] == own:
-                total -= values[place] * unknowns[j]
-        unknowns[i] = total * inverse[i]
-
-
-@njit(**_FAST)
-def residual_of_part(low, high, rows, part, starts, columns, values, diagonal, unknowns, out):
-    """Residual after :func:`forward_part` in every part."""
-    own = part[rows[low]]
-    for k in range(low, high):
-        i = rows[k]
-        total = shift = values.dtype.type(0.0)
-        for place in range(starts[i], diagonal[i]):
-            j = columns[place]
-            if part[j] != own:
-                total -= values[place] * unknowns[j]
-                shift += abs(values[place])
-        for place in range(diagonal[i] + 1, starts[i + 1]):
-            j = columns[place]
-            total -= values[place] * unknowns[j]
-            if part[j] != own:
-                shift += abs(values[place])
-        out[i] = total + values.dtype.type(0.5) * shift * unknowns[i]
-
-
-@njit(**_FAST)
-def backward_part(low, high, rows, part, starts, columns, values, inverse, right, before, unknowns):
-    """Backward sweep over a part; other parts keep what they had ``before``."""
-    own = part[rows[low]]
-    for k in range(high - 1, low - 1, -1):
-        i = rows[k]
-        total = right[i]
-        for place in range(starts[i], starts[i + 1]):
-            j = columns[place]
-            total -= values[place] * (unknowns[j] if part[j] == own else before[j])
-        unknowns[i] += total * inverse[i]
+def add_prolonged_many(low, high, columns, values, vectors, out):
+    """``out += P vectors`` on a range of rows, P as in :func:`add_prolonged`."""
+    for i in range(low, high):
+        for k in range(WIDTH):
+            j, value = columns[i, k], values[i, k]
+            for c in range(out.shape[1]):
+                out[i, c] += value * vectors[j, c]
 
 
 @njit(**_FAST)
@@ -271,19 +219,26 @@ def scaled_copy(low, high, factor, vector, out):
 
 
 @njit(**_OPTIONS)
-def find_diagonal(starts, columns, values, diagonal, inverse):
-    """Place of each row's diagonal and its inverse."""
-    for i in range(diagonal.size):
+def invert_diagonal(low, high, starts, columns, values, largest, inverse, smoothing):
+    """Inverse of each row's diagonal, and the one that smoothing scales by.
+
+    That is smaller where the row's sizes add up to more than ``largest`` times the
+    diagonal: no eigenvalue of the scaled matrix is then above it (Gershgorin).
+    """
+    for i in range(low, high):
+        diagonal = size = 0.0
         for place in range(starts[i], starts[i + 1]):
-            if columns[place] == i:
-                diagonal[i] = place
-                inverse[i] = 1.0 / values[place]
+            value = values[place]
+            size += abs(value)
+            diagonal = value if columns[place] == i else diagonal
+        inverse[i] = 1.0 / diagonal
+        smoothing[i] = min(1.0 / diagonal, largest / size)
 
 
 # -------------------------------------------------------- smoothed aggregation
 @njit(**_OPTIONS)
 def aggregate(indptr, indices, data):
-    """Aggregate of each row; -1 for rows coupled with nothing. Also returns their number.
+    """Aggregate of each row, and their number, which is also that of rows coupled with nothing.
 
     Roots take all their neighbours where none is taken yet; what is left joins
     the neighbour it is coupled with most strongly.
@@ -330,62 +285,107 @@ def aggregate(indptr, indices, data):
         if coupled:
             label[i] = count
             count += 1
+    for i in range(n):
+        if label[i] < 0:
+            label[i] = count
     return label, count
 
 
 @njit(**_OPTIONS)
 def smoothed_prolongation(
-    low, high, starts, columns, values, diagonal, label, damping, size, counts, new_columns, new_values
+    low, high, starts, columns, values, inverse, label, damping, size, new_columns, new_values
 ):
-    """Rows of ``(I − damping D⁻¹ A) T`` with T constant on each aggregate; returns the entries.
+    """Rows of ``(I − damping D⁻¹ A) T`` with T constant on each aggregate, (n, WIDTH).
 
-    Returns -1 when the space is too small, as :func:`product_rows` does.
+    A row keeps its largest entries, scaled so that their sum stays what it was;
+    a row with fewer is filled with zeros.
     """
-    mark = np.full(size, -1, dtype=np.int32)
-    end = 0
+    # sums by aggregate, and the row that last had it: what a row has is found without a branch
+    sums = np.zeros(size + 1)
+    last = np.full(size + 1, -1, dtype=np.int64)
+    found = np.empty(size + 2, dtype=np.uint32)
     for i in range(low, high):
-        begin = end
-        if begin + starts[i + 1] - starts[i] > new_columns.size:
-            return -1
-        factor = -damping / values[diagonal[i]]
+        factor = -damping * inverse[i]
+        count = np.uint32(0)
         for place in range(starts[i], starts[i + 1]):
-            j = columns[place]
-            value = values[place]
-            coarse = label[j]
-            if value == 0.0 or coarse < 0:
-                continue
-            value = factor * value
-            if j == i:
-                value += 1.0
-            if mark[coarse] >= begin:
-                new_values[mark[coarse]] += value
-            else:
-                mark[coarse] = end
-                new_columns[end] = coarse
-                new_values[end] = value
-                end += 1
-        counts[i + 1] = end - begin
-    return end
+            coarse = label[columns[place]]
+            found[count] = coarse
+            count += np.uint32(last[coarse] != i)
+            last[coarse] = i
+            sums[coarse] += factor * values[place]
+        sums[label[i]] += 1.0
+        # rows of no aggregate have nothing to interpolate from
+        sums[size] = 0.0
+        scale = 1.0
+        if count > WIDTH:
+            whole = kept = 0.0
+            for k in range(count):
+                whole += sums[found[k]]
+            for k in range(WIDTH):
+                largest = k
+                for at in range(k + 1, count):
+                    if abs(sums[found[at]]) > abs(sums[found[largest]]):
+                        largest = at
+                found[k], found[largest] = found[largest], found[k]
+                kept += sums[found[k]]
+            if kept != 0.0:
+                scale = whole / kept
+        for k in range(WIDTH):
+            # fillers name what the row has anyway: products get no entries from them
+            coarse = found[k] if k < count else found[0]
+            new_columns[i, k] = coarse if coarse < size else np.uint32(0)
+            new_values[i, k] = scale * sums[coarse] if k < count else 0.0
+        for k in range(count):
+            sums[found[k]] = 0.0
 
 
 @njit(**_OPTIONS)
-def transpose(indptr, indices, data, n_columns):
-    """Compressed rows of the transpose."""
+def transpose_fixed(columns, values, n_columns):
+    """Compressed rows of the transpose of (n, WIDTH) rows, without their zeros."""
     starts = np.zeros(n_columns + 1, dtype=np.int32)
-    for place in range(indices.size):
-        starts[indices[place] + 1] += 1
+    for i in range(columns.shape[0]):
+        for k in range(WIDTH):
+            starts[columns[i, k] + np.uint32(1)] += values[i, k] != 0.0
     for i in range(n_columns):
         starts[i + 1] += starts[i]
     place_of = starts[:-1].copy()
-    rows = np.empty(indices.size, dtype=np.int32)
-    values = np.empty(data.size, dtype=data.dtype)
-    for i in range(indptr.size - 1):
-        for place in range(indptr[i], indptr[i + 1]):
-            j = indices[place]
-            rows[place_of[j]] = i
-            values[place_of[j]] = data[place]
-            place_of[j] += 1
-    return starts, rows, values
+    rows = np.empty(starts[n_columns], dtype=np.int32)
+    weights = np.empty(starts[n_columns], dtype=values.dtype)
+    for i in range(columns.shape[0]):
+        for k in range(WIDTH):
+            if values[i, k] != 0.0:
+                place = place_of[columns[i, k]]
+                rows[place] = i
+                weights[place] = values[i, k]
+                place_of[columns[i, k]] += 1
+    return starts, rows, weights
+
+
+@njit(**_OPTIONS)
+def times_fixed(
+    low, high, starts, columns, values, fixed_columns, fixed_values, size, counts, new_columns, new_values
+):
+    """Rows of ``A P`` with P of (n, WIDTH) rows; returns the entries, -1 when the space is too small."""
+    sums = np.zeros(size)
+    last = np.full(size, -1, dtype=np.int64)
+    end = np.uint64(0)
+    for i in range(low, high):
+        begin = end
+        if begin + np.uint64(WIDTH) * np.uint64(starts[i + 1] - starts[i]) >= np.uint64(new_columns.size):
+            return -1
+        for place in range(starts[i], starts[i + 1]):
+            j, weight = columns[place], values[place]
+            for k in range(WIDTH):
+                coarse = fixed_columns[j, k]
+                new_columns[end] = coarse
+                end += np.uint64(last[coarse] != i)
+                last[coarse] = i
+                sums[coarse] += weight * fixed_values[j, k]
+        for place in range(begin, end):
+            new_values[place] = sums[new_columns[place]]
+            sums[new_columns[place]] = 0.0
+        counts[i + 1] = end - begin
+    return np.int64(end)
 
 
 @njit(**_OPTIONS)
@@ -419,13 +419,3 @@ def product_rows(
                     end += 1
         counts[i + 1] = end - begin
     return end
-
-
-@njit(**_OPTIONS)
-def sort_rows(starts, columns, values):
-    """Sort each compressed row by its columns."""
-    for i in range(starts.size - 1):
-        begin, end = starts[i], starts[i + 1]
-        order = np.argsort(columns[begin:end])
-        columns[begin:end] = columns[begin:end][order]
-        values[begin:end] = values[begin:end][order]

@@ -18,6 +18,7 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
 
 from spindle_fem.conduction.skfem_mesh import ELEMENT_QUADRATURE_DEGREE, FACET_QUADRATURE_DEGREE
+from spindle_fem.conduction.threads import use_compiled
 from spindle_fem.errors import MeshQualityError
 
 CHUNK = 16384
@@ -252,8 +253,10 @@ class FacetIntegrals:
 
 def integrate_facets(points: NDArray[np.float64], facets: NDArray[np.int64], order: int) -> FacetIntegrals:
     """Film matrices with unit coefficient on facets, (n_facets, 6) curved or (n_facets, 3) straight."""
-    table = triangle_table(order)
     is_flat = facets.shape[1] == 3
+    if is_flat and order == 1 and use_compiled(len(points)):
+        return _flat_facets(points, facets)
+    table = triangle_table(order)
     geometry = triangle_table(1).gradients[:1] if is_flat else triangle_table(2).gradients
     nodes = points[facets]
     tangents = [[nodes[:, :, i] @ geometry[:, :, k].T for i in range(3)] for k in range(2)]
@@ -269,3 +272,12 @@ def integrate_facets(points: NDArray[np.float64], facets: NDArray[np.int64], ord
         tables = tuple(each.sum(axis=0, keepdims=True) for each in tables)
     film, load, area = (area_element @ each for each in tables)
     return FacetIntegrals(film, load, area[:, 0])
+
+
+def _flat_facets(points: NDArray[np.float64], facets: NDArray[np.int64]) -> FacetIntegrals:
+    from spindle_fem.conduction.compiled_assembly import integrate_flat_facets
+
+    n = len(facets)
+    answer = FacetIntegrals(np.empty((n, 6)), np.empty((n, 3)), np.empty(n))
+    integrate_flat_facets(0, n, points, facets, answer.film, answer.load, answer.area)
+    return answer

@@ -14,6 +14,7 @@ from spindle_fem.conduction.elements import (
     is_straight,
     upper_pairs,
 )
+from spindle_fem.conduction.memory import room
 from spindle_fem.conduction.pattern import SymmetricPattern, build_pattern
 from spindle_fem.conduction.threads import fill_rows, row_blocks, run_blocks, unsigned, use_compiled
 from spindle_fem.errors import MeshQualityError, MeshTagError
@@ -34,7 +35,7 @@ class MeshIntegrals:
     ----------
     pattern : SymmetricPattern
     part_of_unknown : (n_unknowns,) int32 ndarray
-    part_of_slot : (n_upper,) int32 ndarray
+    part_of_slot : (n_upper,) int16 ndarray
         -1 where only a joint couples.
     conduction, storage : (n_upper,) ndarray, [m], [m³]
     circumferential : (n_upper,) ndarray or None, [m]
@@ -47,7 +48,7 @@ class MeshIntegrals:
 
     pattern: SymmetricPattern
     part_of_unknown: NDArray[np.int32]
-    part_of_slot: NDArray[np.int32]
+    part_of_slot: NDArray[np.int16]
     conduction: NDArray[np.float64]
     storage: NDArray[np.float64]
     circumferential: NDArray[np.float64] | None
@@ -138,7 +139,7 @@ def _in_numpy(
     groups = [(element_nodes[:, rows], element_nodes[:, columns]), _facet_pairs(facet_nodes)]
     groups += [_cross_pairs(facet_nodes, sides) for sides in joint_sides]
     pattern, (element_slots, facet_slots, *cross_slots) = build_pattern(n_unknowns, groups)
-    part_of_slot = np.full(pattern.n_upper, -1, dtype=np.int32)
+    part_of_slot = np.full(pattern.n_upper, -1, dtype=np.int16)
     part_of_slot[element_slots] = part[:, None]
     _require_facets(not np.any(part_of_slot[facet_slots] < 0))
     circumferential = None
@@ -181,43 +182,48 @@ def _compiled(
     part_of_unknown, shared = compiled.part_of_nodes(nodes, part, n_unknowns)
     _require_parts(part_of_unknown, bool(shared))
     crossings = [_cross_pairs(facet_nodes, sides) for sides in joint_sides]
-    pattern, upper = _compiled_pattern(nodes, n_unknowns, crossings)
-    blocks = row_blocks(n_unknowns)
-    conduction, storage = np.zeros(pattern.n_upper), np.zeros(pattern.n_upper)
+    joined = unsigned(*_upper_crossings(crossings, n_unknowns))
+    around = room(nodes.size, np.int32)
+    members = unsigned(compiled.elements_of_nodes(nodes, n_unknowns, around), around)
     load, volume = np.zeros(n_unknowns), np.zeros(len(mesh.part_names))
     straight = is_straight(mesh.points, tetrahedra) if order == 1 else np.zeros(len(tetrahedra), dtype=bool)
     if straight.any():
-        every = straight.all()
-        answers = run_blocks(
-            compiled.add_linear_elements,
-            blocks,
-            mesh.points,
-            nodes if every else nodes[straight],
-            part if every else part[straight],
-            len(mesh.part_names),
-            *upper,
-            conduction,
-            storage,
-            load,
+        values, volume = _straight_elements(mesh, nodes, part, straight)
+        given = (nodes, *members, values, part_of_unknown, *joined, load)
+        kinds = (np.int32, np.int16, np.float64, np.float64)
+        indptr, indices, part_of_slot, conduction, storage = fill_rows(
+            compiled.fill_linear_rows, n_unknowns, given, ENTRIES_OF_LINEAR, kinds
         )
-        _require_upright(sum(inverted for _, inverted in answers))
-        volume += sum(volumes for volumes, _ in answers)
+        del values, given
+    else:
+        given = (nodes, *members, *joined)
+        guess = ENTRIES_OF_LINEAR if order == 1 else ENTRIES_OF_QUADRATIC
+        indptr, indices = fill_rows(compiled.fill_upper, n_unknowns, given, guess, (np.int32,))
+        # parts share no node, so what couples two nodes of one part is an element
+        part_of_row = np.repeat(part_of_unknown.astype(np.int16), np.diff(indptr))
+        part_of_slot = np.where(part_of_row == part_of_unknown[indices], part_of_row, np.int16(-1))
+        conduction, storage = np.zeros(len(indices)), np.zeros(len(indices))
+    del members, around
+    upper = unsigned(indptr, indices)
+    blocks = row_blocks(n_unknowns)
     rest = np.flatnonzero(~straight)
     for start in range(0, len(rest), BATCH):
         chosen = rest[start : start + BATCH]
         integrals = integrate_elements(mesh.points, tetrahedra[chosen], order)
         both = (integrals.conduction, integrals.storage)
-        run_blocks(
-            compiled.add_element_values, blocks, nodes[chosen], *both, *upper, conduction, storage
-        )  # fmt: skip
+        run_blocks(compiled.add_element_values, blocks, nodes[chosen], *both, *upper, conduction, storage)
         load += np.bincount(nodes[chosen].ravel(), weights=integrals.load.ravel(), minlength=n_unknowns)
         volume += np.bincount(part[chosen], weights=integrals.volume, minlength=len(volume))
+    starts = compiled.full_starts(*upper)
+    full = room(int(starts[-1]), np.int32), room(int(starts[-1]), np.int32)
+    run_blocks(compiled.expand_upper, blocks, *upper, starts, *full)
+    pattern = SymmetricPattern(n_unknowns, len(indices), starts, *full)
     circumferential = None
     if circumferential_parts:
         circumferential, unused = np.zeros((2, pattern.n_upper))
-        around = np.flatnonzero(np.isin(part, circumferential_parts))
-        for start in range(0, len(around), BATCH):
-            chosen = around[start : start + BATCH]
+        own = np.flatnonzero(np.isin(part, circumferential_parts))
+        for start in range(0, len(own), BATCH):
+            chosen = own[start : start + BATCH]
             values = integrate_circumferential(mesh.points, tetrahedra[chosen], order)
             run_blocks(
                 compiled.add_element_values,
@@ -230,17 +236,16 @@ def _compiled(
                 unused,
             )
 
-    def find(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int32]:
-        slots = np.empty(rows.size, dtype=np.int32)
-        flat = unsigned(*(np.ascontiguousarray(item, dtype=np.int32).ravel() for item in (rows, columns)))
-        compiled.find_upper(*flat, *upper, slots)
-        return slots.reshape(rows.shape)
-
-    # parts share no node, so what couples two nodes of one part is an element
-    part_of_row = np.repeat(part_of_unknown, np.diff(upper[0].view(np.int32)))
-    part_of_slot = np.where(part_of_row == part_of_unknown[upper[1]], part_of_row, np.int32(-1))
-    facet_slots = find(*_facet_pairs(facet_nodes))
+    small_nodes = facet_nodes.astype(np.int32).view(np.uint32)
+    facet_slots = np.empty((len(facet_nodes), len(upper_pairs(facet_nodes.shape[1])[0])), dtype=np.int32)
+    run_blocks(compiled.find_facets, row_blocks(len(facet_nodes)), small_nodes, *upper, facet_slots)
     _require_facets(bool(np.all(facet_slots >= 0)) and bool(np.all(part_of_slot[facet_slots] >= 0)))
+    cross_slots = []
+    for one, other in joint_sides:
+        sides = small_nodes[one], small_nodes[other]
+        slots = np.empty((*sides[0].shape, sides[1].shape[1]), dtype=np.int32)
+        compiled.find_crossings(0, len(slots), *sides, *upper, slots)
+        cross_slots.append(slots)
     return MeshIntegrals(
         pattern,
         part_of_unknown,
@@ -251,28 +256,34 @@ def _compiled(
         load,
         volume,
         facet_slots,
-        [find(*pairs) for pairs in crossings],
+        cross_slots,
     )
 
 
-def _compiled_pattern(
-    nodes: NDArray[np.uint32],
-    n_unknowns: int,
-    crossings: list[tuple[NDArray[np.int64], NDArray[np.int64]]],
-) -> tuple[SymmetricPattern, tuple[NDArray[np.uint32], NDArray[np.uint32]]]:
-    """Pattern of elements and joints, and the compressed rows of its upper triangle."""
-    from spindle_fem.conduction import compiled_assembly as compiled
+def _straight_elements(
+    mesh: TaggedMesh, nodes: NDArray[np.uint32], part: NDArray[np.int32], straight: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What ``integrate_linear`` gives for straight elements, zeros for others; and the volume by part."""
+    from spindle_fem.conduction.compiled_assembly import integrate_linear
 
+    every = bool(straight.all())
+    chosen = nodes if every else nodes[straight]
+    values = room((len(chosen), 7))
+    given = (mesh.points, chosen, part if every else part[straight], len(mesh.part_names), values)
+    answers = run_blocks(integrate_linear, row_blocks(len(chosen)), *given)
+    _require_upright(sum(inverted for _, inverted in answers))
+    if not every:
+        own, values = values, np.zeros((len(nodes), 7))
+        values[straight] = own
+    return values, sum(volumes for volumes, _ in answers)
+
+
+def _upper_crossings(
+    crossings: list[tuple[NDArray[np.int64], NDArray[np.int64]]], n_unknowns: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Compressed rows of what joints couple, right of the diagonal."""
     low = np.concatenate([np.minimum(*pairs).ravel() for pairs in crossings] or [np.empty(0, np.int64)])
     high = np.concatenate([np.maximum(*pairs).ravel() for pairs in crossings] or [np.empty(0, np.int64)])
     extra = sparse.coo_array((np.ones(low.size, dtype=np.int8), (low, high)), shape=(n_unknowns, n_unknowns))
     extra = extra.tocsr()
-    shared = (
-        nodes,
-        *unsigned(*compiled.elements_of_nodes(nodes, n_unknowns)),
-        *unsigned(extra.indptr, extra.indices),
-    )
-    guess = ENTRIES_OF_LINEAR if nodes.shape[1] == 4 else ENTRIES_OF_QUADRATIC
-    indptr, indices = fill_rows(compiled.fill_upper, n_unknowns, shared, guess, with_values=False)
-    full = compiled.expand_upper(*unsigned(indptr, indices))
-    return SymmetricPattern(n_unknowns, len(indices), *full), unsigned(indptr, indices)
+    return extra.indptr, extra.indices

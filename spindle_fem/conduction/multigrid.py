@@ -25,7 +25,7 @@ from scipy.linalg import cho_factor, cho_solve
 from spindle_fem.conduction.threads import use_compiled
 
 if TYPE_CHECKING:
-    from spindle_fem.conduction.multigrid_compiled import SweptHierarchy
+    from spindle_fem.conduction.multigrid_compiled import CompiledHierarchy
 
 SMOOTHING_DEGREE = 2
 # The smoother damps eigenvalues from the largest down to this fraction of it.
@@ -92,7 +92,7 @@ class Hierarchy:
 
 def build_hierarchy(
     matrix: sparse.csr_array, prolongation: sparse.csr_array | None
-) -> Hierarchy | SweptHierarchy:
+) -> Hierarchy | CompiledHierarchy:
     """Hierarchy of a symmetric positive definite matrix; in compiled loops where they are worth it.
 
     Parameters
@@ -102,9 +102,9 @@ def build_hierarchy(
         From linear to quadratic temperatures; None when they are linear.
     """
     if use_compiled(matrix.shape[0]):
-        from spindle_fem.conduction.multigrid_compiled import build_swept_hierarchy
+        from spindle_fem.conduction.multigrid_compiled import build_compiled_hierarchy
 
-        return build_swept_hierarchy(matrix, prolongation)
+        return build_compiled_hierarchy(matrix, prolongation)
     import pyamg
 
     levels = []

@@ -16,6 +16,7 @@ from scipy import sparse
 from spindle_fem.conduction.elements import EDGES, integrate_facets
 from spindle_fem.conduction.integration import integrate_mesh
 from spindle_fem.conduction.thermal_operators import AREA_TOLERANCE, ThermalOperators, spread
+from spindle_fem.conduction.threads import use_compiled
 from spindle_fem.errors import MeshTagError, SpecError, UnknownSurfaceError, did_you_mean
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
@@ -117,6 +118,10 @@ def prolongation_from_corners(mesh: TaggedMesh) -> sparse.csr_array:
 
 def _distinct(slots: NDArray[np.int32], size: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Distinct values below ``size``, rising, and the place of each value among them."""
+    if use_compiled(size):
+        from spindle_fem.conduction.compiled_assembly import distinct
+
+        return distinct(slots, size)
     used = np.zeros(size, dtype=bool)
     used[slots] = True
     place = np.cumsum(used, dtype=np.int32)

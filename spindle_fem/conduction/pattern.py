@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from spindle_fem.conduction.memory import room
+from spindle_fem.conduction.threads import row_blocks, run_blocks, use_compiled
+
 
 @dataclass(frozen=True, slots=True)
 class SymmetricPattern:
@@ -43,9 +46,14 @@ class SymmetricPattern:
         ----------
         upper : (n_upper,) ndarray
         """
-        matrix = sparse.csr_array(
-            (upper[self.upper_of_full], self.indices, self.indptr), shape=(self.size, self.size), copy=False
-        )
+        if use_compiled(self.size):
+            from spindle_fem.conduction.compiled_assembly import gather
+
+            data = room(len(self.indices))
+            run_blocks(gather, row_blocks(len(data)), upper, self.upper_of_full, data)
+        else:
+            data = upper[self.upper_of_full]
+        matrix = sparse.csr_array((data, self.indices, self.indptr), shape=(self.size, self.size), copy=False)
         matrix.has_canonical_format = True
         return matrix
 

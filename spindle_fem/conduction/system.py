@@ -109,14 +109,11 @@ def merged(matrix: sparse.csr_array, tie: sparse.csr_array) -> sparse.csr_array:
     """
     if not use_compiled(matrix.shape[0]):
         return (tie.T @ matrix @ tie).tocsr()
-    from spindle_fem.conduction.compiled_assembly import merge_rows
+    from spindle_fem.conduction.compiled_assembly import group, merge_rows
 
     size = tie.shape[1]
-    label = tie.indices.astype(np.int32, copy=False)
-    members = np.argsort(label, kind="stable").astype(np.int32)
-    starts = np.zeros(size + 1, dtype=np.int32)
-    np.cumsum(np.bincount(label, minlength=size), out=starts[1:])
-    given = (*unsigned(starts, members, label, matrix.indptr, matrix.indices), matrix.data)
+    (label,) = unsigned(tie.indices)
+    given = (*unsigned(*group(label, size)), label, *unsigned(matrix.indptr, matrix.indices), matrix.data)
     indptr, columns, values = fill_rows(merge_rows, size, given, matrix.nnz / size)
     answer = sparse.csr_array((values, columns, indptr), shape=(size, size))
     answer.has_canonical_format = True

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from spindle_fem.conduction.elements import upper_pairs
+from spindle_fem.conduction.memory import room
 from spindle_fem.conduction.pattern import SymmetricPattern
+from spindle_fem.conduction.threads import row_blocks, run_blocks, use_compiled
 from spindle_fem.errors import MeshQualityError, SpecError, UnknownSurfaceError, did_you_mean
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
@@ -32,7 +34,7 @@ class ThermalOperators:
         1 or 2.
     n_unknowns : int
     pattern : SymmetricPattern
-    part_of_slot : (n_upper,) int32 ndarray
+    part_of_slot : (n_upper,) int16 ndarray
         Part of each upper entry; -1 where only a joint couples.
     part_of_unknown : (n_unknowns,) int32 ndarray
     conduction, storage : (n_upper,) ndarray, [m], [m³]
@@ -65,7 +67,7 @@ class ThermalOperators:
     order: int
     n_unknowns: int
     pattern: SymmetricPattern
-    part_of_slot: NDArray[np.int32]
+    part_of_slot: NDArray[np.int16]
     part_of_unknown: NDArray[np.int32]
     conduction: NDArray[np.float64]
     storage: NDArray[np.float64]
@@ -173,7 +175,7 @@ class ThermalOperators:
         circumferential_factor : (n_parts,) ndarray, optional, [-]
             Conductivity around the axis relative to the other directions.
         """
-        upper = self.conduction * np.append(conductivity, 0.0)[self.part_of_slot]
+        upper = self._scaled(self.conduction, conductivity)
         if circumferential_factor is not None and np.any(circumferential_factor != 1.0):
             if self.circumferential is None:
                 raise SpecError(
@@ -185,11 +187,29 @@ class ThermalOperators:
 
     def sum_storage(self, volumetric_capacity: NDArray[np.float64]) -> NDArray[np.float64]:
         """Upper entries of the capacity matrix; (n_parts,) [J/(m³·K)] in."""
-        return self.storage * np.append(volumetric_capacity, 0.0)[self.part_of_slot]
+        return self._scaled(self.storage, volumetric_capacity)
+
+    def _scaled(self, unit: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Each upper entry times the factor of its part."""
+        if not use_compiled(self.n_unknowns):
+            return unit * np.append(factors, 0.0)[self.part_of_slot]
+        from spindle_fem.conduction.compiled_assembly import scale_by_part
+
+        out = room(len(unit))
+        given = (self.part_of_slot, np.asarray(factors, dtype=float), unit, out)
+        run_blocks(scale_by_part, row_blocks(len(unit)), *given)
+        return out
 
     def add_films(self, upper: NDArray[np.float64], coefficient: NDArray[np.float64]) -> None:
         """Add ``Σ h_f R_f`` in place; ``coefficient`` (n_facets,) [W/(m²·K)] over all facets."""
         active = np.flatnonzero(coefficient)
+        if use_compiled(self.n_unknowns):
+            from spindle_fem.conduction.compiled_assembly import add_films
+
+            summed = np.zeros(len(self.facet_slots))
+            add_films(active, coefficient, self.facet_film, self.facet_inverse, summed)
+            upper[self.facet_slots] += summed
+            return
         weights = (coefficient[active, None] * self.facet_film[active]).ravel()
         summed = np.bincount(
             self.facet_inverse[active].ravel(), weights=weights, minlength=len(self.facet_slots)

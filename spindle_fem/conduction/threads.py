@@ -14,6 +14,8 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.conduction.memory import room
+
 # Loading compiled code takes as long as it saves on so many unknowns.
 COMPILED_ABOVE = 40_000
 # A block of fewer rows costs more to hand over than it saves.
@@ -82,39 +84,52 @@ def run_blocks(function: Callable, bounds: NDArray[np.int64], *arguments: object
 
 
 def fill_rows(
-    function: Callable, n_rows: int, given: tuple, entries_a_row: float, *, with_values: bool = True
-) -> tuple[NDArray[np.int32], ...]:
-    """Compressed rows whose lengths are not known before: starts, columns and, unless told not to, values.
+    function: Callable,
+    n_rows: int,
+    given: tuple,
+    entries_a_row: float,
+    kinds: tuple[type, ...] = (np.int32, np.float64),
+) -> tuple[NDArray, ...]:
+    """Compressed rows whose lengths are not known before: starts, columns and what goes with them.
 
-    ``function(low, high, *given, counts, columns[, values])`` fills a range of rows,
-    writes row i's length to ``counts[i + 1]`` and returns how many entries it made, or
-    -1 when these did not fit.
+    ``function(low, high, *given, counts, columns, ...)`` fills a range of rows, writes
+    row i's length to ``counts[i + 1]`` and returns how many entries it made, or -1 when
+    these did not fit. ``kinds`` are the types of the columns and of the others.
     """
     counts = np.zeros(n_rows + 1, dtype=np.int32)
+    blocks = row_blocks(n_rows)
+    spaces = [int(entries_a_row * rows) + 1024 for rows in np.diff(blocks)]
+    while True:
+        begins = np.concatenate(([0], np.cumsum(spaces)))
+        parts = [room(int(begins[-1]), kind) for kind in kinds]
 
-    def fill(low: int, high: int) -> list[NDArray]:
-        space = int(entries_a_row * (high - low)) + 1024
-        while True:
-            parts = [np.empty(space, dtype=np.int32)]
-            if with_values:
-                parts.append(np.empty(space))
-            made = function(low, high, *given, counts, *parts)
-            if made >= 0:
-                for part in parts:
-                    part.resize(made, refcheck=False)
-                return parts
-            space += space // 2
+        def fill(low: int, high: int, begins: NDArray = begins, parts: list[NDArray] = parts) -> int:
+            k = int(np.searchsorted(blocks, low, side="right")) - 1
+            return function(low, high, *given, counts, *(part[begins[k] : begins[k + 1]] for part in parts))
 
-    blocks = run_blocks(fill, row_blocks(n_rows))
+        made = run_blocks(fill, blocks)
+        if min(made) >= 0:
+            break
+        spaces = [
+            space + (space // 2 if entries < 0 else 0) for space, entries in zip(spaces, made, strict=True)
+        ]
     # in 32 bits: numpy would sum in 64 and, in place, through a buffer
     starts = np.cumsum(counts, dtype=np.int32)
-    if len(blocks) == 1:
-        return starts, *blocks[0]
-    # one kind after the other, so that only that one is there twice
-    joined = []
-    while blocks[0]:
-        joined.append(np.concatenate([parts.pop(0) for parts in blocks]))
-    return starts, *joined
+    for part in parts:
+        end = made[0]
+        for begin, entries in zip(begins[1:-1], made[1:], strict=True):
+            _move(part, begin, end, entries)
+            end += entries
+    # the rest was never touched and takes no memory
+    return starts, *(part[: starts[-1]] for part in parts)
+
+
+def _move(array: NDArray, begin: int, to: int, count: int) -> None:
+    """Move a slice towards the front, in pieces that do not overlap themselves."""
+    gap = begin - to
+    for done in range(0, count if gap else 0, max(gap, 1)):
+        size = min(gap, count - done)
+        array[to + done : to + done + size] = array[begin + done : begin + done + size]
 
 
 def unsigned(*arrays: NDArray) -> tuple[NDArray[np.uint32], ...]:
