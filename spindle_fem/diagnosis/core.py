@@ -183,6 +183,10 @@ def _refit(problem: Problem, found: Sequence[Hypothesis]) -> list[Hypothesis]:
         for position, item in enumerate(ranked[:REFITTED])
         if position < ALWAYS_REFITTED or score[id(item)] > best - NEGLIGIBLE
     ]
+    # The slow error is another one by now: what the best set needs each member for is asked again.
+    members = ranked[0].keys
+    smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
+    chosen += [h for h in smaller if h not in chosen]
     chosen += [h for h in ranked if not h.fit.candidates and h not in chosen]
     fitted = [
         Hypothesis(problem.fit(item.fit.candidates, item.fit.values, iterations=12), item.log_prior)

@@ -81,13 +81,14 @@ def harmonics(operators: ThermalOperators, mean: Array) -> tuple[Array, Array]:
     Returns
     -------
     (n_unknowns,) ndarray, (n_unknowns,) ndarray
-        The same weights times the cosine and the sine of the angle from y: of
-        a field ``T`` the means of ``T cos`` and ``T sin``. As a load, 1 W of
-        it moves heat from one side to the other and adds nothing.
+        The same weights times the cosine and the sine of the angle from y, less
+        their means: of a field ``T`` the covariances with both. As a load, 1 W
+        of it moves heat from one side to the other and adds nothing.
     """
     x, y = operators.mesh.points[: operators.n_unknowns, :2].T
     radius = np.maximum(np.hypot(x, y), np.finfo(float).tiny)
-    return mean * y / radius, -mean * x / radius
+    up, across = y / radius, -x / radius
+    return mean * (up - mean @ up), mean * (across - mean @ across)
 
 
 def probe_slopes(operators: ThermalOperators, probes: Sequence[Probe]) -> sparse.csr_array:

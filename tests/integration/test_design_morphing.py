@@ -214,5 +214,5 @@ def test_the_way_of_meshing_is_part_of_what_a_row_is():
 
 
 def test_another_word_for_the_mesh_is_refused(tmp_path):
-    with pytest.raises(FaultsError, match=r"study.mesh.*\"stretched\".*new.*moved"):
+    with pytest.raises(FaultsError, match=r"study.mesh.*\"stretched\".*moved, new"):
         study(tmp_path, (5, 6), mesh="stretched")

@@ -14,6 +14,7 @@ from spindle_fem.reduced.affine import build_affine_system
 from spindle_fem.reduced.build import ReductionOptions, build_reduced_model, reduced_model_of
 from spindle_fem.reduced.drive import STANDARD, make_drive
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.probe_places import ACROSS, UP
 from spindle_fem.reduced.transient import simulate_fast
 from spindle_fem.simulate import fast_model_for, simulate_machine
 from spindle_fem.spec.load import load_machine
@@ -67,7 +68,9 @@ def test_reduced_operators_are_positive_and_hold_the_uniform_field(fast):
         values = np.linalg.eigvalsh(matrix)
         assert values[0] > -1e-9 * max(values[-1], 1e-300), name
     assert model.probes @ model.one == pytest.approx(1.0, abs=1e-9)
-    assert model.places @ model.one == pytest.approx(1.0, abs=1e-9)
+    sided = np.array([name.startswith((UP, ACROSS)) for name in model.place_names])
+    assert model.places[~sided] @ model.one == pytest.approx(1.0, abs=1e-9)
+    assert model.places[sided] @ model.one == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
