@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import os
+import threading
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -51,7 +52,7 @@ def gmsh_session(threads: int = 1) -> Iterator[Geometry]:
     import gmsh
     import pygmsh
 
-    with pygmsh.occ.Geometry() as geometry:
+    with _opened(pygmsh.occ.Geometry()) as geometry:
         # A configuration file of the user would change meshes behind our back.
         gmsh.option.restoreDefaults()
         gmsh.option.setNumber("General.Terminal", 0)
@@ -59,6 +60,23 @@ def gmsh_session(threads: int = 1) -> Iterator[Geometry]:
         gmsh.option.setNumber("General.NumThreads", threads)
         gmsh.option.setNumber("Geometry.OCCParallel", 1 if threads > 1 else 0)
         yield geometry
+
+
+@contextmanager
+def _opened(geometry: Geometry) -> Iterator[Geometry]:
+    """The environment; in a worker's thread without gmsh's handler of interrupts, which is the main one's."""
+    if threading.current_thread() is threading.main_thread():
+        with geometry:
+            yield geometry
+        return
+    import gmsh
+
+    gmsh.initialize([], interruptible=False)
+    gmsh.model.add("pygmsh model")
+    try:
+        yield geometry
+    finally:
+        geometry.__exit__()
 
 
 def build_solids(assembly: AssemblyGeometry, geometry: Geometry) -> SolidModel:
