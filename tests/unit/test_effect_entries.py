@@ -290,7 +290,7 @@ parameters = {friction_change = 0.5, onset_speed = "3600 rpm", width = "100 rpm"
 [[effect]]
 effect = "sensor_detached"
 component = "SP01"
-parameters = {share_of_air = 0.4, time = "9000 s", lag = "120 s"}
+parameters = {share_of_air = 0.4, time = "9000 s", time_in_air = "300 s"}
 [[effect]]
 effect = "ambient_drift"
 component = "ambient"
