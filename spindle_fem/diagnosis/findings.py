@@ -54,9 +54,10 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
         values = {c.name: c.at(u) for c, u in zip(fit.coordinates, draw, strict=True)}
         for name, item in effect.report(candidate, candidate_values(candidate, values)).items():
             samples[name].append(item.value)
-    for name in effect.law_sigma.keys() & samples.keys():
-        spread = np.exp(effect.law_sigma[name] * generator.standard_normal(DRAWS))
-        samples[name] = (np.array(samples[name]) * spread).tolist()
+    for name, sigma in effect.law_sigma.items():
+        if name in samples:
+            spread = np.exp(sigma * generator.standard_normal(DRAWS))
+            samples[name] = (np.array(samples[name]) * spread).tolist()
     found = {}
     for name, item in central.items():
         ends = np.quantile(samples[name], [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])

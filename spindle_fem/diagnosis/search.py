@@ -61,35 +61,36 @@ class Screened:
     families: Mapping[str, str] = field(default_factory=dict)
     boxed: BoxedColumns | None = None
     base: float = 0.0
+    # Of sets of one size: what was evaluated and its gains, asked for several times and dear within bounds.
+    _known: dict[int, tuple[NDArray[np.int64], Array]] = field(default_factory=dict, repr=False)
 
     def singles(self) -> Array:
         """Logarithm of the evidence of every variant alone over nothing, priors included, (m,)."""
-        sets = np.arange(len(self.variants))[:, None]
-        return self._gain(sets) if self.boxed is None else self._gain_within(sets)
+        return self._evaluated(1)[1]
 
     def _gain_within(self, sets: NDArray[np.int64]) -> Array:
         """Gain of sets (k, s) with the machine's coordinates between their bounds."""
         one_sided = self.signs != 0.0
         costs = np.array([self.boxed.cost(members, self.spread, one_sided) for members in sets])
-        return 0.5 * (self.base - costs) - self._price(sets)
+        return 0.5 * (self.base - costs) - self._price(sets, self._scaled(sets))
 
-    def _price(self, sets: NDArray[np.int64]) -> Array:
-        """What the amplitudes' room and the priors cost."""
+    def _scaled(self, sets: NDArray[np.int64]) -> Array:
+        """Posterior over prior precision of the amplitudes of sets, (k, s, s)."""
         spread = self.spread[sets]
-        scaled = spread[:, :, None] * self.gram[sets[:, :, None], sets[:, None, :]] * spread[:, None, :]
-        _, log_det = np.linalg.slogdet(scaled + np.eye(sets.shape[1]))
+        gram = self.gram[sets[:, :, None], sets[:, None, :]]
+        return spread[:, :, None] * gram * spread[:, None, :] + np.eye(sets.shape[1])
+
+    def _price(self, sets: NDArray[np.int64], scaled: Array) -> Array:
+        """What the amplitudes' room and the priors cost."""
+        _, log_det = np.linalg.slogdet(scaled)
         return 0.5 * log_det - np.log(2.0) * self.signs[sets].sum(axis=1) - self.log_prior[sets].sum(axis=1)
 
     def _gain(self, sets: NDArray[np.int64]) -> Array:
-        """The same for sets of equal size (k, s)."""
-        size = sets.shape[1]
-        gram = self.gram[sets[:, :, None], sets[:, None, :]]
-        data = self.data[sets]
-        spread = self.spread[sets]
-        scaled = spread[:, :, None] * gram * spread[:, None, :] + np.eye(size)
-        right = spread * data
+        """Gain of sets (k, s) of equal size, whatever the machine's coordinates have to do for it."""
+        scaled = self._scaled(sets)
+        right = self.spread[sets] * self.data[sets]
         solution = np.linalg.solve(scaled, right[:, :, None])[:, :, 0]
-        gain = 0.5 * np.sum(right * solution, axis=1) - self._price(sets)
+        gain = 0.5 * np.sum(right * solution, axis=1) - self._price(sets, scaled)
         allowed = np.all((self.signs[sets] == 0.0) | (solution >= 0.0), axis=1)
         return np.where(allowed, gain, -np.inf)
 
@@ -109,24 +110,7 @@ class Screened:
             1 to 3; triples extend the best pairs.
         number : int
         """
-        count = len(self.variants)
-        if size == 1:
-            sets = np.arange(count)[:, None]
-        elif size == 2:
-            first, second = np.triu_indices(count, 1)
-            sets = np.column_stack((first, second))
-        else:
-            pairs = [members for members, _ in self.best(2, KEPT_FOR_TRIPLES)]
-            sets = np.array([(*pair, third) for pair in pairs for third in range(count) if third not in pair])
-            if sets.size == 0:
-                return []
-        sets = sets[self._distinct(sets)]
-        if sets.size == 0:
-            return []
-        gain = np.concatenate([self._gain(chunk) for chunk in np.array_split(sets, 1 + len(sets) // 100_000)])
-        if self.boxed is not None:
-            sets = self._promising(sets, gain)
-            gain = self._gain_within(sets)
+        sets, gain = self._evaluated(size)
         found: dict[frozenset[tuple[str, str]], tuple[tuple[int, ...], float]] = {}
         places: dict[tuple[str, ...], int] = {}
         for index in np.argsort(-gain):
@@ -143,10 +127,35 @@ class Screened:
                 break
         return list(found.values())
 
+    def _evaluated(self, size: int) -> tuple[NDArray[np.int64], Array]:
+        """Sets of a size (k, s) and their gains (k,); the promising ones where bounds matter."""
+        if size not in self._known:
+            sets = self._sets(size)
+            if self.boxed is None or size > 1:
+                pieces = np.array_split(sets, 1 + len(sets) // 100_000)
+                gain = np.concatenate([self._gain(piece) for piece in pieces])
+            if self.boxed is not None:
+                sets = sets if size == 1 else self._promising(sets, gain)
+                gain = self._gain_within(sets)
+            self._known[size] = sets, gain
+        return self._known[size]
+
+    def _sets(self, size: int) -> NDArray[np.int64]:
+        """Every set of distinct variants, (k, s); triples of the best pairs."""
+        count = len(self.variants)
+        if size == 1:
+            return np.arange(count)[:, None]
+        if size == 2:
+            sets = np.column_stack(np.triu_indices(count, 1))
+        else:
+            pairs = [members for members, _ in self.best(2, KEPT_FOR_TRIPLES)]
+            sets = np.array(
+                [(*pair, third) for pair in pairs for third in range(count) if third not in pair], dtype=int
+            ).reshape(-1, 3)
+        return sets[self._distinct(sets)]
+
     def _promising(self, sets: NDArray[np.int64], gain: Array) -> NDArray[np.int64]:
         """Sets worth a bounded solution: the best without bounds, and those of good members."""
-        if sets.shape[1] == 1:
-            return sets
         good = np.zeros(len(self.variants), dtype=bool)
         good[np.argsort(-self.singles())[:GOOD_MEMBERS]] = True
         chosen = np.zeros(len(sets), dtype=bool)

@@ -6,15 +6,15 @@ from scipy.optimize import minimize
 
 from spindle_fem.diagnosis.linear import Box, BoxedColumns
 
-GENERATOR = np.random.default_rng(5)
 READINGS, COORDINATES, COLUMNS = 60, 4, 5
 
 
 def problem(room):
-    jacobian = GENERATOR.normal(size=(READINGS, COORDINATES))
-    residual = GENERATOR.normal(size=READINGS) + jacobian @ np.array([2.0, -1.0, 0.5, 0.0])
-    root = np.eye(COORDINATES) + 0.2 * np.triu(GENERATOR.normal(size=(COORDINATES, COORDINATES)), 1)
-    departure = root @ GENERATOR.normal(0.0, 0.3, COORDINATES)
+    generator = np.random.default_rng(5)
+    jacobian = generator.normal(size=(READINGS, COORDINATES))
+    residual = generator.normal(size=READINGS) + jacobian @ np.array([2.0, -1.0, 0.5, 0.0])
+    root = np.eye(COORDINATES) + 0.2 * np.triu(generator.normal(size=(COORDINATES, COORDINATES)), 1)
+    departure = root @ generator.normal(0.0, 0.3, COORDINATES)
     box = Box(
         jacobian,
         residual,
@@ -24,7 +24,7 @@ def problem(room):
         np.full(COORDINATES, -room),
         np.full(COORDINATES, room),
     )
-    columns = GENERATOR.normal(size=(READINGS, COLUMNS))
+    columns = generator.normal(size=(READINGS, COLUMNS))
     boxed = BoxedColumns(box, jacobian.T @ columns, columns.T @ columns, columns.T @ residual)
     return box, boxed, columns, root, departure
 
