@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words
-from spindle_fem.effects.laws import Complex, amplitude, relaxed, repeated, rows, shape
+from spindle_fem.effects.laws import Complex, amplitude, relaxed, rows, shape
+from spindle_fem.effects.spread import Spread
 from spindle_fem.effects.term import Term, TermContext
-from spindle_fem.effects.unrecorded import sides_of
 from spindle_fem.effects.view import MachineView
 
 PLACES = ("housing", "flange", "nose", "drive_end", "shaft", "channel")
@@ -51,29 +51,25 @@ class ContactCapacityTerm(Term):
     places : tuple of str
     usual : float, [J/K]
     sides : tuple of str
-        First harmonics of the place, as for :class:`spindle_fem.effects.unrecorded.IntervalTerm`.
+        Of the place, as :class:`Spread` has them.
     """
 
     # its temperature, and whether it has one yet
     n_states = 2
 
     def __init__(self, name: str, places: tuple[str, ...], usual: float, sides: tuple[str, ...] = ()) -> None:
-        self.name, self._even = name, len(places)
-        self.heat_places = self.reads = (*places, *sides)
+        self.name, self._spread = name, Spread(places, sides)
+        self.heat_places = self.reads = self._spread.names
         self.parameters = (
             amplitude("capacity", usual, "J/K"),
             shape("contact_time", 1200.0, 0.8, "s", low=60.0, high=50000.0),
-            *sides_of(sides),
+            *self._spread.parameters,
         )
 
     def heat(self, context: TermContext) -> Complex:
         """Into every place, (n, k) W."""
         own, (mass, place) = context.parameters, self._temperatures(context)
-        heat = own["capacity"] * (mass - place) / own["contact_time"]
-        even = repeated(context, heat / self._even, self._even)
-        if len(self.heat_places) == self._even:
-            return even
-        return np.concatenate((even, rows(context, 2.0 * own["up"] * heat, 2.0 * own["across"] * heat)))
+        return self._spread.heat(context, own["capacity"] * (mass - place) / own["contact_time"])
 
     def advance(self, context: TermContext, step: float) -> Complex:
         """The mass follows, (2, k)."""
@@ -81,10 +77,7 @@ class ContactCapacityTerm(Term):
         return rows(context, relaxed(mass, place, step, context.parameters["contact_time"]), 1.0)
 
     def _temperatures(self, context: TermContext) -> tuple[Complex, Complex]:
-        own, found = context.parameters, context.temperatures
-        place = found[: self._even].mean(axis=0)
-        if len(found) > self._even:
-            place = place + 2.0 * (own["up"] * found[-2] + own["across"] * found[-1])
+        place = self._spread.temperature(context)
         return np.where(context.state[1].real > 0.5, context.state[0], place), place
 
 
@@ -118,9 +111,9 @@ class HeatCapacity(Effect):
                             starts=[{"contact_time": t} for t in (600.0, 2400.0)] if form else ({},),
                         )
                     )
-        housing = "housing" if "housing" in machine.capacity else None
         for spot, sides in machine.sides.items():
-            if housing is not None and machine.component(spot) == housing:
+            housing = machine.component(spot)
+            if housing == "housing":
                 usual = SHARE * machine.capacity[housing]
                 term = ContactCapacityTerm(self.term_name(spot, ON_A_SIDE), machine.spots[spot], usual, sides)
                 found.append(

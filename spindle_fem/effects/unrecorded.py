@@ -9,14 +9,13 @@ from types import MappingProxyType
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, IntervalEffect, Intervals, Reported
-from spindle_fem.effects.laws import Complex, linear, repeated, rows, shape, switched
+from spindle_fem.effects.laws import Complex, amplitude, linear, shape, switched
+from spindle_fem.effects.spread import Spread
 from spindle_fem.effects.term import Term, TermContext, TermParameter
 from spindle_fem.effects.view import MachineView
 
 # Of the edges where the lag is short, s.
 EDGE_WIDTH = 20.0
-# 1 σ of the first harmonic of heat around the axis, beside its mean: 2 is all of it along one line.
-UNEVEN = 1.0
 # 1 σ of an edge that a search found, s, and of the factors that one interval has beside the common size.
 EDGE_SIGMA = 300.0
 JITTER = 0.1
@@ -29,25 +28,14 @@ class IntervalTerm(Term):
     ----------
     name : str
     size : TermParameter
-    places : tuple of str
-        Where it acts, evenly.
-    sides : tuple of str
-        First harmonics of the place around the axis, along y and along -x, where it has them: then
-        it acts with ``1 + 2 (up cos + across sin)`` of its mean, both free.
+    spread : Spread
+        Where it acts.
     intervals : sequence of (float, float), [s]
     """
 
-    def __init__(
-        self,
-        name: str,
-        size: TermParameter,
-        places: tuple[str, ...],
-        sides: tuple[str, ...],
-        intervals: Intervals,
-    ) -> None:
-        self.name, self._number = name, len(intervals)
-        self.heat_places = (*places, *sides)
-        self._even = len(places)
+    def __init__(self, name: str, size: TermParameter, spread: Spread, intervals: Intervals) -> None:
+        self.name, self._number, self.spread = name, len(intervals), spread
+        self.heat_places = spread.names
         # Edges stay nearer to their own interval than to what is beside it.
         edges: list[TermParameter] = []
         for number, (start, end) in enumerate(intervals, 1):
@@ -64,22 +52,13 @@ class IntervalTerm(Term):
             if len(intervals) > 1
             else ()
         )
-        uneven = sides_of(sides)
         self.parameters = (
             size,
             shape("lag", 200.0, 0.7, "s", low=2.0, high=7200.0),
-            *uneven,
+            *spread.parameters,
             *edges,
             *factors,
         )
-
-    def spread(self, context: TermContext, heat: Complex) -> Complex:
-        """Heat (k,) over the heat places, (n, k)."""
-        even = repeated(context, heat / self._even, self._even)
-        if len(self.heat_places) == self._even:
-            return even
-        own = context.parameters
-        return np.concatenate((even, rows(context, 2.0 * own["up"] * heat, 2.0 * own["across"] * heat)))
 
     def share(self, context: TermContext) -> Complex:
         """How far it is on, (k,)."""
@@ -91,10 +70,28 @@ class IntervalTerm(Term):
         return found
 
 
-def sides_of(sides: tuple[str, ...]) -> tuple[TermParameter, ...]:
-    """Parameters of what acts more on one side than on the other; none where the place has no sides."""
-    names = ("up", "across") if sides else ()
-    return tuple(linear(name, 0.0, 0.5 * UNEVEN, low=-1.0, high=1.0) for name in names)
+class IntervalHeatTerm(IntervalTerm):
+    """Heat that comes, or goes whatever the temperature.
+
+    Parameters
+    ----------
+    name : str
+    spread : Spread
+    usual : float, [W]
+    intervals : sequence of (float, float), [s]
+    sign : float
+        -1 for heat that goes.
+    """
+
+    def __init__(
+        self, name: str, spread: Spread, usual: float, intervals: Intervals, sign: float = 1.0
+    ) -> None:
+        super().__init__(name, amplitude("heat", usual, "W"), spread, intervals)
+        self._sign = sign
+
+    def heat(self, context: TermContext) -> Complex:
+        """Of every place, (n, k) W."""
+        return self.spread.heat(context, self._sign * context.parameters["heat"] * self.share(context))
 
 
 class UnrecordedEffect(IntervalEffect):
@@ -109,6 +106,11 @@ class UnrecordedEffect(IntervalEffect):
     def places(self, machine: MachineView) -> tuple[str, ...]:
         """Every spot of the view."""
         return tuple(machine.spots)
+
+    @staticmethod
+    def spread(machine: MachineView, spot: str) -> Spread:
+        """Over a spot."""
+        return Spread(machine.spots[spot], machine.sides.get(spot, ()))
 
     @abstractmethod
     def term(self, machine: MachineView, spot: str, intervals: Intervals, form: str) -> Term:

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 from spindle_fem.effects.base import Candidate, Intervals, Reported, place_words, quantity
 from spindle_fem.effects.laws import Complex, amplitude, fluid_temperature
+from spindle_fem.effects.spread import Spread
 from spindle_fem.effects.term import Term, TermContext
-from spindle_fem.effects.unrecorded import IntervalTerm, UnrecordedEffect, interval_words
+from spindle_fem.effects.unrecorded import IntervalHeatTerm, IntervalTerm, UnrecordedEffect, interval_words
 from spindle_fem.effects.view import MachineView
 
 
@@ -17,63 +18,28 @@ class CoolingTerm(IntervalTerm):
     Parameters
     ----------
     name : str
-    places : tuple of str
+    spread : Spread
     fluid : str or float
         Input of the surroundings, or their temperature [K].
     usual : float, [W/K]
     intervals : sequence of (float, float), [s]
-    sides : tuple of str
     """
 
     def __init__(
-        self,
-        name: str,
-        places: tuple[str, ...],
-        fluid: str | float,
-        usual: float,
-        intervals: Intervals,
-        sides: tuple[str, ...] = (),
+        self, name: str, spread: Spread, fluid: str | float, usual: float, intervals: Intervals
     ) -> None:
-        super().__init__(name, amplitude("conductance", usual, "W/K"), places, sides, intervals)
+        super().__init__(name, amplitude("conductance", usual, "W/K"), spread, intervals)
         self.reads = self.heat_places
-        self._fluid, self._places = fluid, len(places)
+        self._fluid = fluid
 
     def heat(self, context: TermContext) -> Complex:
         """Of every place, (n, k) W."""
         size = context.parameters["conductance"] * self.share(context)
         fluid = fluid_temperature(context, self._fluid)
-        if len(self.heat_places) == self._places:
-            return -size / self._places * (context.temperatures - fluid)
-        own, (mean, up, across) = context.parameters, context.temperatures
-        here = mean + 2.0 * (own["up"] * up + own["across"] * across)
-        return self.spread(context, -size * (here - fluid))
-
-
-class LossTerm(IntervalTerm):
-    """Heat taken from places whatever their temperature.
-
-    Parameters
-    ----------
-    name : str
-    places : tuple of str
-    usual : float, [W]
-    intervals : sequence of (float, float), [s]
-    sides : tuple of str
-    """
-
-    def __init__(
-        self,
-        name: str,
-        places: tuple[str, ...],
-        usual: float,
-        intervals: Intervals,
-        sides: tuple[str, ...] = (),
-    ) -> None:
-        super().__init__(name, amplitude("heat", usual, "W"), places, sides, intervals)
-
-    def heat(self, context: TermContext) -> Complex:
-        """Of every place, (n, k) W."""
-        return self.spread(context, -context.parameters["heat"] * self.share(context))
+        if self.spread.sides:
+            return self.spread.heat(context, -size * (self.spread.temperature(context) - fluid))
+        # Each place by its own temperature.
+        return -size / len(self.reads) * (context.temperatures - fluid)
 
 
 class UnrecordedCooling(UnrecordedEffect):
@@ -95,12 +61,11 @@ class UnrecordedCooling(UnrecordedEffect):
 
     def term(self, machine: MachineView, spot: str, intervals: Intervals, form: str) -> Term:
         """Loss at a spot."""
-        places, sides = machine.spots[spot], machine.sides.get(spot, ())
-        usual, own = self.usual(machine, form), tuple(intervals)
+        spread, usual, own = self.spread(machine, spot), self.usual(machine, form), tuple(intervals)
         if form == "heat":
-            return LossTerm(self.term_name(spot, form), places, usual, own, sides)
+            return IntervalHeatTerm(self.term_name(spot, form), spread, usual, own, sign=-1.0)
         fluid = "ambient" if "ambient" in machine.inputs else machine.reference_temperature
-        return CoolingTerm(self.term_name(spot), places, fluid, usual, own, sides)
+        return CoolingTerm(self.term_name(spot), spread, fluid, usual, own)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and how often."""

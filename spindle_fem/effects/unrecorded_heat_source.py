@@ -5,37 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.effects.base import Candidate, Intervals, Reported, capital, place_words, quantity
-from spindle_fem.effects.laws import Complex, amplitude
-from spindle_fem.effects.term import TermContext
-from spindle_fem.effects.unrecorded import IntervalTerm, UnrecordedEffect, interval_words
+from spindle_fem.effects.unrecorded import IntervalHeatTerm, UnrecordedEffect, interval_words
 from spindle_fem.effects.view import MachineView
-
-
-class HeatSourceTerm(IntervalTerm):
-    """Heat spread over places.
-
-    Parameters
-    ----------
-    name : str
-    places : tuple of str
-    usual : float, [W]
-    intervals : sequence of (float, float), [s]
-    sides : tuple of str
-    """
-
-    def __init__(
-        self,
-        name: str,
-        places: tuple[str, ...],
-        usual: float,
-        intervals: Intervals,
-        sides: tuple[str, ...] = (),
-    ) -> None:
-        super().__init__(name, amplitude("heat", usual, "W"), places, sides, intervals)
-
-    def heat(self, context: TermContext) -> Complex:
-        """Of every place, (n, k) W."""
-        return self.spread(context, context.parameters["heat"] * self.share(context))
 
 
 class UnrecordedHeatSource(UnrecordedEffect):
@@ -54,14 +25,10 @@ class UnrecordedHeatSource(UnrecordedEffect):
         """A fifth of all heat."""
         return 0.2 * machine.typical_heat
 
-    def term(self, machine: MachineView, spot: str, intervals: Intervals, form: str) -> HeatSourceTerm:
+    def term(self, machine: MachineView, spot: str, intervals: Intervals, form: str) -> IntervalHeatTerm:
         """Heat at a spot."""
-        return HeatSourceTerm(
-            self.term_name(spot),
-            machine.spots[spot],
-            self.usual(machine, form),
-            tuple(intervals),
-            machine.sides.get(spot, ()),
+        return IntervalHeatTerm(
+            self.term_name(spot), self.spread(machine, spot), self.usual(machine, form), tuple(intervals)
         )
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

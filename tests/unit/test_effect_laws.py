@@ -17,11 +17,12 @@ from spindle_fem.effects.laws import power, relaxed, smooth_step, softplus, swit
 from spindle_fem.effects.natural_convection import NaturalConvectionTerm
 from spindle_fem.effects.radiation import RadiationTerm
 from spindle_fem.effects.speed_heat import SpeedHeatTerm
+from spindle_fem.effects.spread import Spread
 from spindle_fem.effects.starvation import StarvationTerm
 from spindle_fem.effects.term import TermContext
 from spindle_fem.effects.thermal_preload import NAME, ThermalPreloadTerm
+from spindle_fem.effects.unrecorded import IntervalHeatTerm
 from spindle_fem.effects.unrecorded_cooling import CoolingTerm
-from spindle_fem.effects.unrecorded_heat_source import HeatSourceTerm
 from spindle_fem.effects.view import ChannelFlow, FrictionTable
 from spindle_fem.effects.viscosity_heat import ViscosityHeatTerm, Walther
 from spindle_fem.surroundings.air import STEFAN_BOLTZMANN
@@ -269,7 +270,7 @@ def test_coolant_warms_by_what_it_took_before():
 
 # ------------------------------------------------------------------ intervals
 def test_an_unrecorded_source_gives_its_heat_while_on():
-    term = HeatSourceTerm("t", ("a", "b"), 50.0, ((1000.0, 3000.0), (6000.0, 9000.0)))
+    term = IntervalHeatTerm("t", Spread(("a", "b")), 50.0, ((1000.0, 3000.0), (6000.0, 9000.0)))
     own = {"heat": 40.0, "factor_2": 0.9, "lag": 100.0}
     total = [term.heat(context(term, time=t, **own)).real.sum() for t in (0.0, 2700.0, 5500.0, 8700.0, 2e4)]
     assert total == pytest.approx([0.0, 40.0, 0.0, 36.0, 0.0], abs=1e-4)
@@ -284,7 +285,7 @@ def test_heat_beside_a_gap_is_shared_by_both_walls():
 
 
 def test_what_heats_one_side_gives_the_same_heat_there():
-    term = HeatSourceTerm("t", ("a",), 50.0, ((1000.0, 3000.0),), ("up.a", "across.a"))
+    term = IntervalHeatTerm("t", Spread(("a",), ("up.a", "across.a")), 50.0, ((1000.0, 3000.0),))
     own = {"heat": 40.0, "up": 0.5, "across": -0.25, "lag": 100.0}
     heat = term.heat(context(term, time=2700.0, **own)).real[:, 0]
     # A pattern 1 + 2 (up cos + across sin): the mean is the heat, half a squared cosine is left of each side.
@@ -296,7 +297,7 @@ def test_what_heats_one_side_gives_the_same_heat_there():
 
 
 def test_a_loss_of_one_side_follows_the_temperature_there():
-    term = CoolingTerm("t", ("a",), 290.0, 5.0, ((1000.0, 3000.0),), ("up.a", "across.a"))
+    term = CoolingTerm("t", Spread(("a",), ("up.a", "across.a")), 290.0, 5.0, ((1000.0, 3000.0),))
     own = {"conductance": 3.0, "up": 1.0, "across": 0.0, "lag": 100.0}
     # Field 300 + 10 cos: means of T, T cos, T sin.
     heat = term.heat(context(term, time=2700.0, temperatures=[300.0, 5.0, 0.0], **own)).real[:, 0]
@@ -304,7 +305,7 @@ def test_a_loss_of_one_side_follows_the_temperature_there():
 
 
 def test_edges_of_neighbouring_intervals_cannot_cross():
-    term = HeatSourceTerm("t", ("a",), 50.0, ((0.0, 100.0), (140.0, 900.0), (950.0, 1000.0)))
+    term = IntervalHeatTerm("t", Spread(("a",)), 50.0, ((0.0, 100.0), (140.0, 900.0), (950.0, 1000.0)))
     own = {item.name: item for item in term.parameters}
     for number in (1, 2):
         assert own[f"end_{number}"].high <= own[f"start_{number + 1}"].low
