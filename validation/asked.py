@@ -14,7 +14,7 @@ ASKED = (
     ("interval_coverage", "stated 90 % intervals that hold the truth", "within", (0.85, 0.95)),
     ("heldout_after_over_noise.median", "held-out error after over noise, median", "<=", 1.05),
     ("heldout_after_over_noise.worst", "held-out error after over noise, worst", "<=", 1.5),
-    ("ambiguous_truth_kept", "undecidable cases with the truth among the sets named", ">=", 0.95),
+    ("ambiguous_called", "undecidable cases called ambiguous with the truth among the sets", ">=", 0.95),
     ("confident_wrong", "confident (above 0.9) and wrong", "<=", 0.01),
     ("wall_s.worst", "wall time of a case on one core of a shared machine, worst, s", "<=", 60.0),
 )

@@ -245,8 +245,13 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
     if twins:
         out["clear"] = False
         verdicts.append("ambiguous")
-        out["indistinguishable"] = twins
     own, best = known["own_simple_form"], known["best_mimics"]
+    if all(not _unseen(part["ratio"], part["chi2"]) for part in known["each"]):
+        # As near as the truth's own plain law comes; unrecorded heat is the way out where no other law fits.
+        plain = float(own["chi2"]) if own and len(effects) == 1 else 0.0
+        out["indistinguishable"] = [
+            t for t in twins if t["chi2"] < plain + TWIN_CHI2 and not t["effect"].startswith("unrecorded_")
+        ]
     out["simple_form_loses"] = bool(
         own and best and len(effects) == 1 and best[0]["chi2"] < own["chi2"] + 10.0
     )

@@ -100,19 +100,26 @@ def machine_mimics(model: ReducedSpindle, plan: Plan) -> list[Mimic]:
     def add(effect: str, place: str, form: str, make: Callable[[float], Law], small: float) -> None:
         out.append(Mimic(effect, place, form, make, small))
 
-    add("seal_friction", "nose", "", lambda a: laws.SpeedHeat((("nose", 1.0),), a, 1000.0, 1.0), 2.0)
-    add(
-        "seal_friction", "drive_end", "", lambda a: laws.SpeedHeat((("drive_lip", 1.0),), a, 1000.0, 1.0), 2.0
-    )
+    # Exponents and delays from end to end of what is drawn: a seal and a drive at one end may be alike.
+    for place, where in (("nose", "nose"), ("drive_end", "drive_lip")):
+        for exponent, wear in ((0.9, 0.0), (1.0, 0.0), (1.1, 0.0), (1.0, 4000.0)):
+            add(
+                "seal_friction",
+                place,
+                f"power{exponent}wear{wear:.0f}",
+                lambda a, p=where, e=exponent, w=wear: laws.SpeedHeat(((p, 1.0),), a, 1000.0, e, wear=w),
+                2.0,
+            )
     add("windage", "shaft", "", lambda a: laws.SpeedHeat((("shaft_gap", 1.0),), a, 4500.0, 3.0), 10.0)
-    for delay in (0.0, 600.0):
-        add(
-            "drive_heat",
-            "drive_end",
-            f"lag{delay:.0f}",
-            lambda a, d=delay: laws.SpeedHeat((("drive_end", 1.0),), a, 3000.0, 1.2, d),
-            5.0,
-        )
+    for exponent in (0.95, 1.2, 1.45):
+        for delay in (100.0, 300.0, 900.0):
+            add(
+                "drive_heat",
+                "drive_end",
+                f"power{exponent}lag{delay:.0f}",
+                lambda a, e=exponent, d=delay: laws.SpeedHeat((("drive_end", 1.0),), a, 3000.0, e, d),
+                5.0,
+            )
     add("mount_sink", "flange", "", lambda a: laws.MountSink(a), 1.0)
     add("shaft_convection", "shaft", "", lambda a: laws.ShaftConvection(a), 0.1)
     add("radiation", "housing", "", lambda a: laws.OutsideFilm(a, "radiation"), 0.1)

@@ -68,7 +68,7 @@ def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | 
         pointed = {f["component"] for f in found} or {where.get("component")}
         located = bool(pointed & all_places)
     fit = diagnosis["fit"]
-    noise = fit.get("noise_K")
+    noise = noise_of(answer)
     after = fit["after"]["heldout_rmse_K"]
     return {
         "case": answer["case"],
@@ -103,6 +103,16 @@ def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | 
         else None,
         "wall_s": wall,
     }
+
+
+def noise_of(answer: dict[str, Any]) -> float:
+    """All that was added to the readings: white noise, the slow part, rounding; K.
+
+    >>> round(noise_of({"noise": {"white_K": 0.08, "slow_K": 0.06, "rounding_K": 0.0}}), 6)
+    0.1
+    """
+    noise = answer["noise"]
+    return float(np.sqrt(noise["white_K"] ** 2 + noise["slow_K"] ** 2 + noise["rounding_K"] ** 2 / 12.0))
 
 
 def coverage(answer: dict[str, Any], found: list[dict[str, Any]]) -> list[dict[str, Any]]:

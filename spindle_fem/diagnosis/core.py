@@ -10,6 +10,8 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.conduction.threads import thread_count
+from spindle_fem.diagnosis.abreast import FitOrder, Workers
 from spindle_fem.diagnosis.engine import Hypothesis, Search
 from spindle_fem.diagnosis.heldout import heldout_stamps
 from spindle_fem.diagnosis.inference import Coordinate, Fit, Problem
@@ -33,6 +35,8 @@ Progress = Callable[[str], None]
 # Hypotheses that are fitted again with the slow error that the best of them leaves, on the whole basis.
 REFITTED = 8
 ALWAYS_REFITTED = 2
+# More could not be kept busy.
+MOST_WORKERS = 4
 # Less likely than the best by so much (natural logarithm): of no account.
 NEGLIGIBLE = 8.0
 #: Prior weight of effects; the ways out for what no other fits count less.
@@ -104,6 +108,7 @@ def diagnose_recordings(
     """
     clock = _Clock()
     fast, view = machine.fast, machine.view
+    workers = Workers(min(thread_count(), MOST_WORKERS)) if workers is None else workers
     recordings, calibration = machine.recordings, machine.calibration
     chosen = [heldout_stamps(item, heldout) for item in recordings]
     plant = Plant(fast, recordings, [~mask for mask, _ in chosen], machine.effects)
@@ -122,14 +127,14 @@ def diagnose_recordings(
     small = plant if machine.is_network else plant.compressed([name for name, *_ in plant.uncertain()], known)
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
     clock.lap("reduction")
-    search = Search(problem, view, effects, candidates, interval_effects(), weights, progress)
+    search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)
     found = search.run()
     clock.lap("search")
     progress("diagnosis: final fits")
     best = rank(found)[0].best
     slow = slow_error_of(problem, best.fit)
     final = Problem(plant, calibrated.belief, slow, plant.observations)
-    refitted = _refit(final, found)
+    refitted = _refit(final, found, workers)
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
     judgement = judge(
@@ -172,10 +177,9 @@ def _overlapping(view: MachineView) -> dict[str, frozenset[str]]:
     return {name: frozenset(family) for name, family in found.items()}
 
 
-def _refit(problem: Problem, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _refit(problem: Problem, found: Sequence[Hypothesis], workers: Workers) -> list[Hypothesis]:
     """The most probable hypotheses and the empty one, fitted on the whole basis."""
-    null = next(h for h in found if not h.fit.candidates)
-    score = {id(h): tempered(h, null) for h in found}
+    score = {id(h): value for h, value in zip(found, tempered(found), strict=True)}
     ranked = sorted(found, key=lambda h: -score[id(h)])
     best = score[id(ranked[0])]
     chosen = [
@@ -188,9 +192,12 @@ def _refit(problem: Problem, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
     chosen += [h for h in smaller if h not in chosen]
     chosen += [h for h in ranked if not h.fit.candidates and h not in chosen]
+    orders = [FitOrder(h.fit.candidates, h.fit.values, iterations=12) for h in chosen]
+    # What ran before on a part of the basis may run away on the whole of it: it is no hypothesis then.
     fitted = [
-        Hypothesis(problem.fit(item.fit.candidates, item.fit.values, iterations=12), item.log_prior)
-        for item in chosen
+        Hypothesis(fit, item.log_prior)
+        for fit, item in zip(workers.fits(problem, orders), chosen, strict=True)
+        if fit is not None
     ]
     return sorted(fitted, key=lambda h: -h.score)
 

@@ -14,16 +14,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.diagnosis.abreast import FitOrder, Workers
 from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit, Problem
 from spindle_fem.diagnosis.locate import ONSETS, OnOff, Onsets, Pattern, find_intervals, onset_answers
 from spindle_fem.diagnosis.screening import Variant, variants_of
 from spindle_fem.diagnosis.search import Screened, amplitude_value, screen
 from spindle_fem.effects.base import Candidate, Effect, IntervalEffect
 from spindle_fem.effects.view import MachineView
-from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
+# A set, and values to begin from.
+Task = tuple[tuple[Candidate, ...], Mapping[str, float]]
 
 LARGEST_SET = 3
 # Root mean square of whitened residuals below which there is nothing left for a further effect to explain.
@@ -41,8 +43,12 @@ EXCHANGED, OTHERS = 1, 5
 # Sets that are fitted from each start: single effects from one start and from each of two, pairs, triples.
 SINGLES, PAIRS, TRIPLES = (8, 5), 6, 3
 BEAM, ADDITIONS = 3, 6
-# Shares of the amplitudes that a fit begins from, one after the other until it can be simulated.
+# Shares of the amplitudes that a fit begins from, one after the other until it can be simulated: friction that
+# feeds on its own heat has no state at amplitudes that are too large, and first order does not know where
+# that begins.
 MILDER = (1.0, 0.5, 0.2)
+# Sets that are fitted abreast before the best of them says what is hopeless.
+ABREAST = 2
 # A hypothesis this much less likely (natural logarithm) than the best is not extended, but for one effect
 # that explains a fair share of what the best does: half of a strong pair leaves a lot.
 HOPELESS, FAIR_SHARE = 400.0, 0.55
@@ -91,6 +97,8 @@ class Search:
     interval_effects : tuple of IntervalEffect
     weights : mapping of effect to float
         Prior weight of each.
+    workers : Workers
+        Who fit.
     found : dict
         Hypotheses by their keys and forms.
     """
@@ -102,6 +110,7 @@ class Search:
     interval_effects: tuple[IntervalEffect, ...]
     weights: Mapping[str, float]
     progress: Progress = lambda stage: None
+    workers: Workers = field(default_factory=Workers)
     found: dict[frozenset, Hypothesis] | None = None
     _screenings: dict[frozenset, Screened] = field(default_factory=dict)
     _paid: dict[frozenset, float] = field(default_factory=dict)
@@ -162,6 +171,7 @@ class Search:
         neighbours may not have come through the screening.
         """
         with_intervals = {effect.name for effect in self.interval_effects}
+        tasks: list[Task] = []
         for hypothesis in [h for h in self.ranked() if h.fit.candidates][:EXCHANGED]:
             for member in hypothesis.fit.candidates:
                 rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
@@ -173,23 +183,24 @@ class Search:
                 screened = self._screenings[_identity(rest)]
                 places = {member.component, *self._groups_of(member.component)}
                 for index, amplitude in screened.best_at(places, {member.effect, *with_intervals}, OTHERS):
-                    self._try(base.fit, [(screened.variants[index], amplitude)], {})
+                    tasks.append(self._task(base.fit, [(screened.variants[index], amplitude)], {}))
+        self._fit_all(tasks)
 
     def _widen(self) -> None:
         """Try the whole set where one of its bearings was found."""
+        tasks: list[Task] = []
         for hypothesis in self.ranked()[:REDUCED]:
             for position, candidate in enumerate(hypothesis.fit.candidates):
                 for wider in self._sets_of(candidate):
                     members = list(hypothesis.fit.candidates)
                     members[position] = wider
-                    if _identity(members) in self.found or len(
-                        {(c.effect, c.component) for c in members}
-                    ) < len(members):
+                    if len({(c.effect, c.component) for c in members}) < len(members):
                         continue
                     # What the bearing had is a start for the set; its own names differ.
                     values = hypothesis.fit.values
                     start = values | _renamed_values(candidate, wider, values)
-                    self._fit(tuple(members), start)
+                    tasks.append((tuple(members), start))
+        self._fit_all(tasks)
 
     def _families(self) -> dict[str, str]:
         """Bearing set of every bearing: what all of a set has, one of its bearings has not once more."""
@@ -211,12 +222,13 @@ class Search:
 
     def _reduce(self) -> None:
         """Leave out what came first: each of the best sets without each of its members."""
-        for hypothesis in [h for h in self.ranked() if len(h.fit.candidates) > 1][:REDUCED]:
-            for left_out in hypothesis.fit.candidates:
-                rest = tuple(c for c in hypothesis.fit.candidates if c is not left_out)
-                if _identity(rest) in self.found:
-                    continue
-                self._fit(rest, hypothesis.fit.values)
+        self._fit_all(
+            [
+                (tuple(c for c in hypothesis.fit.candidates if c is not left_out), hypothesis.fit.values)
+                for hypothesis in [h for h in self.ranked() if len(h.fit.candidates) > 1][:REDUCED]
+                for left_out in hypothesis.fit.candidates
+            ]
+        )
 
     def ranked(self) -> list[Hypothesis]:
         """Hypotheses, the most probable first."""
@@ -239,16 +251,19 @@ class Search:
         """Fit the most promising additions of so many effects to a hypothesis."""
         if len(fit.candidates) + number > LARGEST_SET:
             return
+        tasks: list[Task] = []
+        known = self.ranked()[0].score - self.found[_identity(())].score
         for tried, (members, gain) in enumerate(screened.best(number, count)):
             if tried == 0:
                 promised = gain
             if tried >= always and (gain < ENOUGH_GAIN or gain < PROMISING * promised):
                 break
-            if number > 1 and gain < self.ranked()[0].score - self.found[_identity(())].score:
+            if number > 1 and gain < known:
                 break
             amplitudes = screened.amplitudes(members)
             additions = [(screened.variants[i], amplitudes[i]) for i in members]
-            self._try(fit, additions, intervals)
+            tasks.append(self._task(fit, additions, intervals))
+        self._fit_all(tasks)
 
     def screened(self, fit: Fit, trust: Fit | None = None) -> tuple[Screened, dict[int, OnOff]]:
         """Candidates, and intervals at every spot, against what a fit leaves.
@@ -319,11 +334,11 @@ class Search:
                     ),
                 )
 
-    def _try(
+    def _task(
         self, fit: Fit, additions: Sequence[tuple[Variant, float]], intervals: Mapping[int, OnOff]
-    ) -> None:
+    ) -> Task:
+        """A fit with additions, and where it begins."""
         candidates = (*fit.candidates, *(variant.candidate for variant, _ in additions))
-        key = _identity(candidates)
         start = fit.values
         for variant, scaled in additions:
             factors = {item.name for item in variant.candidate.factors}
@@ -332,38 +347,33 @@ class Search:
             if id(variant.candidate) in intervals:
                 cost = intervals_cost(intervals[id(variant.candidate)])
                 self._paid[_identity((variant.candidate,))] = cost
-        if key not in self.found:
-            self._fit(candidates, start)
+        return candidates, start
 
-    def _fit(self, candidates: tuple[Candidate, ...], start: Mapping[str, float]) -> None:
-        """Fit a set and keep it."""
-        fitted = self._fitted(candidates, start)
-        if fitted is None:
-            return
-        if any(self._unseen(candidate, fitted.values) for candidate in candidates):
-            return
-        paid = sum(self._paid.get(_identity((c,)), 0.0) for c in candidates)
-        self._keep(Hypothesis(fitted, self.log_prior(candidates) - paid))
+    def _fit_all(self, tasks: Sequence[Task]) -> None:
+        """Fit the sets that are not known yet, some abreast, and keep them.
 
-    def _fitted(self, candidates: tuple[Candidate, ...], start: Mapping[str, float]) -> Fit | None:
-        """Fit of a set; from milder amplitudes where it cannot be simulated at those of the screening.
-
-        Friction that feeds on its own heat has no state at amplitudes that are
-        too large, and first order does not know where that begins.
+        As many together whether or not there are workers for it, so that the result is the same.
         """
-        for share in MILDER:
-            values = dict(start)
-            for candidate in candidates:
-                own = candidate.amplitude
-                name = EFFECT_PREFIX + own if own in {f.name for f in candidate.factors} else own
-                if name in values:
-                    values[name] = candidate.null + share * (values[name] - candidate.null)
-            try:
-                return self.problem.fit(candidates, values, hopeless=self._hopeless(len(candidates)))
-            except (ConvergenceError, OutOfValidityError, SpecError):
-                continue
-        # What cannot be simulated explains nothing; its neighbours are tried.
-        return None
+        waiting: dict[frozenset, Task] = {}
+        for candidates, start in tasks:
+            key = _identity(candidates)
+            if key not in self.found:
+                waiting.setdefault(key, (candidates, start))
+        queue = list(waiting.values())
+        for first in range(0, len(queue), ABREAST):
+            together = queue[first : first + ABREAST]
+            orders = [
+                FitOrder(candidates, start, MILDER, self._hopeless(len(candidates)))
+                for candidates, start in together
+            ]
+            for (candidates, _), fitted in zip(
+                together, self.workers.fits(self.problem, orders), strict=True
+            ):
+                # What cannot be simulated explains nothing; its neighbours are tried.
+                if fitted is None or any(self._unseen(c, fitted.values) for c in candidates):
+                    continue
+                paid = sum(self._paid.get(_identity((c,)), 0.0) for c in candidates)
+                self._keep(Hypothesis(fitted, self.log_prior(candidates) - paid))
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
         """Whether an effect is on only where nothing was recorded, neither readings nor inputs."""

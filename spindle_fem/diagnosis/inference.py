@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from spindle_fem.calibration.noise import SlowError, Whitener
 from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Observation, Plant, Prediction
@@ -307,18 +308,14 @@ class Problem:
         covariance = np.linalg.inv(precision)
         _, log_det = np.linalg.slogdet(precision)
         _, log_root = np.linalg.slogdet(root)
-        one_sided = sum(
-            np.log(2.0)
-            for candidate in candidates
-            for c in candidate_coordinates(candidate)
-            if not c.logarithmic and (c.low == 0.0 or c.high == 0.0)
-        )
+        # A prior that ends at bounds is so much denser between them.
+        cut_off = -sum(float(np.log(norm.cdf(c.high) - norm.cdf(c.low))) for c in own)
         return Fit(
             tuple(candidates),
             coordinates,
             position,
             0.5 * (covariance + covariance.T),
-            -0.5 * cost - 0.5 * log_det + log_root + one_sided,
+            -0.5 * cost - 0.5 * log_det + log_root + cut_off,
             float(np.sum(_huber(residual))),
             cost,
             residual,

@@ -11,7 +11,7 @@ from spindle_fem.effects.laws import Complex, amplitude, linear, repeated, shape
 from spindle_fem.effects.term import Term, TermContext, TermParameter
 from spindle_fem.effects.view import MachineView, fluid_place
 
-STEADY, RAMP, STEP, WAVE = "steady drift", "ramp", "step", "wave"
+STEADY, RAMP, STEP, HUMP, WAVE = "steady drift", "ramp", "step", "hump", "wave"
 DAILY, YEARLY = "daily", "yearly"
 CYCLES = {DAILY: 86400.0, YEARLY: 365.25 * 86400.0}
 # Of a ramp's bends, s.
@@ -27,7 +27,7 @@ class DriftTerm(Term):
     films : tuple of str
         Whose fluid it is.
     form : str
-        steady drift, ramp (from one instant to another), step or wave.
+        steady drift, ramp (from one instant to another), step, hump (there and back) or wave.
     parameters : tuple of TermParameter
     """
 
@@ -48,6 +48,8 @@ class DriftTerm(Term):
             shift = own["change"] * BEND * passed / own["ramp_time"]
         elif self._form == STEP:
             shift = own["change"] * smooth_step((time - own["time"]) / own["width"])
+        elif self._form == HUMP:
+            shift = own["change"] * np.exp(-0.5 * ((time - own["middle"]) / own["spread"]) ** 2)
         else:
             shift = own["amplitude"] * np.sin(2.0 * np.pi * time / own["period"] + own["phase"])
         return repeated(context, shift, len(self.heat_places))
@@ -69,7 +71,7 @@ class AmbientDrift(Effect):
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """Drift, ramp, step and slow wave of the ambient, or of every boundary of a network."""
+        """Drift, ramp, step, hump and slow wave of the ambient, or of every boundary of a network."""
         found = []
         span = machine.duration
         for key, films in machine.surroundings.items():
@@ -102,6 +104,20 @@ class AmbientDrift(Effect):
                     "change",
                     3.0,
                     [{"time": share * span} for share in (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)],
+                ),
+                HUMP: (
+                    (
+                        linear("change", 0.0, 3.0, "K", low=-40.0, high=40.0),
+                        linear("middle", 0.5 * span, 0.3 * span, "s", low=-0.1 * span, high=1.1 * span),
+                        shape("spread", 0.15 * span, 0.5, "s", low=5.0 * BEND, high=span),
+                    ),
+                    "change",
+                    3.0,
+                    [
+                        {"middle": middle * span, "spread": spread * span}
+                        for middle in (0.25, 0.5, 0.75)
+                        for spread in (0.08, 0.16)
+                    ],
                 ),
                 WAVE: (
                     (
@@ -171,6 +187,13 @@ class AmbientDrift(Effect):
             return (
                 f"{subject} becomes {abs(change):.2g} K {word} than recorded about "
                 f"{reported['time'].value / 60.0:.0f} min after the start."
+            )
+        if candidate.form == HUMP:
+            change = reported["change"].value
+            word = "warmer" if change >= 0.0 else "colder"
+            return (
+                f"{subject} becomes up to {abs(change):.2g} K {word} than recorded, most about "
+                f"{reported['middle'].value / 60.0:.0f} min after the start, and comes back."
             )
         if candidate.form in CYCLES:
             size = reported["amplitude"].value

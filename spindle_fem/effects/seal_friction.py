@@ -11,10 +11,11 @@ from spindle_fem.effects.speed_heat import SpeedHeatTerm
 from spindle_fem.effects.view import MachineView
 
 NAME = "heat_per_1000rpm"
+LASTING, RUNS_IN = "", "runs in"
 
 
 class SealFriction(Effect):
-    """Constant torque at a seal, so heat in proportion to speed.
+    """Constant torque at a seal, so heat in proportion to speed; more of it while a new lip runs in.
 
     Source: Freudenberg, Simrit catalogue of radial shaft seals: power loss in
     proportion to speed at given contact force; 20-60 W per 1000 rpm at 100-180 mm.
@@ -27,35 +28,48 @@ class SealFriction(Effect):
         "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the "
         "spindle by hand with and without the seal."
     )
-    # A lip wears in.
+    # Contact force and grease of a lip change with temperature.
     law_sigma = MappingProxyType({"heat_per_1000rpm": 0.1})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """Both shaft ends; every node of a network that has something turning."""
+        """Lasting or running in, at both shaft ends; every node of a network that has something turning."""
         ends = machine.spots if machine.kind == "network" else ("nose", "drive_end")
         found = []
         for key in ends:
             speeds = machine.speeds(key)
             for speed in speeds if key in machine.heat else ():
-                form = speed if len(speeds) > 1 else ""
+                own = speed if len(speeds) > 1 else ""
                 size = (NAME, max(5.0, 0.1 * machine.typical_heat), 1000.0 * RPM)
-                term = SpeedHeatTerm(
-                    self.term_name(key, form), machine.heat[key], speed, size, exponent=(1.0, 0.08)
-                )
-                found.append(
-                    self.candidate(
-                        machine.component(key),
-                        term,
-                        amplitude=NAME,
-                        reference=size[1],
-                        form=machine.form(key, form),
+                for word in (LASTING, RUNS_IN):
+                    form = f"{own} {word}".strip()
+                    term = SpeedHeatTerm(
+                        self.term_name(key, form),
+                        machine.heat[key],
+                        speed,
+                        size,
+                        exponent=(1.0, 0.08),
+                        runs_in=word == RUNS_IN,
                     )
-                )
+                    found.append(
+                        self.candidate(
+                            machine.component(key),
+                            term,
+                            amplitude=NAME,
+                            reference=size[1],
+                            form=machine.form(key, form),
+                        )
+                    )
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much at which end."""
+        """How much at which end, and how much more when new."""
+        new = ""
+        if "more_when_new" in reported:
+            new = (
+                f" once it has run in ({100.0 * reported['more_when_new'].value:.0f} % more at first, "
+                f"fading with {reported['run_in_time'].value / 60.0:.0f} min)"
+            )
         return (
             f"A seal rubs at {place_words(candidate.component)}: {quantity(reported[NAME])} per 1000 rpm "
-            "of heat that the model lacks, in proportion to speed."
+            f"of heat that the model lacks, in proportion to speed{new}."
         )

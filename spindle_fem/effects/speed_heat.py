@@ -9,6 +9,8 @@ from spindle_fem.effects.term import Term, TermContext
 
 # Before any data: value and standard deviation.
 SHARE_BESIDE = (0.15, 0.15)
+# Of what runs in: heat beyond the lasting one when new, and its time constant with its logarithm's deviation.
+RUN_IN, RUN_IN_TIME = (0.3, 0.3), (5000.0, 0.8)
 
 
 class SpeedHeatTerm(Term):
@@ -28,6 +30,8 @@ class SpeedHeatTerm(Term):
         Time constant before any data, [s]; none when 0.
     beside : tuple of str
         Places that take an unknown share of the heat; none of it where there are none.
+    runs_in : bool
+        Whether there is more of it at first, ``1 + a e^(-t/τ)`` with the time since the recording began.
     """
 
     def __init__(
@@ -39,9 +43,10 @@ class SpeedHeatTerm(Term):
         exponent: tuple[float, float],
         lag: float = 0.0,
         beside: tuple[str, ...] = (),
+        runs_in: bool = False,
     ) -> None:
         self.name, self.heat_places, self._speed = name, (*places, *beside), speed
-        self._own, self._beside = len(places), len(beside)
+        self._own, self._beside, self._runs_in = len(places), len(beside), runs_in
         self._heat, usual, self._reference = size
         self.parameters = (
             amplitude(self._heat, usual, "W"),
@@ -52,6 +57,12 @@ class SpeedHeatTerm(Term):
             self.n_states = 1
         if beside:
             self.parameters += (linear("share_beside", *SHARE_BESIDE, low=0.0, high=0.9),)
+        if runs_in:
+            value, sigma = RUN_IN_TIME
+            self.parameters += (
+                linear("more_when_new", *RUN_IN, low=0.0, high=5.0),
+                shape("run_in_time", value, sigma, "s", low=300.0, high=100000.0),
+            )
 
     def _share(self, context: TermContext) -> Complex:
         relative = np.abs(context.inputs[self._speed]) / self._reference
@@ -61,6 +72,9 @@ class SpeedHeatTerm(Term):
         """Heat of every place, (n, k) W."""
         share = context.state[0] if self.n_states else self._share(context)
         total = context.parameters[self._heat] * share
+        if self._runs_in:
+            own = context.parameters
+            total = total * (1.0 + own["more_when_new"] * np.exp(-context.time / own["run_in_time"]))
         if not self._beside:
             return repeated(context, total / self._own, self._own)
         away = context.parameters["share_beside"]

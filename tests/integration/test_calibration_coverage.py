@@ -11,20 +11,12 @@ from spindle_fem.simulate import fast_model_for
 from spindle_fem.spec.load import load_machine
 
 PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
-CHANNEL = '[[channel]]\ncolumn = "{0}"\nrole = "temperature"\nprobe = "{0}"\nunit = "degC"\nsigma = 0.1\n'
-INPUT = '[[channel]]\ncolumn = "{0}"\nrole = "input"\ndrives = "{0}"\nunit = "{1}"\nhold = "{2}"\n'
-INPUTS = (
-    ("speed", "rpm", "previous"),
-    ("thrust", "N", "previous"),
-    ("ambient", "degC", "linear"),
-    ("coolant_inlet", "degC", "linear"),
-)
+INPUTS = ("speed", "thrust", "ambient", "coolant_inlet")
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
+def recording(recorded_in, tmp_path_factory):
     """Seven hours of four speeds and standstill, a reading every half minute; the study puts readings in."""
-    folder = tmp_path_factory.mktemp("made")
     times = np.arange(0.0, 7.0 * 3600.0, 30.0)
     steps = np.array([3000.0, 1500.0, 4500.0, 0.0, 2500.0])
     frame = pd.DataFrame({"time": times, "speed": steps[np.minimum(times // 5400.0, 4).astype(int)]})
@@ -33,14 +25,9 @@ def recording(tmp_path_factory):
     frame["coolant_inlet"] = 17.0 + 0.3 * np.cos(times / 1500.0)
     noise = np.random.default_rng(0).normal(0.0, 0.1, (times.size, len(PROBES)))
     frame[list(PROBES)] = 20.0 + noise
-    frame.to_csv(folder / "made.csv", index=False)
-    head = 'schema = "spindle-fem/recording/1"\nname = "made"\ndata = "made.csv"\n'
-    head += 'time = {column = "time", unit = "s"}\n'
-    text = "".join(
-        [head, *(CHANNEL.format(name) for name in PROBES), *(INPUT.format(*item) for item in INPUTS)]
-    )
-    (folder / "recording.toml").write_text(text)
-    return read_recording(folder)
+    temperatures, inputs = ({name: name for name in names} for names in (PROBES, INPUTS))
+    folder = tmp_path_factory.mktemp("made")
+    return read_recording(recorded_in(folder, frame, temperatures, inputs))
 
 
 @pytest.mark.slow

@@ -35,6 +35,14 @@ def fast(spec):
     return fast_model_for(spec, [SimpleNamespace(input_names=("speed",), inputs=SPEED[:, None])])
 
 
+def driven(spec):
+    """The definition's operating point, and the standard inputs over ``TIMES``."""
+    point = OperatingPoint.of(spec)
+    columns = (SPEED, 1750.0, point.ambient_temperature, point.coolant_inlet_temperature, point.coolant_flow)
+    columns = [np.broadcast_to(np.asarray(c, dtype=float), TIMES.shape) for c in columns]
+    return point, np.column_stack(columns)
+
+
 def test_expansion_is_refused_with_a_way_out(spec):
     follows = spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": True})})
     with pytest.raises(SpecError, match=r"every ring.*heat.thermal_preload=false.*spindle-fem transient"):
@@ -43,9 +51,7 @@ def test_expansion_is_refused_with_a_way_out(spec):
 
 @pytest.mark.slow
 def test_it_follows_the_full_model_whose_friction_follows_its_films(spec, fast):
-    point = OperatingPoint.of(spec)
-    columns = (SPEED, 1750.0, point.ambient_temperature, point.coolant_inlet_temperature, point.coolant_flow)
-    values = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), TIMES.shape) for c in columns])
+    point, values = driven(spec)
     full = simulate_full(
         prepare_machine(spec),
         InputHistory(TIMES, STANDARD, values, HELD),
@@ -64,38 +70,15 @@ def test_it_follows_the_full_model_whose_friction_follows_its_films(spec, fast):
     assert np.abs(cold.temperature[::3, row] - full.reading("SP01")).max() > 0.05
 
 
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "made"
-data = "made.csv"
-time = {column = "time", unit = "s"}
-[[channel]]
-column = "rear seat"
-role = "temperature"
-probe = "SP05"
-unit = "degC"
-sigma = 0.1
-[[channel]]
-column = "n"
-role = "input"
-drives = "speed"
-unit = "rpm"
-hold = "previous"
-"""
-
-
 @pytest.mark.slow
-def test_simulate_takes_it_and_a_calibrated_machine_keeps_its_heat_model(spec, fast, tmp_path):
-    point = OperatingPoint.of(spec)
-    columns = (SPEED, 1750.0, point.ambient_temperature, point.coolant_inlet_temperature, point.coolant_flow)
-    values = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), TIMES.shape) for c in columns])
+def test_simulate_takes_it_and_a_calibrated_machine_keeps_its_heat_model(spec, fast, recorded_in, tmp_path):
+    point, values = driven(spec)
     drive = make_drive(TIMES, STANDARD, values, HELD)
     made = simulate_fast(fast, drive, point.ambient_temperature).temperature
     frame = pd.DataFrame({"time": TIMES, "n": SPEED / RPM})
     noise = np.random.default_rng(5).normal(0.0, 0.1, TIMES.size)
     frame["rear seat"] = made[:, fast.channels.index("SP05")] - 273.15 + noise
-    frame.to_csv(tmp_path / "made.csv", index=False)
-    (tmp_path / "recording.toml").write_text(MANIFEST)
+    recorded_in(tmp_path, frame, {"rear seat": "SP05"}, {"n": "speed"})
     found = simulate_machine(
         "wu_tan_2016", tmp_path, tmp_path / "out", calibrate=[tmp_path], overrides=OVERRIDES
     )

@@ -1,7 +1,7 @@
 """``simulate`` on a machine without drawings."""
 
 import json
-from pathlib import Path
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -36,43 +36,13 @@ input = "power"
 gain = "1 W/W"
 """
 
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "made"
-data = "made.csv"
-time = {column = "time", unit = "s"}
-[[channel]]
-column = "W"
-role = "temperature"
-probe = "winding"
-unit = "degC"
-sigma = 0.1
-[[channel]]
-column = "B"
-role = "temperature"
-probe = "body"
-unit = "degC"
-sigma = 0.1
-[[channel]]
-column = "P"
-role = "input"
-drives = "power"
-unit = "W"
-hold = "previous"
-[[channel]]
-column = "room"
-role = "input"
-drives = "ambient"
-unit = "degC"
-"""
-
+TEMPERATURES, INPUTS = {"W": "winding", "B": "body"}, {"P": "power", "room": "ambient"}
 # winding and body [J/K], between them and to the room [W/K]
 TRUE = (400.0, 700.0, 1.5, 1.4)
 
 
-def record(folder: Path, seed: int, power) -> Path:
+def made(seed: int, power) -> pd.DataFrame:
     """Readings of the true machine: explicit Euler with steps far below its time constants."""
-    folder.mkdir()
     times = np.arange(0.0, 6000.0, 20.0)
     state, rows = np.array([20.0, 20.0]), []
     for time in times:
@@ -84,17 +54,17 @@ def record(folder: Path, seed: int, power) -> Path:
     read = np.array(rows) + np.random.default_rng(seed).normal(0.0, 0.1, (times.size, 2))
     frame = pd.DataFrame({"time": times, "W": read[:, 0], "B": read[:, 1], "room": 20.0})
     frame["P"] = [power(time) for time in times]
-    frame.to_csv(folder / "made.csv", index=False)
-    (folder / "recording.toml").write_text(MANIFEST)
-    return folder
+    return frame
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory):
+def files(recorded_in, tmp_path_factory):
     folder = tmp_path_factory.mktemp("network")
     (folder / "machine.toml").write_text(MACHINE)
-    first = record(folder / "first", 1, lambda t: 30.0 if t < 3000 else 0.0)
-    second = record(folder / "second", 2, lambda t: 15.0 if t > 1000 else 40.0)
+    first = recorded_in(folder / "first", made(1, lambda t: 30.0 if t < 3000 else 0.0), TEMPERATURES, INPUTS)
+    second = recorded_in(
+        folder / "second", made(2, lambda t: 15.0 if t > 1000 else 40.0), TEMPERATURES, INPUTS
+    )
     return folder / "machine.toml", first, second
 
 
@@ -123,15 +93,14 @@ def test_a_calibrated_network_predicts_another_recording(files, tmp_path):
     assert set(errors["condition"]) >= {"all", "heating", "cooling"}
 
 
-def test_the_report_says_errors_parameters_and_what_was_wrong_with_the_file(files, tmp_path, capsys):
+def test_the_report_says_errors_parameters_and_what_was_wrong_with_the_file(
+    files, recorded_in, tmp_path, capsys
+):
     machine, first, second = files
-    holey = tmp_path / "holey"
-    holey.mkdir()
-    (holey / "recording.toml").write_text(MANIFEST)
     frame = pd.read_csv(second / "made.csv")
     frame.loc[40:44, "B"] = np.nan
     frame.loc[100, "W"] += 30.0
-    pd.concat([frame, frame.iloc[[7]]]).to_csv(holey / "made.csv", index=False)
+    holey = recorded_in(tmp_path / "holey", pd.concat([frame, frame.iloc[[7]]]), TEMPERATURES, INPUTS)
     folder = tmp_path / "out"
     content = simulate_machine(machine, holey, folder, calibrate=[first])
     html = (folder / "report.html").read_text()
@@ -167,10 +136,9 @@ def test_overrides_reach_the_network(files, tmp_path):
 
 
 def test_a_bad_recording_leaves_no_folder(files, tmp_path):
-    machine, _, _ = files
+    machine, first, _ = files
     broken = tmp_path / "broken"
-    broken.mkdir()
-    (broken / "recording.toml").write_text(MANIFEST)
+    shutil.copytree(first, broken)
     (broken / "made.csv").write_text("time,W\n0,x\n")
     with pytest.raises((RecordingError, BadInputError)):
         simulate_machine(machine, broken, tmp_path / "out")

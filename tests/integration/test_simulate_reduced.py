@@ -143,41 +143,9 @@ def test_it_is_found_again_in_the_cache(machine, monkeypatch, tmp_path):
     assert reduced_model_of(machine.spec, options=replace(small, tolerance=1e-2)).digest != first.digest
 
 
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "made"
-data = "made.csv"
-time = {column = "time", unit = "s"}
-[[channel]]
-column = "rear seat"
-role = "temperature"
-probe = "SP05"
-unit = "degC"
-sigma = 0.1
-[[channel]]
-column = "oil"
-role = "temperature"
-probe = "COOLANT_OUT"
-unit = "degC"
-sigma = 0.1
-[[channel]]
-column = "n"
-role = "input"
-drives = "speed"
-unit = "rpm"
-hold = "previous"
-[[channel]]
-column = "room"
-role = "input"
-drives = "ambient"
-unit = "degC"
-"""
-
-
 @pytest.fixture(scope="module")
-def made(fast, tmp_path_factory):
+def made(fast, recorded_in, tmp_path_factory):
     """A recording of a spindle whose rear bearings make 15 % more heat than the definition says."""
-    folder = tmp_path_factory.mktemp("made")
     times = np.arange(0.0, 9000.0, 30.0)
     speed = np.where((times > 600) & (times < 6000), 3000.0, 0.0)
     values = history(times, speed * RPM, 293.15, OperatingPoint.of(fast.spec).coolant_inlet_temperature)
@@ -189,9 +157,8 @@ def made(fast, tmp_path_factory):
     frame = pd.DataFrame({"time": times, "n": speed, "room": 20.0})
     frame["rear seat"] = read[:, fast.channels.index("SP05")]
     frame["oil"] = read[:, fast.channels.index("COOLANT_OUT")]
-    frame.to_csv(folder / "made.csv", index=False)
-    (folder / "recording.toml").write_text(MANIFEST)
-    return folder
+    temperatures, inputs = {"rear seat": "SP05", "oil": "COOLANT_OUT"}, {"n": "speed", "room": "ambient"}
+    return recorded_in(tmp_path_factory.mktemp("made"), frame, temperatures, inputs)
 
 
 def test_simulate_writes_what_every_channel_should_have_read(fast, made, tmp_path, monkeypatch):

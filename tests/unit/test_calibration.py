@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from spindle_fem.calibration.fit import BOUND_SIGMAS, calibrate, prediction_interval
@@ -12,36 +13,6 @@ from spindle_fem.errors import RecordingError
 from spindle_fem.network.build import build_network
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.spec.network import validate_network_machine
-
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "made"
-data = "made.csv"
-time = {column = "time", unit = "s"}
-[[channel]]
-column = "A"
-role = "temperature"
-probe = "winding"
-unit = "degC"
-sigma = 0.1
-[[channel]]
-column = "B"
-role = "temperature"
-probe = "body"
-unit = "degC"
-sigma = 0.1
-[[channel]]
-column = "room"
-role = "input"
-drives = "ambient"
-unit = "degC"
-[[channel]]
-column = "power"
-role = "input"
-drives = "power"
-hold = "previous"
-unit = "W"
-"""
 
 NETWORK = {
     "schema": "spindle-fem/machine/1",
@@ -62,22 +33,15 @@ NETWORK = {
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
+def recording(recorded_in, tmp_path_factory):
     """Two hours of heating and cooling; the readings are put in by each test."""
-    folder = tmp_path_factory.mktemp("made")
     rng = np.random.default_rng(0)
     times = np.arange(0.0, 7200.0, 20.0)
-    power = np.select([times < 3000, times < 5000], [40.0, 0.0], 25.0)
-    room = 20.0 + 0.5 * np.sin(times / 2000.0)
-    readings = 20.0 + rng.normal(0.0, 0.1, (times.size, 2))
-    rows = ["time,A,B,room,power"]
-    rows += [
-        f"{t:.0f},{a:.4f},{b:.4f},{r:.4f},{p:.1f}"
-        for t, (a, b), r, p in zip(times, readings, room, power, strict=True)
-    ]
-    (folder / "made.csv").write_text("\n".join(rows) + "\n")
-    (folder / "recording.toml").write_text(MANIFEST)
-    found = read_recording(folder)
+    frame = pd.DataFrame({"time": times, "room": 20.0 + 0.5 * np.sin(times / 2000.0)})
+    frame["power"] = np.select([times < 3000, times < 5000], [40.0, 0.0], 25.0)
+    frame[["A", "B"]] = 20.0 + rng.normal(0.0, 0.1, (times.size, 2))
+    temperatures, inputs = {"A": "winding", "B": "body"}, {"room": "ambient", "power": "power"}
+    found = read_recording(recorded_in(tmp_path_factory.mktemp("made"), frame, temperatures, inputs))
     return replace(found, flags=np.zeros_like(found.flags))
 
 

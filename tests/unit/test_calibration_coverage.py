@@ -3,40 +3,21 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from spindle_fem.calibration.coverage import coverage_study
 from spindle_fem.calibration.predictor import Prior
 from spindle_fem.recordings.align import read_recording
 
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "made"
-data = "made.csv"
-time = {column = "time", unit = "s"}
-[[channel]]
-column = "A"
-role = "temperature"
-probe = "A"
-unit = "degC"
-sigma = 0.1
-[[channel]]
-column = "room"
-role = "input"
-drives = "ambient"
-unit = "degC"
-"""
-
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
+def recording(recorded_in, tmp_path_factory):
     """Two hours; the readings are put in by the study."""
-    folder = tmp_path_factory.mktemp("made")
     times = np.arange(0.0, 7200.0, 30.0)
-    readings = 20.0 + np.random.default_rng(0).normal(0.0, 0.1, times.size)
-    rows = [f"{time:.0f},{value:.4f},20" for time, value in zip(times, readings, strict=True)]
-    (folder / "made.csv").write_text("\n".join(["time,A,room", *rows]) + "\n")
-    (folder / "recording.toml").write_text(MANIFEST)
+    frame = pd.DataFrame({"time": times, "room": 20.0})
+    frame["A"] = 20.0 + np.random.default_rng(0).normal(0.0, 0.1, times.size)
+    folder = recorded_in(tmp_path_factory.mktemp("made"), frame, {"A": "A"}, {"room": "ambient"})
     found = read_recording(folder)
     return replace(found, flags=np.zeros_like(found.flags))
 

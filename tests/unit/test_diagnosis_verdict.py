@@ -15,6 +15,7 @@ from spindle_fem.diagnosis.verdict import (
     LEAST_TEMPERATURE_RATIO,
     PRIOR_SIGMAS,
     TEMPERATURE,
+    TEMPERATURE_OF_A_SIZE,
     counted,
     detection_p_value,
     judge,
@@ -100,7 +101,7 @@ def test_differences_of_likelihood_count_by_the_temperature():
     worse = hypothesis(CHURNING, misfit=408.0)
     ranked = rank([worse, better, hypothesis(misfit=420.0, evidence=-1e4)])
     odds = ranked[0].probability / ranked[1].probability
-    assert odds == pytest.approx(np.exp((counted(10.0) - counted(6.0)) / TEMPERATURE))
+    assert odds == pytest.approx(np.exp(4.0 / TEMPERATURE_OF_A_SIZE))
 
 
 def test_a_gain_counts_less_beside_a_large_one_but_never_nothing():
@@ -120,17 +121,32 @@ def test_complexity_and_prior_count_in_full():
     assert ranked[0].probability / ranked[1].probability == pytest.approx(np.exp(4.0))
 
 
-def test_what_a_strong_effect_leaves_counts_less():
-    """The same difference of misfit decides less after a large improvement."""
+def test_what_a_strong_effect_leaves_counts_less_for_one_more():
+    """An effect more gains less beside a strong one; which of two of one size it is does not."""
 
-    def odds(first):
-        ranked = rank(
-            [hypothesis(misfit=first), hypothesis(PRELOAD, misfit=400.0), hypothesis(CHURNING, misfit=420.0)]
-        )
+    def odds(first, one, other):
+        ranked = rank([hypothesis(misfit=first), one, other])
         share = {item.fit.keys: item.probability for item in ranked}
-        return share[PRELOAD_KEY] / share[CHURNING_KEY]
+        return share[one.keys] / share[other.keys]
 
-    assert odds(600.0) > 1.1 * odds(20000.0) > 1.1
+    single = hypothesis(PRELOAD, misfit=420.0)
+    pair, rival = hypothesis(PRELOAD, CHURNING, misfit=400.0), hypothesis(CHURNING, misfit=400.0)
+    weak, strong = (counted(x + 10.0) - counted(x) for x in (90.0, 9790.0))
+    assert weak > 2.0 * strong
+    ratio = odds(600.0, pair, single) / odds(20000.0, pair, single)
+    assert ratio == pytest.approx(np.exp((weak - strong) / TEMPERATURE))
+    assert odds(20000.0, rival, single) == pytest.approx(np.exp(10.0 / TEMPERATURE_OF_A_SIZE))
+
+
+def test_the_most_probable_set_of_a_size_stands_for_it():
+    """A set that gains more but pays for it does not make the others of its size less likely."""
+    empty, single = hypothesis(misfit=20000.0), hypothesis(PRELOAD, misfit=500.0)
+    pair = hypothesis(PRELOAD, CHURNING, misfit=400.0)
+    # Its determinants cost what 100 more of misfit cannot pay.
+    greedy = hypothesis(PRELOAD, OFFSET, misfit=300.0, evidence=-150.0 - 200.0)
+    alone = {r.fit.keys: r.probability for r in rank([empty, single, pair])}
+    beside = {r.fit.keys: r.probability for r in rank([empty, single, pair, greedy])}
+    assert beside[pair.keys] == pytest.approx(alone[pair.keys], rel=1e-6)
 
 
 PRELOAD_KEY = frozenset({("thermal_preload", "front_bearings")})

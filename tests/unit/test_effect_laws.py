@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spindle_fem.effects.ambient_drift import RAMP, STEADY, DriftTerm
+from spindle_fem.effects.ambient_drift import HUMP, RAMP, STEADY, DriftTerm
 from spindle_fem.effects.chiller_cycling import PEAK, SHARPNESS, ChillerCyclingTerm
 from spindle_fem.effects.coolant_film import TransitionTerm, reynolds_number
 from spindle_fem.effects.coolant_heating import CoolantHeatingTerm
@@ -13,7 +13,7 @@ from spindle_fem.effects.gap_closure import GapClosureTerm
 from spindle_fem.effects.grease_churning import GreaseChurningTerm
 from spindle_fem.effects.heat_capacity import ContactCapacityTerm
 from spindle_fem.effects.heat_split import HeatSplitTerm
-from spindle_fem.effects.laws import power, relaxed, smooth_step, softplus, switched
+from spindle_fem.effects.laws import linear, power, relaxed, shape, smooth_step, softplus, switched
 from spindle_fem.effects.natural_convection import NaturalConvectionTerm
 from spindle_fem.effects.radiation import RadiationTerm
 from spindle_fem.effects.speed_heat import SpeedHeatTerm
@@ -163,6 +163,17 @@ def test_heat_follows_its_power_of_speed():
 
 
 # ------------------------------------------------------------------ surroundings
+def test_a_lip_gives_more_heat_until_it_has_run_in():
+    size = ("heat_per_1000rpm", 10.0, 1000.0 * RPM)
+    term = SpeedHeatTerm("seal", ("nose",), "speed", size, exponent=(1.0, 0.08), runs_in=True)
+    given = {"heat_per_1000rpm": 20.0, "more_when_new": 0.5, "run_in_time": 3000.0}
+    heat = [
+        term.heat(context(term, time=time, inputs={"speed": 2000.0 * RPM}, **given))[0, 0].real
+        for time in (0.0, 3000.0, 1e6)
+    ]
+    assert heat == pytest.approx([40.0 * 1.5, 40.0 * (1.0 + 0.5 / np.e), 40.0])
+
+
 def test_an_outside_film_is_nominal_at_ten_kelvin_where_it_carries_all():
     term = NaturalConvectionTerm("t", ("film.a",), ("a",), ("ambient",), ())
     term.parameters = parameters = _film_parameters("convective_share", exponent=0.25)
@@ -225,6 +236,19 @@ def test_a_room_drifts_from_one_instant_to_another():
 
 
 # ------------------------------------------------------------------ coolant
+def test_a_hump_of_the_room_comes_and_goes():
+    parameters = (
+        linear("change", 0.0, 3.0, "K"),
+        linear("middle", 9000.0, 1.0, "s"),
+        shape("spread", 1e3, 0.5),
+    )
+    term = DriftTerm("drift", ("film.housing.outside",), HUMP, parameters)
+    at = [
+        term.heat(context(term, time=time, change=2.0))[0, 0].real for time in (0.0, 8000.0, 9000.0, 18000.0)
+    ]
+    assert at == pytest.approx([0.0, 2.0 * np.exp(-0.5), 2.0, 0.0], abs=1e-12)
+
+
 def test_the_channels_reynolds_number_is_the_reference_ones():
     channel = ChannelFlow("iso_vg_32", 0.010909, 0.010 * 0.012)
     # reference/spindle.md: about 292 at 15 °C and 20 L/min.

@@ -37,6 +37,7 @@ def answer(number, effects, *, ratio=None):
         "detectable": True,
         "identifiability": {"ratio": ratio} if effects else None,
         "effects": done,
+        "noise": {"white_K": NOISE, "slow_K": 0.0, "rounding_K": 0.0},
     }
 
 

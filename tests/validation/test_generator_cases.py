@@ -124,6 +124,7 @@ def _answer(effects, **known):
         "indistinguishable": [],
         "identifiability": {"ratio": 5.0} if effects else None,
         "two_recordings": True,
+        "noise": {"white_K": 0.08, "slow_K": 0.06, "rounding_K": 0.0},
     } | known
 
 
@@ -160,6 +161,7 @@ def test_score_of_a_right_and_a_wrong_case():
     assert right["exact"]
     assert right["rank"] == 1
     assert right["place"]
+    assert right["after_over_noise"] == pytest.approx(1.03)
     assert right["coverage"][0]["inside"]
     assert not wrong["exact"]
     assert wrong["rank"] == 2
@@ -209,6 +211,14 @@ def test_judgement_of_what_cannot_be_seen(reduced):
     known |= {"ratio": 4.0, "chi2": 900.0, "best_mimics": [twin]}
     assert judge([effect], known, calibrated=True)["acceptable_verdicts"] == ["missing_physics", "ambiguous"]
     known |= {"best_mimics": [twin | {"ratio": 2.0, "chi2": 400.0}]}
+    undecided = judge([effect], known | {"best_mimics": [twin]}, calibrated=True)
+    assert undecided["indistinguishable"] == [twin]
+    # Unrecorded heat is named where no law fits, so it leaves nothing to decide.
+    spare = twin | {"effect": "unrecorded_heat_source"}
+    assert judge([effect], known | {"best_mimics": [spare]}, calibrated=True)["indistinguishable"] == []
+    # The truth's own plain law comes no nearer than the twin that is off by as much.
+    own = {"own_simple_form": {"ratio": 0.3, "chi2": 60.0}, "best_mimics": [twin | {"chi2": 65.0}]}
+    assert judge([effect], known | own, calibrated=True)["indistinguishable"]
     clear = judge([effect], known, calibrated=True)
     assert clear["clear"]
     assert clear["acceptable_verdicts"] == ["missing_physics"]
