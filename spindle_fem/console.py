@@ -228,9 +228,33 @@ def print_sweep(content: dict[str, Any], folder: Path) -> None:
 
 
 def print_transient(content: dict[str, Any], folder: Path) -> None:
-    """Headline of a transient study."""
+    """Headline of a transient study: the end of every phase, and the approach to equilibrium."""
+    from spindle_fem.reporting.transient_report import equilibrium_text
+
     console = _console()
-    for key, value in content.items():
-        if isinstance(value, (str, int, float)) and key != "schema":
-            console.print(f"{key.replace('_', ' ')}: {value}")
+    phases, equilibrium = content["phases"], content["equilibrium"]
+    probes = list(phases[0]["probes_degC"])
+    table = _table(
+        f"{content['study']}: {content['machine']}, {content['unknowns']:,} temperatures",
+        "end of",
+        "after h",
+        "heat W",
+        "hottest °C",
+        *probes,
+    )
+    for phase in phases:
+        table.add_row(
+            phase["name"] + (" (not settled)" if phase["settled"] is False else ""),
+            _number(phase["end_s"] / 3600.0, 2),
+            _number(phase["heat_W"], 1),
+            _number(phase["hottest_degC"], 2),
+            *(_number(phase["probes_degC"][name], 2) for name in probes),
+        )
+    console.print(table)
+    console.print(equilibrium_text(equilibrium))
+    worst = max(phase["energy"]["imbalance_relative"] for phase in phases)
+    console.print(
+        f"{sum(phase['steps'] for phase in phases)} steps, heat in less out and stored {worst:.1e}, "
+        f"{sum(phase['cpu_seconds'] for phase in phases):.0f} s of processor"
+    )
     console.print(f"Report: {folder / 'report.html'}")

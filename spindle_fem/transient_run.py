@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.conduction.transient import ThermalState
 from spindle_fem.coupling import prepare_machine
 from spindle_fem.effect_entries import physics_of
 from spindle_fem.reporting.output import output_folder
 from spindle_fem.reporting.transient_report import write_transient
 from spindle_fem.spec.load import load_machine
+from spindle_fem.transients.saved_state import load_state
 from spindle_fem.transients.study import load_study, run_study
 
 
@@ -48,10 +48,10 @@ def run_transient_study(
         The content of ``transient.json``.
     """
     asked = load_study(study)
-    start = None if restart is None else ThermalState.load(Path(restart))
+    start, memory = (None, None) if restart is None else load_state(restart)
     spec = load_machine(asked.machine if machine is None else machine, overrides)
     with output_folder(folder) as place:
         prepared = prepare_machine(spec, progress=progress)
         physics = physics_of(prepared)
-        result = run_study(prepared, asked, start=start, physics=physics, progress=progress)
+        result = run_study(prepared, asked, start=start, memory=memory, physics=physics, progress=progress)
         return write_transient(prepared, result, place)

@@ -95,7 +95,11 @@ class Diagnosis:
 
 
 def diagnose_recordings(
-    machine: DiagnosedMachine, *, heldout: str = "blocks", progress: Progress = lambda stage: None
+    machine: DiagnosedMachine,
+    *,
+    heldout: str = "blocks",
+    progress: Progress = lambda stage: None,
+    workers: Workers | None = None,
 ) -> Diagnosis:
     """Diagnose a machine's recordings.
 
@@ -105,6 +109,8 @@ def diagnose_recordings(
     heldout : str
         As :func:`heldout_stamps` takes it.
     progress : callable
+    workers : Workers, optional
+        Who fit, by default as many as threads are given; the result does not depend on it.
     """
     clock = _Clock()
     fast, view = machine.fast, machine.view

@@ -43,9 +43,9 @@ EXCHANGED, OTHERS = 1, 5
 # Sets that are fitted from each start: single effects from one start and from each of two, pairs, triples.
 SINGLES, PAIRS, TRIPLES = (8, 5), 6, 3
 BEAM, ADDITIONS = 3, 6
-# Shares of the amplitudes that a fit begins from, one after the other until it can be simulated: friction that
-# feeds on its own heat has no state at amplitudes that are too large, and first order does not know where
-# that begins.
+# Shares of the amplitudes that a fit begins from, one after the other until it can be simulated: friction
+# that feeds on its own heat has no state at amplitudes that are too large, and first order does not know
+# where that begins.
 MILDER = (1.0, 0.5, 0.2)
 # Sets that are fitted abreast before the best of them says what is hopeless.
 ABREAST = 2

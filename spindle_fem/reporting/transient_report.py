@@ -19,6 +19,7 @@ from spindle_fem.reporting.transient_charts import bearing_history, heat_history
 from spindle_fem.results.summary import package_versions
 from spindle_fem.solve import solve_prepared
 from spindle_fem.spec.load import write_machine
+from spindle_fem.transients.saved_state import save_state
 from spindle_fem.transients.study import StudyResult, time_to_stay_within
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -117,7 +118,7 @@ def write_transient(machine: PreparedMachine, result: StudyResult, folder: Path)
     """
     summary = summarise_transient(machine, result)
     _write_table(result, folder / "transient.csv")
-    result.state.save(folder / "state.npz")
+    save_state(folder / "state.npz", result.state, result.memory)
     replace_text(folder / "machine.toml", write_machine(machine.spec))
     figures = {
         "probes": (probe_history(result), "Every probe, and the speed."),
@@ -174,7 +175,7 @@ def _report(summary: dict[str, Any], pictures: list[Any]) -> str:
         {"value": str(sum(phase["steps"] for phase in phases)), "name": "time steps"},
     ]
     sections = [
-        Section("summary", "Summary", [Cards(cards), Text(_equilibrium_text(equilibrium))]),
+        Section("summary", "Summary", [Cards(cards), Text(equilibrium_text(equilibrium))]),
         Section("course", "Course", pictures),
         Section("phases", "Phases", [_phase_table(phases), _energy_table(phases)]),
     ]
@@ -182,7 +183,8 @@ def _report(summary: dict[str, Any], pictures: list[Any]) -> str:
     return render_document("Transient", summary["study"], sections, subtitle)
 
 
-def _equilibrium_text(equilibrium: dict[str, Any]) -> str:
+def equilibrium_text(equilibrium: dict[str, Any]) -> str:
+    """What :func:`equilibrium_of` found, in words."""
     if not equilibrium["exists"]:
         return f"The last phase tends to no steady state: {equilibrium['reason']}"
 
@@ -194,8 +196,7 @@ def _equilibrium_text(equilibrium: dict[str, Any]) -> str:
         f"At the end the probes are within {equilibrium['left_K']:.2f} K of the steady state of the last "
         f"phase. From its start, 95 % of the way takes {hours(shares['0.95'])}, "
         f"99 % {hours(shares['0.99'])}; all probes stay within 0.5 K after {hours(bands['0.5'])} "
-        f"and within 0.1 K after {hours(bands['0.1'])}. "
-        "The paper reports 3.5–4 h to equilibrium at 3000 rpm."
+        f"and within 0.1 K after {hours(bands['0.1'])}."
     )
 
 

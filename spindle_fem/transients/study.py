@@ -39,7 +39,7 @@ from spindle_fem.transients.run import (
     start_at,
     start_from,
 )
-from spindle_fem.transients.terms import NO_PHYSICS, Physics, steady_physics, with_factors
+from spindle_fem.transients.terms import NO_PHYSICS, Physics, settled_memory, steady_physics, with_factors
 
 Array = NDArray[np.float64]
 
@@ -178,6 +178,11 @@ class StudyResult:
         """At the end, to go on from."""
         return self.phases[-1].transient.state
 
+    @property
+    def memory(self) -> Array | None:
+        """What terms remember at the end; None without terms."""
+        return self.phases[-1].transient.memory
+
     def joined(self, name: str) -> Array:
         """An array of :class:`MachineTransient` over all phases; a jump keeps the later sample."""
         parts = [getattr(phase.transient, name) for phase in self.phases]
@@ -255,6 +260,7 @@ def run_study(
     study: TransientStudy,
     *,
     start: ThermalState | None = None,
+    memory: Array | None = None,
     physics: Physics = NO_PHYSICS,
     progress: Callable[[str], None] = lambda text: None,
 ) -> StudyResult:
@@ -266,6 +272,8 @@ def run_study(
     study : TransientStudy
     start : ThermalState, optional
         A saved state to go on from, in place of the study's own start.
+    memory : ndarray, optional
+        What the terms remembered then.
     physics : Physics
         Terms and factors beyond the machine's own; their memory goes on from phase to phase.
     progress : callable
@@ -275,11 +283,12 @@ def run_study(
     if start is None and study.start == "steady":
         progress("steady start")
         start = start_from(solve_coupled(machine, point, beyond=steady_physics(machine, physics)))
+        memory = settled_memory(machine, physics, point, start.temperature, start.lumped_temperature)
     if start is not None:
         require_state(machine, start)
     options = TransientOptions(error=study.error)
     values = {name: getattr(point, field) for name, field in FIELD_OF.items()}
-    state, memory, results = start, None, []
+    state, results = start, []
     for phase in study.phase:
         given = {name: getattr(phase, field) for name, field in FIELD_OF.items()}
         values |= {name: value for name, value in given.items() if value is not None}

@@ -249,8 +249,12 @@ class FieldTerms:
     def steady(self, point: OperatingPoint, temperature: Array, lumped: Array) -> LoadChange:
         """What the terms do in the long run: memories have gone where they go, clocks stand at zero."""
         sensed, inputs = self._sensed(temperature, lumped), inputs_of(point)
-        memory = self._advanced(0.0, LONG, inputs, sensed, self._initial)
-        return self._change(0.0, point, inputs, sensed, memory)
+        return self._change(0.0, point, inputs, sensed, self.settled(point, temperature, lumped))
+
+    def settled(self, point: OperatingPoint, temperature: Array, lumped: Array) -> Array:
+        """Memory of terms that have long seen the same."""
+        sensed = self._sensed(temperature, lumped)
+        return self._advanced(0.0, LONG, inputs_of(point), sensed, self._initial)
 
     # --------------------------------------------------------------- details
     def _sensed(self, temperature: Array, lumped: Array) -> Array:
@@ -372,11 +376,8 @@ def steady_physics(machine: PreparedMachine, physics: Physics) -> Callable[..., 
     """
     if not physics.is_there:
         return None
-    first = OperatingPoint.of(machine.spec)
-    uniform = np.full(machine.operators.n_unknowns, first.ambient_temperature)
-    loads, _ = machine.builder.at(first, machine.field_state(uniform, {}))
-    names = tuple(node.name for node in loads.lumped)
-    terms = FieldTerms(machine, names, physics)
+    terms = _terms_of(machine, physics)
+    names = terms.lumped_names
 
     def beyond(point: OperatingPoint, temperature: Array, lumped: Mapping[str, float]) -> LoadChange:
         # Before the first solve, balls and air of gaps are as warm as the parts are on average.
@@ -384,6 +385,29 @@ def steady_physics(machine: PreparedMachine, physics: Physics) -> Callable[..., 
         return terms.steady(point, temperature, np.array([lumped.get(name, mean) for name in names]))
 
     return beyond
+
+
+def settled_memory(
+    machine: PreparedMachine, physics: Physics, point: OperatingPoint, temperature: Array, lumped: Array
+) -> Array | None:
+    """What the terms remember in a steady state, such as :func:`steady_physics` makes; None without physics.
+
+    Parameters
+    ----------
+    machine : PreparedMachine
+        Of :func:`with_factors`.
+    physics : Physics
+    point : OperatingPoint
+    temperature, lumped : ndarray, [K]
+    """
+    return _terms_of(machine, physics).settled(point, temperature, lumped) if physics.is_there else None
+
+
+def _terms_of(machine: PreparedMachine, physics: Physics) -> FieldTerms:
+    first = OperatingPoint.of(machine.spec)
+    uniform = np.full(machine.operators.n_unknowns, first.ambient_temperature)
+    loads, _ = machine.builder.at(first, machine.field_state(uniform, {}))
+    return FieldTerms(machine, tuple(node.name for node in loads.lumped), physics)
 
 
 def inputs_of(point: OperatingPoint) -> dict[str, float]:

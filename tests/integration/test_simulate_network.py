@@ -61,11 +61,12 @@ def made(seed: int, power) -> pd.DataFrame:
 def files(recorded_in, tmp_path_factory):
     folder = tmp_path_factory.mktemp("network")
     (folder / "machine.toml").write_text(MACHINE)
-    first = recorded_in(folder / "first", made(1, lambda t: 30.0 if t < 3000 else 0.0), TEMPERATURES, INPUTS)
-    second = recorded_in(
-        folder / "second", made(2, lambda t: 15.0 if t > 1000 else 40.0), TEMPERATURES, INPUTS
-    )
-    return folder / "machine.toml", first, second
+    frames = {
+        "first": made(1, lambda t: 30.0 if t < 3000 else 0.0),
+        "second": made(2, lambda t: 15.0 if t > 1000 else 40.0),
+    }
+    recordings = [recorded_in(folder / name, frame, TEMPERATURES, INPUTS) for name, frame in frames.items()]
+    return folder / "machine.toml", *recordings
 
 
 def test_a_calibrated_network_predicts_another_recording(files, tmp_path):

@@ -29,6 +29,7 @@ from spindle_fem.transient_run import run_transient_study
 from spindle_fem.transients.coupled import CoupledInputs
 from spindle_fem.transients.history import OperatingHistory
 from spindle_fem.transients.run import MachineEnergy, TransientOptions, simulate_full, start_from
+from spindle_fem.transients.saved_state import load_state, save_state
 from spindle_fem.transients.study import load_study, run_study, study_of, time_to_stay_within
 from spindle_fem.transients.terms import Physics
 
@@ -210,6 +211,46 @@ def test_restart_from_a_saved_state(quick, tmp_path):
     total = first.energy + second.energy
     assert total.heat_in == pytest.approx(whole.energy.heat_in, rel=1e-5)
     assert total.stored == pytest.approx(whole.energy.stored, rel=1e-4)
+
+
+class Lagging(Term):
+    """200 W into the housing, of which so much is there as the term remembers."""
+
+    name = "lagging"
+    parameters = (TermParameter("power", 200.0, unit="W"),)
+    heat_places = ("housing",)
+    n_states = 1
+
+    def heat(self, context):
+        return context.parameters["power"] * context.state
+
+    def advance(self, context, step):
+        kept = np.exp(-step / 1800.0)
+        return kept * context.state + (1.0 - kept)
+
+
+def of_phase(duration, **more):
+    """A study of one phase at the definition's own operating point."""
+    content = {"schema": "spindle-fem/transient/1", "name": "x", "error": "0.5 K"}
+    return study_of({**content, "phase": [{"name": "x", "duration": duration}], **more})
+
+
+def test_what_terms_remember_is_saved_with_the_state(quick, tmp_path):
+    physics, study = Physics((Lagging(),)), of_phase("1 min")
+    first = run_study(quick, study, physics=physics)
+    save_state(tmp_path / "state.npz", first.state, first.memory)
+    start, memory = load_state(tmp_path / "state.npz")
+    second = run_study(quick, study, start=start, memory=memory, physics=physics)
+    assert second.memory == pytest.approx(1.0 - np.exp(-120.0 / 1800.0), rel=1e-9)
+    save_state(tmp_path / "plain.npz", first.state)
+    assert load_state(tmp_path / "plain.npz")[1] is None
+
+
+def test_a_steady_start_holds_what_terms_remember_then(quick):
+    """Nothing moves: all of the heat has been there for long."""
+    run = run_study(quick, of_phase("20 min", start="steady"), physics=Physics((Lagging(),)))
+    assert run.memory == pytest.approx(1.0, abs=1e-9)
+    assert np.ptp(run.joined("readings"), axis=0).max() < 1e-4
 
 
 def test_state_of_another_mesh_is_refused(quick):
