@@ -189,14 +189,14 @@ def equilibrium_text(equilibrium: dict[str, Any]) -> str:
         return f"The last phase tends to no steady state: {equilibrium['reason']}"
 
     def hours(value: float | None) -> str:
-        return "not within this run" if value is None else f"{value / 3600.0:.2f} h"
+        return "not within this run" if value is None else f"after {value / 3600.0:.2f} h"
 
     shares, bands = equilibrium["shares_s"], equilibrium["bands_s"]
     return (
         f"At the end the probes are within {equilibrium['left_K']:.2f} K of the steady state of the last "
-        f"phase. From its start, 95 % of the way takes {hours(shares['0.95'])}, "
-        f"99 % {hours(shares['0.99'])}; all probes stay within 0.5 K after {hours(bands['0.5'])} "
-        f"and within 0.1 K after {hours(bands['0.1'])}."
+        f"phase. Counted from its start, every probe has gone 95 % of the way: {hours(shares['0.95'])}; "
+        f"99 %: {hours(shares['0.99'])}. All probes stay within 0.5 K: {hours(bands['0.5'])}; "
+        f"within 0.1 K: {hours(bands['0.1'])}."
     )
 
 
