@@ -9,8 +9,15 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
+from spindle_fem.diagnosis.abreast import FitOrder, Workers, fit_order
+from spindle_fem.diagnosis.inference import Problem
+from spindle_fem.diagnosis.machines import open_machine
+from spindle_fem.diagnosis.plant import Plant
+from spindle_fem.diagnosis.prepare import all_stamps, calibrate
 from spindle_fem.diagnosis.run import diagnose
-from spindle_fem.errors import BadInputError
+from spindle_fem.effects.catalogue import candidates_for
+from spindle_fem.errors import BadInputError, ConvergenceError
+from spindle_fem.recordings.align import read_recording
 from spindle_fem.simulate import simulate_machine
 
 MACHINE = """
@@ -285,6 +292,43 @@ def test_the_improved_machine_simulates_what_the_diagnosis_predicts(heated, tmp_
     late = predicted["time_s"] > 1800.0
     for name in ("Tw", "Tl", "Tb"):
         assert (predicted[name] - again[name])[late].abs().max() < 0.2
+
+
+def test_fits_abreast_are_those_of_one_process(machine, tmp_path):
+    folder = record(tmp_path / "r", 5, extra=hot)
+    opened = open_machine(machine, (), [read_recording(folder)], [])
+    plant = Plant(opened.fast, opened.recordings, all_stamps(opened.recordings), opened.effects)
+    calibrated = calibrate(None, plant)
+    problem = Problem(plant, calibrated.belief, calibrated.slow, plant.observations)
+    chosen = [c for c in candidates_for(opened.view) if c.effect in ("sensor_offset", "heat_scale")][:3]
+    orders = [FitOrder((candidate,), {}, iterations=3) for candidate in chosen]
+    alone, abreast = (Workers(number).fits(problem, orders) for number in (1, 2))
+    for order, one, other in zip(orders, alone, abreast, strict=True):
+        assert other.log_evidence == pytest.approx(one.log_evidence, rel=1e-9)
+        assert other.candidates[0] is order.candidates[0]
+    assert len({round(fit.log_evidence, 3) for fit in alone}) == len(orders)
+
+
+def test_a_set_that_cannot_be_simulated_begins_milder(machine, tmp_path, monkeypatch):
+    folder = record(tmp_path / "r", 5)
+    opened = open_machine(machine, (), [read_recording(folder)], [])
+    plant = Plant(opened.fast, opened.recordings, all_stamps(opened.recordings), opened.effects)
+    calibrated = calibrate(None, plant)
+    problem = Problem(plant, calibrated.belief, calibrated.slow, plant.observations)
+    candidate = next(c for c in candidates_for(opened.view) if c.terms)
+    tried = []
+
+    def fit(self, candidates, values, **options):
+        tried.append(values[candidate.amplitude])
+        if len(tried) < 3:
+            raise ConvergenceError("diagnosis", "it runs away.")
+        return "fitted"
+
+    monkeypatch.setattr(Problem, "fit", fit)
+    order = FitOrder((candidate,), {candidate.amplitude: candidate.null + 10.0}, shares=(1.0, 0.5, 0.2))
+    assert fit_order(problem, order) == "fitted"
+    assert np.array(tried) - candidate.null == pytest.approx([10.0, 5.0, 2.0])
+    assert fit_order(problem, FitOrder((candidate,), {candidate.amplitude: 1.0}, shares=())) is None
 
 
 def test_two_things_at_once_are_both_named(machine, tmp_path):
