@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 _RPM = 30.0 / np.pi
+# Share of the preload by which it has to change to be drawn.
+SAME_PRELOAD = 1.0e-3
 
 
 def _hours(seconds: Array | float) -> Array:
@@ -46,16 +50,35 @@ def _speed_strip(axes, result: StudyResult) -> None:
 
 
 @styled
-def probe_history(result: StudyResult) -> Figure:
-    """Every probe over time, the speed below."""
+def probe_history(result: StudyResult, steady: Mapping[str, float] | None = None) -> Figure:
+    """Every probe over time, the speed below.
+
+    Parameters
+    ----------
+    result : StudyResult
+    steady : mapping of probe to float, optional, [°C]
+        Where the last phase tends to: dotted over it.
+    """
     figure, (upper, lower) = _stacked(900.0, f"{result.study.name}: probes", (4.0, 1.0))
     hours, readings = _hours(result.joined("times")), result.joined("readings") - ZERO_CELSIUS_K
     for column, name in enumerate(result.phases[0].transient.probes):
-        upper.plot(hours, readings[:, column], label=name, color=CYCLE[column % len(CYCLE)])
+        colour = CYCLE[column % len(CYCLE)]
+        upper.plot(hours, readings[:, column], label=name, color=colour)
+        if steady is not None:
+            last = _hours(np.array([result.phases[-1].start, result.phases[-1].end]))
+            upper.plot(last, [steady[name]] * 2, color=colour, linestyle=":", linewidth=1.2)
+    if steady is not None:
+        upper.plot([], [], color=MUTED, linestyle=":", label="steady state of the last phase")
+    _phase_ends(upper, result)
     upper.set_ylabel(TEMPERATURE_LABEL)
     upper.legend(ncols=3)
     _speed_strip(lower, result)
     return figure
+
+
+def _phase_ends(axes, result: StudyResult) -> None:
+    for phase in result.phases[:-1]:
+        axes.axvline(_hours(phase.end), color=MUTED, linewidth=0.6, alpha=0.6, zorder=0.5)
 
 
 @styled
@@ -74,6 +97,8 @@ def bearing_history(result: StudyResult) -> Figure | None:
         lower.plot(hours, inner[:, column] - outer[:, column], color=colour)
     upper.plot([], [], color=MUTED, label="inner raceway")
     upper.plot([], [], color=MUTED, linestyle="--", label="outer raceway")
+    for axes in (upper, lower):
+        _phase_ends(axes, result)
     upper.set_ylabel(TEMPERATURE_LABEL)
     upper.legend(ncols=4)
     lower.set_ylabel("inner − outer / K")
@@ -82,9 +107,10 @@ def bearing_history(result: StudyResult) -> Figure | None:
 
 @styled
 def heat_history(result: StudyResult) -> Figure:
-    """Friction heat, what the coolant takes, and preload where the heat model follows it."""
+    """Friction heat, what the coolant takes, and preload where it changes."""
     preload = result.step_record("preload")
-    follows = bool(preload.size) and bool(np.isfinite(preload).any())
+    known = preload[np.isfinite(preload).all(axis=1)]
+    follows = bool(known.size) and bool(np.any(np.ptp(known, axis=0) > SAME_PRELOAD * known.max()))
     figure, axes = _stacked(
         1000.0 if follows else 700.0, f"{result.study.name}: heat", (2.0, 1.0) if follows else (1.0,)
     )
@@ -93,6 +119,8 @@ def heat_history(result: StudyResult) -> Figure:
     axes[0].plot(
         hours, result.step_record("coolant_heat"), color=OUTER, label="taken by the coolant (mean of a step)"
     )
+    for axis in axes:
+        _phase_ends(axis, result)
     axes[0].set_ylabel("heat / W")
     axes[0].legend()
     if follows:

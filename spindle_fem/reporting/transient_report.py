@@ -121,7 +121,10 @@ def write_transient(machine: PreparedMachine, result: StudyResult, folder: Path)
     save_state(folder / "state.npz", result.state, result.memory)
     replace_text(folder / "machine.toml", write_machine(machine.spec))
     figures = {
-        "probes": (probe_history(result), "Every probe, and the speed."),
+        "probes": (
+            probe_history(result, summary["equilibrium"].get("steady_degC")),
+            "Every probe, and the speed; dotted, where the last phase tends to.",
+        ),
         "bearings": (
             bearing_history(result),
             "Raceway means of every bearing and how much hotter the inner ring is.",
