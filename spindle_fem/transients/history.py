@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import RecordedHeat
 from spindle_fem.errors import RecordingError, did_you_mean
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.network.history import InputHistory
@@ -24,6 +25,9 @@ FIELD_OF = {
 }
 # Changes below this pass inside a step: share of the largest value, or K for temperatures.
 RELATIVE_RESOLUTION = {"speed": 2.0e-3, "thrust": 1.0e-2, "coolant_flow": 1.0e-2}
+# Heat that the inputs give for a place, in W, and its resolution.
+HEAT = "heat."
+HEAT_RESOLUTION = 1.0e-2
 TEMPERATURE_RESOLUTION = 0.05
 # A held input that jumps by this many resolutions starts the steps anew.
 RESTART_FACTOR = 10.0
@@ -37,8 +41,8 @@ class OperatingHistory:
     ----------
     inputs : InputHistory
         Columns named ``speed`` [rad/s], ``thrust`` [N], ``ambient``,
-        ``coolant_inlet`` [K], ``coolant_flow`` [m³/s]; before the first time
-        the first value holds, after the last one the last.
+        ``coolant_inlet`` [K], ``coolant_flow`` [m³/s], ``heat.<place>`` [W];
+        before the first time the first value holds, after the last one the last.
     defined : OperatingPoint
         The definition's own values.
     """
@@ -56,7 +60,7 @@ class OperatingHistory:
             An input that a machine with geometry does not have.
         """
         for name in inputs.names:
-            if name not in FIELD_OF:
+            if name not in FIELD_OF and not name.startswith(HEAT):
                 raise RecordingError(
                     "inputs", f'"{name}" drives nothing in this machine.', did_you_mean(name, FIELD_OF)
                 )
@@ -65,21 +69,31 @@ class OperatingHistory:
     def at(self, time: float) -> OperatingPoint:
         """Operating point just after a time [s]; friction does not know which way a spindle turns."""
         values = {field: getattr(self.defined, field) for field in FIELD_OF.values()}
+        extra_heat = {}
         times = self.inputs.times
         left = max(int(np.searchsorted(times, time, side="right")) - 1, 0)
         for column, name in enumerate(self.inputs.names):
             samples = self.inputs.values[:, column]
             held = self.inputs.held[column]
-            values[FIELD_OF[name]] = float(samples[left] if held else np.interp(time, times, samples))
+            value = float(samples[left] if held else np.interp(time, times, samples))
+            if name in FIELD_OF:
+                values[FIELD_OF[name]] = value
+            else:
+                extra_heat[name.removeprefix(HEAT)] = value
         values["speed"] = abs(values["speed"])
-        return OperatingPoint(**values)
+        return OperatingPoint(**values, extra_heat=extra_heat)
+
+    def given_heat(self) -> tuple[RecordedHeat, ...]:
+        """Terms that put the heat of the inputs into their places."""
+        return tuple(RecordedHeat(name) for name in self.inputs.names if name.startswith(HEAT))
 
     def _resolution(self, column: int, temperature: float = TEMPERATURE_RESOLUTION) -> float:
         name = self.inputs.names[column]
-        if name not in RELATIVE_RESOLUTION:
+        share = HEAT_RESOLUTION if name.startswith(HEAT) else RELATIVE_RESOLUTION.get(name)
+        if share is None:
             return temperature
         largest = float(np.abs(self.inputs.values[:, column]).max())
-        return RELATIVE_RESOLUTION[name] * max(largest, 1.0e-9)
+        return share * max(largest, 1.0e-9)
 
     def breakpoints(self, temperature: float = TEMPERATURE_RESOLUTION) -> Array:
         """Times [s] at which a step has to end for the inputs to be followed within their resolution.

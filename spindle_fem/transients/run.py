@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,7 +86,8 @@ def simulate_full(
     machine : PreparedMachine
     inputs : InputHistory
         ``speed``, ``thrust``, ``ambient``, ``coolant_inlet``, ``coolant_flow``
-        in SI, held or on straight lines; such as ``Recording.input_history()``.
+        and ``heat.<place>`` in SI, held or on straight lines; such as
+        ``Recording.input_history()``.
     sample_times : (n,) array_like, optional, [s]
         Rising; the times of ``inputs`` when absent.
     start : ThermalState, optional
@@ -117,6 +119,7 @@ def simulate_full(
     began = clock.process_time()
     machine, physics = with_factors(machine, physics)
     history = OperatingHistory.of(machine.spec, inputs)
+    physics = replace(physics, terms=(*physics.terms, *history.given_heat()))
     if start is None:
         first = history.at(float(inputs.times[0]))
         start = start_at(machine, history, first.ambient_temperature)

@@ -316,6 +316,21 @@ def test_a_term_is_switched_at_its_instant_though_no_input_jumps(quick):
     assert added == pytest.approx(100.0 * 60.0, rel=1e-6)
 
 
+def test_heat_that_the_inputs_give_enters_at_its_place(quick):
+    """Held, it is in the account to the joule; where the place is no part, it is refused."""
+    options = TransientOptions(fixed_step=60.0, coupling_tolerance=1e-3, coefficient_tolerance=5e-3)
+    times = [0.0, 60.0, 120.0]
+    plain = simulate_full(quick, held(times, speed=0.0), options=options)
+    heated = simulate_full(
+        quick, held(times, **{"speed": 0.0, "heat.housing": np.array([100.0, 300.0, 300.0])}), options=options
+    )
+    added = heated.energy.heat_in - plain.energy.heat_in
+    assert added == pytest.approx(60.0 * (100.0 + 300.0), rel=1e-6)
+    assert heated.state.temperature.max() > plain.state.temperature.max()
+    with pytest.raises(SpecError, match=r"hosing.*housing"):
+        simulate_full(quick, held(times, **{"speed": 0.0, "heat.hosing": 1.0}))
+
+
 def test_held_and_linear_inputs():
     spec = load_machine("wu_tan_2016", SMALL)
     history = InputHistory(
