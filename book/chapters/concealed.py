@@ -149,7 +149,9 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
             "Both models know the same drawings and the same heat table: a machine whose drawing is wrong "
             "is not in the study.",
             "The shares hold for this mix of cases; another mix has others.",
-            "What is called clear is decided by the generator's own re-fit, by thresholds that are a choice.",
+            "What is called clear is decided by the generator's own re-fit, by thresholds that are a choice. "
+            "Undecidable is a case in which another effect's plain law comes as near to the truth as the "
+            "true effect's own plain law.",
         ],
         tone="good" if not unmet else "",
     )
@@ -326,8 +328,8 @@ def _errors(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], pictu
         pictures.add(
             "errors",
             charts.errors_against_noise(rows),
-            "Held-out error over the noise of a reading, before and after; where nothing was found both "
-            "are the same.",
+            "Held-out error over all that was added to a reading (white noise, a slow part, rounding), "
+            "before and after; where nothing was found both are the same.",
         ),
         Table(
             (
@@ -338,8 +340,8 @@ def _errors(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], pictu
                 column("worst", number=True),
             ),
             rows_of(listed),
-            "Noise is what the sensor declares with rounding; a slow error of 0.02 to 0.05 K comes on top "
-            "in every recording, so that 1 cannot be reached by every case.",
+            "Noise is all that was added to the readings: the sensor's own, a slow error of 0.02 to 0.05 K, "
+            "rounding.",
         ),
     ]
 

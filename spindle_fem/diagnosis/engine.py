@@ -410,12 +410,13 @@ class Search:
         for candidate in candidates:
             effect = self.effects[candidate.effect]
             if isinstance(effect, IntervalEffect):
-                places, forms = len(effect.places(self.view)), 1
+                places, share = len(effect.places(self.view)), 1.0
             else:
                 same = [c for c in self.candidates if c.effect == candidate.effect]
                 places = len({c.component for c in same})
-                forms = sum(c.component == candidate.component for c in same)
-            found += float(np.log(self.weights[candidate.effect] / total / places / max(forms, 1)))
+                here = sum(c.likelihood for c in same if c.component == candidate.component)
+                share = candidate.likelihood / here if here else 1.0
+            found += float(np.log(self.weights[candidate.effect] / total * share / places))
         # A set counts once, in whatever order it is drawn.
         return found + float(np.sum(np.log(np.arange(1, len(candidates) + 1))))
 

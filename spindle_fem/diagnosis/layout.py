@@ -10,6 +10,8 @@ from spindle_fem.spec.model import AnnulusSegment, MachineSpec, Part, Surface
 
 # A segment is a flange where its diameter passes the next largest by this share.
 FLANGE_STEP = 1.1
+# Spot of the wall of the cooling channel.
+CHANNEL_WALL = "channel_wall"
 
 
 class Layout:

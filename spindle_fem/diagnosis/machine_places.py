@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from spindle_fem.diagnosis.layout import Layout
+from spindle_fem.diagnosis.layout import CHANNEL_WALL, Layout
 from spindle_fem.reduced.probe_places import NEAR
 from spindle_fem.spec.model import MachineSpec
 
@@ -111,7 +111,7 @@ def _channel_middle(spec: MachineSpec) -> float:
 
 def _of_channel(spec: MachineSpec, name: str) -> tuple[Region, ...]:
     channel = spec.channel
-    if channel is None or name != "channel":
+    if channel is None or name not in ("channel", CHANNEL_WALL):
         return ()
     half = 0.5 * channel.width
     return (

@@ -26,6 +26,10 @@ TEMPERATURE = 2.0
 INEXACT_BEYOND = 300.0
 LEAST_TEMPERATURE_RATIO = 3.0
 TEMPERATURE_OF_A_SIZE = 1.5
+# When sets are compared, amplitudes from this share of their usual size up to it are as likely in every
+# decade: what a normal prior says of an effect a tenth as large is a convention, and another one for each
+# effect. Beyond the usual size the normal prior holds.
+SMALLEST_SIZE = 0.01
 # Below this the most probable set is named together with what else may be.
 DECIDED = 0.75
 LISTED = 0.02
@@ -105,7 +109,8 @@ def rank(hypotheses: Sequence[Hypothesis]) -> list[Ranked]:
 def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
     """Logarithm of prior, complexity and likelihood over nothing missing, the last as far as it counts.
 
-    Complexity (the determinants of Laplace's evidence) counts in full.
+    Complexity (the determinants of Laplace's evidence) counts in full, with
+    amplitudes that may have any order of magnitude (:func:`any_magnitude`).
 
     Parameters
     ----------
@@ -116,7 +121,13 @@ def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
     gains = [0.5 * (null.fit.misfit_with_prior - h.fit.misfit_with_prior) for h in hypotheses]
     # Within a size; the best of it stands for the size beside others.
     scores = [
-        float(h.log_prior + h.fit.log_evidence + 0.5 * h.fit.misfit_with_prior + gain / TEMPERATURE_OF_A_SIZE)
+        float(
+            h.log_prior
+            + h.fit.log_evidence
+            + 0.5 * h.fit.misfit_with_prior
+            + any_magnitude(h.fit)
+            + gain / TEMPERATURE_OF_A_SIZE
+        )
         for h, gain in zip(hypotheses, gains, strict=True)
     ]
     best: dict[int, int] = {}
@@ -129,6 +140,26 @@ def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
         for size, index in best.items()
     }
     return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]
+
+
+def any_magnitude(fit: Fit) -> float:
+    """Logarithm of the prior density of a fit's amplitudes, even in their logarithm, over the normal one.
+
+    Two effects that leave the same then have the same complexity, whatever widths
+    their priors were given.
+    """
+    width = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / SMALLEST_SIZE))
+    found = 0.0
+    for candidate in fit.candidates:
+        size = abs(fit.position[_amplitude_index(fit, candidate)])
+        found += float(np.log(width / np.clip(size, SMALLEST_SIZE, 1.0)))
+    return found
+
+
+def _amplitude_index(fit: Fit, candidate: Candidate) -> int:
+    own = candidate.amplitude
+    name = EFFECT_PREFIX + own if own in {item.name for item in candidate.factors} else own
+    return next(i for i, coordinate in enumerate(fit.coordinates) if coordinate.name == name)
 
 
 def counted(gain: float) -> float:

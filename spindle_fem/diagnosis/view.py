@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from spindle_fem.coolant.properties import coolant_by_name
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.diagnosis.contacts import seats_of
-from spindle_fem.diagnosis.layout import Layout, segment_volume, volume
+from spindle_fem.diagnosis.layout import CHANNEL_WALL, Layout, segment_volume, volume
 from spindle_fem.diagnosis.network_view import view_of_network
 from spindle_fem.diagnosis.usual_sizes import LEAST_HEAT, input_series, lowest_speed, usual_rise
 from spindle_fem.effects.coolant_film import reynolds_number
@@ -149,12 +149,15 @@ def _spots(
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
     """Places where heat may come and go, and the component that each is told as."""
     groups = [key for key, members in sets.items() if members != (key,)]
-    spots = {
-        key: heat[key] for key in (*groups, "shaft", "nose", "drive_end", "flange", "channel") if key in heat
-    }
+    spots = {key: heat[key] for key in (*groups, "shaft", "nose", "drive_end", "flange") if key in heat}
     reported: dict[str, str] = {}
     places = layout.places
     housing = layout.housing
+    channel = layout.spec.channel
+    if channel is not None:
+        # What heats its wall heats the part that it is cut into.
+        own = layout.component_of(channel.part)
+        spots[CHANNEL_WALL], reported[CHANNEL_WALL] = heat["channel"], own
     if housing is not None:
         segments = [f"{housing.name}.{s.name}" for s in housing.segment if s.name != layout.flange]
         inside = [name for name in segments if name in places]

@@ -116,6 +116,8 @@ class Candidate:
         The only recording in which it acts, of several; all of them when None.
     constants : mapping of str to float
         Numbers of the machine that a report needs.
+    likelihood : float
+        How likely this form is before the data, beside the other forms at its place.
     """
 
     effect: str
@@ -132,6 +134,7 @@ class Candidate:
     shift_of_prior: bool = False
     recording: int | None = None
     constants: Mapping[str, float] = field(default_factory=dict)
+    likelihood: float = 1.0
 
     @property
     def label(self) -> str:
@@ -207,6 +210,7 @@ class Effect(ABC):
         starts: Sequence[Mapping[str, float]] = ({},),
         reading: Reading | None = None,
         constants: Mapping[str, float] | None = None,
+        likelihood: float = 1.0,
     ) -> Candidate:
         """Candidate of one term or reading; ``amplitude`` and ``starts`` by inner names."""
         owner = term.name if term is not None else reading.name
@@ -222,6 +226,7 @@ class Effect(ABC):
             reading=reading,
             starts=tuple({f"{owner}.{name}": value for name, value in start.items()} for start in starts),
             constants=constants or {},
+            likelihood=likelihood,
         )
 
     def term_name(self, key: str, form: str = "") -> str:

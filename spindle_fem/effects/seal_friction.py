@@ -11,7 +11,9 @@ from spindle_fem.effects.speed_heat import SpeedHeatTerm
 from spindle_fem.effects.view import MachineView
 
 NAME = "heat_per_1000rpm"
+# Forms, and how likely they are: most machines have run before.
 LASTING, RUNS_IN = "", "runs in"
+LIKELIHOODS = {LASTING: 0.75, RUNS_IN: 0.25}
 
 
 class SealFriction(Effect):
@@ -40,7 +42,7 @@ class SealFriction(Effect):
             for speed in speeds if key in machine.heat else ():
                 own = speed if len(speeds) > 1 else ""
                 size = (NAME, max(5.0, 0.1 * machine.typical_heat), 1000.0 * RPM)
-                for word in (LASTING, RUNS_IN):
+                for word, likelihood in LIKELIHOODS.items():
                     form = f"{own} {word}".strip()
                     term = SpeedHeatTerm(
                         self.term_name(key, form),
@@ -57,6 +59,7 @@ class SealFriction(Effect):
                             amplitude=NAME,
                             reference=size[1],
                             form=machine.form(key, form),
+                            likelihood=likelihood,
                         )
                     )
         return tuple(found)

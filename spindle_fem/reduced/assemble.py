@@ -98,21 +98,17 @@ def run_operators(
             # To the logarithm: d/d ln x = x d/dx.
             scale = (value if owned[name][1].logarithmic else 1.0) / (2.0 * step)
             upper, lower = ({**parameters, name: value + sign * step} for sign in (1.0, -1.0))
-            storage_by[name] = scale * (
-                fast.storage(factors, changes.capacities(upper))
-                - fast.storage(factors, changes.capacities(lower))
-            )
+            capacities = [changes.capacities(end) for end in (upper, lower)]
+            if capacities[0] != capacities[1]:
+                storage_by[name] = scale * (
+                    fast.storage(factors, capacities[0]) - fast.storage(factors, capacities[1])
+                )
+            conductances = (changes.conductances(upper), changes.conductances(lower))
             for number, point in enumerate(points):
-                ends = [
-                    fast.operators(
-                        point,
-                        factors,
-                        changes=changes.coefficients(point, end),
-                        conductances=changes.conductances(end),
-                    )
-                    for end in (upper, lower)
-                ]
-                classes[number] = _with_difference(classes[number], name, *ends, scale)
+                ends = (changes.coefficients(point, upper), changes.coefficients(point, lower))
+                if ends[0] != ends[1] or conductances[0] != conductances[1]:
+                    change = fast.change(point, factors, ends, conductances)
+                    classes[number] = _with_change(classes[number], name, change, scale)
     coefficients = tuple(
         fast.coefficients(point, factors, changes.coefficients(point, parameters)) for point in points
     )
@@ -127,18 +123,15 @@ def run_operators(
     return RunOperators(factors, asked, tuple(classes), coefficients, touched, storage, storage_by)
 
 
-def _with_difference(
-    operators: ClassOperators, name: str, upper: ClassOperators, lower: ClassOperators, scale: float
+def _with_change(
+    operators: ClassOperators, name: str, change: ClassOperators, scale: float
 ) -> ClassOperators:
     return replace(
         operators,
-        conduction_by={**operators.conduction_by, name: scale * (upper.conduction - lower.conduction)},
-        loads_by={**operators.loads_by, name: scale * (upper.loads - lower.loads)},
-        outputs_by={**operators.outputs_by, name: scale * (upper.outputs - lower.outputs)},
-        output_inputs_by={
-            **operators.output_inputs_by,
-            name: scale * (upper.output_inputs - lower.output_inputs),
-        },
+        conduction_by={**operators.conduction_by, name: scale * change.conduction},
+        loads_by={**operators.loads_by, name: scale * change.loads},
+        outputs_by={**operators.outputs_by, name: scale * change.outputs},
+        output_inputs_by={**operators.output_inputs_by, name: scale * change.output_inputs},
     )
 
 

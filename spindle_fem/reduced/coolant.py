@@ -88,13 +88,91 @@ def film_derivative(
     return CoolantMaps(*(np.imag(getattr(maps, name)) / COMPLEX_STEP for name in CoolantMaps.__slots__))
 
 
-def flow_derivative(
-    model: ReducedModel, film: Array, film_slope: float, capacity_rate: float, pumping_heat: float = 0.0
-) -> CoolantMaps:
-    """Derivative to the logarithm of the flow; ``film_slope`` is d ln(film) / d ln(flow)."""
-    step = 1j * COMPLEX_STEP
-    maps = coolant_maps(model, film * (1.0 + film_slope * step), capacity_rate * (1.0 + step), pumping_heat)
-    return CoolantMaps(*(np.imag(getattr(maps, name)) / COMPLEX_STEP for name in CoolantMaps.__slots__))
+# Of the logarithm of film over capacity rate: distance of nodes, and how many share an interpolation.
+SPACING, STENCIL = 0.05, 10
+
+
+class UniformFilmMaps:
+    """Maps for films that are the same in every cell, interpolated between some that are worked out once.
+
+    With a film h and a capacity rate C they depend on h / C alone, but for a
+    factor of C or of the friction heat: one variable, whose logarithm carries
+    polynomials of degree nine through even nodes.
+
+    Parameters
+    ----------
+    model : ReducedModel
+    """
+
+    def __init__(self, model: ReducedModel) -> None:
+        self._model = model
+        self._nodes: dict[int, Array] = {}
+        self._stencils: dict[int, Array] = {}
+
+    def maps(self, film: float, capacity_rate: float, pumping_heat: float = 0.0) -> CoolantMaps:
+        """As :func:`coolant_maps` gives them, to 1e-8 of the largest up to some ten units of transfer."""
+        at, stencil = self._place(film, capacity_rate)
+        return self._scaled(_lagrange(at) @ stencil, capacity_rate, pumping_heat)
+
+    def film_derivative(self, film: float, capacity_rate: float, pumping_heat: float = 0.0) -> CoolantMaps:
+        """As :func:`film_derivative` gives it: the derivative of what :meth:`maps` interpolates."""
+        at, stencil = self._place(film, capacity_rate)
+        return self._scaled(_lagrange_slope(at) / SPACING @ stencil, capacity_rate, pumping_heat)
+
+    def _place(self, film: float, capacity_rate: float) -> tuple[float, Array]:
+        """Where in its stencil a film is, in nodes, and the maps at the nodes (STENCIL, n)."""
+        position = float(np.log(film / capacity_rate)) / SPACING
+        first = int(np.floor(position)) - STENCIL // 2 + 1
+        if first not in self._stencils:
+            for node in range(first, first + STENCIL):
+                if node not in self._nodes:
+                    self._nodes[node] = self._worked_out(node)
+            self._stencils = {first: np.array([self._nodes[first + i] for i in range(STENCIL)])}
+        return position - first, self._stencils[first]
+
+    def _worked_out(self, node: int) -> Array:
+        film = np.full(self._model.cell_area.size, np.exp(SPACING * node))
+        maps = coolant_maps(self._model, film, 1.0, 1.0)
+        parts = (getattr(maps, name) for name in CoolantMaps.__slots__)
+        return np.concatenate([np.ravel(part) for part in parts])
+
+    def _scaled(self, values: Array, capacity_rate: float, pumping_heat: float) -> CoolantMaps:
+        size = self._model.cell_load.shape[1]
+        conduction, inlet, constant, outlet, rest = np.split(
+            values, np.cumsum([size * size, size, size, size])
+        )
+        return CoolantMaps(
+            capacity_rate * conduction.reshape(size, size),
+            capacity_rate * inlet,
+            pumping_heat * constant,
+            outlet,
+            float(rest[0]),
+            float(rest[1]) * pumping_heat / capacity_rate,
+        )
+
+
+_EVEN = np.arange(STENCIL)
+_SCALE = np.array([np.prod([i - j for j in _EVEN if j != i]) for i in _EVEN], dtype=float)
+
+
+def _lagrange(at: float) -> Array:
+    """Weights of even nodes 0, 1, 2, ... for the value in between, (STENCIL,).
+
+    >>> bool(abs(_lagrange(3.4) @ _EVEN**3 - 3.4**3) < 1e-12)
+    True
+    """
+    away = at - _EVEN
+    return np.array([np.prod(np.delete(away, i)) for i in _EVEN]) / _SCALE
+
+
+def _lagrange_slope(at: float) -> Array:
+    """Weights of even nodes for the slope, (STENCIL,).
+
+    >>> bool(abs(_lagrange_slope(3.4) @ _EVEN**3 - 3.0 * 3.4**2) < 1e-12)
+    True
+    """
+    away = at - _EVEN
+    return np.array([sum(np.prod(np.delete(away, [i, j])) for j in _EVEN if j != i) for i in _EVEN]) / _SCALE
 
 
 def _march(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -14,7 +14,7 @@ from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.loads.coolant_loop import CoolantLoop
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
-from spindle_fem.reduced.coolant import CoolantMaps, coolant_maps, film_derivative
+from spindle_fem.reduced.coolant import CoolantMaps, UniformFilmMaps, coolant_maps, film_derivative
 from spindle_fem.reduced.directions import ConductingDirections
 from spindle_fem.reduced.drive import Drive, heat_of_table
 from spindle_fem.reduced.model import ReducedModel
@@ -25,7 +25,8 @@ from spindle_fem.spec.parameters import uncertain_parameters
 
 Array = NDArray[np.float64]
 
-MOST_MAPS = 64
+# Films of cells that differ by no more are one film.
+ROUND_OFF = 1e-14
 # Numbers in remembered sums of operators.
 MOST_SUMS = 4_000_000
 NO_CHANGES: Mapping[str, float] = MappingProxyType({})
@@ -88,7 +89,7 @@ class FastModel:
         self._point_rows = [row for row, probe in enumerate(spec.probe) if probe.kind == "point"]
         self._base: dict[tuple[float, float], dict[str, float]] = {}
         self._films: dict[tuple[float, float], tuple[Array, float, float]] = {}
-        self._maps: dict[tuple[str, bytes, float, float], CoolantMaps] = {}
+        self._maps = UniformFilmMaps(model)
         self._sums: dict[tuple[tuple[int, ...], bytes], Array] = {}
         self._scales: tuple[dict[str, float], dict[str, float]] = ({}, {})
         self._reached: dict[str, frozenset[str]] = {}
@@ -235,12 +236,12 @@ class FastModel:
                 loads_by[parameter] = by
         if self.loop is not None:
             film, rate, friction = self.channel_film(point, factors, changes)
-            maps = self._coolant(coolant_maps, film, rate, friction)
+            maps = self._coolant(film, rate, friction)
             conduction = conduction + maps.conduction
             self._add_coolant(loads, outputs, output_inputs, maps)
             for parameter in parameters:
                 if CHANNEL_FILM in self.reached(parameter):
-                    by = self._coolant(film_derivative, film, rate, friction)
+                    by = self._coolant(film, rate, friction, by_film=True)
                     conduction_by[parameter] = conduction_by.get(parameter, 0.0) + by.conduction
                     loads_by.setdefault(parameter, np.zeros_like(loads))
                     outputs_by[parameter] = np.zeros_like(outputs)
@@ -251,6 +252,43 @@ class FastModel:
         return ClassOperators(
             conduction, loads, outputs, output_inputs, conduction_by, loads_by, outputs_by, output_inputs_by
         )
+
+    def change(
+        self,
+        point: OperatingPoint,
+        factors: Mapping[str, float],
+        changes: tuple[Mapping[str, float], Mapping[str, float]],
+        conductances: tuple[Mapping[str, float], Mapping[str, float]],
+    ) -> ClassOperators:
+        """Operators with the first of two sets of changes less those with the second, no derivatives.
+
+        Only what differs is worked out. Arguments as :meth:`operators` takes them.
+        """
+        model = self.model
+        values = [self.coefficients(point, factors, own) for own in changes]
+        differs = [name for name in model.coefficient_names if values[0][name] != values[1][name]]
+        amounts = np.array([values[0][name] - values[1][name] for name in differs])
+        rows = [self._positions[name] for name in differs]
+        conduction = np.tensordot(amounts, model.operators[rows], axes=1)
+        loads = np.zeros((model.size, len(self.load_names)))
+        for name, amount in zip(differs, amounts, strict=True):
+            if name in self._fluid_rows:
+                loads[:, self.fluid_column(name)] += amount * model.fluid_load[self._fluid_rows[name]]
+        for place in {*conductances[0], *conductances[1]}:
+            amount = conductances[0].get(place, 0.0) - conductances[1].get(place, 0.0)
+            mean = model.place(place)
+            conduction += amount * np.outer(mean, mean)
+            loads[:, self.load_names.index("ambient")] += amount * mean
+        outputs = np.zeros((len(self.channels), model.size))
+        output_inputs = np.zeros((len(self.channels), len(self.load_names)))
+        if self.loop is not None:
+            films = [self.channel_film(point, factors, own) for own in changes]
+            if any(np.any(one != other) for one, other in zip(*films, strict=True)):
+                upper, lower = (self._coolant(*film) for film in films)
+                maps = CoolantMaps(*(getattr(upper, n) - getattr(lower, n) for n in CoolantMaps.__slots__))
+                conduction += maps.conduction
+                self._add_coolant(loads, outputs, output_inputs, maps)
+        return ClassOperators(conduction, loads, outputs, output_inputs, {}, {}, {}, {})
 
     def _scales_of(self, factors: Mapping[str, float]) -> dict[str, float]:
         """Factor on every coefficient, made once for the classes of a run."""
@@ -288,16 +326,12 @@ class FastModel:
             return self.load_names.index("ambient")
         return self.load_names.index(f"fixed[{self.fixed_fluids.index(film.temperature)}]")
 
-    def _coolant(
-        self, kind: Callable[..., CoolantMaps], film: Array, rate: float, friction: float
-    ) -> CoolantMaps:
-        """Maps of the coolant or their derivative, kept for the classes of one oil temperature."""
-        key = (kind.__name__, film.tobytes(), rate, friction)
-        if key not in self._maps:
-            if len(self._maps) >= MOST_MAPS:
-                self._maps.clear()
-            self._maps[key] = kind(self.model, film, rate, friction)
-        return self._maps[key]
+    def _coolant(self, film: Array, rate: float, friction: float, *, by_film: bool = False) -> CoolantMaps:
+        """Maps of the coolant or their derivative to the film; of one film for all cells, interpolated."""
+        if film[0] > 0.0 and rate > 0.0 and np.ptp(film) <= ROUND_OFF * film[0]:
+            kind = self._maps.film_derivative if by_film else self._maps.maps
+            return kind(float(film[0]), rate, friction)
+        return (film_derivative if by_film else coolant_maps)(self.model, film, rate, friction)
 
     def _add_coolant(self, loads: Array, outputs: Array, output_inputs: Array, maps: CoolantMaps) -> None:
         inlet, friction = self.load_names.index("coolant_inlet"), self.load_names.index("coolant_friction")

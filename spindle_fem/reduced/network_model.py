@@ -195,6 +195,21 @@ class NetworkFastModel:
         nothing = np.zeros((model.size, len(self.load_names)))
         return ClassOperators(conduction, loads, outputs, nothing, conduction_by, loads_by, {}, {})
 
+    def change(
+        self,
+        point: OperatingPoint,
+        factors: Mapping[str, float],
+        changes: tuple[Mapping[str, float], Mapping[str, float]],
+        conductances: tuple[Mapping[str, float], Mapping[str, float]],
+    ) -> ClassOperators:
+        """Operators with the first of two sets of changes less those with the second, no derivatives."""
+        first, second = (
+            self.operators(point, factors, changes=one, conductances=other)
+            for one, other in zip(changes, conductances, strict=True)
+        )
+        names = ("conduction", "loads", "outputs", "output_inputs")
+        return ClassOperators(*(getattr(first, n) - getattr(second, n) for n in names), {}, {}, {}, {})
+
     def _boundary_column(self, coefficient: str) -> int:
         return self.load_names.index(f"boundary.{self._boundary_of[coefficient]}")
 

@@ -14,8 +14,10 @@ from spindle_fem.diagnosis.inference import Coordinate, Fit
 from spindle_fem.diagnosis.verdict import (
     LEAST_TEMPERATURE_RATIO,
     PRIOR_SIGMAS,
+    SMALLEST_SIZE,
     TEMPERATURE,
     TEMPERATURE_OF_A_SIZE,
+    any_magnitude,
     counted,
     detection_p_value,
     judge,
@@ -27,6 +29,8 @@ from spindle_fem.effects.base import Candidate
 from spindle_fem.effects.term import TermParameter
 from spindle_fem.errors import SpecError
 
+# Where a prior that is even in the logarithm has the density of the normal one.
+AS_NORMAL = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / SMALLEST_SIZE))
 HEAT = Coordinate("heat.front", 1.0, 0.2, True, -4.0, 4.0)
 DATA = 400
 
@@ -48,9 +52,13 @@ def candidate(effect, component="front_bearings", kind="missing_physics", form="
 
 def hypothesis(*candidates, misfit, evidence=None, log_prior=0.0, position=(), reduced=1.0):
     """A fit with one coordinate for each candidate beside the machine's own."""
-    own = [Coordinate(f"effect:{c.amplitude}", 1.0, 0.6, True, -4.0, 4.0) for c in candidates]
+    own = [
+        Coordinate(f"effect:{c.amplitude}" if c.factors else c.amplitude, 1.0, 0.6, True, -4.0, 4.0)
+        for c in candidates
+    ]
     coordinates = (HEAT, *own)
-    where = np.zeros(len(coordinates))
+    where = np.full(len(coordinates), AS_NORMAL)
+    where[0] = 0.0
     where[: len(position)] = position
     fit = Fit(
         tuple(candidates),
@@ -119,6 +127,22 @@ def test_complexity_and_prior_count_in_full():
     complex_ = hypothesis(CHURNING, misfit=400.0, evidence=-200.0 - 4.0, log_prior=-1.0)
     ranked = rank([plain, complex_, hypothesis(misfit=400.0, evidence=-1e4)])
     assert ranked[0].probability / ranked[1].probability == pytest.approx(np.exp(4.0))
+
+
+def test_amplitudes_of_any_magnitude_are_as_likely():
+    usual, small = (
+        hypothesis(PRELOAD, misfit=400.0, position=(0.0, u)) for u in (AS_NORMAL, 0.1 * AS_NORMAL)
+    )
+    assert any_magnitude(usual.fit) == pytest.approx(0.0, abs=1e-12)
+    # Ten times as dense in the amplitude where the amplitude is a tenth.
+    assert any_magnitude(small.fit) == pytest.approx(np.log(10.0))
+    beyond, far = (hypothesis(PRELOAD, misfit=400.0, position=(0.0, u)) for u in (1.0, 3.0))
+    assert any_magnitude(far.fit) == any_magnitude(beyond.fit) == pytest.approx(np.log(AS_NORMAL))
+    # Known to a fifth and a fiftieth of priors that differ by ten, both to a tenth of themselves: the same.
+    wide = hypothesis(CHURNING, misfit=400.0, evidence=-200.0 - np.log(10.0), position=(0.0, 0.05))
+    narrow = hypothesis(PRELOAD, misfit=400.0, evidence=-200.0, position=(0.0, 0.5))
+    ranked = rank([wide, narrow, hypothesis(misfit=900.0)])
+    assert ranked[0].probability == pytest.approx(ranked[1].probability)
 
 
 def test_what_a_strong_effect_leaves_counts_less_for_one_more():

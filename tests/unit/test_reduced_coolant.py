@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.coolant.marching import march_enthalpy
-from spindle_fem.reduced.coolant import coolant_maps, film_derivative, flow_derivative
+from spindle_fem.reduced.coolant import UniformFilmMaps, coolant_maps, film_derivative
 
 
 def walls_as_unknowns(starts, cells, seed=0):
@@ -41,22 +41,28 @@ def test_wall_and_coolant_of_one_temperature_exchange_nothing():
     assert maps.outlet.sum() + maps.outlet_inlet == pytest.approx(1.0, abs=1e-13)
 
 
+NAMES = ("conduction", "inlet_load", "constant_load", "outlet", "outlet_inlet", "outlet_constant")
+
+
 def test_derivatives_are_those_of_differences():
     model = walls_as_unknowns(2, 8)
-    film = np.full(16, 300.0)
-    step = 1e-5
-
-    def difference(name, slope, flow):
-        ends = [
-            getattr(
-                coolant_maps(model, film * (1 + s * slope * step), 560.0 * (1 + s * flow * step), 10.0), name
-            )
-            for s in (1, -1)
-        ]
-        return (ends[0] - ends[1]) / (2 * step)
-
+    film, step = np.full(16, 300.0), 1e-5
+    ends = [coolant_maps(model, film * (1 + sign * step), 560.0, 10.0) for sign in (1, -1)]
     by_film = film_derivative(model, film, 560.0, 10.0)
-    by_flow = flow_derivative(model, film, 1 / 3, 560.0, 10.0)
-    for name in ("conduction", "inlet_load", "constant_load", "outlet", "outlet_inlet", "outlet_constant"):
-        assert getattr(by_film, name) == pytest.approx(difference(name, 1.0, 0.0), abs=1e-7)
-        assert getattr(by_flow, name) == pytest.approx(difference(name, 1 / 3, 1.0), abs=1e-7)
+    for name in NAMES:
+        difference = (getattr(ends[0], name) - getattr(ends[1], name)) / (2 * step)
+        assert getattr(by_film, name) == pytest.approx(difference, abs=1e-7)
+
+
+@pytest.mark.parametrize("film", [100.0, 243.7, 4.0e3])
+@pytest.mark.parametrize("rate", [40.0, 560.0])
+def test_uniform_films_are_interpolated_as_they_are_worked_out(film, rate):
+    model = walls_as_unknowns(2, 8)
+    table, films = UniformFilmMaps(model), np.full(16, film)
+    for exact, quick in (
+        (coolant_maps(model, films, rate, 12.0), table.maps(film, rate, 12.0)),
+        (film_derivative(model, films, rate, 12.0), table.film_derivative(film, rate, 12.0)),
+    ):
+        for name in NAMES:
+            size = np.abs(getattr(exact, name)).max()
+            assert np.abs(getattr(quick, name) - getattr(exact, name)).max() <= 1e-8 * size, name
