@@ -12,12 +12,12 @@ import protocol
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from case import STEP_S, divided, merged_nodes, read_case
+from numbering import numbered
 
 from spindle_fem.conduction import threads
 from spindle_fem.conduction.assemble import assemble_capacity, assemble_load, assemble_system
 from spindle_fem.conduction.guesses import SolvedSpace
 from spindle_fem.conduction.linear_solvers import build_preconditioner, multiply, solve_linear
-from spindle_fem.conduction.numbering import numbered
 from spindle_fem.conduction.operators import build_operators
 from spindle_fem.conduction.problem import ConductionProblem, Film
 from spindle_fem.conduction.stage import add_scaled
@@ -133,7 +133,10 @@ def warm_up() -> None:
     tied = system.tied()
     merged(assemble_capacity(problem)[0], system.tie)
     ones = np.ones(len(tied.load))
-    solve_linear(tied.matrix, ones, build_preconditioner(tied, "multigrid"), ones)
+    preconditioner = build_preconditioner(tied, "multigrid")
+    known = SolvedSpace(tied.matrix)
+    known.add(solve_linear(tied.matrix, ones, preconditioner, ones).unknowns)
+    known.add(multiply(tied.matrix, ones), known.guess(ones))
     threads.COMPILED_ABOVE = least
 
 

@@ -15,6 +15,7 @@ from spindle_fem.conduction.problem import (
     reference_temperature,
 )
 from spindle_fem.conduction.system import ThermalSystem
+from spindle_fem.conduction.threads import use_compiled
 from spindle_fem.errors import SpecError
 
 
@@ -160,6 +161,12 @@ def _tie_matrix(operators: ThermalOperators, joints: list[str]) -> sparse.csr_ar
     nodes_a = np.concatenate([operators.facet_nodes[a].ravel() for a, _ in sides])
     nodes_b = np.concatenate([operators.facet_nodes[b].ravel() for _, b in sides])
     n = operators.n_unknowns
-    graph = sparse.coo_array((np.ones(len(nodes_a)), (nodes_a, nodes_b)), shape=(n, n))
-    count, label = connected_components(graph, directed=False)
-    return sparse.csr_array((np.ones(n), (np.arange(n), label)), shape=(n, count))
+    if use_compiled(n):
+        from spindle_fem.conduction.compiled_facets import label_tied
+
+        label, count = label_tied(nodes_a, nodes_b, n)
+    else:
+        graph = sparse.coo_array((np.ones(len(nodes_a)), (nodes_a, nodes_b)), shape=(n, n))
+        count, label = connected_components(graph, directed=False)
+    starts = np.arange(n + 1, dtype=np.int32)
+    return sparse.csr_array((np.ones(n), label.astype(np.int32, copy=False), starts), shape=(n, count))

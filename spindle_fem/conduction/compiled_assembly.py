@@ -135,81 +135,6 @@ def expand_upper(low, high, indptr, indices, starts, columns, slots):
 
 
 @njit(**_OPTIONS)
-def _find(i, j, indptr, indices):
-    if j < i:
-        i, j = j, i
-    for place in range(indptr[i], indptr[i + 1]):
-        if indices[place] == j:
-            return np.int64(place)
-    return -1
-
-
-@njit(**_OPTIONS)
-def find_facets(low, high, nodes, indptr, indices, slots):
-    """Upper entry of each two nodes of facets, (n, k (k + 1) / 2); -1 where the pattern has none."""
-    for facet in range(low, high):
-        pair = 0
-        for a in range(nodes.shape[1]):
-            for b in range(a, nodes.shape[1]):
-                slots[facet, pair] = _find(nodes[facet, a], nodes[facet, b], indptr, indices)
-                pair += 1
-
-
-@njit(**_OPTIONS)
-def find_crossings(low, high, one, other, indptr, indices, slots):
-    """Upper entry of each node of one facet with each of the other, (n, k, k)."""
-    for facet in range(low, high):
-        for a in range(one.shape[1]):
-            for b in range(other.shape[1]):
-                slots[facet, a, b] = _find(one[facet, a], other[facet, b], indptr, indices)
-
-
-@njit(**_OPTIONS)
-def distinct(values, size):
-    """Distinct values below a size, rising, and the place of each value among them."""
-    place = np.zeros(size, dtype=np.int32)
-    for index in range(values.shape[0]):
-        for k in range(values.shape[1]):
-            place[values[index, k]] = 1
-    count = 0
-    for value in range(size):
-        used = place[value]
-        place[value] = count
-        count += used
-    found = np.empty(count, dtype=np.int64)
-    answer = np.empty(values.shape, dtype=np.int32)
-    for index in range(values.shape[0]):
-        for k in range(values.shape[1]):
-            answer[index, k] = place[values[index, k]]
-            found[answer[index, k]] = values[index, k]
-    return found, answer
-
-
-@njit(**_OPTIONS)
-def integrate_flat_facets(low, high, points, facets, film, load, area):
-    """Straight triangles of a range: upper film matrices, loads and areas."""
-    for facet in range(low, high):
-        p0, p1, p2 = facets[facet, 0], facets[facet, 1], facets[facet, 2]
-        ox, oy, oz = points[p0, 0], points[p0, 1], points[p0, 2]
-        ax, ay, az = points[p1, 0] - ox, points[p1, 1] - oy, points[p1, 2] - oz
-        bx, by, bz = points[p2, 0] - ox, points[p2, 1] - oy, points[p2, 2] - oz
-        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        size = 0.5 * np.sqrt(x * x + y * y + z * z)
-        area[facet] = size
-        load[facet, 0] = load[facet, 1] = load[facet, 2] = size / 3.0
-        film[facet, 0] = film[facet, 3] = film[facet, 5] = size / 6.0
-        film[facet, 1] = film[facet, 2] = film[facet, 4] = size / 12.0
-
-
-@njit(**_OPTIONS)
-def add_films(active, coefficient, film, slots, upper):
-    """Add each active facet's film matrix times its coefficient to the upper entries."""
-    for facet in active:
-        for pair in range(film.shape[1]):
-            upper[slots[facet, pair]] += coefficient[facet] * film[facet, pair]
-
-
-@njit(**_OPTIONS)
 def scale_by_part(low, high, part_of_slot, factors, unit, out):
     """``out = factor of the part · unit``; zero where there is no part."""
     for place in range(low, high):
@@ -258,15 +183,16 @@ def add_element_values(low, high, elements, values, others, indptr, indices, out
 
 
 @njit(**_OPTIONS)
-def integrate_linear(low, high, points, elements, part_of_element, n_parts, values):
-    """Straight linear tetrahedra of a range: off-diagonal conduction and volume, (n_elements, 7).
+def integrate_linear(low, high, points, elements, chosen, part_of_element, n_parts, values):
+    """Chosen tetrahedra of a range, linear and straight: off-diagonal conduction and volume, (n_elements, 7).
 
     Pairs of nodes come as 01, 23, 02, 13, 03, 12. Returns the volume of each part
     and how many elements are inverted.
     """
     volume = np.zeros(n_parts)
     inverted = 0
-    for e in range(low, high):
+    for index in range(low, high):
+        e = chosen[index]
         p0, p1, p2, p3 = elements[e, 0], elements[e, 1], elements[e, 2], elements[e, 3]
         ox, oy, oz = points[p0, 0], points[p0, 1], points[p0, 2]
         ax, ay, az = points[p1, 0] - ox, points[p1, 1] - oy, points[p1, 2] - oz

@@ -30,16 +30,6 @@ def multiply(low, high, indptr, indices, data, vector, out):
 
 
 @njit(**_FAST)
-def add_product(low, high, indptr, indices, data, vector, out):
-    """``out += A vector`` on a range of rows."""
-    for i in range(low, high):
-        total = data.dtype.type(0.0)
-        for place in range(indptr[i], indptr[i + 1]):
-            total += data[place] * vector[indices[place]]
-        out[i] += total
-
-
-@njit(**_FAST)
 def multiply_and_dot(low, high, indptr, indices, data, vector, out):
     """``out = A vector`` on a range of rows; returns the range's share of ``vector · out``."""
     dot = 0.0
@@ -209,13 +199,6 @@ def add_prolonged_many(low, high, columns, values, vectors, out):
             j, value = columns[i, k], values[i, k]
             for c in range(out.shape[1]):
                 out[i, c] += value * vectors[j, c]
-
-
-@njit(**_FAST)
-def scaled_copy(low, high, factor, vector, out):
-    """``out = factor vector`` on a range, in the precision of ``out``."""
-    for i in range(low, high):
-        out[i] = factor * vector[i]
 
 
 @njit(**_OPTIONS)

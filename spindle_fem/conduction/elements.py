@@ -275,7 +275,7 @@ def integrate_facets(points: NDArray[np.float64], facets: NDArray[np.int64], ord
 
 
 def _flat_facets(points: NDArray[np.float64], facets: NDArray[np.int64]) -> FacetIntegrals:
-    from spindle_fem.conduction.compiled_assembly import integrate_flat_facets
+    from spindle_fem.conduction.compiled_facets import integrate_flat_facets
 
     n = len(facets)
     answer = FacetIntegrals(np.empty((n, 6)), np.empty((n, 3)), np.empty(n))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from spindle_fem.conduction.elements import (
     integrate_circumferential,
@@ -16,12 +18,21 @@ from spindle_fem.conduction.elements import (
 )
 from spindle_fem.conduction.memory import room
 from spindle_fem.conduction.pattern import SymmetricPattern, build_pattern
-from spindle_fem.conduction.threads import fill_rows, row_blocks, run_blocks, unsigned, use_compiled
+from spindle_fem.conduction.threads import (
+    fill_rows,
+    row_blocks,
+    run_blocks,
+    run_jobs,
+    unsigned,
+    use_compiled,
+)
 from spindle_fem.errors import MeshQualityError, MeshTagError
 from spindle_fem.meshing.tagged_mesh import TaggedMesh
 
 # Elements integrated at once where the compiled loops do not integrate themselves.
 BATCH = 1 << 16
+# Calls that straight elements are divided into, so that threads end together.
+INTEGRATION_CALLS = 8
 # First guesses of the upper entries a row, with room for the last rows; wrong ones only cost time.
 ENTRIES_OF_LINEAR = 9.0
 ENTRIES_OF_QUADRATIC = 17.0
@@ -175,26 +186,40 @@ def _compiled(
     circumferential_parts: list[int],
 ) -> MeshIntegrals:
     from spindle_fem.conduction import compiled_assembly as compiled
+    from spindle_fem.conduction import compiled_facets
 
     tetrahedra = mesh.tetrahedra
     nodes = np.ascontiguousarray(tetrahedra[:, : 4 if order == 1 else 10], dtype=np.int32).view(np.uint32)
     part = np.asarray(mesh.part_of_element, dtype=np.int32)
-    part_of_unknown, shared = compiled.part_of_nodes(nodes, part, n_unknowns)
-    _require_parts(part_of_unknown, bool(shared))
-    crossings = [_cross_pairs(facet_nodes, sides) for sides in joint_sides]
-    joined = unsigned(*_upper_crossings(crossings, n_unknowns))
+    small_nodes = facet_nodes.astype(np.int32).view(np.uint32)
+    one, other = (
+        (_facets_of(small_nodes, sides) for sides in zip(*joint_sides, strict=True))
+        if joint_sides
+        else (small_nodes[:0], small_nodes[:0])
+    )
     around = room(nodes.size, np.int32)
-    members = unsigned(compiled.elements_of_nodes(nodes, n_unknowns, around), around)
-    load, volume = np.zeros(n_unknowns), np.zeros(len(mesh.part_names))
     straight = is_straight(mesh.points, tetrahedra) if order == 1 else np.zeros(len(tetrahedra), dtype=bool)
+    values, integrate = _straight_elements(mesh, nodes, part, straight)
+    starts, (part_of_unknown, shared), joined, *integrated = run_jobs(
+        [
+            partial(compiled.elements_of_nodes, nodes, n_unknowns, around),
+            partial(compiled.part_of_nodes, nodes, part, n_unknowns),
+            partial(compiled_facets.upper_crossings, one, other, n_unknowns),
+            *integrate,
+        ]
+    )
+    _require_parts(part_of_unknown, bool(shared))
+    members, joined = unsigned(starts, around), unsigned(*joined)
+    load, volume = np.zeros(n_unknowns), np.zeros(len(mesh.part_names))
     if straight.any():
-        values, volume = _straight_elements(mesh, nodes, part, straight)
+        _require_upright(sum(inverted for _, inverted in integrated))
+        volume = sum(volumes for volumes, _ in integrated)
         given = (nodes, *members, values, part_of_unknown, *joined, load)
         kinds = (np.int32, np.int16, np.float64, np.float64)
         indptr, indices, part_of_slot, conduction, storage = fill_rows(
             compiled.fill_linear_rows, n_unknowns, given, ENTRIES_OF_LINEAR, kinds
         )
-        del values, given
+        del given
     else:
         given = (nodes, *members, *joined)
         guess = ENTRIES_OF_LINEAR if order == 1 else ENTRIES_OF_QUADRATIC
@@ -203,7 +228,7 @@ def _compiled(
         part_of_row = np.repeat(part_of_unknown.astype(np.int16), np.diff(indptr))
         part_of_slot = np.where(part_of_row == part_of_unknown[indices], part_of_row, np.int16(-1))
         conduction, storage = np.zeros(len(indices)), np.zeros(len(indices))
-    del members, around
+    del members, around, starts, values, integrate
     upper = unsigned(indptr, indices)
     blocks = row_blocks(n_unknowns)
     rest = np.flatnonzero(~straight)
@@ -236,16 +261,13 @@ def _compiled(
                 unused,
             )
 
-    small_nodes = facet_nodes.astype(np.int32).view(np.uint32)
     facet_slots = np.empty((len(facet_nodes), len(upper_pairs(facet_nodes.shape[1])[0])), dtype=np.int32)
-    run_blocks(compiled.find_facets, row_blocks(len(facet_nodes)), small_nodes, *upper, facet_slots)
-    _require_facets(bool(np.all(facet_slots >= 0)) and bool(np.all(part_of_slot[facet_slots] >= 0)))
-    cross_slots = []
-    for one, other in joint_sides:
-        sides = small_nodes[one], small_nodes[other]
-        slots = np.empty((*sides[0].shape, sides[1].shape[1]), dtype=np.int32)
-        compiled.find_crossings(0, len(slots), *sides, *upper, slots)
-        cross_slots.append(slots)
+    given = (small_nodes, *upper, part_of_slot, facet_slots)
+    _require_facets(not sum(run_blocks(compiled_facets.find_facets, row_blocks(len(facet_nodes)), *given)))
+    slots = np.empty((*one.shape, one.shape[1]), dtype=np.int32)
+    run_blocks(compiled_facets.find_crossings, row_blocks(len(one)), one, other, *upper, slots)
+    ends = np.cumsum([side.stop - side.start for side, _ in joint_sides], dtype=int)
+    cross_slots = np.split(slots, ends[:-1]) if joint_sides else []
     return MeshIntegrals(
         pattern,
         part_of_unknown,
@@ -260,30 +282,21 @@ def _compiled(
     )
 
 
+def _facets_of(nodes: NDArray[np.uint32], rows: Sequence[slice]) -> NDArray[np.uint32]:
+    return np.concatenate([nodes[each] for each in rows])
+
+
 def _straight_elements(
     mesh: TaggedMesh, nodes: NDArray[np.uint32], part: NDArray[np.int32], straight: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What ``integrate_linear`` gives for straight elements, zeros for others; and the volume by part."""
+) -> tuple[NDArray[np.float64], list[Callable]]:
+    """Room for what ``integrate_linear`` gives, zeros for elements that are not straight, and its calls."""
     from spindle_fem.conduction.compiled_assembly import integrate_linear
 
-    every = bool(straight.all())
-    chosen = nodes if every else nodes[straight]
-    values = room((len(chosen), 7))
-    given = (mesh.points, chosen, part if every else part[straight], len(mesh.part_names), values)
-    answers = run_blocks(integrate_linear, row_blocks(len(chosen)), *given)
-    _require_upright(sum(inverted for _, inverted in answers))
-    if not every:
-        own, values = values, np.zeros((len(nodes), 7))
-        values[straight] = own
-    return values, sum(volumes for volumes, _ in answers)
-
-
-def _upper_crossings(
-    crossings: list[tuple[NDArray[np.int64], NDArray[np.int64]]], n_unknowns: int
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Compressed rows of what joints couple, right of the diagonal."""
-    low = np.concatenate([np.minimum(*pairs).ravel() for pairs in crossings] or [np.empty(0, np.int64)])
-    high = np.concatenate([np.maximum(*pairs).ravel() for pairs in crossings] or [np.empty(0, np.int64)])
-    extra = sparse.coo_array((np.ones(low.size, dtype=np.int8), (low, high)), shape=(n_unknowns, n_unknowns))
-    extra = extra.tocsr()
-    return extra.indptr, extra.indices
+    if not straight.any():
+        return np.zeros((0, 7)), []
+    values = room((len(nodes), 7))
+    chosen = np.flatnonzero(straight).astype(np.int32)
+    values[~straight] = 0.0
+    bounds = np.linspace(0, len(chosen), INTEGRATION_CALLS + 1).astype(np.int64)
+    given = (mesh.points, nodes, unsigned(chosen)[0], part, len(mesh.part_names), values)
+    return values, [partial(integrate_linear, low, high, *given) for low, high in pairwise(bounds)]

@@ -14,7 +14,14 @@ from scipy.sparse.linalg import splu
 
 from spindle_fem.conduction.multigrid import build_hierarchy
 from spindle_fem.conduction.system import ThermalSystem
-from spindle_fem.conduction.threads import row_blocks, run_blocks, unsigned, use_compiled
+from spindle_fem.conduction.threads import (
+    chunk_bounds,
+    row_blocks,
+    run_blocks,
+    run_team,
+    unsigned,
+    use_compiled,
+)
 from spindle_fem.errors import ConvergenceError, SpecError
 
 DIRECT_BELOW = 20_000
@@ -186,12 +193,13 @@ def solve_linear(
         scale = float(np.linalg.norm(residual))
     target = relative_tolerance * scale
     if error_tolerance is not None:
-        floor = ROUND_OFF * float(np.abs(unknowns).max(initial=0.0))
-        first = preconditioner.apply(residual).astype(float)
-        estimate = float(np.abs(first).max(initial=0.0))
+        floor = ROUND_OFF * largest(unknowns)
+        first = preconditioner.apply(residual).astype(float, copy=False)
+        estimate = largest(first)
         wanted = max(error_tolerance, floor, reduction * estimate)
         if estimate <= wanted:
-            return LinearSolution(unknowns + first, 0, np.nan)
+            unknowns += first
+            return LinearSolution(unknowns, 0, np.nan)
         correction, iterations, reached = _to_error(
             matrix, residual, preconditioner.apply, first, wanted, max_iterations
         )
@@ -202,7 +210,8 @@ def solve_linear(
                 "Rebuild the preconditioner or allow more iterations.",
             )
         digits = float(np.log10(estimate / max(reached, np.finfo(float).tiny)))
-        return LinearSolution(unknowns + correction, iterations, np.nan, digits)
+        unknowns += correction
+        return LinearSolution(unknowns, iterations, np.nan, digits)
     iterations = 0
     restarts = 0
     while (norm := float(np.linalg.norm(residual))) > target:
@@ -332,14 +341,15 @@ def _to_error(
     limit: int,
 ) -> tuple[NDArray[np.float64], int, float]:
     """Correction whose estimated error is nowhere above what is wanted, iterations, and that error."""
-    state = _iterate(matrix, residual.copy(), first)
+    state = _iterate(matrix, residual)
+    preconditioned = first
     for iteration in range(1, limit + 1):
-        state.advance()
+        state.advance(preconditioned)
         preconditioned = precondition(state.residual)
-        reached = float(np.abs(preconditioned).max())
+        reached = largest(preconditioned)
         if reached <= wanted:
-            return state.unknowns + preconditioned, iteration, reached
-        state.turn(preconditioned)
+            state.unknowns += preconditioned
+            return state.unknowns, iteration, reached
     return state.unknowns, limit, reached
 
 
@@ -348,29 +358,26 @@ class _Iteration:
 
     __slots__ = ("_energy", "_image", "_matrix", "_step", "direction", "residual", "unknowns")
 
-    def __init__(
-        self, matrix: sparse.csr_array, residual: NDArray[np.float64], preconditioned: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, matrix: sparse.csr_array, residual: NDArray[np.float64]) -> None:
         self._matrix = matrix
         self.unknowns = np.zeros_like(residual)
         self.residual = residual
-        self.direction = preconditioned.copy()
-        self._energy = float(residual @ preconditioned)
+        self.direction = np.zeros_like(residual)
+        self._image = np.zeros_like(residual)
+        self._energy = self._step = 0.0
 
-    def advance(self) -> float:
-        """Go as far along the direction as helps; returns the residual's norm."""
+    def advance(self, preconditioned: NDArray[np.float64]) -> float:
+        """Turn, go as far along the new direction as helps; returns the residual's norm."""
+        if self._energy > 0.0:
+            # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
+            self.direction *= -self._step * float(preconditioned @ self._image) / self._energy
+        self.direction += preconditioned
+        self._energy = float(self.residual @ preconditioned)
         self._image = self._matrix @ self.direction
         self._step = self._length(float(self.direction @ self._image))
         self.unknowns += self._step * self.direction
         self.residual -= self._step * self._image
         return float(np.linalg.norm(self.residual))
-
-    def turn(self, preconditioned: NDArray[np.float64]) -> None:
-        """Next direction."""
-        # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
-        self.direction *= -self._step * float(preconditioned @ self._image) / self._energy
-        self.direction += preconditioned
-        self._energy = float(self.residual @ preconditioned)
 
     def _length(self, curvature: float) -> float:
         if not curvature > 0.0 or not np.isfinite(self._energy):
@@ -379,43 +386,32 @@ class _Iteration:
 
 
 class _CompiledIteration(_Iteration):
-    """The same in compiled loops: each vector is read once a step, rows are shared by threads."""
+    """The same in one compiled call that threads share."""
 
-    __slots__ = ("_blocks", "_loops", "_rows")
+    __slots__ = ("_bounds", "_rows", "_run", "_shares")
 
-    def __init__(
-        self, matrix: sparse.csr_array, residual: NDArray[np.float64], preconditioned: NDArray[np.float64]
-    ) -> None:
-        from spindle_fem.conduction import compiled_solver
+    def __init__(self, matrix: sparse.csr_array, residual: NDArray[np.float64]) -> None:
+        from spindle_fem.conduction.compiled_teams import conjugate_step
 
-        super().__init__(matrix, residual, preconditioned)
-        self._loops = compiled_solver
+        super().__init__(matrix, residual)
+        self._run = conjugate_step
         self._rows = (*unsigned(matrix.indptr, matrix.indices), matrix.data)
-        self._blocks = row_blocks(len(residual))
-        self._image = np.empty_like(residual)
+        self._bounds = chunk_bounds(matrix.indptr)
+        self._shares = np.empty((4, len(self._bounds) - 1))
 
-    def advance(self) -> float:
-        loops, blocks = self._loops, self._blocks
-        shares = run_blocks(loops.multiply_and_dot, blocks, *self._rows, self.direction, self._image)
-        self._step = self._length(sum(shares))
-        shares = run_blocks(
-            loops.advance, blocks, self._step, self.direction, self._image, self.unknowns, self.residual
-        )
-        return float(np.sqrt(sum(shares)))
-
-    def turn(self, preconditioned: NDArray[np.float64]) -> None:
-        loops, blocks = self._loops, self._blocks
-        shares = run_blocks(loops.two_dots, blocks, preconditioned, self._image, self.residual)
-        along, energy = (sum(share) for share in zip(*shares, strict=True))
-        run_blocks(loops.turn, blocks, -self._step * along / self._energy, self.direction, preconditioned)
-        self._energy = energy
+    def advance(self, preconditioned: NDArray[np.float64]) -> float:
+        run_team(
+            self._run, len(self._bounds) - 1, self._bounds, *self._rows, preconditioned, self.residual,
+            self._image, self.direction, self.unknowns, self._step, self._energy, self._shares,
+        )  # fmt: skip
+        _, self._energy, curvature, square = self._shares.sum(axis=1).tolist()
+        self._step = self._length(curvature)
+        return float(np.sqrt(square))
 
 
-def _iterate(
-    matrix: sparse.csr_array, residual: NDArray[np.float64], preconditioned: NDArray[np.float64]
-) -> _Iteration:
+def _iterate(matrix: sparse.csr_array, residual: NDArray[np.float64]) -> _Iteration:
     kind = _CompiledIteration if use_compiled(len(residual)) else _Iteration
-    return kind(matrix, residual, preconditioned)
+    return kind(matrix, residual)
 
 
 def _conjugate_gradients(
@@ -425,9 +421,13 @@ def _conjugate_gradients(
     target: float,
     limit: int,
 ) -> tuple[NDArray[np.float64], int]:
-    state = _iterate(matrix, load.copy(), precondition(load).astype(float))
+    state = _iterate(matrix, load.copy())
     for iteration in range(1, limit + 1):
-        if state.advance() <= target:
+        if state.advance(precondition(state.residual).astype(float, copy=False)) <= target:
             return state.unknowns, iteration
-        state.turn(precondition(state.residual))
     return state.unknowns, limit
+
+
+def largest(vector: NDArray[np.float64]) -> float:
+    """Largest size of a vector's entries, without a vector of sizes."""
+    return max(float(vector.max(initial=0.0)), -float(vector.min(initial=0.0)))

@@ -30,6 +30,6 @@ def room(shape: int | tuple[int, ...], kind: DTypeLike = np.float64) -> NDArray:
     # what lies before the first and behind the last large page is never touched
     block = mmap.mmap(-1, size + LARGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     block.madvise(mmap.MADV_HUGEPAGE)
-    whole = np.frombuffer(block, dtype=np.uint8)
-    start = -whole.ctypes.data % LARGE_PAGE
-    return whole[start : start + size].view(kind).reshape(shape)
+    start = -np.frombuffer(block, dtype=np.uint8).ctypes.data % LARGE_PAGE
+    # no view of bytes: sparse arrays copy what they take for a small part of something larger
+    return np.frombuffer(block, dtype=kind, count=count, offset=start).reshape(shape)

@@ -1,6 +1,7 @@
 """The multigrid cycle in compiled loops: polynomial smoothing, single precision, rows shared by threads.
 
-Two steps of Chebyshev's polynomials of the fourth kind, with Lottes' weights,
+A cycle is one call in which threads claim chunks of rows, pass after pass
+(``compiled_teams``). Two steps of Chebyshev's polynomials of the fourth kind, with Lottes' weights,
 smooth before and after each coarser correction. They need products alone, which
 threads share without waiting for each other and which give the same digits
 whatever their number; a Gauss-Seidel sweep damps as much with half the products,
@@ -17,7 +18,7 @@ De Sterck, Falgout, Nolting & Yang (2008), Numer. Linear Algebra Appl. 15,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,24 @@ from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
 from spindle_fem.conduction import compiled_solver as compiled
+from spindle_fem.conduction import compiled_teams as teams
+from spindle_fem.conduction.compiled_teams import (
+    FIRST_STEP,
+    FIRST_WEIGHT,
+    KEEP,
+    LARGEST,
+    SECOND_STEP,
+    SECOND_WEIGHT,
+)
 from spindle_fem.conduction.memory import room
-from spindle_fem.conduction.threads import fill_rows, row_blocks, run_blocks, unsigned
+from spindle_fem.conduction.threads import (
+    chunk_bounds,
+    fill_rows,
+    row_blocks,
+    run_blocks,
+    run_team,
+    unsigned,
+)
 from spindle_fem.errors import SpecError
 
 COARSEST_SIZE = 400
@@ -34,17 +51,17 @@ MAXIMUM_LEVELS = 12
 # Damping of the step that smooths the aggregates' constants.
 DAMPING = 0.8
 PRECISION = np.float32
-# Weights of the two steps: Lottes (2023), table of optimal fourth-kind weights.
-FIRST_WEIGHT = PRECISION(1.02387287570313)
-SECOND_WEIGHT = PRECISION(1.26408905371085)
-# Largest eigenvalue of the scaled matrix: that of rows that sum to zero with no positive coupling.
-LARGEST = 2.0
-FIRST_STEP = PRECISION(4.0 / (3.0 * LARGEST))
-KEEP = PRECISION(1.0 / 5.0)
-SECOND_STEP = PRECISION(12.0 / (5.0 * LARGEST))
 # First guesses of how long rows are; wrong ones only cost time.
 ENTRIES_OF_PRODUCT = 9.0
 ENTRIES_OF_COARSE = 45.0
+
+# Elements of single precision on a cache line.
+LINE = 16
+# Which column of the layout tells where each array of a level begins.
+_BEGINS = (
+    teams.START, teams.ENTRY, teams.ENTRY, teams.ROW, teams.ROW, teams.ROW,
+    teams.TO_START, teams.TO_ENTRY, teams.TO_ENTRY,
+)  # fmt: skip
 
 Rows = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray]
 FixedRows = tuple[NDArray[np.uint32], NDArray]
@@ -74,13 +91,45 @@ class CompiledLevel:
 
 
 @dataclass(frozen=True, slots=True)
+class CyclePlan:
+    """What a compiled cycle goes through, and where: see ``compiled_teams.cycle``.
+
+    Attributes
+    ----------
+    passes : (n_passes + 1, 3) int64 ndarray
+        Kind, level and first chunk; the last row has the number of chunks.
+    bounds : (n_levels + 1, n) int64 ndarray
+        Rows of each level's chunks.
+    layout : (n_levels + 1, 7) int64 ndarray
+        Rows of each level and where its arrays begin in ``coarse``.
+    fine : tuple
+        Matrix, inverse, prolongation and restriction of the finest level.
+    coarse : tuple of ndarray
+        The same of all coarser levels, one after the other.
+    coarsest : (n, n) ndarray
+        Inverse of the coarsest matrix.
+    size : int
+        Unknowns of all levels together.
+    """
+
+    passes: NDArray[np.int64]
+    bounds: NDArray[np.int64]
+    layout: NDArray[np.int64]
+    fine: tuple
+    coarse: tuple[NDArray, ...]
+    coarsest: NDArray[np.float64]
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
 class CompiledHierarchy:
-    """Levels from fine to coarse and the factor of the coarsest matrix."""
+    """Levels from fine to coarse, the factor of the coarsest matrix, and the plan of a cycle."""
 
     levels: tuple[CompiledLevel, ...]
     coarsest: tuple[NDArray[np.float64], bool]
+    plan: CyclePlan | None
     # vectors of all levels, for the next cycle: fresh memory would be touched anew in each
-    _spare: list[list[NDArray]] = field(default_factory=list)
+    _spare: list[NDArray] = field(default_factory=list)
 
     def cycle(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
         """One V-cycle: approximate solution of ``K x = residual``.
@@ -93,60 +142,20 @@ class CompiledHierarchy:
             scales = np.abs(residual).max(axis=0, initial=0.0)
             scales[scales == 0.0] = 1.0
             return scales * self._descend_many(0, (residual / scales).astype(PRECISION, order="C"))
-        if not self.levels:
+        if self.plan is None:
             return cho_solve(self.coarsest, residual)
         # scaled, so that small residuals stay inside the range of single precision
         scale = float(np.linalg.norm(residual)) / np.sqrt(len(residual)) or 1.0
-        level = self.levels[0]
+        plan = self.plan
         # calls from several threads find vectors of their own
-        work = self._spare.pop() if self._spare else self._vectors()
-        right, direction = work[0][:2]
-        run_blocks(
-            compiled.begin_scaled, level.blocks, 1.0 / scale, FIRST_STEP, level.inverse, residual,
-            right, direction,
-        )  # fmt: skip
+        work = self._spare.pop() if self._spare else room(teams.N_VECTORS * plan.size, PRECISION)
         answer = np.empty(len(residual))
-        self._smooth_and_correct(0, work, scale, answer)
+        run_team(
+            teams.cycle, plan.bounds.shape[1] - 1, plan.passes, plan.bounds, plan.layout, plan.fine,
+            plan.coarse, plan.coarsest, work, np.ascontiguousarray(residual), scale, answer,
+        )  # fmt: skip
         self._spare.append(work)
         return answer
-
-    def _vectors(self) -> list[NDArray]:
-        return [room((5, len(level.inverse)), PRECISION) for level in self.levels]
-
-    def _descend(self, depth: int, work: list[NDArray], right: NDArray) -> NDArray:
-        if depth == len(self.levels):
-            return cho_solve(self.coarsest, right.astype(np.float64), check_finite=False).astype(PRECISION)
-        level = self.levels[depth]
-        work[depth][0] = right
-        run_blocks(compiled.begin, level.blocks, FIRST_STEP, level.inverse, right, work[depth][1])
-        answer = np.empty_like(right)
-        self._smooth_and_correct(depth, work, PRECISION(1.0), answer)
-        return answer
-
-    def _smooth_and_correct(self, depth: int, work: list[NDArray], scale: float, answer: NDArray) -> None:
-        """A level from its first direction on; ``answer`` gets the result times a scale."""
-        level = self.levels[depth]
-        blocks, matrix, inverse = level.blocks, level.matrix, level.inverse
-        right, direction, left, following, unknowns = work[depth]
-        run_blocks(
-            compiled.go_on, blocks, *matrix, inverse, right, direction, KEEP, SECOND_STEP, left, following
-        )
-        # the residual after both steps takes the place of the one between, row by row
-        run_blocks(
-            compiled.end_from_zero, blocks, *matrix, right, left, direction, following,
-            FIRST_WEIGHT, SECOND_WEIGHT, unknowns, left,
-        )  # fmt: skip
-        coarse = np.empty(len(level.restriction[0]) - 1, dtype=PRECISION)
-        run_blocks(compiled.multiply, level.coarse_blocks, *level.restriction, left, coarse)
-        correction = self._descend(depth + 1, work, coarse)
-        run_blocks(compiled.add_prolonged, blocks, *level.prolongation, correction, unknowns)
-        run_blocks(
-            compiled.begin_again, blocks, *matrix, inverse, right, unknowns, FIRST_STEP, left, direction
-        )
-        run_blocks(
-            compiled.end, blocks, *matrix, inverse, left, direction,
-            FIRST_WEIGHT, SECOND_WEIGHT, KEEP, SECOND_STEP, unknowns, scale, answer,
-        )  # fmt: skip
 
     def _descend_many(self, depth: int, right: NDArray) -> NDArray:
         """The cycle for several columns."""
@@ -215,7 +224,93 @@ def build_compiled_hierarchy(
                 np.linspace(0, size, len(blocks)).astype(np.int64),
             )
         )
-    return CompiledHierarchy(tuple(levels), cho_factor(matrix.toarray()))
+    coarsest = cho_factor(matrix.toarray())
+    if not levels:
+        return CompiledHierarchy((), coarsest, None)
+    plan, kept = _plan(levels, coarsest)
+    return CompiledHierarchy(kept, coarsest, plan)
+
+
+def _plan(
+    levels: list[CompiledLevel], coarsest: tuple[NDArray[np.float64], bool]
+) -> tuple[CyclePlan, tuple[CompiledLevel, ...]]:
+    """Plan of a cycle, and the levels with the arrays of coarser ones lying one after the other."""
+    count, size = len(levels), len(coarsest[0])
+    rows = np.array([*(len(level.inverse) for level in levels), size])
+    layout = np.zeros((count + 1, 7), dtype=np.int64)
+    layout[:, teams.ROWS] = rows
+    # each level's vectors begin on a cache line of their own
+    padded = -(-rows // LINE) * LINE
+    layout[1:, teams.WORK] = np.cumsum(padded)[:-1]
+    coarse = levels[1:]
+    sizes = {
+        teams.ROW: [len(level.inverse) for level in coarse],
+        teams.START: [len(level.matrix[0]) for level in coarse],
+        teams.ENTRY: [len(level.matrix[1]) for level in coarse],
+        teams.TO_START: [len(level.restriction[0]) for level in coarse],
+        teams.TO_ENTRY: [len(level.restriction[1]) for level in coarse],
+    }
+    for column, each in sizes.items():
+        layout[2:, column] = np.cumsum(each)
+    flat = [
+        np.concatenate([_arrays(level)[k] for level in coarse] or [_arrays(levels[0])[k][:0]])
+        for k in range(9)
+    ]
+    bounds = [chunk_bounds(level.matrix[0]) for level in levels]
+    bounds.append(np.array([0, size]))
+    table = np.zeros((count + 1, max(len(each) for each in bounds)), dtype=np.int64)
+    passes, first = [], 0
+    for kind, level in _order(count):
+        passes.append((kind, level, first))
+        first += len(bounds[level]) - 1
+    for level, each in enumerate(bounds):
+        table[level, : len(each)] = each
+    inverse = cho_solve(coarsest, np.eye(size))
+    one = levels[0]
+    plan = CyclePlan(
+        np.array([*passes, (-1, -1, first)], dtype=np.int64),
+        table,
+        layout,
+        (one.matrix, one.inverse, one.prolongation, one.restriction),
+        tuple(flat),
+        # symmetric to the last digit, as what it preconditions
+        0.5 * (inverse + inverse.T),
+        int(padded.sum()),
+    )
+    kept = [one]
+    for index, level in enumerate(coarse, start=1):
+        pieces = _arrays(level)
+        columns = _BEGINS
+        begins = [int(layout[index, column]) for column in columns]
+        own = [
+            array[begin : begin + len(piece)]
+            for array, begin, piece in zip(flat, begins, pieces, strict=True)
+        ]
+        kept.append(
+            replace(
+                level,
+                matrix=tuple(own[:3]),
+                inverse=own[3],
+                prolongation=tuple(own[4:6]),
+                restriction=tuple(own[6:]),
+            )
+        )
+    return plan, tuple(kept)
+
+
+def _arrays(level: CompiledLevel) -> tuple[NDArray, ...]:
+    return (*level.matrix, level.inverse, *level.prolongation, *level.restriction)
+
+
+def _order(count: int) -> list[tuple[int, int]]:
+    """Kind and level of each pass of a V-cycle with so many levels above the coarsest."""
+    order = [(teams.BEGIN, 0)]
+    for level in range(count):
+        order += [(teams.GO_ON, level), (teams.END_FROM_ZERO, level), (teams.RESTRICT, level + 1)]
+    order.append((teams.COARSEST, count))
+    for level in reversed(range(count)):
+        order += [(teams.PROLONG, level), (teams.BEGIN_AGAIN, level), (teams.END, level)]
+    return order
 
 
 def _empty_rows(n: int) -> FixedRows:

@@ -119,7 +119,7 @@ def prolongation_from_corners(mesh: TaggedMesh) -> sparse.csr_array:
 def _distinct(slots: NDArray[np.int32], size: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Distinct values below ``size``, rising, and the place of each value among them."""
     if use_compiled(size):
-        from spindle_fem.conduction.compiled_assembly import distinct
+        from spindle_fem.conduction.compiled_facets import distinct
 
         return distinct(slots, size)
     used = np.zeros(size, dtype=bool)

@@ -204,7 +204,7 @@ class ThermalOperators:
         """Add ``Σ h_f R_f`` in place; ``coefficient`` (n_facets,) [W/(m²·K)] over all facets."""
         active = np.flatnonzero(coefficient)
         if use_compiled(self.n_unknowns):
-            from spindle_fem.conduction.compiled_assembly import add_films
+            from spindle_fem.conduction.compiled_facets import add_films
 
             summed = np.zeros(len(self.facet_slots))
             add_films(active, coefficient, self.facet_film, self.facet_inverse, summed)

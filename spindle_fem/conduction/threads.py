@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
+from queue import SimpleQueue
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,11 @@ from spindle_fem.conduction.memory import room
 COMPILED_ABOVE = 40_000
 # A block of fewer rows costs more to hand over than it saves.
 LEAST_ROWS = 15_000
+# A chunk of work for a team: few hand-overs against some 20 µs of work, and all threads end together.
+ENTRIES_A_CHUNK = 30_000
+MOST_CHUNKS = 32
+# Room for the two counters of a team, on cache lines of their own.
+N_COUNTERS = 32
 _ONE: ContextVar[bool] = ContextVar("one_thread", default=False)
 
 
@@ -60,8 +66,24 @@ def _given_threads() -> int:
 
 
 @cache
-def _pool(count: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(count, thread_name_prefix="spindle-fem")
+def _jobs(count: int, process: int) -> SimpleQueue:
+    """Where so many threads of a process wait for work; handing over to a pool takes five times as long."""
+    jobs: SimpleQueue = SimpleQueue()
+    for index in range(count):
+        threading.Thread(target=_serve, args=(jobs,), name=f"spindle-fem-{index}", daemon=True).start()
+    return jobs
+
+
+def _serve(jobs: SimpleQueue) -> None:
+    while True:
+        jobs.get()()
+
+
+def _hand_over(count: int, job: Callable[[], object]) -> None:
+    """Have a job called by so many other threads, once each."""
+    jobs = _jobs(count, os.getpid())
+    for _ in range(count):
+        jobs.put(job)
 
 
 def row_blocks(n_rows: int) -> NDArray[np.int64]:
@@ -70,17 +92,63 @@ def row_blocks(n_rows: int) -> NDArray[np.int64]:
     return np.linspace(0, n_rows, count + 1).astype(np.int64)
 
 
-def run_blocks(function: Callable, bounds: NDArray[np.int64], *arguments: object) -> list:
-    """Call ``function(low, high, *arguments)`` for every range, and return what the calls return.
+def chunk_bounds(starts: NDArray) -> NDArray[np.int64]:
+    """Bounds of ranges of compressed rows with about as many entries each, (n_chunks + 1,).
 
-    The calling thread takes the first range; idle threads sleep.
+    They do not depend on the number of threads, so that neither do sums over them.
     """
-    if len(bounds) == 2:
-        return [function(bounds[0], bounds[1], *arguments)]
-    pool = _pool(len(bounds) - 2)
-    others = [pool.submit(function, low, high, *arguments) for low, high in itertools.pairwise(bounds[1:])]
-    first = function(bounds[0], bounds[1], *arguments)
-    return [first, *(other.result() for other in others)]
+    total = int(starts[-1])
+    count = max(1, min(total // ENTRIES_A_CHUNK, MOST_CHUNKS, len(starts) - 1))
+    bounds = np.searchsorted(starts, np.linspace(0, total, count + 1)).astype(np.int64)
+    bounds[0], bounds[-1] = 0, len(starts) - 1
+    return bounds
+
+
+def run_team(function: Callable, n_chunks: int, *arguments: object) -> None:
+    """Call ``function(is_first, counters, *arguments)`` in as many threads as are worth it.
+
+    For loops whose members claim chunks from the counters (``compiled_teams``): the
+    calling thread is the first and returns when all is done, whoever did it. Others
+    join when they come; one that finds nothing left to claim leaves again.
+    """
+    counters = np.zeros(N_COUNTERS, dtype=np.int64)
+    count = min(thread_count(), n_chunks)
+    if count > 1:
+        _hand_over(count - 1, partial(function, False, counters, *arguments))
+    function(True, counters, *arguments)
+
+
+def run_jobs(jobs: Sequence[Callable[[], object]]) -> list:
+    """Call functions, each in whatever thread is free, and return what they return in their order.
+
+    The calling thread takes part; idle threads sleep.
+    """
+    answers: list = [None] * len(jobs)
+    places, done = iter(range(len(jobs))), SimpleQueue()
+
+    def work() -> None:
+        # taking the next of a range is one step of the interpreter
+        for place in places:
+            try:
+                answers[place] = jobs[place]()
+                done.put(None)
+            except Exception as error:  # noqa: BLE001 - the caller raises it
+                done.put(error)
+
+    count = min(thread_count(), len(jobs))
+    if count > 1:
+        _hand_over(count - 1, work)
+    work()
+    errors = [done.get() for _ in jobs]
+    for error in errors:
+        if error is not None:
+            raise error
+    return answers
+
+
+def run_blocks(function: Callable, bounds: NDArray[np.int64], *arguments: object) -> list:
+    """Call ``function(low, high, *arguments)`` for every range, and return what the calls return."""
+    return run_jobs([partial(function, low, high, *arguments) for low, high in itertools.pairwise(bounds)])
 
 
 def fill_rows(

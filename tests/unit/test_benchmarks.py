@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from spindle_fem.errors import SpecError
 from spindle_fem.meshing.simple import build_box, build_joined_tubes
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
@@ -16,7 +17,7 @@ def on_path(monkeypatch):
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     monkeypatch.syspath_prepend(str(BENCHMARKS / "peers"))
     yield
-    for name in ("case", "comparison", "stages", "scale", "protocol"):
+    for name in ("case", "comparison", "stages", "scale", "protocol", "numbering"):
         sys.modules.pop(name, None)
 
 
@@ -170,3 +171,40 @@ def test_a_million_designs_on_paper():
     assert paper["scheduler_and_wire_h"] == pytest.approx(4.0 / 3.6)
     assert paper["client_memory_of_tasks_GB"] == pytest.approx(8.0)
     assert paper["workers_carried"] == pytest.approx(180.0)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_another_numbering_changes_no_temperature(monkeypatch, compiled):
+    import case
+    from numbering import numbered
+
+    from spindle_fem.conduction import threads
+    from spindle_fem.conduction.operators import build_operators
+    from spindle_fem.conduction.problem import ConductionProblem, Film
+    from spindle_fem.conduction.steady import solve_steady
+
+    if compiled:
+        pytest.importorskip("numba")
+        monkeypatch.setattr(threads, "COMPILED_ABOVE", 0)
+    tubes = build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((2, 2), 12, 3))
+    mesh = case.divided(tubes)
+    changed, number = numbered(mesh)
+    assert np.array_equal(np.sort(number), np.arange(len(mesh.points)))
+    assert np.array_equal(changed.points[number], mesh.points)
+    fields = []
+    for each in (mesh, changed):
+        problem = ConductionProblem(
+            build_operators(each, 1),
+            {"inner": 40.0, "outer": 15.0},
+            films=(Film("outer.outer", 300.0, 290.0),),
+            joint_conductance={"inner|outer": 2e3},
+            surface_heat={"inner.inner": 200.0},
+            adiabatic="rest",
+        )
+        fields.append(solve_steady(problem).temperature)
+    assert fields[1][number] == pytest.approx(fields[0], abs=1e-9)
+    shuffled = np.random.default_rng(8).permutation(len(mesh.points))
+    spread = np.abs(np.diff(shuffled[mesh.tetrahedra], axis=1)).mean()
+    assert np.abs(np.diff(changed.tetrahedra, axis=1)).mean() < 0.4 * spread
+    with pytest.raises(SpecError, match="10 nodes an element"):
+        numbered(tubes)

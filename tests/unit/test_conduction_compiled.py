@@ -12,7 +12,6 @@ from spindle_fem.conduction.assemble import assemble_system
 from spindle_fem.conduction.linear_solvers import build_preconditioner, multiply, solve_linear, solve_many
 from spindle_fem.conduction.memory import room
 from spindle_fem.conduction.multigrid import Hierarchy, build_hierarchy
-from spindle_fem.conduction.numbering import numbered
 from spindle_fem.conduction.operators import build_operators
 from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.conduction.skfem_mesh import ELEMENT_QUADRATURE_DEGREE
@@ -36,6 +35,7 @@ def loops(monkeypatch):
         monkeypatch.setattr(threads, "thread_count", lambda: count)
         monkeypatch.setattr(threads, "COMPILED_ABOVE", 0)
         monkeypatch.setattr(threads, "LEAST_ROWS", 50)
+        monkeypatch.setattr(threads, "ENTRIES_A_CHUNK", 500)
 
     return switch
 
@@ -162,6 +162,17 @@ def test_a_cycle_is_the_same_to_the_last_digit_whatever_the_threads(loops):
     for data, answer in answers[1:]:
         assert np.array_equal(data, answers[0][0])
         assert np.array_equal(answer, answers[0][1])
+
+
+def test_a_solution_is_the_same_to_the_last_digit_whatever_the_threads(loops):
+    answers = []
+    for count in (1, 2, 3):
+        loops(count)
+        system = assemble_system(problem_on(build_operators(TUBES, 1)))
+        preconditioner = build_preconditioner(system, "multigrid")
+        found = solve_linear(system.full_matrix(), system.full_load(), preconditioner)
+        answers.append(found.unknowns)
+    assert all(np.array_equal(answer, answers[0]) for answer in answers)
 
 
 def test_a_cycle_leaves_earlier_answers_alone(loops):
@@ -306,24 +317,6 @@ def test_room_is_an_array_of_its_own(shape):
     assert np.all(one == 1.0)
 
 
-def test_another_numbering_changes_no_temperature(loops):
-    mesh = linear(TUBES)
-    loops(2)
-    changed, number = numbered(mesh)
-    loops(0)
-    assert np.array_equal(numbered(mesh)[1], number)
-    assert np.array_equal(np.sort(number), np.arange(len(mesh.points)))
-    assert np.array_equal(changed.points[number], mesh.points)
-    operators = [build_operators(item, 1, area_tolerance=1.0) for item in (mesh, changed)]
-    one, other = (solve_steady(problem_on(item)) for item in operators)
-    assert other.temperature[number] == pytest.approx(one.temperature, abs=1e-9)
-    shuffled = np.random.default_rng(8).permutation(len(mesh.points))
-    spread = np.abs(np.diff(shuffled[mesh.tetrahedra], axis=1)).mean()
-    assert np.abs(np.diff(changed.tetrahedra, axis=1)).mean() < 0.4 * spread
-    with pytest.raises(SpecError, match="10 nodes an element"):
-        numbered(TUBES)
-
-
 def test_the_environment_says_how_many_threads_and_whether_to_compile(monkeypatch):
     for name in ("SPINDLE_FEM_THREADS", "OMP_NUM_THREADS", "SPINDLE_FEM_COMPILED"):
         monkeypatch.delenv(name, raising=False)
@@ -344,6 +337,74 @@ def test_the_environment_says_how_many_threads_and_whether_to_compile(monkeypatc
     finally:
         threads._given_threads.cache_clear()
         threads.has_compiled.cache_clear()
+
+
+def test_work_that_fails_in_another_thread_fails_where_it_was_asked(monkeypatch):
+    monkeypatch.setattr(threads, "thread_count", lambda: 3)
+
+    def refuse():
+        raise SpecError("work", "it was refused.")
+
+    for place in range(4):
+        jobs = [lambda k=k: k for k in range(4)]
+        assert threads.run_jobs(jobs) == [0, 1, 2, 3]
+        jobs[place] = refuse
+        with pytest.raises(SpecError, match="it was refused"):
+            threads.run_jobs(jobs)
+
+
+def test_a_team_does_every_chunk_once_whoever_comes(loops):
+    from spindle_fem.conduction.compiled_teams import project
+
+    rng = np.random.default_rng(12)
+    basis = rng.standard_normal((7, 1000)).astype(np.float32)
+    vector, start = rng.standard_normal((2, 1000))
+    known = basis[:5].astype(float)
+    expected = start - 0.5 * (known @ vector) @ known
+    bounds = np.array([0, 10, 300, 300, 999, 1000])
+    answers = []
+    for count in (1, 2, 5):
+        loops(count)
+        out, parts = start.copy(), np.empty((5, 5))
+        threads.run_team(project, 5, bounds, basis, 5, vector, -0.5, parts, out)
+        assert parts.sum(axis=0) == pytest.approx(known @ vector, abs=1e-3)
+        answers.append(out)
+    assert np.abs(answers[0] - expected).max() < 1e-4 * np.abs(expected).max()
+    assert all(np.array_equal(answer, answers[0]) for answer in answers)
+
+
+def test_chunks_have_as_many_entries_and_do_not_depend_on_threads(loops):
+    starts = np.concatenate((np.arange(0, 9000, 9), np.arange(9000, 30001, 30)))
+    loops(1)
+    bounds = threads.chunk_bounds(starts)
+    assert bounds[0] == 0
+    assert bounds[-1] == len(starts) - 1
+    assert np.diff(starts[bounds]) == pytest.approx(30000 / (len(bounds) - 1), abs=30)
+    loops(4)
+    assert np.array_equal(threads.chunk_bounds(starts), bounds)
+    assert threads.chunk_bounds(np.array([0, 3])).tolist() == [0, 1]
+
+
+def test_tied_nodes_have_the_label_of_their_component():
+    from scipy.sparse.csgraph import connected_components
+
+    from spindle_fem.conduction.compiled_facets import label_tied
+
+    one, other = np.random.default_rng(5).integers(0, 300, (2, 150))
+    graph = sparse.coo_array((np.ones(150), (one, other)), shape=(300, 300))
+    count, expected = connected_components(graph, directed=False)
+    label, found = label_tied(one, other, 300)
+    assert found == count
+    assert np.array_equal(label, expected)
+
+
+def test_sparse_arrays_keep_room_as_it_is():
+    n = 400_000
+    data, indices = room(n), room(n, np.int32)
+    data[:], indices[:] = 1.0, np.arange(n)
+    matrix = sparse.csr_array((data, indices, np.arange(n + 1, dtype=np.int32)), shape=(n, n))
+    assert np.shares_memory(matrix.data, data)
+    assert np.shares_memory(matrix.indices, indices)
 
 
 def test_ranges_cover_all_rows_and_return_in_order(monkeypatch):
