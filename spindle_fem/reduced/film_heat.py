@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from spindle_fem.effects.term import Operating, Term, TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
-from spindle_fem.loads.bearing_heat import BearingMechanics
+from spindle_fem.loads.bearing_heat import BearingMechanics, FilmCurves
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.build import ReductionOptions
 from spindle_fem.spec.model import HeatTable, MachineSpec
@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 SPEED_SHARES = (0.02, 0.04, 0.08, 0.14, 0.22, 0.32, 0.44, 0.58, 0.72, 0.86, 1.0)
 FILM_TEMPERATURES = (ZERO_CELSIUS_K + 5.0, ZERO_CELSIUS_K + 95.0)
 TEMPERATURE_POINTS = 8
+# Chebyshev points on -1 to 1, and the polynomials there.
+NODES = np.cos(np.pi * (np.arange(TEMPERATURE_POINTS) + 0.5) / TEMPERATURE_POINTS)
+AT_NODES = chebvander(NODES, TEMPERATURE_POINTS - 1)
 NOMINAL_FILM_TEMPERATURE = ZERO_CELSIUS_K + 30.0
 TABLE_POINTS = 61
 MOST_KNOWN = 1024
@@ -55,6 +58,8 @@ class FrictionMap:
     conductances : CubicSpline
         Over the same, (n_thrusts, 2 n_bearings, n_t): of the conductance between
         the balls and the inner and the outer raceway of each bearing in turn.
+    at_rest : (n_thrusts, 2 n_bearings, n_t) ndarray
+        The same at standstill, where no lubricant flows around the balls.
     shares : CubicSpline or None
         Over the thrust, (n_thrusts,): how much each of them counts; None where
         there is but one.
@@ -65,6 +70,7 @@ class FrictionMap:
     thrust: Array
     moments: CubicSpline
     conductances: CubicSpline
+    at_rest: Array
     shares: CubicSpline | None
 
     def log_moment(self, speed: float, thrust: float, film_temperature: NDArray) -> NDArray:
@@ -108,9 +114,16 @@ class FrictionMap:
         self._require(speed, thrust)
         known = np.log(max(speed, self.speed[0]))
         shares = np.ones(1) if self.shares is None else self.shares(thrust)
-        return tuple(
-            np.tensordot(shares, curves(known), axes=1) for curves in (self.moments, self.conductances)
+        moments, turning, still = (
+            np.tensordot(shares, item, axes=1)
+            for item in (self.moments(known), self.conductances(known), self.at_rest)
         )
+        if speed >= self.speed[0]:
+            return moments, turning
+        # What the lubricant carries around the balls goes with the root of the speed.
+        values = [np.exp(item @ AT_NODES.T) for item in (still, turning)]
+        between = values[0] + np.sqrt(speed / self.speed[0]) * (values[1] - values[0])
+        return moments, np.linalg.solve(AT_NODES, np.log(between).T).T
 
     def _require(self, speed: float, thrust: float) -> None:
         for name, value, known in (("speed", speed, self.speed), ("thrust", thrust, self.thrust)):
@@ -199,23 +212,36 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
     speeds = highest_speed * np.array(SPEED_SHARES)
     loads = np.unique(np.asarray(thrusts, dtype=float))
     low, high = FILM_TEMPERATURES
-    nodes = np.cos(np.pi * (np.arange(TEMPERATURE_POINTS) + 0.5) / TEMPERATURE_POINTS)
-    kelvin = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+    kelvin = 0.5 * (low + high) + 0.5 * (high - low) * NODES
     moments = np.empty((len(speeds), len(loads), len(names), TEMPERATURE_POINTS))
-    conductances = np.empty((len(speeds), len(loads), len(names), 2, TEMPERATURE_POINTS))
-    fit = chebvander(nodes, TEMPERATURE_POINTS - 1)
+    conductances = np.empty((len(speeds), len(loads), 2 * len(names), TEMPERATURE_POINTS))
+
+    def log_conductances(curves: Mapping[str, FilmCurves]) -> Array:
+        rows = [(curves[name].conductance_inner, curves[name].conductance_outer) for name in names]
+        values = np.array(rows).reshape(-1, TEMPERATURE_POINTS)
+        return np.linalg.solve(AT_NODES, np.log(values).T).T
+
     for i, speed in enumerate(speeds):
         for j, thrust in enumerate(loads):
             curves = mechanics.over_film_temperature(_point(spec, speed, thrust), kelvin)
             heat = np.array([curves[name].heat for name in names]) / factors
-            moments[i, j] = np.linalg.solve(fit, np.log(heat / speed).T).T
-            for side, word in enumerate(("inner", "outer")):
-                values = np.array([getattr(curves[name], f"conductance_{word}") for name in names])
-                conductances[i, j, :, side] = np.linalg.solve(fit, np.log(values).T).T
-    conductances = conductances.reshape(len(speeds), len(loads), -1, TEMPERATURE_POINTS)
+            moments[i, j] = np.linalg.solve(AT_NODES, np.log(heat / speed).T).T
+            conductances[i, j] = log_conductances(curves)
+    at_rest = [
+        log_conductances(mechanics.over_film_temperature(_point(spec, 0.0, thrust), kelvin))
+        for thrust in loads
+    ]
     at = np.log(speeds)
     shares = CubicSpline(loads, np.eye(len(loads))) if len(loads) > 1 else None
-    return FrictionMap(names, speeds, loads, CubicSpline(at, moments), CubicSpline(at, conductances), shares)
+    return FrictionMap(
+        names,
+        speeds,
+        loads,
+        CubicSpline(at, moments),
+        CubicSpline(at, conductances),
+        np.array(at_rest),
+        shares,
+    )
 
 
 def _point(spec: MachineSpec, speed: float, thrust: float) -> OperatingPoint:

@@ -74,6 +74,23 @@ def test_the_map_is_the_heat_model_between_its_points(spec, friction, speed, cel
         assert conductance[row, 1] == pytest.approx(exact[name].conductance_outer[0], rel=1e-3)
 
 
+@pytest.mark.parametrize(("rpm", "within"), [(0.0, 1e-3), (1e-6, 1e-3), (30.0, 2e-3), (90.0, 1e-3)])
+def test_balls_lose_their_lubricant_as_the_spindle_stops(spec, friction, rpm, within):
+    """Down to standstill, where only the contacts conduct."""
+    given, celsius = OperatingPoint.of(spec), 40.0
+    exact = BearingMechanics(spec).over_film_temperature(
+        replace(given, speed=rpm * RPM, thrust=1500.0), [celsius + 273.15]
+    )
+    kelvin = np.full((len(friction.bearings), 1), celsius + 273.15)
+    found = np.exp(friction.log_conductance(rpm * RPM, 1500.0, kelvin))[:, :, 0]
+    turning = np.exp(friction.log_conductance(90.0 * RPM, 1500.0, kelvin))[:, :, 0]
+    for row, name in enumerate(friction.bearings):
+        assert found[row, 0] == pytest.approx(exact[name].conductance_inner[0], rel=within)
+        assert found[row, 1] == pytest.approx(exact[name].conductance_outer[0], rel=within)
+    if rpm < 1.0:
+        assert np.all(found < 0.95 * turning)
+
+
 def test_table_and_term_together_are_the_map(spec, friction, table):
     term = FilmHeat(friction, spec, table)
     film = 273.15 + np.linspace(20.0, 50.0, len(friction.bearings))
