@@ -241,6 +241,7 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
         elif part["ratio"] < 0.6 or part["chi2"] < CLEAR_CHI2 / 2:
             out["clear"] = False
             out["acceptable_sets"].append(_set_of(rest))
+            verdicts.append(_verdict_of(rest))
     twins = [t for t in (*known["best_mimics"], *known["pair_mimics"]) if _twin(t, total)]
     if twins:
         out["clear"] = False
