@@ -16,7 +16,7 @@ from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
 from spindle_fem.reduced.coolant import CoolantMaps, UniformFilmMaps, coolant_maps, film_derivative
 from spindle_fem.reduced.directions import ConductingDirections
-from spindle_fem.reduced.drive import Drive, heat_of_table
+from spindle_fem.reduced.drive import Drive, WarmedPoint, heat_of_table
 from spindle_fem.reduced.model import ReducedModel
 from spindle_fem.reduced.natural import natural_film_terms
 from spindle_fem.reduced.stepping import build_propagator
@@ -88,7 +88,7 @@ class FastModel:
         )
         self._point_rows = [row for row, probe in enumerate(spec.probe) if probe.kind == "point"]
         self._base: dict[tuple[float, float], dict[str, float]] = {}
-        self._films: dict[tuple[float, float], tuple[Array, float, float]] = {}
+        self._films: dict[tuple[float, float, bytes], tuple[Array, float, float]] = {}
         self._maps = UniformFilmMaps(model)
         self._sums: dict[tuple[tuple[int, ...], bytes], Array] = {}
         self._scales: tuple[dict[str, float], dict[str, float]] = ({}, {})
@@ -144,13 +144,17 @@ class FastModel:
     ) -> tuple[Array, float, float]:
         """Film of each cell [W/(m²·K)], capacity rate of each start [W/K], friction heat [W].
 
-        Film and properties at inlet temperature; where the definition asks for
-        those at bulk temperature, this is the first step of that iteration.
+        With the wall at inlet temperature unless the point knows the wall's
+        (:class:`spindle_fem.reduced.drive.WarmedPoint`).
         """
         flow = point.coolant_flow * changes.get(FLOW, 1.0)
-        key = (flow, point.coolant_inlet_temperature)
+        warmed = point.channel_wall if isinstance(point, WarmedPoint) else None
+        key = (flow, point.coolant_inlet_temperature, b"" if warmed is None else warmed.tobytes())
         if key not in self._films:
-            wall = np.full(self.model.cell_area.shape, point.coolant_inlet_temperature)
+            shape = self.model.cell_area.shape
+            wall = (
+                np.full(shape, point.coolant_inlet_temperature) if warmed is None else warmed.reshape(shape)
+            )
             state = self.loop.at(replace(point, coolant_flow=flow), wall)
             rate = float(state.march.mass_flow * np.mean(state.march.march.specific_heat_capacity))
             friction = float(state.march.march.pumping_heat.sum()) if self.spec.coolant.pumping_heat else 0.0
@@ -341,6 +345,15 @@ class FastModel:
             outputs[self._outlet_row] = maps.outlet
             output_inputs[self._outlet_row, inlet] = maps.outlet_inlet
             output_inputs[self._outlet_row, friction] = maps.outlet_constant
+
+    @property
+    def film_follows_wall(self) -> bool:
+        """Whether the channel's film changes with the temperatures of coolant and wall along it."""
+        return self.loop is not None and self.spec.coolant.properties_at == "bulk"
+
+    def channel_walls(self, states: Array) -> Array:
+        """Temperature of the channel's wall in each cell, (n, n_cells) K, from unknowns (n, r)."""
+        return states @ (self.model.cell_load / self.model.cell_area.ravel()[:, None]).T
 
     # ----------------------------------------------------------------- inputs
     propagator = staticmethod(build_propagator)

@@ -210,6 +210,11 @@ class NetworkFastModel:
         names = ("conduction", "loads", "outputs", "output_inputs")
         return ClassOperators(*(getattr(first, n) - getattr(second, n) for n in names), {}, {}, {}, {})
 
+    @property
+    def film_follows_wall(self) -> bool:
+        """Never: links conduct as they are written."""
+        return False
+
     def _boundary_column(self, coefficient: str) -> int:
         return self.load_names.index(f"boundary.{self._boundary_of[coefficient]}")
 

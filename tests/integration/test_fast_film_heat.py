@@ -18,8 +18,7 @@ from spindle_fem.spec.load import load_machine
 from spindle_fem.transients.run import TransientOptions, simulate_full
 
 RPM = np.pi / 30.0
-# The fast model holds the coolant's properties at the inlet.
-OVERRIDES = ("mesh.preset=coarse", "mesh.order=1", "coolant.properties_at=inlet")
+OVERRIDES = ("mesh.preset=coarse", "mesh.order=1")
 HELD = np.array([True, True, False, False, True])
 TIMES = np.arange(0.0, 2401.0, 20.0)
 SPEED = RPM * np.where(TIMES < 1200.0, 3000.0, 1000.0)

@@ -6,7 +6,7 @@ import pytest
 from spindle_fem.errors import RecordingError
 from spindle_fem.loads.bearing_heat import table_heat
 from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.reduced.drive import STANDARD, heat_of_table, inputs_at, make_drive
+from spindle_fem.reduced.drive import STANDARD, WALL_BIN, heat_of_table, inputs_at, make_drive, with_walls
 from spindle_fem.spec.load import load_machine
 
 HELD = np.array([True, True, False, False, True])
@@ -82,3 +82,19 @@ def test_heat_over_time_is_the_tables_heat_at_each_instant():
         expected, _ = table_heat(spec, OperatingPoint(n, f, 293.15, 288.15, 3.3e-4))
         names = [bearing.name for _, bearing in spec.bearings]
         assert found[row].tolist() == pytest.approx([expected[name] for name in names])
+
+
+def test_classes_are_divided_by_the_temperature_of_the_wall():
+    times = np.arange(0.0, 1300.0, 100.0)
+    drive = make_drive(times, STANDARD, inputs(times, np.where(times < 600.0, 100.0, 200.0)), HELD)
+    walls = 290.0 + np.outer(drive.grid / 400.0, [0.9, 1.1])
+    found = with_walls(drive, walls)
+    middle = 0.5 * (walls[:-1] + walls[1:])
+    assert len(found.points) > len(drive.points) == 2
+    for number, point in enumerate(found.points):
+        rows = found.step_class == number
+        assert len(set(drive.step_class[rows])) == 1
+        assert point.speed == drive.points[drive.step_class[rows][0]].speed
+        assert point.channel_wall == pytest.approx(middle[rows].mean(axis=0))
+        assert np.ptp(middle[rows].mean(axis=1)) <= WALL_BIN
+    assert len(with_walls(drive, np.full_like(walls, 300.0)).points) == 2

@@ -13,7 +13,7 @@ from spindle_fem.effects.term import TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.loads.bearing_heat import BearingMechanics
 from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.reduced.drive import heat_of_table
+from spindle_fem.reduced.drive import heat_of_table, with_walls
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.film_heat import (
     FilmHeat,
@@ -253,8 +253,14 @@ def test_given_terms_are_always_there_and_stay_on_a_smaller_basis(lumped):
     assert sloped.projected(np.eye(fast.model.size)[:, :-1]).extra_terms == (term,)
 
 
-def test_derivatives_through_the_films_are_those_of_differences(lumped):
-    fast, drive = lumped
+@pytest.mark.parametrize(("properties_at", "share"), [("inlet", 1e-4), ("bulk", 2e-3)])
+def test_derivatives_through_the_films_are_those_of_differences(lumped, properties_at, share):
+    """Where the channel's film follows its wall, derivatives hold it: they miss what that changes."""
+    given, drive = lumped
+    coolant = given.spec.coolant.model_copy(update={"properties_at": properties_at})
+    spec = given.spec.model_copy(update={"coolant": coolant})
+    fast = FastModel(given.model, spec, given.extra_terms)
+    assert fast.film_follows_wall == (properties_at == "bulk")
     names = ("heat.front", "film.outside", "coolant.film_factor", "heat.inner_share")
     run = simulate_fast(fast, drive, 291.0, derivatives=names)
     for column, name in enumerate(names):
@@ -264,8 +270,24 @@ def test_derivatives_through_the_films_are_those_of_differences(lumped):
         ]
         expected = (ends[0] - ends[1]) / 2e-4
         assert run.sensitivity[:, :, column] == pytest.approx(
-            expected, rel=1e-4, abs=1e-4 * np.abs(expected).max()
+            expected, rel=share, abs=share * np.abs(expected).max()
         ), name
+
+
+def test_the_channels_film_is_that_at_its_wall(lumped):
+    fast, drive = lumped
+    states = np.tile(300.0 * fast.model.one, (len(drive.grid), 1))
+    walls = fast.channel_walls(states)
+    assert walls == pytest.approx(300.0)
+    point = with_walls(drive, walls).points[0]
+    shape = fast.model.cell_area.shape
+    expected = fast.loop.at(drive.points[0], np.full(shape, 300.0)).film_coefficient.ravel()
+    film, _, _ = fast.channel_film(point, {})
+    assert film == pytest.approx(expected, rel=1e-12)
+    cold, _, _ = fast.channel_film(drive.points[0], {})
+    # The coolant warms along it.
+    assert np.all(np.diff(film) > 0.0)
+    assert film[-1] > 1.005 * cold[-1]
 
 
 def test_a_warmer_film_makes_less_heat_than_the_table(lumped):
