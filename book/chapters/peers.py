@@ -14,6 +14,7 @@ import numpy as np
 
 from book.page import Chapter, Pictures
 from book.work import ROOT, Desk, read_json
+from spindle_fem.errors import BadInputError
 from spindle_fem.reporting.document import Section, Table, Text
 from spindle_fem.reporting.output import replace_text
 from spindle_fem.reporting.tables import column, number, rows_of, significant
@@ -140,6 +141,11 @@ def interpreter_of(name: str) -> str | None:
     """Python that can run a peer's script; None where none of those that are named can.
 
     Interpreters are this one, those of the environment variable ``PEER_PYTHONS``, and the system's.
+
+    Raises
+    ------
+    BadInputError
+        One of the variable cannot be run.
     """
     needs = PEERS[name][0]
     if not (SCRIPTS / f"run_{name}.py").is_file():
@@ -147,6 +153,11 @@ def interpreter_of(name: str) -> str | None:
     if name == "calculix":
         return sys.executable if shutil.which(needs) else None
     given = [item for item in os.environ.get(_ENVIRONMENT, "").split(os.pathsep) if item]
+    for item in given:
+        if shutil.which(item) is None:
+            raise BadInputError(
+                _ENVIRONMENT, f'"{item}" cannot be run.', f"Join interpreters by “{os.pathsep}”."
+            )
     system = shutil.which("python3", path="/usr/bin")
     for python in dict.fromkeys([sys.executable, *given, *([system] if system else [])]):
         asked = subprocess.run(
