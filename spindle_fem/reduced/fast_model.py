@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 
 # Films of cells that differ by no more are one film.
 ROUND_OFF = 1e-14
+# Films that are remembered: runs whose films follow the wall have new ones each time.
+MOST_FILMS = 2000
 # Numbers in remembered sums of operators.
 MOST_SUMS = 4_000_000
 NO_CHANGES: Mapping[str, float] = MappingProxyType({})
@@ -151,6 +153,8 @@ class FastModel:
         warmed = point.channel_wall if isinstance(point, WarmedPoint) else None
         key = (flow, point.coolant_inlet_temperature, b"" if warmed is None else warmed.tobytes())
         if key not in self._films:
+            if len(self._films) >= MOST_FILMS:
+                self._films.clear()
             shape = self.model.cell_area.shape
             wall = (
                 np.full(shape, point.coolant_inlet_temperature) if warmed is None else warmed.reshape(shape)
