@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from joblib import Parallel, delayed, parallel_config
 
-from spindle_fem.diagnosis.inference import EFFECT_PREFIX, MOST_ITERATIONS, Fit, Problem
+from spindle_fem.diagnosis.inference import MOST_ITERATIONS, Fit, Problem, amplitude_name
 from spindle_fem.effects.base import Candidate
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 
@@ -40,8 +40,7 @@ def fit_order(problem: Problem, order: FitOrder) -> Fit | None:
     for share in order.shares:
         values = dict(order.start)
         for candidate in order.candidates:
-            own = candidate.amplitude
-            name = EFFECT_PREFIX + own if own in {f.name for f in candidate.factors} else own
+            name = amplitude_name(candidate)
             if name in values:
                 values[name] = candidate.null + share * (values[name] - candidate.null)
         try:

@@ -176,6 +176,12 @@ def candidate_coordinates(candidate: Candidate) -> tuple[Coordinate, ...]:
     return tuple(found)
 
 
+def amplitude_name(candidate: Candidate) -> str:
+    """Name of the coordinate that switches a candidate on."""
+    own = candidate.amplitude
+    return EFFECT_PREFIX + own if own in {item.name for item in candidate.factors} else own
+
+
 @dataclass(slots=True)
 class Problem:
     """Data, noise and what is known of the machine.

@@ -11,7 +11,7 @@ from scipy.special import comb
 from scipy.stats import chi2, norm
 
 from spindle_fem.diagnosis.engine import Hypothesis
-from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit
+from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit, amplitude_name
 from spindle_fem.effects.base import Candidate
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
@@ -151,15 +151,10 @@ def any_magnitude(fit: Fit) -> float:
     width = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / SMALLEST_SIZE))
     found = 0.0
     for candidate in fit.candidates:
-        size = abs(fit.position[_amplitude_index(fit, candidate)])
+        name = amplitude_name(candidate)
+        size = abs(next(u for c, u in zip(fit.coordinates, fit.position, strict=True) if c.name == name))
         found += float(np.log(width / np.clip(size, SMALLEST_SIZE, 1.0)))
     return found
-
-
-def _amplitude_index(fit: Fit, candidate: Candidate) -> int:
-    own = candidate.amplitude
-    name = EFFECT_PREFIX + own if own in {item.name for item in candidate.factors} else own
-    return next(i for i, coordinate in enumerate(fit.coordinates) if coordinate.name == name)
 
 
 def counted(gain: float) -> float:
