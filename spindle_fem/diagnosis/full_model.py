@@ -148,11 +148,6 @@ def full_model_errors(
     if machine.is_network:
         return nothing_run(OFF if mesh == AUTO else mesh, NETWORK_REASON)
     plant = diagnosis.plant
-    heated = sorted({n for drive in plant.drives for n in drive.names if n.startswith("heat.")})
-    if heated:
-        return nothing_run(
-            mesh, f"The recording gives {', '.join(heated)}, which the full model does not take."
-        )
     options = options_for(plant) if options is None else options
     if mesh == AUTO:
         steps = expected_steps(plant, options)

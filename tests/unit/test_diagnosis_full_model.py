@@ -256,12 +256,19 @@ def test_a_difference_of_the_meshes_is_not_one_of_what_was_found(plant, monkeypa
         assert [row[f"{key}_K"] for key in ("before", "after", "change")] == pytest.approx([0.4, 0.5, 0.1])
 
 
-def test_recorded_heat_is_said_to_be_beyond_the_full_model(plant):
+def test_recorded_heat_goes_into_the_full_model(plant):
     drive = plant.drives[0]
-    heated = SimpleNamespace(drives=(replace(drive, names=(*drive.names, "heat.motor")),))
-    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
-    found = full_model_errors(diagnosis_of(heated, fit_of((), {}), fit_of((), {})), machine, mesh="own")
-    assert found["reason"] == "The recording gives heat.motor, which the full model does not take."
+    heat = np.full((len(drive.start), 1), 40.0)
+    heated = replace(
+        drive,
+        names=(*drive.names, "heat.housing"),
+        start=np.hstack((drive.start, heat)),
+        end=np.hstack((drive.end, heat)),
+    )
+    history = OperatingHistory.of(plant.fast.spec, inputs_of_drive(heated))
+    (term,) = history.given_heat()
+    assert term.heat_places == ("housing",)
+    assert history.at(0.0).extra_heat == {"housing": 40.0}
 
 
 def test_another_mesh_is_refused():
