@@ -12,6 +12,8 @@ from spindle_fem.spec.model import AnnulusSegment, MachineSpec, Part, Surface
 FLANGE_STEP = 1.1
 # Spot of the wall of the cooling channel.
 CHANNEL_WALL = "channel_wall"
+# Spot of the shaft between its bearings: a rotor, a drawbar, what runs through the bore.
+SHAFT_GAP = "shaft_gap"
 
 
 class Layout:
@@ -102,10 +104,15 @@ class Layout:
             gaps = [
                 g for g in gaps if self._part_of(g.rotating) == self.shaft.name and g.rotating in self.places
             ]
-            found["shaft_gap"] = tuple(g.rotating for g in gaps) or found["shaft"]
+            found[SHAFT_GAP] = tuple(g.rotating for g in gaps) or found["shaft"]
             standing = tuple(name for g in gaps for name in g.standing if name in self.places)
             if standing:
                 found["standing_gap"] = standing
+        for part in self.spec.part:
+            # What holds the seal at an end of the shaft.
+            end = "" if part in (self.shaft, self.housing) else self.component_of(part.name)
+            if not part.rotating and end in ("nose", "drive_end") and part.name in self.places:
+                found[f"standing_{end}"] = (*found.get(f"standing_{end}", ()), part.name)
         if self.housing is not None:
             found["housing"] = (self.housing.name,)
             if self.flange:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from spindle_fem.diagnosis.layout import CHANNEL_WALL, Layout
+from spindle_fem.diagnosis.layout import CHANNEL_WALL, SHAFT_GAP, Layout
 from spindle_fem.reduced.probe_places import NEAR
 from spindle_fem.spec.model import MachineSpec
 
@@ -123,7 +123,7 @@ def _of_channel(spec: MachineSpec, name: str) -> tuple[Region, ...]:
 
 
 def _of_ends(spec: MachineSpec, name: str) -> tuple[Region, ...]:
-    if name not in ("shaft", "housing", "nose", "drive_end", "flange"):
+    if name not in ("shaft", SHAFT_GAP, "housing", "nose", "drive_end", "flange"):
         return ()
     layout = Layout(spec, set())
     if name == "housing":
@@ -139,6 +139,10 @@ def _of_ends(spec: MachineSpec, name: str) -> tuple[Region, ...]:
         segments = [s for s in segments if s.z[1] <= layout.first + 1e-9]
     elif name == "drive_end":
         segments = [s for s in segments if s.z[0] >= layout.last - 1e-9]
+    elif name == SHAFT_GAP:
+        seats = [tuple(bearing.z) for _, bearing in spec.bearings]
+        inner = [s for s in segments if s.z[0] >= layout.first - 1e-9 and s.z[1] <= layout.last + 1e-9]
+        segments = [s for s in inner if not any(s.z[0] < z[1] and z[0] < s.z[1] for z in seats)]
     return _sections(segments)
 
 

@@ -150,6 +150,7 @@ def _write(
         "set_probability": judgement.chosen.probability,
         "alternatives": alternatives,
         "something_else_probability": judgement.other,
+        "evidence": {"probability": judgement.evidence, "share_of_last": judgement.share_of_last},
         "fit": {
             "before": _errors(diagnosis, before),
             "after": _errors(diagnosis, after),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from spindle_fem.coolant.properties import coolant_by_name
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.diagnosis.contacts import seats_of
-from spindle_fem.diagnosis.layout import CHANNEL_WALL, Layout, segment_volume, volume
+from spindle_fem.diagnosis.layout import CHANNEL_WALL, SHAFT_GAP, Layout, segment_volume, volume
 from spindle_fem.diagnosis.network_view import view_of_network
 from spindle_fem.diagnosis.usual_sizes import LEAST_HEAT, input_series, lowest_speed, usual_rise
 from spindle_fem.effects.coolant_film import reynolds_number
@@ -151,6 +151,8 @@ def _spots(
     groups = [key for key, members in sets.items() if members != (key,)]
     spots = {key: heat[key] for key in (*groups, "shaft", "nose", "drive_end", "flange") if key in heat}
     reported: dict[str, str] = {}
+    if SHAFT_GAP in heat and heat[SHAFT_GAP] != heat["shaft"]:
+        spots[SHAFT_GAP], reported[SHAFT_GAP] = heat[SHAFT_GAP], "shaft"
     places = layout.places
     housing = layout.housing
     channel = layout.spec.channel

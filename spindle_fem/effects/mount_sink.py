@@ -8,15 +8,17 @@ from types import MappingProxyType
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, quantity
-from spindle_fem.effects.laws import Complex, amplitude, repeated, shape
+from spindle_fem.effects.laws import Complex, amplitude, linear, repeated, shape
 from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView, fluid_place
 
 NAME = "temperature_above_ambient"
+# Share of it that is there from the start where the rest builds up: value and standard deviation.
+SHARE_AT_ONCE = (0.5, 0.35)
 
 
 class MountSinkTerm(Term):
-    """The frame is some kelvin above (below) the ambient, at once or warming up.
+    """The frame is some kelvin above (below) the ambient, at once or partly warming up.
 
     Parameters
     ----------
@@ -32,13 +34,18 @@ class MountSinkTerm(Term):
         self._warming = warming
         self.parameters = (amplitude(NAME, 5.0, "K", low=-50.0, high=80.0),)
         if warming:
-            self.parameters += (shape("warm_up_time", 7200.0, 0.8, "s", low=300.0, high=2.0e5),)
+            self.parameters += (
+                shape("warm_up_time", 7200.0, 0.8, "s", low=300.0, high=2.0e5),
+                linear("share_at_once", *SHARE_AT_ONCE, low=0.0, high=1.0),
+            )
 
     def heat(self, context: TermContext) -> Complex:
         """Shift of the frame's temperature, (n, k) K."""
         share: Complex | float = 1.0
         if self._warming:
-            share = 1.0 - np.exp(-np.maximum(context.time, 0.0) / context.parameters["warm_up_time"])
+            own = context.parameters
+            later = 1.0 - np.exp(-np.maximum(context.time, 0.0) / own["warm_up_time"])
+            share = own["share_at_once"] + (1.0 - own["share_at_once"]) * later
         return repeated(context, context.parameters[NAME] * share, len(self.heat_places))
 
 
@@ -70,7 +77,12 @@ class MountSink(Effect):
                         amplitude=NAME,
                         reference=5.0,
                         form=form,
-                        starts=[{"warm_up_time": t} for t in (3600.0, 12000.0)] if warming else ({},),
+                        starts=[
+                            {"warm_up_time": time, "share_at_once": at_once}
+                            for time, at_once in ((3600.0, 0.1), (12000.0, 0.1), (6000.0, 0.7))
+                        ]
+                        if warming
+                        else ({},),
                     )
                 )
         return tuple(found)
@@ -80,10 +92,11 @@ class MountSink(Effect):
         value = reported[NAME]
         word = "above" if value.value >= 0.0 else "below"
         size = quantity(Reported(abs(value.value), "K"))
-        since = (
-            f", reached over {reported['warm_up_time'].value / 3600.0:.1f} h"
-            if "warm_up_time" in reported
-            else ""
-        )
+        since = ""
+        if "warm_up_time" in reported:
+            since = (
+                f", {100.0 * reported['share_at_once'].value:.0f} % of it from the start and the rest over "
+                f"{reported['warm_up_time'].value / 3600.0:.1f} h"
+            )
         what = "flange" if candidate.component == "flange" else candidate.component
         return f"The frame that the {what} is joined to is {size} {word} the ambient temperature{since}."

@@ -19,6 +19,8 @@ LIKELIHOODS = {LASTING: 0.75, RUNS_IN: 0.25}
 class SealFriction(Effect):
     """Constant torque at a seal, so heat in proportion to speed; more of it while a new lip runs in.
 
+    What holds the seal takes a share of it.
+
     Source: Freudenberg, Simrit catalogue of radial shaft seals: power loss in
     proportion to speed at given contact force; 20-60 W per 1000 rpm at 100-180 mm.
     """
@@ -49,7 +51,8 @@ class SealFriction(Effect):
                         machine.heat[key],
                         speed,
                         size,
-                        exponent=(1.0, 0.08),
+                        exponent=(1.0, 0.1),
+                        beside=machine.heat.get(f"standing_{key}", ()),
                         runs_in=word == RUNS_IN,
                     )
                     found.append(

@@ -15,8 +15,8 @@ from spindle_fem.effects.term import TermParameter
 from spindle_fem.effects.view import MachineView
 
 LOOSE = "from the start"
-# Of the instant at which it comes off, s.
-EDGE = 10.0
+# Width of the edge with which it comes off, s, and 1 σ of its logarithm: a clamp opens, glue creeps.
+EDGE = (30.0, 1.0)
 # Of a small sensor in still air, s: about 4 g of steel on 5 cm² at 6 W/(m²K); and 1 σ of its logarithm.
 TIME_IN_AIR = (600.0, 0.8)
 
@@ -55,7 +55,7 @@ class DetachedReading(Reading):
         air = np.broadcast_to(ambient, times.shape)[:, None]
         share = parameters["share_of_air"]
         if "time" in parameters:
-            share = share * smooth_step((times[:, None] - parameters["time"]) / EDGE)
+            share = share * smooth_step((times[:, None] - parameters["time"]) / parameters["coming_off"])
         share = np.broadcast_to(share, values.shape)
         lag = 0.5 * (share[1:] + share[:-1]) * parameters["time_in_air"]
         return first_order_lag(times, values + share * (air - values), lag)
@@ -81,9 +81,10 @@ class SensorDetached(SensorEffect):
         share = amplitude("share_of_air", 0.4, high=1.0)
         time = linear("time", 0.5 * span, 0.35 * span, "s", low=0.0, high=span)
         in_air = shape("time_in_air", *TIME_IN_AIR, "s", low=1.0, high=20000.0)
+        edge = shape("coming_off", *EDGE, "s", low=5.0, high=3600.0)
         starts = [{"time": float(part) * span} for part in np.linspace(0.08, 0.92, 8)]
         return {
-            "": ((share, time, in_air), 0.5, starts),
+            "": ((share, time, edge, in_air), 0.5, starts),
             LOOSE: ((share, in_air), 0.3, ({},)),
         }
 

@@ -28,7 +28,7 @@ def set_probabilities(data: xr.Dataset) -> Figure:
     misfit = [f"misfit {value:.2f}" for value in data["set_misfit"].values]
     chosen = [bool(c) for c in data["set_chosen"].values]
     names, chance, misfit = (
-        [*names[:9], "something not in the catalogue"],
+        [*names[:9], "something else, or another law"],
         [*chance[:9], float(data["not_in_catalogue"].values)],
         [*misfit[:9], ""],
     )

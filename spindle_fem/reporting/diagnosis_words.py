@@ -178,7 +178,10 @@ def confidence_words(content: Mapping[str, Any]) -> list[str]:
         )
     other = content.get("something_else_probability")
     if other is not None:
-        found.append(f"Something that the catalogue does not hold: probability {significant(other, 2)}.")
+        found.append(
+            "Something that the catalogue does not hold, or holds with another law: probability "
+            f"{significant(other, 2)}."
+        )
     slow = content.get("slow_error")
     if slow:
         found.append(
@@ -188,6 +191,7 @@ def confidence_words(content: Mapping[str, Any]) -> list[str]:
         )
     found.append(
         "Probabilities are tempered: the catalogue's laws never hold exactly, so a difference of evidence "
-        "counts for a share of what it says. Intervals are 90 %."
+        "counts for a share of what it says, and no set is given more than sets of such evidence deserved "
+        "on concealed recordings. Intervals are 90 %."
     )
     return found

@@ -17,6 +17,7 @@ from spindle_fem.diagnosis.core import Diagnosis
 from spindle_fem.diagnosis.engine import Hypothesis
 from spindle_fem.diagnosis.findings import findings_of, noise_level, predictions_at_stamps, rmse
 from spindle_fem.diagnosis.inference import Problem
+from spindle_fem.diagnosis.layout import Layout
 from spindle_fem.diagnosis.locate import Pattern, explain, onset_answers
 from spindle_fem.diagnosis.machine_places import centre_of, regions_of
 from spindle_fem.diagnosis.next_measurement import (
@@ -210,6 +211,22 @@ def test_the_channel_lies_within_its_turns():
     (region,) = regions_of(spec, "channel")
     assert region.r == pytest.approx((0.108, 0.118))
     assert region.z == pytest.approx((0.042, 0.174))
+
+
+def test_the_shaft_between_its_bearings_ends_where_they_sit():
+    spec = load_machine("recorded_spindle")
+    found = regions_of(spec, "shaft_gap")
+    seats = [b.z for _, b in spec.bearings]
+    assert min(r.z[0] for r in found) >= max(z[1] for z in seats if z[1] < 0.3)
+    assert max(r.z[1] for r in found) <= min(z[0] for z in seats if z[0] > 0.3)
+
+
+def test_the_cover_holds_the_seal_of_the_nose():
+    spec = load_machine("recorded_spindle")
+    heat = Layout(spec, {"cover", "front_outer_spacer"}).heat()
+    assert heat["standing_nose"] == ("cover",)
+    assert "standing_drive_end" not in heat
+    assert "standing_nose" not in Layout(spec, set()).heat()
 
 
 # ----------------------------------------------------------------------- where

@@ -11,6 +11,7 @@ from spindle_fem.calibration.noise import SlowError
 from spindle_fem.diagnosis.engine import Hypothesis
 from spindle_fem.diagnosis.heldout import heldout_stamps
 from spindle_fem.diagnosis.inference import Coordinate, Fit
+from spindle_fem.diagnosis.reliability import reliable, share_of_last
 from spindle_fem.diagnosis.verdict import (
     LEAST_TEMPERATURE_RATIO,
     PRIOR_SIGMAS,
@@ -224,7 +225,7 @@ def test_complexity_alone_does_not_make_an_impossible_recording_consistent():
     assert rank(found)[0].fit is none.fit
     said = verdict(*found)
     assert said.p_value < 1e-3
-    assert (said.verdict, said.chosen.probability) == ("missing_physics", pytest.approx(1.0))
+    assert (said.verdict, said.evidence) == ("missing_physics", pytest.approx(1.0))
     # What chance makes in so many trials is nothing.
     less = [none, hypothesis(dear, misfit=440.0, evidence=-220.0 - 30.0)]
     assert verdict(*less).verdict == "consistent"
@@ -250,7 +251,8 @@ def test_a_clear_single_effect_gets_the_verdict_of_its_kind(member, expected):
     )
     assert found.verdict == expected
     assert found.p_value < 1e-6
-    assert found.chosen.probability > 0.99
+    assert found.evidence > 0.99
+    assert 0.9 < found.chosen.probability < found.evidence
     assert found.alternatives == ()
 
 
@@ -290,9 +292,10 @@ def test_a_fit_that_stays_above_the_noise_leaves_room_for_something_else():
     assert found.other > 0.1
     assert found.chosen.probability <= 1.0 - found.other + 1e-12
     good = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0, reduced=1.0))
-    assert good.other == 0.0
+    assert good.other == pytest.approx(1.0 - reliable(good.evidence, 1, 1.0))
+    assert found.chosen.probability < good.chosen.probability
     nearly = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=440.0, reduced=1.1))
-    assert 0.02 < nearly.other < 0.1
+    assert good.other < nearly.other < found.other
 
 
 def test_a_shift_that_the_prior_holds_is_consistent():
@@ -348,3 +351,34 @@ def test_the_last_part_is_the_last_part():
 def test_other_choices_are_refused(choice):
     with pytest.raises(SpecError, match=r'Allowed: "blocks", or "last:0.4"'):
         heldout_stamps(SimpleNamespace(times=np.arange(10.0)), choice)
+
+
+# ------------------------------------------------------------------- reliability
+def test_a_small_last_effect_makes_a_set_less_reliable():
+    null, one = hypothesis(misfit=4400.0), hypothesis(PRELOAD, misfit=600.0)
+    other = hypothesis(candidate("windage", "shaft"), misfit=3000.0)
+    pair = hypothesis(PRELOAD, OFFSET, misfit=400.0)
+    assert share_of_last([null, one, other, pair], pair) == pytest.approx(200.0 / 4000.0)
+    assert share_of_last([null, one, other, pair], one) == 1.0
+    # Nothing smaller was fitted but nothing itself: all of the gain is the set's.
+    assert share_of_last([null, pair], pair) == 1.0
+    assert reliable(0.999, 2, 0.05) < reliable(0.999, 2, 0.5) < reliable(0.999, 1, 1.0) < 0.999
+    assert reliable(0.999, 3, 0.5) < reliable(0.999, 2, 0.5)
+
+
+@pytest.mark.parametrize("probability", [0.02, 0.3, 0.6, 0.9, 0.99, 1.0])
+def test_experience_only_lowers_what_evidence_says(probability):
+    found = [reliable(probability, size, share) for size in (1, 2, 3) for share in (0.0, 0.1, 1.0)]
+    assert all(0.0 < value <= probability for value in found)
+
+
+def test_what_experience_takes_goes_to_something_else():
+    found = verdict(
+        hypothesis(misfit=1400.0),
+        hypothesis(PRELOAD, misfit=400.0),
+        hypothesis(candidate("windage", "shaft"), misfit=404.0),
+        calibrated=True,
+    )
+    stated = [found.chosen.probability, *(item.probability for item in found.alternatives), found.other]
+    assert sum(stated) == pytest.approx(1.0)
+    assert found.chosen.probability == pytest.approx(reliable(found.evidence, 1, 1.0))

@@ -14,6 +14,7 @@ from spindle_fem.effects.grease_churning import GreaseChurningTerm
 from spindle_fem.effects.heat_capacity import ContactCapacityTerm
 from spindle_fem.effects.heat_split import HeatSplitTerm
 from spindle_fem.effects.laws import linear, power, relaxed, shape, smooth_step, softplus, switched
+from spindle_fem.effects.mount_sink import MountSinkTerm
 from spindle_fem.effects.natural_convection import NaturalConvectionTerm
 from spindle_fem.effects.radiation import RadiationTerm
 from spindle_fem.effects.speed_heat import SpeedHeatTerm
@@ -290,6 +291,15 @@ def test_coolant_warms_by_what_it_took_before():
     second = first + 0.01 * 3.0 * (40.0 - first)
     assert term.heat_places == ("fluid.b", "fluid.c")
     assert heat == pytest.approx([first, second])
+
+
+@pytest.mark.parametrize("at_once", [0.0, 0.3, 1.0])
+def test_a_frame_is_away_at_once_and_builds_up_the_rest(at_once):
+    term = MountSinkTerm("t", ("film.back",), warming=True)
+    own = {"temperature_above_ambient": -8.0, "warm_up_time": 3000.0, "share_at_once": at_once}
+    shift = [term.heat(context(term, time=t, **own))[0, 0].real for t in (0.0, 3000.0, 1e6)]
+    later = at_once + (1.0 - at_once) * (1.0 - np.exp(-1.0))
+    assert shift == pytest.approx([-8.0 * at_once, -8.0 * later, -8.0])
 
 
 # ------------------------------------------------------------------ intervals

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from spindle_fem.effects.catalogue import catalogue
 from spindle_fem.effects.coolant_bypass import MixedOutlet
 from spindle_fem.effects.filters import delayed, first_order_lag, scan
-from spindle_fem.effects.sensor_detached import EDGE, DetachedReading
+from spindle_fem.effects.sensor_detached import DetachedReading
 from spindle_fem.effects.spectrum import strongest_periods
 
 TIMES = np.array([0.0, 3.0, 10.0, 11.0, 40.0, 41.5, 90.0, 200.0, 201.0, 500.0])
@@ -130,16 +130,16 @@ def test_clock_shift_has_the_slope_of_the_temperature():
 def test_a_detached_sensor_goes_to_the_mix_with_the_air():
     times = np.arange(0.0, 4000.0, 1.0)
     candidate = reading_of("sensor_detached")
-    own = {"share_of_air": 0.4, "time": 1000.0, "time_in_air": 250.0}
+    own = {"share_of_air": 0.4, "time": 1000.0, "coming_off": 12.0, "time_in_air": 250.0}
     reading = DetachedReading("T1", "x", candidate.reading.parameters, 280.0)
     given = {name: np.array([value + 0j]) for name, value in own.items()}
     values = np.full((times.size, 1), 310.0 + 0j)
     told = reading.read(times, values, {"ambient": np.full(times.size, 290.0)}, given).real[:, 0]
     assert told[times < 900.0] == pytest.approx(310.0, abs=0.01)
     assert told[-1] == pytest.approx(0.6 * 310.0 + 0.4 * 290.0, abs=1e-6)
-    after = times > 1000.0 - 12.0 * EDGE
+    after = times > 1000.0 - 12.0 * own["coming_off"]
     # The lag of the place is that of the air times the share: (s 250 s) y' = 310 + s (290 - 310) - y.
-    share = lambda t: 0.4 / (1.0 + np.exp(-(t - 1000.0) / EDGE))  # noqa: E731
+    share = lambda t: 0.4 / (1.0 + np.exp(-(t - 1000.0) / own["coming_off"]))  # noqa: E731
     exact = solve_ivp(
         lambda t, y: (310.0 - 20.0 * share(t) - y) / (250.0 * share(t)),
         (times[after][0], times[-1]),

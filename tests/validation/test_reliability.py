@@ -1,0 +1,59 @@
+"""What experience with concealed recordings says of evidence, on experience made up for the purpose."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.special import expit
+
+from spindle_fem.diagnosis import reliability as stated
+from validation.reliability import experience, features, fitted, log_loss
+
+
+def test_the_regression_finds_what_made_the_experience():
+    generator = np.random.default_rng(1)
+    true = np.array([0.5, 0.3, -1.2, 0.9])
+    rows = np.array(
+        [
+            features(int(size), float(p), float(share))
+            for size, p, share in zip(
+                generator.integers(1, 4, 20_000),
+                expit(generator.uniform(-2.0, 9.0, 20_000)),
+                10.0 ** generator.uniform(-2.5, 0.0, 20_000),
+                strict=True,
+            )
+        ]
+    )
+    right = (generator.random(20_000) < expit(rows @ true)).astype(float)
+    assert fitted(rows, right) == pytest.approx(true, abs=0.1)
+    assert log_loss(expit(rows @ true), right) < log_loss(expit(rows[:, 1]), right)
+
+
+def test_features_are_those_that_are_stated_by():
+    own = [stated.CONSTANT, stated.BY_LOGIT, stated.BY_FURTHER, stated.BY_SHARE]
+    for size, probability, share in ((1, 0.99, 1.0), (2, 0.999, 0.04), (3, 1.0, 0.0)):
+        seen = expit(np.dot(own, features(size, probability, share)))
+        assert stated.reliable(probability, size, share) == pytest.approx(min(probability, seen))
+
+
+def test_only_diagnoses_that_name_something_count(tmp_path):
+    study, results = tmp_path / "study", tmp_path / "results"
+    (study / "answers").mkdir(parents=True)
+    finding = {"effect": "windage", "component": "shaft"}
+    wanted = [{"effect": "windage", "components": ["shaft"]}]
+    for name, effects, findings, foreign in (
+        ("a", wanted, [finding], False),
+        ("b", wanted, [], False),
+        ("c", [], [finding], False),
+        ("d", wanted, [{**finding, "effect": "radiation"}], False),
+        ("e", wanted, [finding], True),
+    ):
+        concealed = [{**e, "outside_catalogue": foreign} for e in effects]
+        answer = {"case": name, "effects": concealed, "acceptable_sets": [wanted]}
+        (study / "answers" / f"{name}.json").write_text(json.dumps(answer))
+        (results / name).mkdir(parents=True)
+        said = {"findings": findings, "evidence": {"probability": 0.9, "share_of_last": 1.0}}
+        (results / name / "diagnosis.json").write_text(json.dumps(said))
+    rows, right = experience(study, results)
+    assert rows.shape == (2, 4)
+    assert right.tolist() == [1.0, 0.0]
