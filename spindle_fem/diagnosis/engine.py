@@ -8,7 +8,7 @@ screening.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -38,8 +38,9 @@ DISTORTED = 1.2
 HIDDEN = 0.5
 # Sets that are tried without each of their members.
 REDUCED = 3
-# Best sets in which each member is exchanged for other effects at its place, and for how many.
-EXCHANGED, OTHERS = 1, 5
+# Best sets in which each member is exchanged for other effects at its place, and for how many; other spots at
+# which a member that is on in intervals is tried.
+EXCHANGED, OTHERS, OTHER_SPOTS = 1, 5, 3
 # Sets that are fitted from each start: single effects from one start and from each of two, pairs, triples.
 SINGLES, PAIRS, TRIPLES = (8, 5), 6, 3
 BEAM, ADDITIONS = 3, 6
@@ -168,23 +169,49 @@ class Search:
         """Try other effects in the place of each member of the best sets.
 
         What a large effect does is misjudged to first order, so that its
-        neighbours may not have come through the screening.
+        neighbours may not have come through the screening. What is on in
+        intervals is a way out: it is tried at other spots, and beside others
+        any effect with a law may stand in its place.
         """
-        with_intervals = {effect.name for effect in self.interval_effects}
         tasks: list[Task] = []
         for hypothesis in [h for h in self.ranked() if h.fit.candidates][:EXCHANGED]:
             for member in hypothesis.fit.candidates:
                 rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
-                base = self.found.get(_identity(rest))
-                if base is None or isinstance(self.effects[member.effect], IntervalEffect):
-                    continue
-                if _identity(rest) not in self._screenings:
-                    self.screened(base.fit)
-                screened = self._screenings[_identity(rest)]
-                places = {member.component, *self._groups_of(member.component)}
-                for index, amplitude in screened.best_at(places, {member.effect, *with_intervals}, OTHERS):
-                    tasks.append(self._task(base.fit, [(screened.variants[index], amplitude)], {}))
+                if isinstance(self.effects[member.effect], IntervalEffect):
+                    tasks += self._at_other_spots(hypothesis.fit, member, rest)
+                    if rest:
+                        tasks += self._with_laws(rest, member, None)
+                else:
+                    places = {member.component, *self._groups_of(member.component)}
+                    tasks += self._with_laws(rest, member, places)
         self._fit_all(tasks)
+
+    def _with_laws(
+        self, rest: tuple[Candidate, ...], member: Candidate, places: Collection[str] | None
+    ) -> list[Task]:
+        """Fits with other effects, no intervals among them, in the place of one member of a set."""
+        base = self.found.get(_identity(rest))
+        if base is None:
+            return []
+        if _identity(rest) not in self._screenings:
+            self.screened(base.fit)
+        screened = self._screenings[_identity(rest)]
+        but = {member.effect, *(effect.name for effect in self.interval_effects)}
+        return [
+            self._task(base.fit, [(screened.variants[index], amplitude)], {})
+            for index, amplitude in screened.best_at(places, but, OTHERS)
+        ]
+
+    def _at_other_spots(self, fit: Fit, member: Candidate, rest: tuple[Candidate, ...]) -> list[Task]:
+        """Fits with intervals at other spots, sought in what a set without one member leaves as it is."""
+        kept = {name: value for name, value in fit.values.items() if name not in member.parameters}
+        left = self.problem.fit(rest, kept, iterations=0)
+        tasks: list[Task] = []
+        for found, candidate in self._interval_candidates(left, None):
+            if _identity((*rest, candidate)) in self.found or len(tasks) == OTHER_SPOTS:
+                continue
+            tasks.append(self._task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found}))
+        return tasks
 
     def _widen(self) -> None:
         """Try the whole set where one of its bearings was found."""

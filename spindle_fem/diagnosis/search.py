@@ -164,15 +164,20 @@ class Screened:
             chosen |= good[sets].all(axis=1)
         return sets[chosen]
 
-    def best_at(self, places: Collection[str], but: Collection[str], number: int) -> list[tuple[int, float]]:
-        """Best variant of each effect and form at some places, with its amplitude, some effects left out."""
+    def best_at(
+        self, places: Collection[str] | None, but: Collection[str], number: int
+    ) -> list[tuple[int, float]]:
+        """Best variant of each effect and form at some places, with its amplitude, some effects left out.
+
+        At all places where ``places`` is None.
+        """
         gain = self.singles()
         found: dict[tuple[str, str, str], int] = {}
         for index in np.argsort(-gain):
             candidate = self.variants[index].candidate
             if not np.isfinite(gain[index]) or len(found) == number:
                 break
-            if candidate.component in places and candidate.effect not in but:
+            if (places is None or candidate.component in places) and candidate.effect not in but:
                 found.setdefault((candidate.effect, candidate.component, candidate.form), int(index))
         return [(index, self.amplitudes([index])[index]) for index in found.values()]
 

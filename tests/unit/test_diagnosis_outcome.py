@@ -13,8 +13,9 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+from spindle_fem.diagnosis.abreast import Workers
 from spindle_fem.diagnosis.core import Diagnosis
-from spindle_fem.diagnosis.engine import Hypothesis
+from spindle_fem.diagnosis.engine import OTHER_SPOTS, Hypothesis, Search
 from spindle_fem.diagnosis.findings import findings_of, noise_level, predictions_at_stamps, rmse
 from spindle_fem.diagnosis.inference import Problem
 from spindle_fem.diagnosis.layout import Layout
@@ -32,7 +33,7 @@ from spindle_fem.diagnosis.trials import AGAIN, answer, reachable_places, trials
 from spindle_fem.diagnosis.verdict import Judgement, Ranked
 from spindle_fem.diagnosis.view import view_of
 from spindle_fem.diagnosis.where import significant_stretches, smoothed_scores, where_of
-from spindle_fem.effects.catalogue import candidates_for, effect_of
+from spindle_fem.effects.catalogue import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.errors import BadInputError
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.reduced.fast_model import FastModel
@@ -227,6 +228,27 @@ def test_the_cover_holds_the_seal_of_the_nose():
     assert heat["standing_nose"] == ("cover",)
     assert "standing_drive_end" not in heat
     assert "standing_nose" not in Layout(spec, set()).heat()
+
+
+# ---------------------------------------------------------------------- search
+def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
+    problem = Problem(heated.plant, heated.calibrated.belief, EXPECTED_SLOW, heated.plant.observations)
+    effects = catalogue()
+    search = Search(
+        problem, case.view, effects, (), interval_effects(), dict.fromkeys(effects, 1.0), workers=Workers(1)
+    )
+    search.found = {}
+    wrong = effect_of("unrecorded_heat_source").over(case.view, "rear_bearings", [(FROM, UNTIL)])
+    for candidates in ((), (wrong,)):
+        search._keep(Hypothesis(problem.fit(candidates), -1.0))
+    found = max(search.ranked(), key=lambda h: len(h.fit.candidates))
+    (first, start), *others = search._at_other_spots(found.fit, wrong, ())
+    assert [c.component for c in first] == ["front_bearings"]
+    assert start[first[0].amplitude] == pytest.approx(HEAT, rel=0.3)
+    assert wrong.component not in {c.component for members, _ in others for c in members}
+    assert len(others) < OTHER_SPOTS
+    search._exchange()
+    assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings")}
 
 
 # ----------------------------------------------------------------------- where
