@@ -25,7 +25,8 @@ from spindle_fem.meshing.build import build_mesh
 from spindle_fem.network.machine import build_machine_network
 from spindle_fem.network.machine_steady import solve_machine_network
 from spindle_fem.reduced.build import build_reduced_model
-from spindle_fem.reporting.report import peak_memory_MB, write_outputs
+from spindle_fem.reporting.report import peak_memory_MB
+from spindle_fem.reporting.run_outputs import write_outputs
 from spindle_fem.solve import solve_prepared, with_heat_study
 from spindle_fem.spec.load import load_machine
 

@@ -54,21 +54,27 @@ def run_machine(
     SpindleFemError
         Bad input, a failed solve, or a failed self-check (after writing).
     """
-    from spindle_fem.checks import require_checks
-    from spindle_fem.coupling import prepare_machine
     from spindle_fem.reporting.output import output_folder
-    from spindle_fem.reporting.report import read_summary, write_outputs
-    from spindle_fem.solve import estimate_refinement, solve_prepared, with_heat_study
+    from spindle_fem.reporting.run_outputs import OutputHelpers, write_outputs
 
     started = time.perf_counter()
     spec = _load_buildable(machine, overrides)
-    with output_folder(folder) as place, stages(progress) as tell:
-        result = solve_prepared(prepare_machine(spec, progress=tell), progress=tell)
+    with output_folder(folder) as place, stages(progress) as tell, OutputHelpers() as helpers:
+        # loaded after the helpers start, which load their own at the same time
+        from spindle_fem.checks import require_checks
+        from spindle_fem.coupling import prepare_machine
+        from spindle_fem.reporting.report import read_summary
+        from spindle_fem.solve import estimate_refinement, solve_prepared, with_heat_study
+
+        prepared = prepare_machine(spec, progress=tell)
+        helpers.prepare(spec, prepared.mesh, prepared.operators.n_unknowns)
+        result = solve_prepared(prepared, progress=tell)
         if estimate_mesh_error:
             tell("second mesh")
             result = estimate_refinement(result, spec)
+        helpers.begin(result, place)
         tell("heat over speed")
-        write_outputs(with_heat_study(result), place, started=started, notify=tell)
+        write_outputs(with_heat_study(result), place, started=started, notify=tell, helpers=helpers)
     require_checks(result.checks, spec.name)
     return read_summary(place / "summary.json")
 

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from PIL.Image import Image
 
     from spindle_fem.reporting.scenes import Picture
 
@@ -169,6 +170,11 @@ def rasterise(figure: Figure) -> NDArray[np.uint8]:
 
 def save_png(figure: Figure, path: Path, *, colours: int = 0) -> Path:
     """Write a figure, in true colour or with a palette of ``colours`` where it has few."""
+    return write_png(image_of(figure, colours=colours), path)
+
+
+def image_of(figure: Figure, *, colours: int = 0) -> Image:
+    """Image of a figure as it is written: in true colour, or with a palette of ``colours``."""
     from PIL import Image
 
     image = Image.fromarray(rasterise(figure))
@@ -178,6 +184,11 @@ def save_png(figure: Figure, path: Path, *, colours: int = 0) -> Path:
         corner = 3 * image.getpixel((0, 0))
         palette[corner : corner + 3] = (255, 255, 255)  # the method rounds white
         image.putpalette(palette)
+    return image
+
+
+def write_png(image: Image, path: Path) -> Path:
+    """Write an image of a figure."""
     image.save(path, dpi=(DPI, DPI), compress_level=6)
     return path
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from spindle_fem.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.reporting.figures import (
     BODY_NAMES,
     FILM_MAP,
@@ -264,9 +265,8 @@ def sharp_edges_of_facets(points: NDArray[np.float64], facets: NDArray[np.int64]
     return sharp_edges(points, facets, np.zeros(len(facets), dtype=np.int32))
 
 
-def mesh_picture(renderer: SceneRenderer, result: ThermalResult) -> Figure:
-    """Whole elements behind the vertical plane, coloured by part."""
-    mesh = result.mesh
+def mesh_picture(renderer: SceneRenderer, mesh: TaggedMesh, n_unknowns: int) -> Figure:
+    """Whole elements behind the vertical plane, coloured by part; alone in the scene."""
     centre = mesh.points[mesh.tetrahedra[:, :4], 0].mean(axis=1)
     facets, part = element_faces(mesh, centre > 0.0)
     shape = facet_triangles(mesh.points, facets, np.zeros((len(facets), 6, 0)), part)
@@ -277,6 +277,6 @@ def mesh_picture(renderer: SceneRenderer, result: ThermalResult) -> Figure:
     return picture_figure(
         renderer.render(view),
         "Mesh: whole elements behind the vertical plane, coloured by part",
-        notes=f"{grouped(mesh.n_elements)} quadratic tetrahedra, {grouped(result.n_unknowns)} temperature "
+        notes=f"{grouped(mesh.n_elements)} quadratic tetrahedra, {grouped(n_unknowns)} temperature "
         f"unknowns, worst element quality (minSICN) {mesh.min_quality:.2f}.",
     )

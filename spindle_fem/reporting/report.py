@@ -1,13 +1,12 @@
-"""Files of a finished run, and its self-contained report."""
+"""The self-contained report of a finished run, from its other files."""
 
 from __future__ import annotations
 
 import json
 import resource
 import sys
-import time
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,17 +16,12 @@ from spindle_fem.reporting.document import Illustration, illustration_of
 from spindle_fem.reporting.inputs import input_groups
 from spindle_fem.reporting.output import replace_text, require_complete
 from spindle_fem.reporting.page import render_page
-from spindle_fem.results.summary import SUMMARY_SCHEMA, build_summary
+from spindle_fem.results.summary import SUMMARY_SCHEMA
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
-
-    from spindle_fem.results.thermal_result import ThermalResult
 
 FIGURE_FOLDER = "figures"
-
-_SHADED = ("meridian_temperature",)  # a palette would show as bands
 
 OVER_SPEED = "over_speed_"
 CAPTIONS = {
@@ -68,143 +62,6 @@ _LIMITS = (
 )
 
 
-def write_outputs(
-    result: ThermalResult,
-    folder: str | Path,
-    *,
-    started: float | None = None,
-    notify: Callable[[str], None] | None = None,
-) -> dict[str, float]:
-    """Write every file of a run: fields, data, pictures, machine, summary, report.
-
-    Call it inside :func:`spindle_fem.reporting.output.output_folder`, which
-    marks the folder until all of it is there.
-
-    Parameters
-    ----------
-    result : ThermalResult
-    folder : str or Path
-        An existing folder.
-    started : float, optional
-        ``time.perf_counter()`` when the run began, for ``wall_time_s``.
-    notify : callable, optional
-        Told the name of each step as it begins.
-
-    Returns
-    -------
-    dict of str to float, [s]
-        Time of each step, also in ``summary.json``. Steps ``files: ...`` ran
-        beside ``pictures``; ``files`` is what was waited for them.
-    """
-    from spindle_fem.reporting.beside import start_beside
-    from spindle_fem.reporting.interactive import SURFACE_GROUP
-    from spindle_fem.results.dataset import read_dataset
-
-    folder = Path(folder)
-    figures = folder / FIGURE_FOLDER
-    figures.mkdir(exist_ok=True)
-    for old in figures.glob("*.png"):
-        old.unlink()
-    clock = _Clock(notify)
-    wait = start_beside(lambda: _write_files(result, folder))
-    try:
-        with clock.step("pictures"):
-            _write_pictures(result, figures)
-    finally:  # also after an error nothing must go on writing here
-        with clock.step("files"):
-            beside = wait()
-    with clock.step("report"):
-        dataset, surface = (
-            read_dataset(folder / "result.nc", group=group) for group in (None, SURFACE_GROUP)
-        )
-        wall_time = time.perf_counter() - started if started is not None else sum(clock.times.values())
-        summary = build_summary(result, wall_time, peak_memory_MB())
-        summary["timings_s"] = {**summary["timings_s"], **clock.times, **beside}
-        replace_text(
-            folder / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-        )
-        replace_text(folder / "report.html", render_run_report(summary, dataset, surface, figures))
-    return {**clock.times, **beside}
-
-
-def _write_files(result: ThermalResult, folder: Path) -> dict[str, float]:
-    """Everything of a run that needs no rendering; times of its steps."""
-    from spindle_fem.reporting.figures import save_png
-    from spindle_fem.reporting.interactive import SURFACE_GROUP, display_surface
-    from spindle_fem.results.dataset import build_dataset, write_dataset
-    from spindle_fem.results.fields import write_fields
-    from spindle_fem.spec.load import write_machine
-
-    clock = _Clock(None)
-    with clock.step("files: fields"):
-        write_fields(result, folder / "fields.vtu")
-    with clock.step("files: data"):
-        write_dataset(build_dataset(result), folder / "result.nc")
-        write_dataset(display_surface(result), folder / "result.nc", group=SURFACE_GROUP)
-        replace_text(folder / "machine.toml", write_machine(result.spec))
-    with clock.step("files: charts"):
-        for name, draw in draw_figures(result).items():
-            figure = draw()
-            if figure is not None:
-                save_png(
-                    figure, folder / FIGURE_FOLDER / f"{name}.png", colours=0 if name in _SHADED else 256
-                )
-    return clock.times
-
-
-def draw_figures(result: ThermalResult) -> Mapping[str, Callable[[], Figure | None]]:
-    """Charts of a run by file name, drawn when called (the 3-D pictures are in ``pictures``)."""
-    from spindle_fem.reporting import balance_charts, charts
-    from spindle_fem.reporting.heat_charts import CHARTS as HEAT_CHARTS
-    from spindle_fem.reporting.machine_drawing import machine_drawing
-    from spindle_fem.reporting.profiles import meridian_section, temperature_scale
-
-    section = meridian_section(result.mesh, result.temperature)
-    bar = temperature_scale(result)
-    study = result.heat_study
-    over_speed = (
-        {}
-        if study is None
-        else {f"{OVER_SPEED}{name}": (lambda draw=draw: draw(study)) for name, draw in HEAT_CHARTS.items()}
-    )
-    return over_speed | {
-        "machine_definition": lambda: machine_drawing(result.spec),
-        "meridian_temperature": lambda: charts.meridian_temperature(result, section, bar),
-        "radial_profiles": lambda: charts.radial_profiles(result, section),
-        "axial_profiles": lambda: charts.axial_profiles(result, section),
-        "heat_balance": lambda: balance_charts.heat_balance(result.energy, result.bearings),
-        "heat_by_bearing": lambda: balance_charts.heat_by_bearing(result),
-        "coolant": lambda: (
-            None
-            if result.coolant is None
-            else balance_charts.coolant_along_channel(result.coolant, ports=_wetted_ports(result))
-        ),
-    }
-
-
-def _write_pictures(result: ThermalResult, folder: Path) -> None:
-    from spindle_fem.reporting import pictures
-    from spindle_fem.reporting.figures import save_png
-    from spindle_fem.reporting.profiles import meridian_section, temperature_scale
-    from spindle_fem.reporting.scenes import SceneRenderer
-    from spindle_fem.reporting.surfaces import part_edges
-
-    with SceneRenderer() as renderer:
-        bar = temperature_scale(result)
-        section = meridian_section(result.mesh, result.temperature)
-        pictures.add_half_machine(renderer, result, section, part_edges(result.mesh), bar)
-        save_png(
-            pictures.temperature_cut(renderer, result, section, bar),
-            folder / "temperature_cut.png",
-        )
-        for name, figure in pictures.bearing_close_ups(renderer, result, bar).items():
-            save_png(figure, folder / f"bearings_{name}.png")
-        channel = pictures.channel_walls(renderer, result)
-        if channel is not None:
-            save_png(channel, folder / "channel_walls.png")
-        save_png(pictures.mesh_picture(renderer, result), folder / "mesh.png", colours=192)
-
-
 def rebuild_report(folder: str | Path) -> Path:
     """Write ``report.html`` of a finished run again, from its other files.
 
@@ -230,7 +87,7 @@ def rebuild_report(folder: str | Path) -> Path:
     summary = read_summary(folder / "summary.json")
     dataset = read_dataset(folder / "result.nc")
     surface = read_dataset(folder / "result.nc", group=SURFACE_GROUP)
-    html = render_run_report(summary, dataset, surface, folder / FIGURE_FOLDER)
+    html = render_run_report(summary, dataset, surface, embedded_figures(folder / FIGURE_FOLDER))
     return replace_text(folder / "report.html", html)
 
 
@@ -259,7 +116,10 @@ def read_summary(path: Path) -> dict[str, Any]:
 
 
 def render_run_report(
-    summary: Mapping[str, Any], dataset: xr.Dataset, surface: xr.Dataset | None, figures: Path
+    summary: Mapping[str, Any],
+    dataset: xr.Dataset,
+    surface: xr.Dataset | None,
+    illustrations: Mapping[str, Illustration | None],
 ) -> str:
     """HTML of a run; everything it needs is inside."""
     from spindle_fem.reporting.interactive import viewer_payload
@@ -268,12 +128,13 @@ def render_run_report(
     view = None if surface is None else json.dumps(viewer_payload(surface)).replace("</", "<\\/")
     failed = [item["name"] for item in summary.get("checks", ()) if not item["passed"]]
     has_bearings, coolant = bool(summary["bearings"]), tables.coolant_table(summary)
+    over_speed = any(drawn and name.startswith(OVER_SPEED) for name, drawn in illustrations.items())
     sections = [
         ("headline", "Headline numbers", True),
         ("answers", "What this answers", True),
         ("temperature", "Temperature field", True),
         ("bearings", "Bearings", has_bearings),
-        ("over_speed", "Bearings over speed", any(figures.glob(f"{OVER_SPEED}*.png"))),
+        ("over_speed", "Bearings over speed", over_speed),
         ("coolant", "Coolant", coolant is not None),
         ("balance", "Energy balance", True),
         ("probes", "Probes, joints and surfaces", True),
@@ -292,7 +153,7 @@ def render_run_report(
         warnings=summary["warnings"],
         failed_checks=failed,
         imbalance=tables.significant(abs(summary["energy"]["imbalance_relative"]), 2),
-        figures=embed_figures(figures, CAPTIONS),
+        figures=illustrations,
         over_speed_captions=tuple(name for name in CAPTIONS if name.startswith(OVER_SPEED)),
         view3d=view,
         bearings=tables.bearing_table(summary),
@@ -311,15 +172,22 @@ def render_run_report(
     )
 
 
-def embed_figures(folder: Path, captions: Mapping[str, str]) -> dict[str, Illustration | None]:
-    """Figures of a folder for the page, by name; None for a captioned one that is absent."""
-    embedded: dict[str, Illustration | None] = dict.fromkeys(captions)
-    for path in sorted(folder.glob("*.png")):
-        embedded[path.stem] = illustration_of(path, captions.get(path.stem) or _caption(path.stem))
-    return embedded
+def embedded_figures(folder: Path) -> dict[str, Illustration | None]:
+    """Figures of a folder for the page, by name; None for one that a run has and this one lacks."""
+    return in_order(
+        {path.stem: illustration_of(path, caption_of(path.stem)) for path in folder.glob("*.png")}
+    )
 
 
-def _caption(stem: str) -> str:
+def in_order(drawn: Mapping[str, Illustration]) -> dict[str, Illustration | None]:
+    """Illustrations in the order of the captions, others by name after them; None for those that lack."""
+    return {**dict.fromkeys(CAPTIONS), **{name: drawn[name] for name in sorted(drawn)}}
+
+
+def caption_of(stem: str) -> str:
+    """Caption of a figure by the name of its file."""
+    if stem in CAPTIONS:
+        return CAPTIONS[stem]
     kind, _, name = stem.partition("_")
     if kind == "bearings" and name:
         return f"Bearing set {name}: where its heat goes, and the temperatures of races and balls."
@@ -330,11 +198,6 @@ def peak_memory_MB() -> float:  # noqa: N802 - the unit belongs to the name
     """Largest resident memory of this process so far."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1024.0**2 if sys.platform == "darwin" else 1024.0)
-
-
-def _wetted_ports(result: ThermalResult) -> bool:
-    channel = result.spec.channel
-    return channel is not None and channel.ports is not None and channel.ports.wetted
 
 
 def _subtitle(definition: Mapping[str, Any]) -> str:
@@ -348,23 +211,3 @@ def _subtitle(definition: Mapping[str, Any]) -> str:
         parts.append(f"coolant {customary(coolant['flow'])} at {customary(coolant['inlet_temperature'])}")
     parts.append(f"heat model “{definition['heat']['model']}”")
     return ", ".join(parts) + "."
-
-
-class _Clock:
-    def __init__(self, notify: Callable[[str], None] | None) -> None:
-        self.times: dict[str, float] = {}
-        self._notify = notify
-        self._name = ""
-        self._start = 0.0
-
-    def step(self, name: str) -> _Clock:
-        self._name = name
-        return self
-
-    def __enter__(self) -> None:
-        if self._notify is not None:
-            self._notify(self._name)
-        self._start = time.perf_counter()
-
-    def __exit__(self, *_: object) -> None:
-        self.times[self._name] = time.perf_counter() - self._start

@@ -82,13 +82,23 @@ class View:
 
 
 class SceneRenderer:
-    """Renders layers of triangles and lines; use as a context manager."""
+    """Renders layers of triangles and lines between ``open`` and ``close``, or as a context manager."""
 
     def __init__(self) -> None:
         self._plotter: Any = None
         self._lines: list[Any] = []
 
     def __enter__(self) -> SceneRenderer:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def open(self) -> None:
+        """Make the window, off the screen."""
         # Without a screen VTK reports the missing X server before it takes EGL or OSMesa.
         verbosity = vtkLogger.GetCurrentVerbosityCutoff()
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
@@ -100,11 +110,9 @@ class SceneRenderer:
             self._plotter.show(auto_close=False, interactive=False)
         finally:
             vtkLogger.SetStderrVerbosity(verbosity)
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Give the window back."""
         self._plotter.close()
 
     def clear(self) -> None:

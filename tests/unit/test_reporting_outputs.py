@@ -15,11 +15,12 @@ import xarray as xr
 from spindle_fem.errors import BadInputError
 from spindle_fem.meshing.simple import build_joined_tubes
 from spindle_fem.reporting import document, tables
-from spindle_fem.reporting.beside import start_beside
+from spindle_fem.reporting.beside import Helper, start_beside
 from spindle_fem.reporting.figures import new_figure
 from spindle_fem.reporting.interactive import SURFACE_GROUP, display_surface, viewer_payload
 from spindle_fem.reporting.output import MARKER, is_complete, output_folder, require_complete
-from spindle_fem.reporting.report import rebuild_report, render_run_report, write_outputs
+from spindle_fem.reporting.report import in_order, rebuild_report, render_run_report
+from spindle_fem.reporting.run_outputs import OutputHelpers, write_outputs
 from spindle_fem.results.dataset import build_dataset, default_paths, read_dataset, spec_digest, write_dataset
 from spindle_fem.results.summary import build_summary
 from spindle_fem.results.thermal_result import (
@@ -126,10 +127,9 @@ def html(result):
 
 
 def render(result: ThermalResult) -> str:
-    from pathlib import Path
 
     summary = json.loads(json.dumps(build_summary(result, 1.0, 100.0)))
-    return render_run_report(summary, build_dataset(result), display_surface(result), Path("/nonexistent"))
+    return render_run_report(summary, build_dataset(result), display_surface(result), in_order({}))
 
 
 class Page(HTMLParser):
@@ -270,6 +270,70 @@ def test_an_answer_larger_than_a_pipe_arrives_whole():
     assert len(start_beside(lambda: "x" * 500_000)()) == 500_000
 
 
+class Counter:
+    """A worker that remembers what it was asked for."""
+
+    def __init__(self):
+        self.total = 0
+
+    def add(self, number):
+        self.total += number
+        return self.total, os.getpid()
+
+    def add_largest(self, values):
+        return self.add(max(values.values()))[0]
+
+    def fail(self):
+        raise BadInputError("worker", "cannot do it.")
+
+    def fail_beside(self, parent):
+        if os.getpid() != parent:
+            raise ValueError("only in the other process")
+        return self.total
+
+
+def test_a_helper_answers_in_order_from_one_other_process():
+    with Helper(Counter) as helper:
+        first, second = helper.ask("add", 1), helper.ask("add", 2)
+        assert second()[0] == 3
+        assert first()[0] == 1
+        assert first()[1] == second()[1]
+        if len(os.sched_getaffinity(0)) > 1:
+            assert first()[1] != os.getpid()
+
+
+def test_a_helper_that_may_not_be_beside_works_here():
+    with Helper(Counter, beside=False) as helper:
+        first, second = helper.ask("add", 1), helper.ask("add", 2)
+        assert second() == (3, os.getpid())
+        assert first() == (1, os.getpid())
+
+
+def test_what_a_failed_helper_was_asked_is_done_here_from_the_start():
+    with Helper(Counter) as helper:
+        before = helper.ask("add", 5)
+        assert before()[0] == 5
+        at_failure, after = helper.ask("fail_beside", os.getpid()), helper.ask("add", 2)
+        assert after() == (7, os.getpid())
+        assert at_failure() == 5
+        assert before()[0] == 5
+
+
+def test_an_error_of_a_helper_is_raised_here():
+    with Helper(Counter) as helper:
+        answer = helper.ask("fail")
+        with pytest.raises(BadInputError, match="cannot do it"):
+            answer()
+
+
+def test_a_helper_takes_large_and_read_only_arguments_while_it_is_still_made():
+    import types
+
+    values = types.MappingProxyType({index: index for index in range(200_000)})
+    with Helper(Counter) as helper:
+        assert helper.ask("add_largest", values)() == 199_999
+
+
 # ------------------------------------------------------------------ the viewer
 def test_viewer_data_restore_the_surface(result):
     import base64
@@ -401,8 +465,8 @@ def run_folder(result, tmp_path_factory):
     steps: list[str] = []
     with output_folder(tmp_path_factory.mktemp("runs") / "run") as folder:
         times = write_outputs(result, folder, notify=steps.append)
-    assert steps == ["pictures", "files", "report"]
-    assert list(times) == [*steps, "files: fields", "files: data", "files: charts"]
+    assert steps == ["fields", "pictures", "report"]
+    assert list(times) == [*steps, "beside: pictures", "beside: data", "beside: charts"]
     return folder
 
 
@@ -453,6 +517,19 @@ def test_pictures_fill_their_page(run_folder):
         assert np.ptp(rows) > 0.88 * ink.shape[0], path.name
         if not path.name.startswith("bearings_"):  # the tubes of this test end inside that frame
             assert np.ptp(columns) > 0.85 * ink.shape[1], path.name
+
+
+@pytest.mark.render
+def test_helpers_that_were_started_before_write_the_same_files(run_folder, result, tmp_path):
+    with output_folder(tmp_path / "run") as folder, OutputHelpers() as helpers:
+        helpers.prepare(result.spec, result.mesh, result.n_unknowns)
+        helpers.begin(result, folder)
+        write_outputs(result, folder, helpers=helpers)
+    figures = sorted(path.name for path in (run_folder / "figures").glob("*.png"))
+    for name in figures:
+        assert (folder / "figures" / name).read_bytes() == (run_folder / "figures" / name).read_bytes(), name
+    assert (folder / "fields.vtu").read_bytes() == (run_folder / "fields.vtu").read_bytes()
+    assert rebuild_report(folder).read_bytes()
 
 
 @pytest.mark.render
