@@ -76,10 +76,11 @@ def add_half_machine(
 ) -> None:
     """Layers of the machine with its near half removed, coloured by temperature."""
     outside = exposed_triangles(result.mesh, result.temperature - ZERO_CELSIUS_K)
-    renderer.add_coloured(clip_triangles(outside, outside.points[:, 0]), bar)
+    # with the section closed: faces turned away are behind others
+    renderer.add_coloured(clip_triangles(outside, outside.points[:, 0]), bar, closed=True)
     renderer.add_coloured(_celsius(section.faces), bar, lit=False)
     if result.bearings:
-        renderer.add_coloured(_half_of_balls(result), bar)
+        renderer.add_coloured(_half_of_balls(result), bar, closed=True)
     renderer.add_lines(section.outlines)
     renderer.add_lines(clip_segments(edges, edges.points[..., 0]), width=1.0)
 
@@ -271,7 +272,7 @@ def mesh_picture(renderer: SceneRenderer, mesh: TaggedMesh, n_unknowns: int) -> 
     facets, part = element_faces(mesh, centre > 0.0)
     shape = facet_triangles(mesh.points, facets, np.zeros((len(facets), 6, 0)), part)
     renderer.clear()
-    renderer.add_parts(shape, part_colours(mesh.part_names))
+    renderer.add_parts(shape, part_colours(mesh.part_names), closed=True)
     renderer.add_lines(facet_edges(mesh.points, facets), width=0.7, opacity=0.75)
     view = View(TOWARDS_HALF, UP, shape.points)
     return picture_figure(

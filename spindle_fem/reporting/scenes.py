@@ -120,8 +120,19 @@ class SceneRenderer:
         self._plotter.clear_actors()
         self._lines.clear()
 
-    def add_coloured(self, shape: TriangleSet, bar: ColourBar, *, column: int = 0, lit: bool = True) -> Any:
-        """Layer coloured by one value of its points; unlit it matches the colour bar exactly."""
+    def add_coloured(
+        self,
+        shape: TriangleSet,
+        bar: ColourBar,
+        *,
+        column: int = 0,
+        lit: bool = True,
+        closed: bool = False,
+    ) -> Any:
+        """Layer coloured by one value of its points; unlit it matches the colour bar exactly.
+
+        ``closed`` says that what faces away is hidden by something in front of it, and need not be drawn.
+        """
         if not len(shape.triangles):
             return None
         mesh = _polydata(shape)
@@ -134,6 +145,7 @@ class SceneRenderer:
             show_scalar_bar=False,
             render=False,
             reset_camera=False,
+            culling="back" if closed else False,
             **_shading(shape, lit),
         )
 
@@ -151,8 +163,10 @@ class SceneRenderer:
             **_shading(shape, lit),
         )
 
-    def add_parts(self, shape: TriangleSet, colours: Sequence[str], *, lit: bool = True) -> Any:
-        """Layer coloured by the label of its triangles."""
+    def add_parts(
+        self, shape: TriangleSet, colours: Sequence[str], *, lit: bool = True, closed: bool = False
+    ) -> Any:
+        """Layer coloured by the label of its triangles; ``closed`` as in :meth:`add_coloured`."""
         from matplotlib.colors import to_rgb
 
         if not len(shape.triangles):
@@ -167,6 +181,7 @@ class SceneRenderer:
             show_scalar_bar=False,
             render=False,
             reset_camera=False,
+            culling="back" if closed else False,
             **_shading(shape, lit),
         )
 
