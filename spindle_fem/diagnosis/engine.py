@@ -41,6 +41,8 @@ REDUCED = 3
 # Best sets in which each member is exchanged for other effects at its place, and for how many; other spots at
 # which a member that is on in intervals is tried.
 EXCHANGED, OTHERS, OTHER_SPOTS = 1, 5, 3
+# Times that members are left out and exchanged, as long as that finds a better set.
+ROUNDS = 2
 # Sets that are fitted from each start: single effects from one start and from each of two, pairs, triples.
 SINGLES, PAIRS, TRIPLES = (8, 5), 6, 3
 BEAM, ADDITIONS = 3, 6
@@ -145,8 +147,14 @@ class Search:
             for hypothesis in self._different(ranked)[:beam]:
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
-        self._reduce()
-        self._exchange()
+        for _ in range(ROUNDS):
+            best = self.ranked()[0]
+            self._reduce()
+            self._exchange()
+            if self.ranked()[0] is best:
+                break
+        else:
+            self._reduce()
         self._widen()
         return self.ranked()
 
