@@ -7,19 +7,33 @@ from types import MappingProxyType
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words, quantity
-from spindle_fem.effects.laws import RPM, Complex, amplitude, linear, relaxed, repeated, shape, smooth_step
+from spindle_fem.effects.laws import (
+    RPM,
+    Complex,
+    amplitude,
+    linear,
+    relaxed,
+    repeated,
+    shape,
+    smooth_step,
+    softplus,
+)
 from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 
 ONSETS = 8
+# Of the friction change with the speed beyond the onset, before any data: value and standard deviation.
+GROWTH = (0.0, 0.2)
 # Where a recording is all standstill.
 USUAL_SPEED = 3000.0 * RPM
 
 
 class StarvationTerm(Term):
-    """Factor ``1 + a s`` on friction; s follows a smooth step ``S((n - n0)/w)`` with a lag.
+    """Factor ``1 + a s`` on friction; s follows ``S((n - n0)/w) (1 + g r)`` with a lag.
 
-    The lag is that of the tracks, which run dry and refill over many turns.
+    S is a smooth step, r the speed beyond the onset, a smooth ramp, in units of
+    1000 rpm: the faster, the less comes back before the next ball. The lag is
+    that of the tracks, which run dry and refill over many turns.
 
     Parameters
     ----------
@@ -39,6 +53,7 @@ class StarvationTerm(Term):
             amplitude("friction_change", 0.4, low=-0.9, high=5.0),
             linear("onset_speed", 0.6 * highest, 0.3 * highest, "rad/s", low=0.0, high=1.3 * highest),
             shape("width", 120.0 * RPM, 0.7, "rad/s", low=5.0 * RPM, high=1500.0 * RPM),
+            linear("growth_per_1000rpm", *GROWTH, low=-0.5, high=5.0),
             shape("lag", 100.0, 1.0, "s", low=1.0, high=5000.0),
         )
 
@@ -51,7 +66,9 @@ class StarvationTerm(Term):
         """Starved share, (1, k)."""
         own = context.parameters
         speed = np.abs(context.inputs[self._speed])
-        target = smooth_step((speed - own["onset_speed"]) / own["width"])
+        beyond = (speed - own["onset_speed"]) / own["width"]
+        ramp = own["width"] * softplus(beyond) / (1000.0 * RPM)
+        target = smooth_step(beyond) * (1.0 + own["growth_per_1000rpm"] * ramp)
         return relaxed(context.state, (target + 0.0 * own["lag"])[None], step, own["lag"])
 
 

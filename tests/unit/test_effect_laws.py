@@ -138,6 +138,10 @@ def test_starvation_is_half_at_its_onset():
         assert term.friction(starved)[0, 0].real == pytest.approx(factor)
     begun = term.advance(context(term, inputs={"speed": 400.0}, state=[0.0], **own), 200.0)
     assert begun[0, 0].real == pytest.approx(1.0 - np.exp(-1.0))
+    # 2000 rpm beyond the onset, 0.3 more for every 1000 rpm.
+    own |= {"onset_speed": 400.0 - 2000.0 * RPM, "growth_per_1000rpm": 0.3}
+    more = term.advance(context(term, inputs={"speed": 400.0}, state=[0.0], **own), settled)
+    assert more[0, 0].real == pytest.approx(1.6)
 
 
 def test_a_moved_share_keeps_the_heat():
