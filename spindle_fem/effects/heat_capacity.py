@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -90,6 +91,8 @@ class HeatCapacity(Effect):
     check = (
         "What is mounted that the drawing does not show: fixture, tool and holder, adapter, standing coolant."
     )
+    # A body on one side, or behind a contact of its own, takes up heat as a smaller or larger one all round.
+    law_sigma = MappingProxyType({"capacity": 0.3})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Large components; nodes of a network."""

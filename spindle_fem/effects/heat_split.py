@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,6 +83,8 @@ class HeatSplit(Effect):
         "Nothing to repair as such: compare shaft and housing temperatures beside the bearings, and ask "
         "whether preload or contact angle differ from the drawing."
     )
+    # A share moves with speed and load, and what of it the rings see depends on where their heat is made.
+    law_sigma = MappingProxyType({"inner_share_change": 0.08})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """All bearings alike, by the machine's own parameter, or one set."""

@@ -32,8 +32,8 @@ class SealFriction(Effect):
         "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the "
         "spindle by hand with and without the seal."
     )
-    # Contact force and grease of a lip change with temperature.
-    law_sigma = MappingProxyType({"heat_per_1000rpm": 0.1})
+    # Contact force and grease of a lip change with temperature; how much of it the shaft takes is guessed.
+    law_sigma = MappingProxyType({"heat_per_1000rpm": 0.2})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Lasting or running in, at both shaft ends; every node of a network that has something turning."""

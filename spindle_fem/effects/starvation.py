@@ -87,7 +87,7 @@ class Starvation(Effect):
         "temperature and noise; compare with freshly greased bearings."
     )
     # Replenishment fails over a range of speeds.
-    law_sigma = MappingProxyType({"onset_speed": 0.03})
+    law_sigma = MappingProxyType({"onset_speed": 0.06})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Sets, single bearings and sources."""
