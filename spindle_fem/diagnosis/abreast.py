@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import pickle
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from uuid import uuid4
 
-from joblib import Parallel, delayed, parallel_config
+from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky.backend.reduction import dumps
+from threadpoolctl import threadpool_limits
 
 from spindle_fem.diagnosis.inference import MOST_ITERATIONS, Fit, Problem, amplitude_name
 from spindle_fem.effects.base import Candidate
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
+
+# How long other processes wait for the next fit, s.
+IDLE = 300
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,17 +65,30 @@ def fit_order(problem: Problem, order: FitOrder) -> Fit | None:
     return None
 
 
+@lru_cache(maxsize=1)
+def _problem_at(path: str) -> Problem:
+    """A problem that was sent; what it works out on its way is kept for the next fit."""
+    return pickle.loads(Path(path).read_bytes())
+
+
+def _fit_there(path: str, order: FitOrder) -> Fit | None:
+    """Fit in another process."""
+    return fit_order(_problem_at(path), order)
+
+
 class Workers:
-    """Who fit: this process alone, or several beside it.
+    """Who fit: this process alone, or several with it.
 
     Parameters
     ----------
     number : int
-        Processes; 1 is this one. They end when idle for some minutes.
+        Processes, this one among them. The others end when idle for some minutes.
     """
 
     def __init__(self, number: int = 1) -> None:
         self._number = number
+        self._folder: TemporaryDirectory[str] | None = None
+        self._sent: tuple[Problem, str] | None = None
 
     def fits(self, problem: Problem, orders: Sequence[FitOrder]) -> list[Fit | None]:
         """Fits in the order asked for, with the candidates that were given.
@@ -72,11 +100,38 @@ class Workers:
         """
         if self._number == 1 or len(orders) == 1:
             return [fit_order(problem, order) for order in orders]
-        with parallel_config(backend="loky", inner_max_num_threads=1):
-            parallel = Parallel(n_jobs=self._number)
-            found = parallel(delayed(fit_order)(problem, order) for order in orders)
-        # Candidates are known by identity; those that come back are copies.
-        return [
-            None if fit is None else replace(fit, candidates=order.candidates)
-            for fit, order in zip(found, orders, strict=True)
-        ]
+        path, beside = self._send(problem), min(self._number, len(orders)) - 1
+        executor = get_reusable_executor(self._number - 1, timeout=IDLE, env=ONE_THREAD)
+        waiting = deque(enumerate(orders))
+        found: list[Fit | None] = [None] * len(orders)
+
+        def work_off(fit: Callable[[FitOrder], Fit | None]) -> None:
+            while waiting:
+                try:
+                    position, order = waiting.popleft()
+                except IndexError:
+                    # Another thread was quicker.
+                    return
+                found[position] = fit(order)
+
+        def there(order: FitOrder) -> Fit | None:
+            fit = executor.submit(_fit_there, path, order).result()
+            # Candidates are known by identity; those that come back are copies.
+            return None if fit is None else replace(fit, candidates=order.candidates)
+
+        with ThreadPoolExecutor(beside) as threads, threadpool_limits(1):
+            others = [threads.submit(work_off, there) for _ in range(beside)]
+            work_off(partial(fit_order, problem))
+        for other in others:
+            other.result()
+        return found
+
+    def _send(self, problem: Problem) -> str:
+        """File from which other processes take a problem, written once."""
+        if self._sent is None or self._sent[0] is not problem:
+            if self._folder is None:
+                self._folder = TemporaryDirectory(prefix="spindle-fem-")
+            path = Path(self._folder.name) / f"problem-{uuid4().hex}"
+            path.write_bytes(dumps(problem))
+            self._sent = problem, str(path)
+        return self._sent[1]

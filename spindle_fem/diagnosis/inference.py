@@ -11,7 +11,7 @@ Learning Algorithms, chapter 27-28.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ SMALLEST_GAIN = 0.02
 SMALLEST_SHARE = 3.0e-4
 LARGEST_MOVE = 2.0
 THETA_BOUND = 4.0
+# A step that differs from the one that was refused by less than this share is not tried.
+SAME_MOVE = 0.05
 # A fit is given up after so many steps when so many more like the last would not do.
 HOPELESS_AFTER, REACH = 3, 6.0
 
@@ -217,16 +219,26 @@ class Problem:
         )
 
     def predict(
-        self, candidates: Sequence[Candidate], coordinates: Sequence[Coordinate], position: Array
+        self,
+        candidates: Sequence[Candidate],
+        coordinates: Sequence[Coordinate],
+        position: Array,
+        *,
+        slopes: bool = True,
+        near: Sequence[Prediction] | None = None,
     ) -> list[Prediction]:
-        """Every recording with derivatives to the coordinates."""
+        """Every recording, with derivatives to the coordinates where ``slopes`` are wanted.
+
+        ``near`` are predictions at a position that is near, which these begin from.
+        """
         values = {c.name: c.at(u) for c, u in zip(coordinates, position, strict=True)}
-        names = [c.name for c in coordinates]
-        scale = np.array([c.sigma for c in coordinates])
+        names = [c.name for c in coordinates] if slopes else []
+        scale = np.array([c.sigma for c in coordinates]) if slopes else np.zeros(0)
         found = []
         for number in range(len(self.plant.recordings)):
-            prediction = self.plant.predict(number, values, candidates, names)
-            found.append(Prediction(prediction.temperature, prediction.sensitivity * scale))
+            beside = None if near is None else near[number]
+            prediction = self.plant.predict(number, values, candidates, names, beside)
+            found.append(replace(prediction, sensitivity=prediction.sensitivity * scale))
         return found
 
     def fit(
@@ -269,39 +281,48 @@ class Problem:
         root[:n_machine, :n_machine] = self.belief.root
         mean = np.concatenate((self.belief.mean, np.zeros(n_own)))
 
-        def evaluate(at: Array) -> tuple[float, Array, Array]:
-            predicted = self.predict(candidates, coordinates, at)
+        def cost_at(at: Array, near: list[Prediction] | None) -> tuple[float, Array, list[Prediction] | None]:
+            predicted = self.predict(candidates, coordinates, at, slopes=False, near=near)
             residual = self.data - self.whitened([p.temperature for p in predicted])
-            jacobian = self.whitened([p.sensitivity for p in predicted])
             pull = root @ (at - mean)
-            return float(np.sum(_huber(residual)) + pull @ pull), residual, jacobian
+            return float(np.sum(_huber(residual)) + pull @ pull), residual, predicted
 
-        cost, residual, jacobian = evaluate(position)
+        def slopes_at(at: Array, near: list[Prediction]) -> Array:
+            predicted = self.predict(candidates, coordinates, at, near=near)
+            return self.whitened([p.sensitivity for p in predicted])
+
+        cost, residual, predicted = cost_at(position, None)
+        jacobian = slopes_at(position, predicted)
         damping = 1e-3
         for iteration in range(iterations):
             weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
             hessian = jacobian.T @ (weight[:, None] * jacobian) + root.T @ root
             gradient = jacobian.T @ (weight * residual) - root.T @ (root @ (position - mean))
-            improved, gain = False, 0.0
+            improved, gain, refused = False, 0.0, None
             while damping < 1e8:
                 move = _bounded_step(hessian, gradient, damping, position, low, high)
                 largest = float(np.abs(move).max()) if move.size else 0.0
                 if largest > LARGEST_MOVE:
                     move *= LARGEST_MOVE / largest
+                if refused is not None and np.abs(move - refused).max() < SAME_MOVE * np.abs(refused).max():
+                    damping *= 10.0
+                    continue
                 try:
-                    trial = evaluate(position + move)
+                    trial = cost_at(position + move, predicted)
                 except (ConvergenceError, OutOfValidityError, SpecError):
                     # Outside what can be simulated (a share above one, a runaway): a shorter step.
-                    trial = (np.inf, residual, jacobian)
+                    trial = (np.inf, residual, None)
                 if trial[0] < cost - 1e-9:
                     gain = cost - trial[0]
                     position = position + move
-                    cost, residual, jacobian = trial
+                    cost, residual, predicted = trial
+                    jacobian = slopes_at(position, predicted)
                     damping = max(damping / 10.0, 1e-6)
                     improved = True
                     break
                 if largest < 1e-6:
                     break
+                refused = move
                 damping *= 10.0
             if not improved or gain < SMALLEST_GAIN + SMALLEST_SHARE * cost:
                 break

@@ -102,10 +102,16 @@ class Prediction:
         In the order of the recording's channels, sensor effects included.
     sensitivity : (G + 1, c, p) ndarray
         To the coordinates asked for.
+    states : (G + 1, r) ndarray
+        Unknowns of the model.
+    run : TransientRun
+        Whose states they are.
     """
 
     temperature: Array
     sensitivity: Array
+    states: Array
+    run: TransientRun
 
 
 class Plant:
@@ -263,6 +269,7 @@ class Plant:
         values: Mapping[str, float],
         candidates: Sequence[Candidate] = (),
         derivatives: Sequence[str] = (),
+        like: TransientRun | None = None,
     ) -> TransientRun:
         """A run of one recording that is ready to march.
 
@@ -276,6 +283,8 @@ class Plant:
         candidates : sequence of Candidate
         derivatives : sequence of str
             Names of the machine or of terms.
+        like : TransientRun, optional
+            Another run of this recording; what both have in common is taken from it.
         """
         drive = self.drives[number]
         candidates, idle = _acting(candidates, number)
@@ -290,7 +299,7 @@ class Plant:
             if candidate.reading is not None:
                 readings |= {f"{candidate.reading.name}.{item.name}" for item in candidate.reading.parameters}
         factors = self._factors(number, values, known, readings)
-        return TransientRun(self.fast, drive, factors | known, tuple(derivatives), tuple(terms))
+        return TransientRun(self.fast, drive, factors | known, tuple(derivatives), tuple(terms), like=like)
 
     def predict(
         self,
@@ -298,12 +307,14 @@ class Plant:
         values: Mapping[str, float],
         candidates: Sequence[Candidate] = (),
         derivatives: Sequence[str] = (),
+        near: Prediction | None = None,
     ) -> Prediction:
         """What every channel of one recording should read.
 
         Parameters as for :meth:`transient`; ``derivatives`` may also name
         factors of candidates (``effect:<name>``) and parameters of readings.
         Derivatives are to logarithms, to values for parameters that say so.
+        ``near`` is a prediction of the recording for values that are near: it begins there.
         """
         candidates, idle = _acting(candidates, number)
         values = {name: value for name, value in values.items() if name not in idle}
@@ -319,8 +330,9 @@ class Plant:
         outside = dict.fromkeys((*apart, *idle))
         inner = {name: self._run_name(number, name, outside) for name in derivatives}
         of_run = tuple(dict.fromkeys(own for own in inner.values() if own is not None))
-        run = self.transient(number, values, candidates, of_run)
-        found: FastTransient = run.solve(self.start(number, values, of_run))
+        run = self.transient(number, values, candidates, of_run, None if near is None else near.run)
+        initial = self.start(number, values, of_run)
+        found: FastTransient = run.solve(initial, None if near is None else near.states)
         columns = self.columns[number]
         temperature = found.temperature[:, columns]
         sensitivity = np.zeros((*temperature.shape, len(derivatives)))
@@ -334,7 +346,7 @@ class Plant:
         for candidate in candidates:
             if candidate.reading is not None:
                 self._read(number, candidate.reading, values, derivatives, temperature, sensitivity)
-        return Prediction(temperature, sensitivity)
+        return Prediction(temperature, sensitivity, found.states, run)
 
     def displacements(self) -> tuple[str, ...]:
         """Names of the displacements of every point probe that is read."""

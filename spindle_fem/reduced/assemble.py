@@ -112,11 +112,10 @@ def run_operators(
     coefficients = tuple(
         fast.coefficients(point, factors, changes.coefficients(point, parameters)) for point in points
     )
+    targets = {i: set(fast.table.targets(n)) for i, n in enumerate(derivatives) if n not in owned}
     touched = {
         coefficient: tuple(
-            i
-            for i, name in enumerate(derivatives)
-            if name not in owned and set(fast.table.targets(name)) & set(fast.table.groups[coefficient])
+            i for i, own in targets.items() if not own.isdisjoint(fast.table.groups[coefficient])
         )
         for coefficient in fast.model.coefficient_names
     }

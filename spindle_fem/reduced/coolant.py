@@ -152,7 +152,10 @@ class UniformFilmMaps:
 
 
 _EVEN = np.arange(STENCIL)
-_SCALE = np.array([np.prod([i - j for j in _EVEN if j != i]) for i in _EVEN], dtype=float)
+# All nodes but one, (STENCIL, STENCIL - 1), and but one more of these, (STENCIL, STENCIL - 1, STENCIL - 2).
+_OTHERS = np.array([np.delete(_EVEN, i) for i in _EVEN])
+_BUT_TWO = np.array([[np.delete(_EVEN, [i, j]) for j in _EVEN if j != i] for i in _EVEN])
+_SCALE = np.prod(_EVEN[:, None] - _OTHERS, axis=1).astype(float)
 
 
 def _lagrange(at: float) -> Array:
@@ -161,8 +164,7 @@ def _lagrange(at: float) -> Array:
     >>> bool(abs(_lagrange(3.4) @ _EVEN**3 - 3.4**3) < 1e-12)
     True
     """
-    away = at - _EVEN
-    return np.array([np.prod(np.delete(away, i)) for i in _EVEN]) / _SCALE
+    return (at - _OTHERS).prod(axis=1) / _SCALE
 
 
 def _lagrange_slope(at: float) -> Array:
@@ -171,8 +173,7 @@ def _lagrange_slope(at: float) -> Array:
     >>> bool(abs(_lagrange_slope(3.4) @ _EVEN**3 - 3.0 * 3.4**2) < 1e-12)
     True
     """
-    away = at - _EVEN
-    return np.array([sum(np.prod(np.delete(away, [i, j])) for j in _EVEN if j != i) for i in _EVEN]) / _SCALE
+    return (at - _BUT_TWO).prod(axis=2).sum(axis=1) / _SCALE
 
 
 def _march(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,12 +90,13 @@ class FastModel:
             (row for row, probe in enumerate(spec.probe) if probe.kind == "coolant_outlet"), None
         )
         self._point_rows = [row for row, probe in enumerate(spec.probe) if probe.kind == "point"]
-        self._base: dict[tuple[float, float], dict[str, float]] = {}
+        self._base: dict[tuple[float, float], Array] = {}
         self._films: dict[tuple[float, float, bytes], tuple[Array, float, float]] = {}
         self._maps = UniformFilmMaps(model)
         self._sums: dict[tuple[tuple[int, ...], bytes], Array] = {}
-        self._scales: tuple[dict[str, float], dict[str, float]] = ({}, {})
+        self._scales: tuple[dict[str, float], Array] | None = None
         self._reached: dict[str, frozenset[str]] = {}
+        self._rows: dict[str, tuple[int, ...]] = {}
         self.loop = CoolantLoop(spec, model.channel_cells()) if spec.channel is not None else None
         self.fixed_fluids = tuple(
             dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
@@ -107,6 +109,12 @@ class FastModel:
         self.load_names = (*self.heat_places, "ambient", "coolant_inlet", "coolant_friction", *fixed)
         self._positions = {name: i for i, name in enumerate(model.coefficient_names)}
         self._fluid_rows = {name: i for i, name in enumerate(model.fluid_names)}
+        self._fluid_columns = {name: self._column_of_fluid(name) for name in model.fluid_names}
+        self._heat_loads = np.array([model.place(place) for place in friction]).reshape(-1, model.size).T
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without sums that another process makes as fast as it reads them."""
+        return {**self.__dict__, "_sums": {}}
 
     def sigmas(self, names: Sequence[str]) -> dict[str, float]:
         """1 σ of the logarithm of some of the machine's parameters; 0 for those that are not uncertain."""
@@ -174,16 +182,25 @@ class FastModel:
         self, point: OperatingPoint, factors: Mapping[str, float], changes: Mapping[str, float] = NO_CHANGES
     ) -> dict[str, float]:
         """Every coefficient of a class, the mean channel film included."""
-        key = (point.speed, point.ambient_temperature)
-        if key not in self._base:
-            self._base[key] = self.table.base(point)
-        base, scales = self._base[key], self._scales_of(factors)
-        found = {
-            name: base[name] * scales[name] * changes.get(name, 1.0) for name in self.model.coefficient_names
-        }
+        values = self._values(point, factors, changes)
+        found = dict(zip(self.model.coefficient_names, values.tolist(), strict=True))
         if self.loop is not None:
             found[CHANNEL_FILM] = float(self.channel_film(point, factors, changes)[0].mean())
         return found
+
+    def _values(
+        self, point: OperatingPoint, factors: Mapping[str, float], changes: Mapping[str, float]
+    ) -> Array:
+        """The model's own coefficients of a class, in their order."""
+        key = (point.speed, point.ambient_temperature)
+        if key not in self._base:
+            base = self.table.base(point)
+            self._base[key] = np.array([base[name] for name in self.model.coefficient_names])
+        values = self._base[key] * self._scales_of(factors)
+        for name, change in changes.items():
+            if name in self._positions:
+                values[self._positions[name]] *= change
+        return values
 
     def operators(
         self,
@@ -209,14 +226,12 @@ class FastModel:
             From places to the ambient, beside the machine's own films.
         """
         model = self.model
-        found = self.coefficients(point, factors, changes)
-        values = np.array([found[name] for name in model.coefficient_names])
+        values = self._values(point, factors, changes)
         conduction = np.tensordot(values, model.operators, axes=1)
         loads = np.zeros((model.size, len(self.load_names)))
-        for column, place in enumerate(self.heat_places):
-            loads[:, column] = model.place(place)
+        loads[:, : len(self.heat_places)] = self._heat_loads
         for name in model.fluid_names:
-            loads[:, self.fluid_column(name)] += (
+            loads[:, self._fluid_columns[name]] += (
                 values[self._positions[name]] * model.fluid_load[self._fluid_rows[name]]
             )
         for place, conductance in conductances.items():
@@ -228,8 +243,7 @@ class FastModel:
         output_inputs = np.zeros((len(self.channels), len(self.load_names)))
         conduction_by, loads_by, outputs_by, output_inputs_by = {}, {}, {}, {}
         for parameter in parameters:
-            reached = self.reached(parameter)
-            rows = tuple(i for i, name in enumerate(model.coefficient_names) if name in reached)
+            rows = self._rows_of(parameter)
             if not rows:
                 continue
             conduction_by[parameter] = self._sum(rows, values)
@@ -240,7 +254,7 @@ class FastModel:
                 by = np.zeros_like(loads)
                 for name in films:
                     load = model.fluid_load[self._fluid_rows[name]]
-                    by[:, self.fluid_column(name)] += values[self._positions[name]] * load
+                    by[:, self._fluid_columns[name]] += values[self._positions[name]] * load
                 loads_by[parameter] = by
         if self.loop is not None:
             film, rate, friction = self.channel_film(point, factors, changes)
@@ -273,15 +287,15 @@ class FastModel:
         Only what differs is worked out. Arguments as :meth:`operators` takes them.
         """
         model = self.model
-        values = [self.coefficients(point, factors, own) for own in changes]
-        differs = [name for name in model.coefficient_names if values[0][name] != values[1][name]]
-        amounts = np.array([values[0][name] - values[1][name] for name in differs])
-        rows = [self._positions[name] for name in differs]
+        upper, lower = (self._values(point, factors, own) for own in changes)
+        rows = np.flatnonzero(upper != lower)
+        amounts = (upper - lower)[rows]
+        differs = [model.coefficient_names[row] for row in rows]
         conduction = np.tensordot(amounts, model.operators[rows], axes=1)
         loads = np.zeros((model.size, len(self.load_names)))
         for name, amount in zip(differs, amounts, strict=True):
             if name in self._fluid_rows:
-                loads[:, self.fluid_column(name)] += amount * model.fluid_load[self._fluid_rows[name]]
+                loads[:, self._fluid_columns[name]] += amount * model.fluid_load[self._fluid_rows[name]]
         for place in {*conductances[0], *conductances[1]}:
             amount = conductances[0].get(place, 0.0) - conductances[1].get(place, 0.0)
             mean = model.place(place)
@@ -292,17 +306,17 @@ class FastModel:
         if self.loop is not None:
             films = [self.channel_film(point, factors, own) for own in changes]
             if any(np.any(one != other) for one, other in zip(*films, strict=True)):
-                upper, lower = (self._coolant(*film) for film in films)
-                maps = CoolantMaps(*(getattr(upper, n) - getattr(lower, n) for n in CoolantMaps.__slots__))
+                one, other = (self._coolant(*film) for film in films)
+                maps = CoolantMaps(*(getattr(one, n) - getattr(other, n) for n in CoolantMaps.__slots__))
                 conduction += maps.conduction
                 self._add_coolant(loads, outputs, output_inputs, maps)
         return ClassOperators(conduction, loads, outputs, output_inputs, {}, {}, {}, {})
 
-    def _scales_of(self, factors: Mapping[str, float]) -> dict[str, float]:
+    def _scales_of(self, factors: Mapping[str, float]) -> Array:
         """Factor on every coefficient, made once for the classes of a run."""
-        if self._scales[0] != factors or not self._scales[1]:
-            names = self.model.coefficient_names
-            self._scales = dict(factors), {name: self.table.scale(name, factors) for name in names}
+        if self._scales is None or self._scales[0] != factors:
+            scales = [self.table.scale(name, factors) for name in self.model.coefficient_names]
+            self._scales = dict(factors), np.array(scales)
         return self._scales[1]
 
     def reached(self, parameter: str) -> frozenset[str]:
@@ -313,6 +327,13 @@ class FastModel:
                 name for name, group in self.table.groups.items() if targets & set(group)
             )
         return self._reached[parameter]
+
+    def _rows_of(self, parameter: str) -> tuple[int, ...]:
+        """Positions of the model's own coefficients that a parameter scales."""
+        if parameter not in self._rows:
+            reached = self.reached(parameter)
+            self._rows[parameter] = tuple(i for name, i in self._positions.items() if name in reached)
+        return self._rows[parameter]
 
     def _sum(self, rows: tuple[int, ...], values: Array) -> Array:
         """Weighted sum of some operators, shared by the classes that do not differ in them."""
@@ -328,6 +349,9 @@ class FastModel:
 
     def fluid_column(self, coefficient: str) -> int:
         """Load input that is the fluid of a film."""
+        return self._fluid_columns[coefficient]
+
+    def _column_of_fluid(self, coefficient: str) -> int:
         surface = coefficient.removeprefix("film.")
         film = next(f for f in self.spec.film if surface in f.surface)
         if film.temperature == "ambient":

@@ -22,6 +22,7 @@ from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.loads.bearing_heat import BearingMechanics, FilmCurves
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.build import ReductionOptions
+from spindle_fem.reduced.term_layout import OneInstant
 from spindle_fem.spec.model import HeatTable, MachineSpec
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
 
@@ -256,7 +257,7 @@ def _point(spec: MachineSpec, speed: float, thrust: float) -> OperatingPoint:
     )
 
 
-class FilmHeat(Term):
+class FilmHeat(OneInstant, Term):
     """Friction and ball rows of a map at the film temperature of the moment.
 
     Parameters

@@ -9,12 +9,13 @@ from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.loads.films import film_coefficient
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.coefficients import natural_reference
+from spindle_fem.reduced.term_layout import OneInstant
 from spindle_fem.spec.model import MachineSpec, NaturalFilm
 
 DIFFERENCE = 1e-3
 
 
-class NaturalFilmTerm(Term):
+class NaturalFilmTerm(OneInstant, Term):
     """A film that follows the temperature of its surface.
 
     The full model takes the coefficient of each facet, this one that of the

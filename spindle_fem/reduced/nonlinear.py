@@ -32,7 +32,7 @@ NO_SHIFT = (0.0, None)
 
 
 @dataclass(frozen=True, slots=True)
-class _Moved:
+class Moved:
     """Heat that a term moves by scaling one coefficient.
 
     Attributes
@@ -92,7 +92,7 @@ class DynamicTerms:
         self.values = [term.values(values) for term in terms]
         model = fast.model
         rows: list[Array] = []
-        self._reads: list[slice] = []
+        self.read_rows: list[slice] = []
         for term in terms:
             start = len(rows)
             for name in term.reads:
@@ -101,20 +101,20 @@ class DynamicTerms:
                         f"term {term.name}", f'reads "{name}".', did_you_mean(name, model.place_names)
                     )
                 rows.append(model.place(name))
-            self._reads.append(slice(start, len(rows)))
-        self._heat: list[slice] = []
+            self.read_rows.append(slice(start, len(rows)))
+        self.heat_rows: list[slice] = []
         self.place_columns: list[tuple[int, str]] = []
         scaled_coefficients: list[list[tuple[str, slice, slice, Array]]] = []
         count = 0
         for term in terms:
-            self._heat.append(slice(count, count + len(term.heat_places)))
+            self.heat_rows.append(slice(count, count + len(term.heat_places)))
             for place in term.heat_places:
                 self._require_place(term, place)
                 self.place_columns.append((count, place))
                 count += 1
         # Friction: columns of the places that a bearing heats, and their positions among the heat places.
         # A term scales what those before it made of the same friction: their columns, by place in its own.
-        self._friction: list[list[tuple[slice, list[int], list[tuple[int, int]]]]] = []
+        self.friction_rows: list[list[tuple[slice, list[int], list[tuple[int, int]]]]] = []
         made: dict[int, list[int]] = {}
         for term in terms:
             scaled = []
@@ -127,7 +127,7 @@ class DynamicTerms:
                 for position in positions:
                     self.place_columns.append((count, fast.heat_places[position]))
                     count += 1
-            self._friction.append(scaled)
+            self.friction_rows.append(scaled)
         self._moved_columns: list[tuple[slice, Array]] = []
         for term in terms:
             moved = []
@@ -144,30 +144,30 @@ class DynamicTerms:
         self.sense = np.array(rows).reshape(-1, model.size)
         sizes = [term.n_states for term in terms]
         ends = np.cumsum([0, *sizes])
-        self._states = [slice(ends[i], ends[i + 1]) for i in range(len(terms))]
+        self.state_rows = [slice(ends[i], ends[i + 1]) for i in range(len(terms))]
         self.n_states = int(ends[-1])
-        self._layouts = []
-        self._shifted: list[list[tuple[int, str]]] = []
+        self.layouts = []
+        self.shifted: list[list[tuple[int, str]]] = []
         for number, term in enumerate(terms):
             names = term.names()
             own = {names[name].name: i for i, name in enumerate(self.derivatives) if name in names}
-            self._layouts.append(
-                Layout.of(term, self.values[number], self._reads[number], self._states[number], own)
+            self.layouts.append(
+                Layout.of(term, self.values[number], self.read_rows[number], self.state_rows[number], own)
             )
             fluids = fast.fluid_places
-            self._shifted.append(
+            self.shifted.append(
                 [(i, fluids[place]) for i, place in enumerate(term.heat_places) if place in fluids]
             )
-        self._moved = [[self._moved_by(*item, values) for item in items] for items in scaled_coefficients]
+        self.moved = [[self._moved_by(*item, values) for item in items] for items in scaled_coefficients]
         self._strengths: dict[tuple[str, float], Array] = {}
 
     def _moved_by(
         self, coefficient: str, sensed: slice, columns: slice, spectrum: Array, values: Mapping[str, float]
-    ) -> _Moved:
+    ) -> Moved:
         fast, n_sensed = self.fast, len(self.sense)
         own = fast.fluid_parameters(coefficient)
         first = columns.start * n_sensed + sensed.start
-        return _Moved(
+        return Moved(
             coefficient,
             sensed,
             columns,
@@ -179,7 +179,7 @@ class DynamicTerms:
             slice(first, first + len(spectrum) * n_sensed, n_sensed + 1),
         )
 
-    def _strength(self, item: _Moved, value: float) -> Array:
+    def _strength(self, item: Moved, value: float) -> Array:
         """What a coefficient of some value conducts in each direction, (k,) W/K."""
         key = (item.coefficient, value)
         found = self._strengths.get(key)
@@ -280,26 +280,26 @@ class DynamicTerms:
         by_state = np.zeros((self.n_added, self.n_states))
         by_parameter = np.zeros((self.n_added, n_derivatives))
         slopes = (by_sensed, by_state, by_parameter)
-        contexts = [layout.context(time, inputs, sensed, states) for layout in self._layouts]
+        contexts = [layout.context(time, inputs, sensed, states) for layout in self.layouts]
         for number, term in enumerate(self.terms):
-            layout, context = self._layouts[number], contexts[number]
+            layout, context = self.layouts[number], contexts[number]
             if term.heat_places:
                 answers = np.asarray(term.heat(context), dtype=complex)
-                rows = self._heat[number]
+                rows = self.heat_rows[number]
                 value[rows] = answers[:, 0].real
                 scale: Array | float = 1.0
-                if self._shifted[number]:
+                if self.shifted[number]:
                     scale = np.ones((len(answers), 1))
-                    for i, film in self._shifted[number]:
+                    for i, film in self.shifted[number]:
                         scale[i] = coefficients[film]
                     value[rows] *= scale[:, 0]
                 layout.spread(answers, rows, scale, slopes)
-                for i, film in self._shifted[number]:
+                for i, film in self.shifted[number]:
                     for target in touched.get(film, ()):
                         by_parameter[rows.start + i, target] += value[rows.start + i]
             if term.bearings:
                 answers = np.asarray(term.friction(context), dtype=complex)
-                for i, (columns, positions, before) in enumerate(self._friction[number]):
+                for i, (columns, positions, before) in enumerate(self.friction_rows[number]):
                     excess = answers[i, 0].real - 1.0
                     scaled = friction[positions]
                     for own, row in before:
@@ -313,9 +313,9 @@ class DynamicTerms:
         for number, term in enumerate(self.terms):
             if not term.coefficients:
                 continue
-            layout = self._layouts[number]
+            layout = self.layouts[number]
             answers = np.asarray(term.factor(contexts[number]), dtype=complex)
-            for i, item in enumerate(self._moved[number]):
+            for i, item in enumerate(self.moved[number]):
                 coefficient, columns = item.coefficient, item.columns
                 strength, uniform = self._strength(item, coefficients[coefficient]), item.uniform
                 fluid = item.fluid_scale * self.fast.fluid_temperature(coefficient, inputs)
@@ -352,7 +352,7 @@ class DynamicTerms:
         for number, term in enumerate(self.terms):
             if not term.n_states:
                 continue
-            layout = self._layouts[number]
+            layout = self.layouts[number]
             answer = np.asarray(
                 term.advance(layout.context(time, inputs, sensed, states), step), dtype=complex
             )

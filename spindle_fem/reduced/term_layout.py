@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 COMPLEX_STEP = 1e-30
 
 
+class OneInstant:
+    """Mark of terms that can be evaluated at one instant only, not at many side by side."""
+
+
 @dataclass(frozen=True, slots=True)
 class Evaluation:
     """Added quantities at one instant and their derivatives.
@@ -87,6 +91,48 @@ class Layout:
             self.state + states[self.states, None] if self.state.size else self.state,
             self.parameters,
         )
+
+    def context_over(
+        self, times: Array, inputs: Mapping[str, Array], sensed: Array, states: Array, *, slopes: bool
+    ) -> TermContext:
+        """What the term sees at many instants, those of one instant side by side.
+
+        Parameters
+        ----------
+        times : (n,) ndarray, [s]
+        inputs : mapping of str to (n,) ndarray
+        sensed : (n, n_y) ndarray
+        states : (n, n_x) ndarray
+        slopes : bool
+            Whether the columns of the parameters' directions are there too.
+        """
+        width, number = self.width(slopes=slopes), len(times)
+        temperatures = sensed[:, self.reads].T[:, :, None] + self.temperatures[:, None, :width]
+        state = states[:, self.states].T[:, :, None] + self.state[:, None, :width]
+        return TermContext(
+            np.repeat(times, width),
+            {name: np.repeat(values, width) for name, values in inputs.items()},
+            temperatures.reshape(-1, number * width),
+            state.reshape(-1, number * width),
+            {name: np.tile(values[:width], number) for name, values in self.parameters.items()},
+        )
+
+    def width(self, *, slopes: bool) -> int:
+        """Columns of one instant."""
+        return self.end + len(self.targets) if slopes else self.end
+
+    def spread_over(
+        self, answers: NDArray, rows: slice, scale: Array | float, slopes: tuple[Array, Array, Array]
+    ) -> None:
+        """As :meth:`spread`, of answers (rows, n, columns) at many instants to slopes (n, m, ...)."""
+        by_sensed, by_state, by_parameter = slopes
+        found = (answers.imag * (scale / COMPLEX_STEP)).transpose(1, 0, 2)
+        if self.split > 1:
+            by_sensed[:, rows, self.reads] += found[:, :, 1 : self.split]
+        if self.end > self.split:
+            by_state[:, rows, self.states] += found[:, :, self.split : self.end]
+        for column, target in enumerate(self.targets[: found.shape[2] - self.end], self.end):
+            by_parameter[:, rows, target] += found[:, :, column]
 
     def spread(
         self, answers: NDArray, rows: slice, scale: Array | float, slopes: tuple[Array, Array, Array]

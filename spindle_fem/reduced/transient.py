@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,8 @@ from spindle_fem.reduced.assemble import RunOperators, run_operators
 from spindle_fem.reduced.drive import Drive, with_walls
 from spindle_fem.reduced.exact_step import ExactPropagator
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.nonlinear import DynamicTerms, solve_added
+from spindle_fem.reduced.linearised import Answers
+from spindle_fem.reduced.nonlinear import DynamicTerms
 from spindle_fem.reduced.open_terms import is_open, with_open_terms
 from spindle_fem.reduced.start import Start
 from spindle_fem.reduced.stepping import (
@@ -26,7 +26,7 @@ from spindle_fem.reduced.stepping import (
     sensitivity_forcing,
     stage_values,
 )
-from spindle_fem.reduced.term_layout import Evaluation
+from spindle_fem.reduced.term_march import TermMarch, Tracks
 
 Array = NDArray[np.float64]
 
@@ -123,6 +123,8 @@ class TransientRun:
         As for :func:`simulate_fast`; ``terms`` include the machine's own.
     open_loop : bool
         Whether terms that follow no temperature join the load inputs.
+    like : TransientRun, optional
+        A run on the same drive; what it has in common with this one is taken from it.
     """
 
     def __init__(
@@ -134,14 +136,14 @@ class TransientRun:
         terms: tuple[Term, ...],
         *,
         open_loop: bool = True,
+        like: TransientRun | None = None,
     ) -> None:
         self.fast, self.drive, self.derivatives = fast, drive, derivatives
         self.built: RunOperators = run_operators(fast, drive.points, parameters, derivatives, terms)
         self.operators = self.built.classes
         self.groups = group_steps(drive.step_class, _stepped(drive))
         self.propagators: dict[tuple[int, float], Propagator | ExactPropagator] = {
-            key: fast.propagator(self.built.storage, self.operators[key[0]].conduction, key[1])
-            for key in self.groups
+            key: self._propagator(key, like) for key in self.groups
         }
         self.group_of_step = np.empty(len(drive.steps), dtype=np.int64)
         for number, rows in enumerate(self.groups.values()):
@@ -170,11 +172,20 @@ class TransientRun:
         self._friction_end_by = self._friction_derivatives(self.end_by)
         dynamic = [term for term in terms if term.is_dynamic and term not in known]
         self.dynamic = DynamicTerms(fast, drive, dynamic, parameters, derivatives) if dynamic else None
-        # Looked up step by step: lists are faster than arrays for that.
-        self._grid, self._class = drive.grid.tolist(), drive.step_class.tolist()
-        self._inputs = (drive.start.tolist(), drive.end.tolist()) if dynamic else ([], [])
         scaled = {name for term in dynamic for name in term.coefficients}
         self._shifts = opened.shifts(scaled, derivatives)
+
+    def _propagator(self, key: tuple[int, float], like: TransientRun | None) -> Propagator | ExactPropagator:
+        """Matrices of a class and length of step."""
+        storage, conduction = self.built.storage, self.operators[key[0]].conduction
+        if (
+            like is not None
+            and key in like.propagators
+            and np.array_equal(conduction, like.operators[key[0]].conduction)
+            and np.array_equal(storage, like.built.storage)
+        ):
+            return like.propagators[key]
+        return self.fast.propagator(storage, conduction, key[1])
 
     def _load_inputs(self, inputs: Array) -> tuple[Array, dict[str, Array]]:
         """Load inputs of every step at one of its ends, and their derivatives."""
@@ -189,18 +200,21 @@ class TransientRun:
                 found[:, :, column] = by[parameter][:, : self._n_heat]
         return found
 
-    def solve(self, initial: float | Array | Start) -> FastTransient:
-        """States, then sensitivities, then outputs."""
+    def solve(self, initial: float | Array | Start, near: Array | None = None) -> FastTransient:
+        """States, then sensitivities, then outputs; ``near`` as :meth:`march` takes it."""
         start = Start.of(initial, self.fast.model.one)
-        states, tracks = self.march(start)
+        states, tracks = self.march(start, near)
         sensitivities = None
         if self.derivatives:
             forcing, slopes = self.forcing_of(states, tracks), start.derivatives(self.derivatives)
             sensitivities = self.tangents(forcing, tracks, explicit=True, start=slopes)
         return self._outputs(states, sensitivities, tracks)
 
-    def march(self, initial: float | Array | Start) -> tuple[Array, Tracks | None]:
-        """States at the ends of all steps, (G + 1, r), and what the terms did."""
+    def march(self, initial: float | Array | Start, near: Array | None = None) -> tuple[Array, Tracks | None]:
+        """States at the ends of all steps, (G + 1, r), and what the terms did.
+
+        ``near`` are states (G + 1, r) of a run that is near: terms that answer are solved from there.
+        """
         start = Start.of(initial, self.fast.model.one)
         if start.points.tolist() != [0, *self.drive.restarts]:
             raise SpecError(
@@ -213,96 +227,42 @@ class TransientRun:
         for key, rows in self.groups.items():
             loads = self.loads[key[0]]
             response[rows] = load_response(self.propagators[key], self.start[rows], self.end[rows], loads)
+        if self.dynamic is not None:
+            return self._with_terms(start, response).march(near)
         states = np.empty((steps + 1, size))
         given = start.rows()
-        tracks = None
-        if self.dynamic is None:
-            advance = [self.propagators[key].advance for key in self.groups]
-            for step, group in enumerate(self.group_of_step.tolist()):
-                if step in given:
-                    states[step] = start.states[given[step]]
-                np.dot(advance[group], states[step], out=states[step + 1])
-                states[step + 1] += response[step]
-        else:
-            tracks = self._march_terms(start, states, response)
-        return states, tracks
-
-    # ------------------------------------------------------------------ terms
-    def _term_inputs(self, step: int, *, at_end: bool) -> dict[str, float]:
-        return dict(zip(self.drive.names, self._inputs[at_end][step], strict=True))
-
-    def _evaluator(self, step: int, *, at_end: bool, memory: Array) -> Callable[[Array], Evaluation]:
-        """Added quantities at one end of a step as a function of the sensed temperatures."""
-        return partial(
-            self.dynamic.evaluate,
-            self._grid[step + at_end],
-            self._term_inputs(step, at_end=at_end),
-            self.built.coefficients[self._class[step]],
-            self.built.touched,
-            states=memory,
-            friction=(self.friction_end if at_end else self.friction_start)[step],
-            friction_by=(self._friction_end_by if at_end else self._friction_start_by)[step],
-            shifts={film: (float(k[step]), by[step]) for film, (k, by) in self._shifts[at_end].items()},
-        )
-
-    def _march_terms(self, start: Start, states: Array, response: Array) -> Tracks:
-        given = start.rows()
-        dynamic, drive = self.dynamic, self.drive
-        keys = list(self.groups)
-        columns = [dynamic.columns(self._inlet_load(key[0])) for key in keys]
-        from_start = [self.propagators[k].from_start @ c for k, c in zip(keys, columns, strict=True)]
-        from_end = [self.propagators[k].from_end @ c for k, c in zip(keys, columns, strict=True)]
-        answer = [dynamic.sense @ matrix for matrix in from_end]
-        lengths, goes_on = drive.steps.tolist(), self._goes_on().tolist()
-        tracks = Tracks(columns, from_start, from_end, answer, dynamic, len(lengths))
-        # One product a step: what follows from the state and from what was added, and what is sensed of it.
-        known = np.hstack((response, response @ dynamic.sense.T))
-        follows = []
-        for key, added in zip(keys, from_start, strict=True):
-            both = np.hstack((self.propagators[key].advance, added))
-            follows.append(np.vstack((both, dynamic.sense @ both)))
-        size = states.shape[1]
-        now = np.empty(size + dynamic.n_added)
-        memory = dynamic.initial_states()
+        advance = [self.propagators[key].advance for key in self.groups]
         for step, group in enumerate(self.group_of_step.tolist()):
             if step in given:
                 states[step] = start.states[given[step]]
-            if goes_on[step] and step not in given:
-                # Nothing jumps between the steps: what held at the end of the last still does.
-                begin, first = tracks.end[-1], tracks.added_end[step - 1]
-                guess = 2.0 * first - tracks.added_start[step - 1]
-            else:
-                begin = self._evaluator(step, at_end=False, memory=memory)(dynamic.sense @ states[step])
-                guess = first = begin.value
-            tracks.begin.append(begin)
-            if step + 1 in given:
-                # A gap: nothing is known of it, and what comes after it is given.
-                tracks.bridge(step, begin, first)
-                continue
-            if dynamic.n_states:
-                inputs, sensed = self._term_inputs(step, at_end=False), dynamic.sense @ states[step]
-                moved = dynamic.advance(self._grid[step], lengths[step], inputs, sensed, memory)
-                memory = moved[0]
-                tracks.moved.append(moved)
-            now[:size], now[size:] = states[step], first
-            base = follows[group] @ now
-            base += known[step]
-            evaluator = self._evaluator(step, at_end=True, memory=memory)
-            added, end = solve_added(evaluator, base[size:], answer[group], guess, self._grid[step + 1])
-            tracks.end.append(end)
-            tracks.added_start[step], tracks.added_end[step] = first, added
-            np.dot(from_end[group], added, out=states[step + 1])
-            states[step + 1] += base[:size]
-        return tracks
+            np.dot(advance[group], states[step], out=states[step + 1])
+            states[step + 1] += response[step]
+        return states, None
 
-    def _goes_on(self) -> NDArray[np.bool_]:
-        """Whether inputs and class are the same on both sides of each step's start, (G,)."""
-        drive = self.drive
-        same = np.zeros(len(drive.step_class), dtype=bool)
-        same[1:] = (drive.step_class[1:] == drive.step_class[:-1]) & np.all(
-            drive.start[1:] == drive.end[:-1], axis=1
+    def _with_terms(self, start: Start, response: Array) -> TermMarch:
+        """The run with its terms, ready to be marched."""
+        dynamic = self.dynamic
+        columns, follows, replies = [], [], []
+        for key, propagator in self.propagators.items():
+            own = dynamic.columns(self._inlet_load(key[0]))
+            both = np.hstack((propagator.advance, propagator.from_start @ own))
+            reply = propagator.from_end @ own
+            columns.append(own)
+            follows.append(np.vstack((both, dynamic.sense @ both)))
+            replies.append(np.vstack((reply, dynamic.sense @ reply)))
+        answers = Answers(follows, replies, dynamic.sense, self.group_of_step, start.rows())
+        return TermMarch(
+            self.drive,
+            self.built,
+            dynamic,
+            columns,
+            answers,
+            response,
+            start,
+            (self.friction_start, self.friction_end),
+            (self._friction_start_by, self._friction_end_by),
+            self._shifts,
         )
-        return same
 
     def _inlet_load(self, number: int) -> Array:
         column = self.fast.inlet_column
@@ -380,43 +340,16 @@ class TransientRun:
         number = forcing.shape[2]
         found = np.zeros((len(forcing) + 1, forcing.shape[1], number))
         given = {point: 0.0 if start is None else start[row] for row, point in enumerate(self._given)}
+        if tracks is not None:
+            if start is None:
+                start = np.zeros((len(self._given), *forcing.shape[1:]))
+            return tracks.follow(forcing, start, explicit=explicit)
         advance = [self.propagators[key].advance for key in self.groups]
-        if tracks is None:
-            for step, group in enumerate(self.group_of_step):
-                if step in given:
-                    found[step] = given[step]
-                np.dot(advance[group], found[step], out=found[step + 1])
-                found[step + 1] += forcing[step]
-            return found
-        sense = self.dynamic.sense
-        memory = np.zeros((self.dynamic.n_states, number))
-        identity = np.eye(self.dynamic.n_added)
-        for step, group in enumerate(self.group_of_step):
+        for step, group in enumerate(self.group_of_step.tolist()):
             if step in given:
                 found[step] = given[step]
-            begin, end = tracks.begin[step], tracks.end[step]
-            sensed = sense @ found[step]
-            added = begin.by_sensed @ sensed + begin.by_state @ memory
-            if explicit:
-                added += begin.by_parameter
-                tracks.start_by[step] = added
-            if step + 1 in given:
-                if explicit:
-                    tracks.end_by[step] = added
-                continue
-            if self.dynamic.n_states:
-                _, by_sensed, by_state, by_parameter = tracks.moved[step]
-                memory = by_sensed @ sensed + by_state @ memory
-                if explicit:
-                    memory += by_parameter
-            base = advance[group] @ found[step] + forcing[step] + tracks.from_start[group] @ added
-            right = end.by_sensed @ (sense @ base) + end.by_state @ memory
-            if explicit:
-                right += end.by_parameter
-            added = np.linalg.solve(identity - end.by_sensed @ tracks.answer[group], right)
-            found[step + 1] = base + tracks.from_end[group] @ added
-            if explicit:
-                tracks.end_by[step] = added
+            np.dot(advance[group], found[step], out=found[step + 1])
+            found[step + 1] += forcing[step]
         return found
 
     # ----------------------------------------------------------------- outputs
@@ -476,41 +409,6 @@ def _stepped(drive: Drive) -> Array:
     if drive.restarts:
         lengths[np.array(drive.restarts) - 1] = np.median(lengths)
     return lengths
-
-
-class Tracks:
-    """What the terms did in every step, kept for the derivatives."""
-
-    def __init__(
-        self,
-        columns: list[Array],
-        from_start: list[Array],
-        from_end: list[Array],
-        answer: list[Array],
-        dynamic: DynamicTerms,
-        steps: int,
-    ) -> None:
-        self.columns, self.from_start, self.from_end, self.answer = columns, from_start, from_end, answer
-        self.dynamic = dynamic
-        self.added_start = np.zeros((steps, dynamic.n_added))
-        self.added_end = np.zeros((steps, dynamic.n_added))
-        self.start_by = np.zeros((steps, dynamic.n_added, len(dynamic.derivatives)))
-        self.end_by = np.zeros_like(self.start_by)
-        self.begin: list[Evaluation] = []
-        self.end: list[Evaluation] = []
-        self.moved: list[tuple[Array, Array, Array, Array]] = []
-
-    def bridge(self, step: int, begin: Evaluation, added: Array) -> None:
-        """Keep what held before a gap for the step that leads over it."""
-        self.end.append(begin)
-        self.added_start[step] = self.added_end[step] = added
-        if self.dynamic.n_states:
-            # Never used: the memory stays as it is.
-            self.moved.append((np.zeros(0),) * 4)
-
-    def added(self) -> Array:
-        """Added quantities at the ends of the steps, (G + 1, m)."""
-        return np.vstack((self.added_start[:1], self.added_end))
 
 
 def _at(times: Array, grid: Array, values: Array) -> Array:

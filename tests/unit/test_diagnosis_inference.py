@@ -1,5 +1,6 @@
 """Fits, evidence and marginal likelihood on a small network, against exact linear-Gaussian results."""
 
+import itertools
 import tomllib
 from dataclasses import replace
 
@@ -24,6 +25,7 @@ from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Plant, even_drive
 from spindle_fem.diagnosis.prepare import calibrate, machine_coordinates, slow_error_of
 from spindle_fem.diagnosis.screening import BaseRun, Variant
 from spindle_fem.effects.catalogue import candidates_for, interval_effects
+from spindle_fem.errors import ConvergenceError
 from spindle_fem.network.build import build_network
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.reduced.network_model import NetworkFastModel
@@ -259,6 +261,44 @@ def test_a_fit_does_not_depend_on_where_it_starts(blank, tmp_path):
     assert far.misfit_with_prior == pytest.approx(near.misfit_with_prior, abs=0.1)
     sigma = np.sqrt(np.diag(near.covariance))
     assert np.all(np.abs(far.position - near.position) < 0.3 * sigma)
+
+
+def test_steps_that_are_refused_cost_no_derivatives_and_are_not_tried_again(blank, tmp_path, monkeypatch):
+    plant = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(plant, calibrate(None, plant).belief, QUIET, plant.observations)
+    asked = []
+    plain = Problem.predict
+
+    def predict(self, candidates, coordinates, position, *, slopes=True, near=None):
+        # Nothing that the first step leads to can be simulated but what lies close to the start.
+        if not slopes and asked and np.abs(position - asked[0][0]).max() > 0.1:
+            asked.append((position, "refused"))
+            raise ConvergenceError("here", "nothing is found.")
+        asked.append((position, "slopes" if slopes else "taken"))
+        return plain(self, candidates, coordinates, position, slopes=slopes, near=near)
+
+    monkeypatch.setattr(Problem, "predict", predict)
+    problem.fit((), {name: 1.0 / value for name, value in TRUTH.items()}, iterations=1)
+    kinds = [kind for _, kind in asked]
+    assert kinds[:2] == ["taken", "slopes"]
+    assert kinds.count("slopes") == kinds.count("taken") == 2
+    start = asked[0][0]
+    refused = [position - start for position, kind in asked if kind == "refused"]
+    assert len(refused) > 1
+    for first, second in itertools.pairwise(refused):
+        assert np.abs(first - second).max() > 0.04 * np.abs(first).max()
+
+
+def test_a_prediction_without_derivatives_is_the_same(blank):
+    plant = blank
+    belief = calibrate(None, plant).belief
+    problem = Problem(plant, belief, QUIET, plant.observations)
+    at = belief.mean + 0.3
+    whole = problem.predict((), belief.coordinates, at)
+    bare = problem.predict((), belief.coordinates, at, slopes=False, near=whole)
+    assert bare[0].sensitivity.shape[2] == 0
+    assert whole[0].sensitivity.shape[2] == len(belief.coordinates)
+    assert np.abs(bare[0].temperature - whole[0].temperature).max() < 1e-9
 
 
 def sensor(candidates, effect):

@@ -8,13 +8,15 @@ import pytest
 from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.reduced import nonlinear
+from spindle_fem.reduced import nonlinear, term_march
 from spindle_fem.reduced.adjoint import fast_gradient
 from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import STANDARD, make_drive
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.model import ReducedModel
-from spindle_fem.reduced.transient import simulate_fast
+from spindle_fem.reduced.term_layout import OneInstant
+from spindle_fem.reduced.term_march import TermMarch
+from spindle_fem.reduced.transient import TransientRun, simulate_fast
 from spindle_fem.spec.load import load_machine
 from spindle_fem.spec.model import NaturalFilm
 from spindle_fem.spec.parameters import with_parameters
@@ -414,14 +416,18 @@ FRICTIONS = (Friction(), RunningIn("first"), LaterFriction(), RunningIn("second"
 SHIFTED = (Closure(), Room(), Plume())
 
 
-@pytest.mark.parametrize(
+of_terms = pytest.mark.parametrize(
     "terms",
     [TERMS, SHIFTED, FRICTIONS],
     ids=["everything", "shifted fluid of a scaled film", "friction of friction"],
 )
+
+
+@of_terms
 def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monkeypatch, terms):
     # Derivatives are those at Newton's last but one iterate: exact to its last change.
-    monkeypatch.setattr(nonlinear, "TEMPERATURE_TOLERANCE", 1e-7)
+    for module in (nonlinear, term_march):
+        monkeypatch.setattr(module, "TEMPERATURE_TOLERANCE", 1e-7)
     owned = {name: item for term in terms for name, item in term.names().items()}
     names = (
         *owned,
@@ -450,6 +456,77 @@ def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monk
         size = np.abs(difference).max()
         assert size > 1e-4, name
         assert np.abs(run.sensitivity[:, :, column] - difference).max() < 2e-5 * max(size, 1.0), name
+
+
+def answering_run(fast, drive, terms, parameters=None):
+    names = (*(name for term in terms for name in term.names()), "film.outside", "heat_capacity_factor")
+    return TransientRun(fast, drive, parameters or {}, names, terms)
+
+
+@of_terms
+@pytest.mark.parametrize("near", [False, True], ids=["from nothing", "from another run"])
+def test_the_whole_run_at_once_is_the_run_step_by_step(fast, steps, monkeypatch, terms, near):
+    other = simulate_fast(fast, steps, 293.15, terms=terms, parameters={"film.outside": 2.0}).states
+    run = answering_run(fast, steps, terms)
+    step_by_step = []
+    monkeypatch.setattr(
+        TermMarch,
+        "_step_by_step",
+        lambda self, march=TermMarch._step_by_step: step_by_step.append(march(self)) or step_by_step[-1],
+    )
+    states, tracks = run.march(293.15, other if near else None)
+    assert not step_by_step
+    monkeypatch.setattr(term_march, "MOST_ROUNDS", 0)
+    expected, stepped = run.march(293.15)
+    assert len(step_by_step) == 1
+    assert np.abs(states - expected).max() < 1e-5
+    assert np.abs(other - expected).max() > 0.1
+    assert np.abs(tracks.added() - stepped.added()).max() < 1e-4 * np.abs(stepped.added()).max()
+    by = [run.tangents(run.forcing_of(states, t), t, explicit=True) for t in (tracks, stepped)]
+    size = np.abs(by[1]).max(axis=(0, 1))
+    assert np.all(np.abs(by[0] - by[1]).max(axis=(0, 1)) < 1e-4 * size)
+    for name in ("start_by", "end_by"):
+        assert getattr(tracks, name) == pytest.approx(getattr(stepped, name), rel=1e-3, abs=1e-3)
+
+
+def test_a_run_that_is_known_takes_one_round(fast, steps, monkeypatch):
+    rounds = []
+    plain = TermMarch._told
+
+    def told(self, *own, slopes):
+        rounds.append(slopes)
+        return plain(self, *own, slopes=slopes)
+
+    monkeypatch.setattr(TermMarch, "_told", told)
+    run = answering_run(fast, steps, TERMS)
+    states, _ = run.march(293.15)
+    assert rounds.count(False) > 1
+    rounds.clear()
+    again, _ = run.march(293.15, states)
+    assert rounds == [True]
+    assert np.abs(again - states).max() < 1e-6
+
+
+def test_terms_of_one_instant_are_marched_step_by_step(fast, steps):
+    class OneByOne(OneInstant, Feedback):
+        def heat(self, context):
+            assert np.ndim(context.time) == 0
+            return super().heat(context)
+
+    expected = simulate_fast(fast, steps, 293.15, terms=(Feedback(),)).states
+    assert np.abs(simulate_fast(fast, steps, 293.15, terms=(OneByOne(),)).states - expected).max() < 1e-5
+
+
+def test_a_run_takes_from_another_what_both_have_in_common(fast, steps):
+    run = TransientRun(fast, steps, {"film.outside": 1.3}, (), ())
+    same = TransientRun(fast, steps, {"film.outside": 1.3, "heat.front": 2.0}, ("heat.front",), (), like=run)
+    assert all(same.propagators[key] is run.propagators[key] for key in run.groups)
+    for changed in ({"film.outside": 1.4}, {"film.outside": 1.3, "heat_capacity_factor": 1.01}):
+        other = TransientRun(fast, steps, changed, (), (), like=run)
+        alone = TransientRun(fast, steps, changed, (), ())
+        for key in run.groups:
+            assert np.array_equal(other.propagators[key].advance, alone.propagators[key].advance)
+            assert not np.array_equal(other.propagators[key].advance, run.propagators[key].advance)
 
 
 def test_a_constant_factor_as_a_term_is_a_factor_of_the_machine(fast, steps):

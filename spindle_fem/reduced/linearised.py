@@ -1,0 +1,177 @@
+"""The steps of a run with its terms as straight lines about what they did.
+
+With what terms add at both ends of a step as straight lines of what they sense and
+remember, a step is a few small products, whether it carries the run itself
+(Newton's method) or its derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import ConvergenceError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """How the model answers, by groups of equal steps.
+
+    Attributes
+    ----------
+    follows : list of (r + n_y, r + m) ndarray
+        Unknowns at the end of a step, and what is sensed of them, from unknowns at its start and what
+        was added there.
+    replies : list of (r + n_y, m) ndarray
+        The same from what is added at the end.
+    sense : (n_y, r) ndarray
+    group_of_step : (G,) int64 ndarray
+    given : mapping of int to int
+        Row of each point of the grid at which a state is given.
+    """
+
+    follows: list[Array]
+    replies: list[Array]
+    sense: Array
+    group_of_step: NDArray[np.int64]
+    given: Mapping[int, int]
+
+    def with_sensed(self, forcing: Array) -> Array:
+        """What is added to the ends of steps (G, r, p) with what is sensed of it, (G, r + n_y, p)."""
+        return np.concatenate((forcing, np.matmul(self.sense, forcing)), axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Derivatives of what terms add at the start and end of every step, and of what they remember.
+
+    Attributes
+    ----------
+    start_by_sensed, end_by_sensed : (G, m, n_y) ndarray
+    start_by_state, end_by_state : (G, m, n_x) ndarray
+        To what is remembered before and after the step.
+    state_by_sensed, state_by_state : (G, n_x, n_y) and (G, n_x, n_x) ndarray
+        Of what is remembered after a step, to what was sensed and remembered before it.
+    """
+
+    start_by_sensed: Array
+    start_by_state: Array
+    end_by_sensed: Array
+    end_by_state: Array
+    state_by_sensed: Array
+    state_by_state: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What followed.
+
+    Attributes
+    ----------
+    states : (G + 1, r, p) ndarray
+    sensed : (G + 1, n_y, p) ndarray
+    added_start, added_end : (G, m, p) ndarray
+    """
+
+    states: Array
+    sensed: Array
+    added_start: Array
+    added_end: Array
+
+
+class Linearised:
+    """A run with terms as straight lines.
+
+    Parameters
+    ----------
+    answers : Answers
+    lines : Lines
+
+    Raises
+    ------
+    ConvergenceError
+        Terms that leave a step without an answer.
+    """
+
+    def __init__(self, answers: Answers, lines: Lines) -> None:
+        self.answers, self.lines = answers, lines
+        size = answers.sense.shape[1]
+        matrix = np.empty((len(answers.group_of_step), *answers.replies[0].shape[1:] * 2))
+        for group, reply in enumerate(answers.replies):
+            rows = np.flatnonzero(answers.group_of_step == group)
+            matrix[rows] = np.eye(reply.shape[1]) - lines.end_by_sensed[rows] @ reply[size:]
+        try:
+            self._solve = np.linalg.inv(matrix)
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                "terms of the fast model", "they leave a step without an answer.", "Take smaller steps."
+            ) from error
+        self._by_sensed = self._solve @ lines.end_by_sensed
+        self._by_state = self._solve @ lines.end_by_state
+
+    def follow(
+        self,
+        forcing: Array,
+        start: Array,
+        begin: Array | None = None,
+        end: Array | None = None,
+        remembered: Array | None = None,
+    ) -> Followed:
+        """March columns of changes, or the run itself with the constants of its lines.
+
+        Parameters
+        ----------
+        forcing : (G, r + n_y, p) ndarray
+            Added to the end of each step, with what is sensed of it.
+        start : (S, r, p) ndarray
+            At the points that are given.
+        begin, end : (G, m, p) ndarray, optional
+            Added at both ends beside what the lines say.
+        remembered : (G, n_x, p) ndarray, optional
+            Likewise after each step.
+        """
+        answers, lines = self.answers, self.lines
+        n_sensed, size = answers.sense.shape
+        steps, _, number = forcing.shape
+        n_added, n_states = self._by_state.shape[1:]
+        states = np.zeros((steps + 1, size, number))
+        sensed = np.zeros((steps + 1, n_sensed, number))
+        added_start, added_end = np.zeros((2, steps, n_added, number))
+        own = None if end is None else self._solve @ end
+        now, base = np.zeros((size + n_added, number)), np.empty((size + n_sensed, number))
+        memory = np.zeros((n_states, number))
+        for step, group in enumerate(answers.group_of_step.tolist()):
+            if step in answers.given:
+                states[step] = start[answers.given[step]]
+                np.dot(answers.sense, states[step], out=sensed[step])
+            added = added_start[step]
+            np.dot(lines.start_by_sensed[step], sensed[step], out=added)
+            if n_states:
+                added += lines.start_by_state[step] @ memory
+            if begin is not None:
+                added += begin[step]
+            if step + 1 in answers.given:
+                # A gap: nothing is known of it, and what comes after it is given.
+                added_end[step] = added
+                continue
+            if n_states:
+                memory = lines.state_by_sensed[step] @ sensed[step] + lines.state_by_state[step] @ memory
+                if remembered is not None:
+                    memory += remembered[step]
+            now[:size], now[size:] = states[step], added
+            np.dot(answers.follows[group], now, out=base)
+            base += forcing[step]
+            added = added_end[step]
+            np.dot(self._by_sensed[step], base[size:], out=added)
+            if n_states:
+                added += self._by_state[step] @ memory
+            if own is not None:
+                added += own[step]
+            base += np.dot(answers.replies[group], added)
+            states[step + 1], sensed[step + 1] = base[:size], base[size:]
+        return Followed(states, sensed, added_start, added_end)
