@@ -20,7 +20,6 @@ from spindle_fem.coupling import (
     prepare_machine,
     solve_coupled,
 )
-from spindle_fem.effect_entries import physics_of
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.heat_study import heat_study
 from spindle_fem.loads.bearing_heat import BearingMechanics, BearingTemperatures
@@ -32,7 +31,6 @@ from spindle_fem.results.thermal_result import (
     ThermalResult,
 )
 from spindle_fem.spec.model import MachineSpec
-from spindle_fem.transients.terms import steady_physics, with_factors
 from spindle_fem.validity import CodedWarning
 
 
@@ -68,8 +66,15 @@ def solve_prepared(
     clock = Clock(progress)
     clock.begin("solve")
     point = point or OperatingPoint.of(machine.spec)
-    machine, physics = with_factors(machine, physics_of(machine))
-    coupled = solve_coupled(machine, point, beyond=steady_physics(machine, physics))
+    beyond = None
+    if machine.spec.effects:
+        # loaded where needed: what effects read brings the fast model and recordings along
+        from spindle_fem.effect_entries import physics_of
+        from spindle_fem.transients.terms import steady_physics, with_factors
+
+        machine, physics = with_factors(machine, physics_of(machine))
+        beyond = steady_physics(machine, physics)
+    coupled = solve_coupled(machine, point, beyond=beyond)
     clock.begin("evaluate")
     result = _build_result(machine, point, coupled)
     clock.end()
