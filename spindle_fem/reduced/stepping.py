@@ -126,6 +126,11 @@ class MatrixChange:
     load_start: Array | None = None
     load_end: Array | None = None
 
+    @property
+    def enters(self) -> bool:
+        """Whether the parameter changes anything."""
+        return any(item is not None for item in (self.conduction, self.storage, self.load_start))
+
 
 def sensitivity_forcing(
     propagator: Propagator | ExactPropagator,
@@ -154,15 +159,17 @@ def sensitivity_forcing(
         ]
         return np.stack(columns, axis=2) if columns else np.zeros((*before.shape, 0))
     weight = SHARE * propagator.step
-    # Defects of both halves of the step; all parameters share the products with the inverses.
-    first = np.zeros((len(changes), *before.shape))
+    # Defects of both halves of the step; all parameters that enter share the products with the inverses.
+    entering = [i for i, change in enumerate(changes) if change.enters]
+    entered = [changes[i] for i in entering]
+    first = np.zeros((len(entered), *before.shape))
     second = np.zeros_like(first)
-    by_conduction = [i for i, change in enumerate(changes) if change.conduction is not None]
+    by_conduction = [i for i, change in enumerate(entered) if change.conduction is not None]
     if by_conduction:
-        matrices = np.stack([changes[i].conduction.T for i in by_conduction])
+        matrices = np.stack([entered[i].conduction.T for i in by_conduction])
         first[by_conduction] -= weight * ((before + stage) @ matrices)
         second[by_conduction] -= weight * (after @ matrices)
-    for own_first, own_second, change in zip(first, second, changes, strict=True):
+    for own_first, own_second, change in zip(first, second, entered, strict=True):
         if change.storage is not None:
             own_first += (before - stage) @ change.storage.T
             own_second += (STAGE_WEIGHT * stage - START_WEIGHT * before - after) @ change.storage.T
@@ -170,9 +177,11 @@ def sensitivity_forcing(
             own_first += weight * ((2.0 - GAMMA) * change.load_start + GAMMA * change.load_end)
             own_second += weight * change.load_end
     size = before.shape[1]
-    found = first.reshape(-1, size) @ propagator.carried.T
-    found += second.reshape(-1, size) @ propagator.inverse.T
-    return found.reshape(first.shape).transpose(1, 2, 0)
+    moved = first.reshape(-1, size) @ propagator.carried.T
+    moved += second.reshape(-1, size) @ propagator.inverse.T
+    found = np.zeros((*before.shape, len(changes)))
+    found[:, :, entering] = moved.reshape(first.shape).transpose(1, 2, 0)
+    return found
 
 
 def group_steps(step_class: NDArray[np.int64], steps: Array) -> Mapping[tuple[int, float], NDArray[np.int64]]:

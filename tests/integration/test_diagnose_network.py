@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
+from spindle_fem.diagnosis import abreast
 from spindle_fem.diagnosis.abreast import FitOrder, Workers, fit_order
 from spindle_fem.diagnosis.inference import Problem
 from spindle_fem.diagnosis.machines import open_machine
@@ -307,6 +308,33 @@ def test_fits_abreast_are_those_of_one_process(machine, tmp_path):
         assert other.log_evidence == pytest.approx(one.log_evidence, rel=1e-9)
         assert other.candidates[0] is order.candidates[0]
     assert len({round(fit.log_evidence, 3) for fit in alone}) == len(orders)
+
+
+def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine, tmp_path, monkeypatch):
+    folder = record(tmp_path / "r", 5, extra=hot)
+    opened = open_machine(machine, (), [read_recording(folder)], [])
+    plant = Plant(opened.fast, opened.recordings, all_stamps(opened.recordings), opened.effects)
+    calibrated = calibrate(None, plant)
+    problems = [Problem(plant, calibrated.belief, calibrated.slow, plant.observations) for _ in range(2)]
+    offsets = [c for c in candidates_for(opened.view) if c.effect == "sensor_offset"][:2]
+    orders = [FitOrder((candidate,), {}, iterations=1) for candidate in offsets]
+    sent, here = [], []
+    plain_dumps, plain_fit = abreast.dumps, abreast.fit_order
+    monkeypatch.setattr(abreast, "dumps", lambda item: sent.append(item) or plain_dumps(item))
+    monkeypatch.setattr(
+        abreast, "fit_order", lambda problem, order: here.append(problem) or plain_fit(problem, order)
+    )
+    workers = Workers(2)
+    for problem, number in ((problems[0], 1), (problems[0], 1), (problems[1], 2)):
+        here.clear()
+        fits = workers.fits(problem, orders)
+        assert [fit.candidates[0] for fit in fits] == offsets
+        assert len(sent) == number
+        assert sent[-1] is problem
+        assert here
+        assert all(item is problem for item in here)
+    workers.fits(problems[1], orders[:1])
+    assert len(sent) == 2
 
 
 def test_a_set_that_cannot_be_simulated_begins_milder(machine, tmp_path, monkeypatch):

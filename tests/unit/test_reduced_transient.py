@@ -1,9 +1,11 @@
 """The fast model on a spindle of one unknown per part, where everything can be checked by hand."""
 
 from dataclasses import replace
+from pickle import loads
 
 import numpy as np
 import pytest
+from joblib.externals.loky.backend.reduction import dumps
 
 from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.errors import ConvergenceError, SpecError
@@ -692,6 +694,17 @@ def test_unknown_parameters_and_other_heat_models_are_refused(fast, spec, steps)
     other = FastModel(fast.model, load_machine("recorded_spindle", ["heat.model=palmgren"]))
     with pytest.raises(SpecError, match=r"takes heat.model"):
         simulate_fast(other, steps, 293.15)
+
+
+def test_a_model_goes_to_another_process_without_its_remembered_sums(fast, steps):
+    point = steps.points[0]
+    expected = fast.operators(point, {}, ("film.outside",))
+    there = loads(dumps(fast))
+    assert fast._sums
+    assert not there._sums
+    found = there.operators(point, {}, ("film.outside",))
+    assert np.array_equal(found.conduction, expected.conduction)
+    assert np.array_equal(found.conduction_by["film.outside"], expected.conduction_by["film.outside"])
 
 
 def test_the_range_of_the_basis_is_watched(fast):
