@@ -38,7 +38,7 @@ MIXING_BELOW = 0.5
 MAXIMUM_RETREATS = 10
 # A linear residual this small against the last change of the field costs no extra iteration of the loop.
 LINEAR_PER_KELVIN = 1.0e-4
-LOOSEST_LINEAR_TOLERANCE = 1.0e-5
+LOOSEST_LINEAR_TOLERANCE = 1.0e-3
 #: Relative residual that a coupled solution may leave of its linear equations.
 LINEAR_RESIDUAL_LIMIT = 1.0e-9
 

@@ -51,7 +51,7 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
             coefficient[rows] += values
             column += operators.facet_vector(values, rows)
             total += float(values @ operators.facet_area[rows])
-        columns.append(sparse.csc_array(column[:, None]))
+        columns.append(column)
         diagonal.append(total)
     ties = []
     for joint, value in problem.joint_conductance.items():
@@ -70,13 +70,22 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
     return ThermalSystem(
         operators.matrix(upper),
         load,
-        sparse.hstack(columns, format="csc") if columns else sparse.csc_array((operators.n_unknowns, 0)),
+        _as_columns(columns, operators.n_unknowns),
         _lumped_matrix(problem, diagonal),
         lumped_load,
         reference,
         _tie_matrix(operators, ties),
         operators.prolongation,
     )
+
+
+def _as_columns(vectors: list[NDArray[np.float64]], n_rows: int) -> sparse.csc_array:
+    """Sparse matrix of columns that are mostly zero."""
+    places = [np.flatnonzero(vector) for vector in vectors]
+    indptr = np.cumsum([0, *(len(own) for own in places)])
+    indices = np.concatenate([np.empty(0, dtype=np.intp), *places])
+    data = np.concatenate([np.empty(0), *(vector[own] for vector, own in zip(vectors, places, strict=True))])
+    return sparse.csc_array((data, indices, indptr), shape=(n_rows, len(vectors)))
 
 
 def assemble_load(

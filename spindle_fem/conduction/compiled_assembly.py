@@ -335,3 +335,21 @@ def merge_rows(low, high, starts, members, label, indptr, indices, data, counts,
                 end += 1
         counts[row + 1] = end - begin
     return end
+
+
+@njit(**_OPTIONS)
+def border_rows(
+    low, high, indptr, indices, data, border_indptr, border_indices, border_data, ends, columns, values
+):
+    """A range of rows with those of a border, whose columns come after, at their ends."""
+    after = np.uint32(indptr.size - 1)
+    for i in range(low, high):
+        at = ends[i]
+        for place in range(indptr[i], indptr[i + 1]):
+            columns[at] = indices[place]
+            values[at] = data[place]
+            at += np.uint32(1)
+        for place in range(border_indptr[i], border_indptr[i + 1]):
+            columns[at] = border_indices[place] + after
+            values[at] = border_data[place]
+            at += np.uint32(1)

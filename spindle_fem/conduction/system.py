@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from spindle_fem.conduction.threads import fill_rows, unsigned, use_compiled
+from spindle_fem.conduction.memory import room
+from spindle_fem.conduction.threads import fill_rows, row_blocks, run_blocks, unsigned, use_compiled
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,13 +90,22 @@ def _bordered(
     below = sparse.csr_array(sparse.hstack((border.T, sparse.csr_array(corner))))
     ends = matrix.indptr + border.indptr
     indptr = np.concatenate((ends, ends[-1] + below.indptr[1:])).astype(np.int32)
-    indices, data = np.empty(indptr[-1], dtype=np.int32), np.empty(indptr[-1])
-    # a row of A moves on by what the border has put before it, a row of B by all of A up to it
-    inner = np.arange(matrix.nnz) + np.repeat(border.indptr[:-1], np.diff(matrix.indptr))
-    outer = np.arange(border.nnz) + np.repeat(matrix.indptr[1:], np.diff(border.indptr))
-    for place, part, shift in ((inner, matrix, 0), (outer, border, n), (slice(ends[-1], None), below, 0)):
-        indices[place] = part.indices + shift
-        data[place] = part.data
+    indices, data = room(int(indptr[-1]), np.int32), room(int(indptr[-1]))
+    indices[ends[-1] :], data[ends[-1] :] = below.indices, below.data
+    if use_compiled(n):
+        from spindle_fem.conduction.compiled_assembly import border_rows
+
+        given = [
+            (*unsigned(part.indptr, part.indices), part.data) for part in (matrix, sparse.csr_array(border))
+        ]
+        run_blocks(border_rows, row_blocks(n), *given[0], *given[1], *unsigned(indptr, indices), data)
+    else:
+        # what the border adds stands at the end of each row
+        added = np.arange(border.nnz) + np.repeat(matrix.indptr[1:], np.diff(border.indptr))
+        own = np.ones(ends[-1], dtype=bool)
+        own[added] = False
+        indices[added], data[added] = border.indices + n, border.data
+        indices[: ends[-1]][own], data[: ends[-1]][own] = matrix.indices, matrix.data
     return sparse.csr_array((data, indices, indptr), shape=(n + m, n + m))
 
 

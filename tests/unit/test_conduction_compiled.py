@@ -416,7 +416,9 @@ def test_ranges_cover_all_rows_and_return_in_order(monkeypatch):
     assert threads.row_blocks(9).tolist() == [0, 9]
 
 
-def test_lumped_nodes_border_the_matrix():
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_lumped_nodes_border_the_matrix(loops, count):
+    loops(count)
     system = assemble_system(problem_on(build_operators(TUBES, 1)))
     expected = sparse.block_array(
         [[system.matrix, -system.exchange], [-system.exchange.T, system.lumped_matrix]]
