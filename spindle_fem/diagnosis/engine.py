@@ -54,7 +54,7 @@ MILDER = (1.0, 0.5, 0.2)
 ABREAST = 2
 # A hypothesis this much less likely (natural logarithm) than the best is not extended, but for one effect
 # that explains a fair share of what the best does: half of a strong pair leaves a lot.
-HOPELESS, FAIR_SHARE = 400.0, 0.55
+HOPELESS, FAIR_SHARE = 100.0, 0.55
 # An addition must promise to make the data this much likelier, its prior paid.
 ENOUGH_GAIN = 4.0
 # So many singles are fitted however little they promise.
