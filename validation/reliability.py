@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import expit, logit
 
-from spindle_fem.diagnosis.reliability import LARGEST_PROBABILITY, SMALLEST_SHARE
-
 from .score import first_right
 
 Array = NDArray[np.float64]
 
+# As the tool has them.
+LARGEST_PROBABILITY, SMALLEST_SHARE = 0.9999, 1e-3
 NAMES = ("constant", "by the logit of evidence", "by each effect beyond two", "by the last effect's share")
 # Precision of the normal prior of every coefficient but the constant: few cases are wrong.
 RIDGE = 0.6

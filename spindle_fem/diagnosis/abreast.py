@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from uuid import uuid4
 
-from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky import BrokenProcessPool, ProcessPoolExecutor
 from joblib.externals.loky.backend.reduction import dumps
 from threadpoolctl import threadpool_limits
 
@@ -71,6 +71,12 @@ def _problem_at(path: str) -> Problem:
     return pickle.loads(Path(path).read_bytes())
 
 
+@lru_cache(maxsize=1)
+def _others(number: int) -> ProcessPoolExecutor:
+    """Other processes, kept for the next diagnosis; joblib's own, which a sweep uses, are left alone."""
+    return ProcessPoolExecutor(number, timeout=IDLE, env=ONE_THREAD)
+
+
 def _fit_there(path: str, order: FitOrder) -> Fit | None:
     """Fit in another process."""
     return fit_order(_problem_at(path), order)
@@ -101,7 +107,7 @@ class Workers:
         if self._number == 1 or len(orders) == 1:
             return [fit_order(problem, order) for order in orders]
         path, beside = self._send(problem), min(self._number, len(orders)) - 1
-        executor = get_reusable_executor(self._number - 1, timeout=IDLE, env=ONE_THREAD)
+        executor = _others(self._number - 1)
         waiting = deque(enumerate(orders))
         found: list[Fit | None] = [None] * len(orders)
 
@@ -115,7 +121,12 @@ class Workers:
                 found[position] = fit(order)
 
         def there(order: FitOrder) -> Fit | None:
-            fit = executor.submit(_fit_there, path, order).result()
+            try:
+                fit = executor.submit(_fit_there, path, order).result()
+            except BrokenProcessPool:
+                # One of them was killed: the next diagnosis gets new ones.
+                _others.cache_clear()
+                raise
             # Candidates are known by identity; those that come back are copies.
             return None if fit is None else replace(fit, candidates=order.candidates)
 

@@ -57,7 +57,7 @@ def reliable(probability: float, size: int, share: float) -> float:
         :func:`share_of_last`.
 
     >>> round(reliable(0.9999, 1, 1.0), 2), round(reliable(0.9999, 2, 0.03), 2), reliable(0.4, 1, 1.0)
-    (0.93, 0.78, 0.4)
+    (0.94, 0.79, 0.4)
     """
     given = float(logit(np.clip(probability, 1.0 - LARGEST_PROBABILITY, LARGEST_PROBABILITY)))
     further = max(0, size - 2)

@@ -7,7 +7,14 @@ import pytest
 from scipy.special import expit
 
 from spindle_fem.diagnosis import reliability as stated
-from validation.reliability import experience, features, fitted, log_loss
+from validation.reliability import (
+    LARGEST_PROBABILITY,
+    SMALLEST_SHARE,
+    experience,
+    features,
+    fitted,
+    log_loss,
+)
 
 
 def test_the_regression_finds_what_made_the_experience():
@@ -30,6 +37,7 @@ def test_the_regression_finds_what_made_the_experience():
 
 
 def test_features_are_those_that_are_stated_by():
+    assert (LARGEST_PROBABILITY, SMALLEST_SHARE) == (stated.LARGEST_PROBABILITY, stated.SMALLEST_SHARE)
     own = [stated.CONSTANT, stated.BY_LOGIT, stated.BY_FURTHER, stated.BY_SHARE]
     for size, probability, share in ((1, 0.99, 1.0), (2, 0.999, 0.04), (3, 1.0, 0.0)):
         seen = expit(np.dot(own, features(size, probability, share)))
