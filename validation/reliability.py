@@ -57,7 +57,9 @@ def experience(study: Path, results: Path) -> tuple[Array, Array]:
             continue
         diagnosis = json.loads(found.read_text(encoding="utf-8"))
         if answer["effects"] and diagnosis["findings"]:
-            evidence = diagnosis["evidence"]
+            evidence = diagnosis.get("evidence")
+            if evidence is None:
+                raise SystemExit(f"{found}: says nothing of evidence. Diagnose the study anew.")
             rows.append(
                 features(len(diagnosis["findings"]), evidence["probability"], evidence["share_of_last"])
             )

@@ -15,9 +15,11 @@ from scipy.special import expit, logit
 
 from spindle_fem.diagnosis.engine import Hypothesis
 
-# Logistic regression of "the set named first is right" over seeds 11 to 13 of the concealed study, 386
-# diagnoses that named something: the constant; by the logit of the probability that evidence gives; for
-# each effect beyond two; by the decimal logarithm of what the last effect adds to the gain of the set.
+# Logistic regression of "the set named first is right" over seeds 11 to 13 of the concealed study: 386 sets
+# of fits that were kept from before some laws became richer, judged as here. The constant; by the logit of
+# the probability that evidence gives; for each effect beyond two; by the decimal logarithm of what the last
+# effect adds to the gain of the set. On seed 14, which it had not seen, the mean logarithmic loss of stated
+# probabilities falls from 0.47 to 0.32.
 CONSTANT, BY_LOGIT, BY_FURTHER, BY_SHARE = 0.565, 0.233, -1.341, 0.906
 # Evidence beyond these odds says no more than they do, shares below this no more than it does.
 LARGEST_PROBABILITY, SMALLEST_SHARE = 0.9999, 1e-3

@@ -65,3 +65,6 @@ def test_only_diagnoses_that_name_something_count(tmp_path):
     rows, right = experience(study, results)
     assert rows.shape == (2, 4)
     assert right.tolist() == [1.0, 0.0]
+    (results / "a" / "diagnosis.json").write_text(json.dumps({"findings": [finding]}))
+    with pytest.raises(SystemExit, match=r"a/diagnosis.json: says nothing of evidence"):
+        experience(study, results)
