@@ -17,12 +17,13 @@ from spindle_fem.effects.base import Candidate
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
 
-# Laws of the catalogue are simpler than nature. Differences of likelihood count half of what they say.
+# Laws of the catalogue are simpler than nature: differences of likelihood count for less than they say.
 # What one effect more gains counts less the more a set explains already: an inexact law of a strong
 # effect leaves a residual that grows with the effect, and which any other effect may fit a little. It never
 # counts less than a sixth of that, or a second effect beside a strong one would stay unseen however clear it
 # is. Sets of one size all carry that residual, and two thirds of their differences count at any strength.
-# (Of the values tried, those under which the truth was likeliest over seeds 11 to 13 of the concealed study.)
+# (Of the values tried, those under which the truth was likeliest over seeds 11 to 13 of the concealed study,
+# whose fits had simpler laws of frames, lips and starvation than today's.)
 TEMPERATURE = 2.4
 INEXACT_BEYOND = 300.0
 LEAST_TEMPERATURE_RATIO = 6.0
