@@ -216,9 +216,10 @@ class Search:
         left = self.problem.fit(rest, kept, iterations=0)
         tasks: list[Task] = []
         for found, candidate in self._interval_candidates(left, None):
-            if _identity((*rest, candidate)) in self.found or len(tasks) == OTHER_SPOTS:
-                continue
-            tasks.append(self._task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found}))
+            if len(tasks) == OTHER_SPOTS:
+                break
+            if _identity((*rest, candidate)) not in self.found:
+                tasks.append(self._task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found}))
         return tasks
 
     def _widen(self) -> None:
