@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.effects.base import Candidate
 from spindle_fem.effects.term import COOLANT_INLET, FLUID_PREFIX, Term, TermContext
+from spindle_fem.reduced.memory import Moves, moves_over, remembered
+from spindle_fem.reduced.term_layout import Layout
 from spindle_fem.reduced.transient import TransientRun
 
 Array = NDArray[np.float64]
@@ -155,22 +157,21 @@ class BaseRun:
     def _memory(self, term: Term, values: Mapping[str, float]) -> Array:
         """State of a term during each step, (n_states, G + 1)."""
         steps = len(self.drive.steps)
-        memory = np.zeros((term.n_states, steps + 1), dtype=complex)
         if not term.n_states:
-            return memory
-        memory[:, 0] = term.initial_state(values)
+            return np.zeros((0, steps + 1))
         reads = np.array([self.place_temperature(place) for place in term.reads]).reshape(-1, steps + 1)
-        parameters = {name: np.full(1, value, dtype=complex) for name, value in values.items()}
-        for step in range(steps):
-            context = TermContext(
-                float(self.drive.grid[step]),
-                {name: float(column[step]) for name, column in self.start_inputs.items()},
-                reads[:, step : step + 1].astype(complex),
-                memory[:, step : step + 1],
-                parameters,
-            )
-            memory[:, step + 1] = term.advance(context, float(self.drive.steps[step]))[:, 0]
-        return memory
+        n_reads = len(reads)
+        layout = Layout.of(term, values, slice(0, n_reads), slice(0, term.n_states), {})
+
+        def seen(layout: Layout, states: Array) -> TermContext:
+            times = self.drive.grid[:-1]
+            return layout.context_over(times, self.start_inputs, reads[:, :-1].T, states, slopes=False)
+
+        def tell(states: Array) -> Moves:
+            shape = (term.n_states, n_reads, 0)
+            return moves_over([(term, layout)], shape, seen, self.drive.steps, states)
+
+        return remembered(tell, term.initial_state(values), steps)[0].T
 
     def _load(
         self, term: Term, values: Mapping[str, float], memory: Array, before: bool
@@ -186,7 +187,7 @@ class BaseRun:
             self.drive.grid[at],
             inputs,
             reads.astype(complex),
-            memory[:, at],
+            memory[:, at].astype(complex),
             {name: np.full(steps, value, dtype=complex) for name, value in values.items()},
         )
         added = np.zeros((steps, model.size))

@@ -18,10 +18,10 @@ from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.reduced.assemble import RunOperators
 from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.fast_model import FastModel
+from spindle_fem.reduced.memory import Moves, carried, moves_over, remembered
+from spindle_fem.reduced.term_layout import COMPLEX_STEP, Layout
 
 Array = NDArray[np.float64]
-
-COMPLEX_STEP = 1e-30
 
 
 def is_open(term: Term) -> bool:
@@ -248,24 +248,33 @@ def _memory(
     memory = np.zeros((term.n_states, steps + 1, width), dtype=complex)
     if not term.n_states:
         return memory
-    memory[:, 0] = term.initial_state(values)[:, None]
-    nothing = np.zeros((0, width), dtype=complex)
-    bridges = set(drive.restarts)
-    columns = [(name, drive.start[:, i].tolist()) for i, name in enumerate(drive.names)]
-    times, lengths = drive.grid.tolist(), drive.steps.tolist()
-    for step in range(steps):
-        if step + 1 in bridges:
-            memory[:, step + 1] = memory[:, step]
-            continue
-        context = TermContext(
-            times[step],
-            {name: column[step] for name, column in columns},
-            nothing,
-            memory[:, step],
-            perturbed,
+    own = tuple(item.name for item in term.parameters if np.any(perturbed[item.name].imag))
+    layout = Layout.of(term, values, slice(0, 0), slice(0, term.n_states), _targets(perturbed, own))
+    inputs = {name: drive.start[:, i] for i, name in enumerate(drive.names)}
+    nothing = np.zeros((steps, 0))
+    gaps = np.array(drive.restarts, dtype=np.int64) - 1
+
+    def tell(states: Array) -> Moves:
+        moves = moves_over(
+            [(term, layout)],
+            (term.n_states, 0, width - 1),
+            lambda layout, states: layout.context_over(drive.grid[:-1], inputs, nothing, states, slopes=True),
+            drive.steps,
+            states,
         )
-        memory[:, step + 1] = term.advance(context, lengths[step])
+        moves.hold(gaps, states)
+        return moves
+
+    found, moves = remembered(tell, term.initial_state(values), steps)
+    memory += found.T[:, :, None]
+    slopes = carried(moves.by_state, moves.by_parameter)
+    memory[:, :, 1:] += 1j * COMPLEX_STEP * slopes.transpose(1, 0, 2)
     return memory
+
+
+def _targets(perturbed: Mapping[str, NDArray], names: Sequence[str]) -> dict[str, int]:
+    """Derivative that each perturbed parameter belongs to."""
+    return {name: int(np.flatnonzero(perturbed[name].imag)[0]) - 1 for name in names}
 
 
 def _context(drive: Drive, perturbed: Mapping[str, NDArray], memory: NDArray, *, at_end: bool) -> TermContext:

@@ -16,14 +16,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import TermContext
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.reduced.assemble import RunOperators
 from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.linearised import Answers, Followed, Linearised, Lines
+from spindle_fem.reduced.memory import Moves, moves_over, remembered
 from spindle_fem.reduced.nonlinear import TEMPERATURE_TOLERANCE, DynamicTerms, solve_added
 from spindle_fem.reduced.over_time import EvaluationOver, Instants, evaluate_over
 from spindle_fem.reduced.start import Start
-from spindle_fem.reduced.term_layout import Evaluation, OneInstant
+from spindle_fem.reduced.term_layout import Evaluation, Layout, OneInstant
 
 Array = NDArray[np.float64]
 
@@ -173,7 +175,7 @@ class TermMarch:
         answers, start = self.answers, self.start
         steps = len(answers.group_of_step)
         begins = np.flatnonzero(~self._goes_on())
-        before, after = self._instants(at_end=False).at(begins), self._instants(at_end=True)
+        before, after = self._instants(at_end=False), self._instants(at_end=True)
         forcing = answers.with_sensed(self.response[:, :, None])
         given = start.states[:, :, None]
         # From a run that is near the first round may be the last, which needs the derivatives to parameters.
@@ -181,10 +183,12 @@ class TermMarch:
         if near is None:
             near = start.states[np.searchsorted(start.points, np.arange(steps + 1), side="right") - 1]
         sensed = near @ answers.sense.T
+        memory = None
         for _ in range(MOST_ROUNDS):
             if not np.all(np.isfinite(sensed)):
                 return None
-            told = self._told(before, after, begins, sensed, slopes=slopes)
+            told = self._told(before, after, begins, sensed, memory, slopes=slopes)
+            memory = told.memory
             try:
                 linearised = Linearised(answers, told.lines)
             except ConvergenceError:
@@ -196,7 +200,7 @@ class TermMarch:
                 return None
             if moved <= TEMPERATURE_TOLERANCE:
                 if self.dynamic.derivatives and not slopes:
-                    told = self._told(before, after, begins, sensed, slopes=True)
+                    told = self._told(before, after, begins, sensed, memory, slopes=True)
                 return found.states[:, :, 0], self._tracks(found, linearised, told)
             slopes = False
         return None
@@ -213,38 +217,53 @@ class TermMarch:
         )
 
     def _told(
-        self, before: Instants, after: Instants, begins: NDArray[np.int64], sensed: Array, *, slopes: bool
+        self,
+        before: Instants,
+        after: Instants,
+        begins: NDArray[np.int64],
+        sensed: Array,
+        guess: Array | None,
+        *,
+        slopes: bool,
     ) -> _Told:
-        """What the terms tell along sensed temperatures (G + 1, n_y)."""
+        """What the terms tell along sensed temperatures (G + 1, n_y); ``guess`` is of what they remember."""
         dynamic, touched = self.dynamic, self.built.touched
-        memory, moved = self._remembered(sensed)
+        memory, moves = self._remembered(before, sensed, guess, slopes=slopes)
         end = evaluate_over(dynamic, after, touched, sensed[1:], memory[1:], slopes=slopes)
-        jumps = evaluate_over(dynamic, before, touched, sensed[begins], memory[begins], slopes=slopes)
+        jumps = evaluate_over(
+            dynamic, before.at(begins), touched, sensed[begins], memory[begins], slopes=slopes
+        )
         # Where nothing jumps between steps, what holds at the end of one holds at the start of the next.
         begin = EvaluationOver(*(np.roll(getattr(end, name), 1, axis=0) for name in EvaluationOver.__slots__))
         begin.put(begins, jumps)
-        by_sensed, by_state, by_parameter = self._stacked(moved)
-        lines = Lines(begin.by_sensed, begin.by_state, end.by_sensed, end.by_state, by_sensed, by_state)
-        return _Told(begin, end, lines, by_parameter)
+        lines = Lines(
+            begin.by_sensed, begin.by_state, end.by_sensed, end.by_state, moves.by_sensed, moves.by_state
+        )
+        return _Told(begin, end, lines, moves.by_parameter, memory)
 
-    def _remembered(self, sensed: Array) -> tuple[Array, list[tuple[Array, Array, Array, Array]]]:
+    def _remembered(
+        self, before: Instants, sensed: Array, guess: Array | None, *, slopes: bool
+    ) -> tuple[Array, Moves]:
         """What terms remember before each step and after the last (G + 1, n_x), and its derivatives."""
-        dynamic, drive, given = self.dynamic, self.drive, self.answers.given
-        memory = np.zeros((len(sensed), dynamic.n_states))
-        moved: list[tuple[Array, Array, Array, Array]] = []
-        if not dynamic.n_states:
-            return memory, moved
-        memory[0] = dynamic.initial_states()
-        times, lengths, inputs = drive.grid.tolist(), drive.steps.tolist(), drive.start.tolist()
-        for step, length in enumerate(lengths):
-            if step + 1 in given:
-                memory[step + 1] = memory[step]
-                moved.append(self._unmoved(memory[step]))
-                continue
-            own = dict(zip(drive.names, inputs[step], strict=True))
-            moved.append(dynamic.advance(times[step], length, own, sensed[step], memory[step]))
-            memory[step + 1] = moved[-1][0]
-        return memory, moved
+        dynamic, drive, steps = self.dynamic, self.drive, len(self.drive.step_class)
+        asked = len(dynamic.derivatives) if slopes else 0
+        terms = [
+            (term, layout)
+            for term, layout in zip(dynamic.terms, dynamic.layouts, strict=True)
+            if term.n_states
+        ]
+        gaps = np.array([point - 1 for point in self.answers.given if point], dtype=np.int64)
+
+        def seen(layout: Layout, states: Array) -> TermContext:
+            return layout.context_over(before.times, before.inputs, sensed[:-1], states, slopes=slopes)
+
+        def tell(states: Array) -> Moves:
+            shape = (dynamic.n_states, len(dynamic.sense), asked)
+            moves = moves_over(terms, shape, seen, drive.steps, states)
+            moves.hold(gaps, states)
+            return moves
+
+        return remembered(tell, dynamic.initial_states(), steps, guess)
 
     def _unmoved(self, memory: Array) -> tuple[Array, Array, Array, Array]:
         """Memory over a gap: as it was."""
@@ -335,12 +354,13 @@ class TermMarch:
 
 @dataclass(frozen=True, slots=True)
 class _Told:
-    """What terms tell at both ends of every step, and of what they remember."""
+    """What terms tell at both ends of every step, and what they remember."""
 
     begin: EvaluationOver
     end: EvaluationOver
     lines: Lines
     state_by_parameter: Array
+    memory: Array
 
     def constants(self, sensed: Array) -> tuple[Array, Array, Array]:
         """What their straight lines add where nothing is sensed, from sensed temperatures (G + 1, n_y).
