@@ -25,7 +25,7 @@ from spindle_fem.diagnosis.prepare import (
     slow_error_of,
 )
 from spindle_fem.diagnosis.screening import variants_of
-from spindle_fem.diagnosis.verdict import Judgement, judge, rank, tempered
+from spindle_fem.diagnosis.verdict import NEAR, Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.effects.catalogue import candidates_for, catalogue, interval_effects
 from spindle_fem.effects.view import MachineView
 
@@ -39,6 +39,9 @@ ALWAYS_REFITTED = 2
 MOST_WORKERS = 4
 # Less likely than the best by so much (natural logarithm): of no account.
 NEGLIGIBLE = 8.0
+# Of so many rivals of the first set, so many that read nearly as it does are fitted again, whatever their
+# likelihood: those this much farther than what counts as near may come nearer.
+MOST_RIVALS, NEAREST, LOOKED_AT = 16, 3, 1.3
 #: Prior weight of effects; the ways out for what no other fits count less.
 WEIGHTS = {"unrecorded_heat_source": 0.5, "unrecorded_cooling": 0.5}
 
@@ -140,14 +143,17 @@ def diagnose_recordings(
     best = rank(found)[0].best
     slow = slow_error_of(problem, best.fit)
     final = Problem(plant, calibrated.belief, slow, plant.observations)
-    refitted = _refit(final, found, workers)
+    overlapping = _overlapping(view)
+    readings = _Readings(plant, slow.sigma)
+    refitted = _refit(final, found, workers, overlapping, readings)
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
     judgement = judge(
         refitted,
         trials=len({(c.effect, c.component) for c in candidates}),
         calibrated=bool(calibration),
-        overlapping=_overlapping(view),
+        overlapping=overlapping,
+        apart=readings.apart,
     )
     null = next(h.fit for h in refitted if not h.fit.candidates)
     progress("diagnosis: where and when")
@@ -183,8 +189,48 @@ def _overlapping(view: MachineView) -> dict[str, frozenset[str]]:
     return {name: frozenset(family) for name, family in found.items()}
 
 
-def _refit(problem: Problem, found: Sequence[Hypothesis], workers: Workers) -> list[Hypothesis]:
-    """The most probable hypotheses and the empty one, fitted on the whole basis."""
+class _Readings:
+    """What fits have the channels read, and how far that is apart.
+
+    Parameters
+    ----------
+    plant : Plant
+    slow : float, [K]
+        Slow error of a reading.
+    """
+
+    def __init__(self, plant: Plant, slow: float) -> None:
+        self._plant, self._slow = plant, slow
+        self._known: dict[int, tuple[Fit, list[Array]]] = {}
+
+    def apart(self, one: Fit, other: Fit) -> float:
+        """Root mean square of the difference over the noise, in the channel where it is largest."""
+        largest = 0.0
+        for item, first, second in zip(self._plant.observations, self._of(one), self._of(other), strict=True):
+            noise = np.hypot(self._plant.recordings[item.recording].sigma[item.channel], self._slow)
+            largest = max(largest, float(np.sqrt(np.mean((first - second) ** 2))) / float(noise))
+        return largest
+
+    def _of(self, fit: Fit) -> list[Array]:
+        if id(fit) not in self._known:
+            told = [
+                self._plant.predict(number, fit.values, fit.candidates).temperature
+                for number in range(len(self._plant.recordings))
+            ]
+            own = [item.at(told[item.recording][:, item.channel]) for item in self._plant.observations]
+            # The fit is kept so that no other takes its identity.
+            self._known[id(fit)] = fit, own
+        return self._known[id(fit)][1]
+
+
+def _refit(
+    problem: Problem,
+    found: Sequence[Hypothesis],
+    workers: Workers,
+    overlapping: Mapping[str, frozenset[str]],
+    readings: _Readings,
+) -> list[Hypothesis]:
+    """The most probable hypotheses, what reads nearly as the first, and the empty one, on the whole basis."""
     score = {id(h): value for h, value in zip(found, tempered(found), strict=True)}
     ranked = sorted(found, key=lambda h: -score[id(h)])
     best = score[id(ranked[0])]
@@ -198,6 +244,9 @@ def _refit(problem: Problem, found: Sequence[Hypothesis], workers: Workers) -> l
     smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
     chosen += [h for h in smaller if h not in chosen]
     chosen += [h for h in ranked if not h.fit.candidates and h not in chosen]
+    rivals = [h for h in ranked if h not in chosen and may_stand_for(h.fit, ranked[0].fit, overlapping)]
+    nearest = sorted((readings.apart(ranked[0].fit, h.fit), i, h) for i, h in enumerate(rivals[:MOST_RIVALS]))
+    chosen += [h for distance, _, h in nearest[:NEAREST] if distance < LOOKED_AT * NEAR]
     orders = [FitOrder(h.fit.candidates, h.fit.values, iterations=12) for h in chosen]
     # What ran before on a part of the basis may run away on the whole of it: it is no hypothesis then.
     fitted = [

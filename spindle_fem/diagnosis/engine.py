@@ -8,7 +8,7 @@ screening.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit, Problem
 from spindle_fem.diagnosis.locate import ONSETS, OnOff, Onsets, Pattern, find_intervals, onset_answers
 from spindle_fem.diagnosis.screening import Variant, variants_of
 from spindle_fem.diagnosis.search import Screened, amplitude_value, screen
-from spindle_fem.effects.base import Candidate, Effect, IntervalEffect
+from spindle_fem.effects.base import Candidate, Effect, IntervalEffect, in_intervals
 from spindle_fem.effects.view import MachineView
 
 Array = NDArray[np.float64]
@@ -166,10 +166,7 @@ class Search:
         """
         found: dict[tuple[str, ...], Hypothesis] = {}
         for item in ranked:
-            names = (
-                "intervals" if isinstance(self.effects[c.effect], IntervalEffect) else c.effect
-                for c in item.fit.candidates
-            )
+            names = ("intervals" if self._in_intervals(c) else c.effect for c in item.fit.candidates)
             found.setdefault(tuple(sorted(names)), item)
         return list(found.values())
 
@@ -185,29 +182,33 @@ class Search:
         for hypothesis in [h for h in self.ranked() if h.fit.candidates][:EXCHANGED]:
             for member in hypothesis.fit.candidates:
                 rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
-                if isinstance(self.effects[member.effect], IntervalEffect):
+                if self._in_intervals(member):
                     tasks += self._at_other_spots(hypothesis.fit, member, rest)
-                    if rest:
-                        tasks += self._with_laws(rest, member, None)
+                    own = {effect.name for effect in self.interval_effects}
+                    tasks += self._with_laws(
+                        rest, lambda c, own=own, rest=rest: bool(rest) or c.effect in own
+                    )
                 else:
                     places = {member.component, *self._groups_of(member.component)}
-                    tasks += self._with_laws(rest, member, places)
+                    tasks += self._with_laws(
+                        rest,
+                        lambda c, places=places, member=member: (
+                            c.component in places and c.effect != member.effect
+                        ),
+                    )
         self._fit_all(tasks)
 
-    def _with_laws(
-        self, rest: tuple[Candidate, ...], member: Candidate, places: Collection[str] | None
-    ) -> list[Task]:
-        """Fits with other effects, no intervals among them, in the place of one member of a set."""
+    def _with_laws(self, rest: tuple[Candidate, ...], allowed: Callable[[Candidate], bool]) -> list[Task]:
+        """Fits with the best of the candidates allowed, no intervals among them, beside a set."""
         base = self.found.get(_identity(rest))
         if base is None:
             return []
         if _identity(rest) not in self._screenings:
             self.screened(base.fit)
         screened = self._screenings[_identity(rest)]
-        but = {member.effect, *(effect.name for effect in self.interval_effects)}
+        found = screened.best_of(lambda c: allowed(c) and not self._in_intervals(c), OTHERS)
         return [
-            self._task(base.fit, [(screened.variants[index], amplitude)], {})
-            for index, amplitude in screened.best_at(places, but, OTHERS)
+            self._task(base.fit, [(screened.variants[index], amplitude)], {}) for index, amplitude in found
         ]
 
     def _at_other_spots(self, fit: Fit, member: Candidate, rest: tuple[Candidate, ...]) -> list[Task]:
@@ -316,7 +317,7 @@ class Search:
             [replace(c, starts=self.effects[c.effect].starts_from(c, times, residual)) for c in allowed]
         )
         intervals = {}
-        if not any(isinstance(self.effects[c.effect], IntervalEffect) for c in fit.candidates):
+        if not any(self._in_intervals(c) for c in fit.candidates):
             for found, candidate in self._interval_candidates(fit, trust):
                 variant = Variant(candidate, {})
                 intervals[id(candidate)] = found
@@ -413,10 +414,13 @@ class Search:
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
         """Whether an effect is on only where nothing was recorded, neither readings nor inputs."""
-        effect = self.effects[candidate.effect]
-        if not isinstance(effect, IntervalEffect):
+        if not self._in_intervals(candidate):
             return False
-        return self._within_gaps(effect.intervals(candidate, values), candidate.recording or 0)
+        on = self.effects[candidate.effect].intervals(candidate, values)
+        return self._within_gaps(on, candidate.recording or 0)
+
+    def _in_intervals(self, candidate: Candidate) -> bool:
+        return in_intervals(self.effects[candidate.effect], candidate)
 
     def _within_gaps(self, intervals: Sequence[tuple[float, float]], recording: int) -> bool:
         gaps = self.problem.plant.gap_intervals(recording)
@@ -444,9 +448,8 @@ class Search:
         total = sum(self.weights.values())
         found = float(np.log(NUMBER_PRIOR[len(candidates)]))
         for candidate in candidates:
-            effect = self.effects[candidate.effect]
-            if isinstance(effect, IntervalEffect):
-                places, share = len(effect.places(self.view)), 1.0
+            if self._in_intervals(candidate):
+                places, share = len(self.effects[candidate.effect].places(self.view)), 1.0
             else:
                 same = [c for c in self.candidates if c.effect == candidate.effect]
                 places = len({c.component for c in same})

@@ -12,8 +12,9 @@ from spindle_fem.diagnosis.core import Diagnosis
 from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit
 from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.diagnosis.verdict import Ranked
-from spindle_fem.effects.base import Candidate, IntervalEffect, Reported
+from spindle_fem.effects.base import Candidate, Reported, in_intervals
 from spindle_fem.effects.catalogue import effect_of
+from spindle_fem.effects.unrecorded import followed_name
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
             | _named(diagnosis, candidate)
             for start, end in effect.intervals(candidate, values)
         ]
-        if isinstance(effect, IntervalEffect)
+        if in_intervals(effect, candidate)
         else []
     )
     return {
@@ -96,6 +97,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
         "probability": probability,
         "parameters": parameters,
         "intervals": intervals,
+        "follows": followed_name(candidate) or None,
         "statement": effect.statement(candidate, reported),
         "check": effect.check,
     }

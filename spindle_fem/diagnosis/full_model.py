@@ -8,7 +8,7 @@ reduction.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from spindle_fem.diagnosis.plant import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, 
 from spindle_fem.effects.base import Candidate
 from spindle_fem.errors import SpecError, SpindleFemError
 from spindle_fem.network.history import InputHistory
-from spindle_fem.reduced.drive import Drive
+from spindle_fem.reduced.drive import COVARIATE, Drive
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.transients.history import OperatingHistory
 from spindle_fem.transients.records import MachineTransient, TransientOptions
@@ -262,13 +262,15 @@ def run_fit(machine: PreparedMachine, plant: Plant, fit: Fit, options: Transient
     return FullFit(tuple(predicted), steps, time.perf_counter() - began)
 
 
-def inputs_of_drive(drive: Drive) -> InputHistory:
-    """The inputs of a drive as the full model takes them.
+def inputs_of_drive(drive: Drive, followed: Collection[str] = ()) -> InputHistory:
+    """The inputs of a drive as the full model takes them, and of its covariates those that are followed.
 
     Inputs that are constant on every step are held, others joined by straight lines.
     """
-    values = np.vstack((drive.start, drive.end[-1:]))
-    return InputHistory(drive.grid, drive.names, values, np.all(drive.start == drive.end, axis=0))
+    columns = [i for i, name in enumerate(drive.names) if not name.startswith(COVARIATE) or name in followed]
+    start, end = drive.start[:, columns], drive.end[:, columns]
+    names = tuple(drive.names[i] for i in columns)
+    return InputHistory(drive.grid, names, np.vstack((start, end[-1:])), np.all(start == end, axis=0))
 
 
 def physics_of_fit(plant: Plant, number: int, fit: Fit) -> Physics:
@@ -359,9 +361,9 @@ def _acting(candidates: Sequence[Candidate], number: int) -> tuple[Candidate, ..
 def _run(
     machine: PreparedMachine, plant: Plant, number: int, fit: Fit, options: TransientOptions
 ) -> MachineTransient:
-    inputs = inputs_of_drive(plant.drives[number])
-    start = start_at(machine, OperatingHistory.of(machine.spec, inputs), plant.start(number, fit.values))
     physics = physics_of_fit(plant, number, fit)
+    inputs = inputs_of_drive(plant.drives[number], {name for term in physics.terms for name in term.follows})
+    start = start_at(machine, OperatingHistory.of(machine.spec, inputs), plant.start(number, fit.values))
     return simulate_full(machine, inputs, start=start, options=options, physics=physics)
 
 

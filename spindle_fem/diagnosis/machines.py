@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from spindle_fem.diagnosis.heldout import heldout_stamps
+from spindle_fem.diagnosis.usual_sizes import common_quantities
 from spindle_fem.diagnosis.view import view_of, view_of_network
 from spindle_fem.effect_entries import ActiveEffects, effects_on
 from spindle_fem.effects.view import MachineView
@@ -182,7 +183,7 @@ def _widest(views: Sequence[MachineView]) -> MachineView:
         highest_speed=max(view.highest_speed for view in views),
         lowest_speed=min((view.lowest_speed for view in views if view.lowest_speed > 0.0), default=0.0),
         channels=tuple(dict.fromkeys(name for view in views for name in view.channels)),
-        covariates=tuple(dict.fromkeys(name for view in views for name in view.covariates)),
+        quantities=common_quantities([view.quantities for view in views]),
         reynolds=(
             float(np.min([view.reynolds[0] for view in views])),
             float(np.max([view.reynolds[1] for view in views])),

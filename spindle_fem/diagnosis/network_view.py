@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.diagnosis.usual_sizes import LEAST_HEAT, lowest_speed, usual_rise
+from spindle_fem.diagnosis.usual_sizes import LEAST_HEAT, lowest_speed, quantities_of, usual_rise
 from spindle_fem.effects.view import MachineView, Seat
 from spindle_fem.network.model import ThermalNetwork
 from spindle_fem.recordings.align import Recording
@@ -87,7 +87,7 @@ def view_of_network(
         parameters={item.name: item.sigma_log for item in network.parameters if item.sigma_log > 0.0},
         channels=recording.temperature_names,
         inputs=tuple(dict.fromkeys((*recording.input_names, *network.input_names))),
-        covariates=recording.covariate_names,
+        quantities=quantities_of(recording, turning),
         has=has,
         reference_temperature=room,
         highest_speed=max((scale[name] for name in turning), default=0.0),

@@ -33,7 +33,7 @@ from spindle_fem.diagnosis.trials import (
     trials_of,
 )
 from spindle_fem.diagnosis.verdict import TEMPERATURE, Ranked, rank
-from spindle_fem.effects.base import IntervalEffect, place_words
+from spindle_fem.effects.base import in_intervals, place_words
 from spindle_fem.effects.catalogue import effect_of
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -346,7 +346,7 @@ def _merit(option: Option) -> tuple[float, float]:
 
 def timed_words(fits: Sequence[Fit]) -> str:
     """What is taken for granted of effects that come and go; empty where there are none."""
-    timed = any(isinstance(effect_of(c.effect), IntervalEffect) for fit in fits for c in fit.candidates)
+    timed = any(in_intervals(effect_of(c.effect), c) for fit in fits for c in fit.candidates)
     return " Unrecorded heat or cooling is taken to come and go as it did in the recording." if timed else ""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from spindle_fem.diagnosis.inference import Fit, Problem
 from spindle_fem.diagnosis.linear import BoxedColumns, LinearProblem
 from spindle_fem.diagnosis.screening import BaseRun, Variant
+from spindle_fem.effects.base import Candidate
 
 Array = NDArray[np.float64]
 
@@ -164,20 +165,15 @@ class Screened:
             chosen |= good[sets].all(axis=1)
         return sets[chosen]
 
-    def best_at(
-        self, places: Collection[str] | None, but: Collection[str], number: int
-    ) -> list[tuple[int, float]]:
-        """Best variant of each effect and form at some places, with its amplitude, some effects left out.
-
-        At all places where ``places`` is None.
-        """
+    def best_of(self, allowed: Callable[[Candidate], bool], number: int) -> list[tuple[int, float]]:
+        """Best variant of each effect and form at each place, among those allowed, with its amplitude."""
         gain = self.singles()
         found: dict[tuple[str, str, str], int] = {}
         for index in np.argsort(-gain):
             candidate = self.variants[index].candidate
             if not np.isfinite(gain[index]) or len(found) == number:
                 break
-            if (places is None or candidate.component in places) and candidate.effect not in but:
+            if allowed(candidate):
                 found.setdefault((candidate.effect, candidate.component, candidate.form), int(index))
         return [(index, self.amplitudes([index])[index]) for index in found.values()]
 

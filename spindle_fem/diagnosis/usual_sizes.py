@@ -1,17 +1,25 @@
-"""Sizes that a recording has: speeds, rises, inputs."""
+"""Sizes that a recording has: speeds, rises, inputs, and what heat may follow of it."""
 
 from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.view import RecordedQuantity
 from spindle_fem.recordings.align import Recording
+from spindle_fem.reduced.drive import COVARIATE
+from spindle_fem.units import registry
 
 Array = NDArray[np.float64]
 
 # Channels rise at least this much, K, and heat is at least this much, W, for usual sizes of effects.
 LEAST_RISE = 2.0
 LEAST_HEAT = 1.0
+KELVIN = "kelvin"
+NAMED = {"kg*m/s**2": "N", "kg*m**2/s**3": "W"}
 
 
 def input_series(recording: Recording, name: str, otherwise: float) -> Array:
@@ -33,3 +41,46 @@ def usual_rise(recording: Recording, ambient: Array) -> float:
     if not np.isfinite(difference).any():
         return LEAST_RISE
     return max(LEAST_RISE, float(np.nanpercentile(difference, 95.0)))
+
+
+def quantities_of(recording: Recording, speeds: Collection[str]) -> tuple[RecordedQuantity, ...]:
+    """Loads and covariates, and changes of speeds; temperatures, flows and heat have laws of their own.
+
+    Parameters
+    ----------
+    recording : Recording
+    speeds : collection of str
+        Inputs that are speeds.
+    """
+    found = []
+    for name, unit in zip(recording.input_names, recording.input_units, strict=True):
+        if unit != KELVIN and name != "coolant_flow" and not name.startswith("heat."):
+            changes = name in speeds
+            values = recording.input_at(name, recording.times)
+            found.append(_quantity(f"change of {name}" if changes else name, name, values, unit, changes))
+    units = dict(zip(recording.covariate_names, recording.covariate_units, strict=True))
+    for name, values in recording.covariate_history().items():
+        if units[name] != KELVIN:
+            found.append(replace(_quantity(name, COVARIATE + name, values, units[name]), beside=True))
+    return tuple(item for item in found if item.highest > 0.0)
+
+
+def _quantity(name: str, own: str, values: Array, unit: str, changes: bool = False) -> RecordedQuantity:
+    size = np.abs(values)
+    highest = float(size.max())
+    short = f"{registry().Unit(unit):~C}"
+    varies = float(np.ptp(size)) / max(highest, 1e-300)
+    return RecordedQuantity(name, own, highest, varies, NAMED.get(short, short), changes)
+
+
+def common_quantities(
+    by_recording: Sequence[Sequence[RecordedQuantity]],
+) -> tuple[RecordedQuantity, ...]:
+    """Quantities that every one of several recordings has, with the widest range of each."""
+    found = []
+    for item in by_recording[0]:
+        same = [other for own in by_recording for other in own if other.name == item.name]
+        if len(same) == len(by_recording):
+            highest = max(other.highest for other in same)
+            found.append(replace(item, highest=highest, varies=max(other.varies for other in same)))
+    return tuple(found)

@@ -12,7 +12,13 @@ from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.diagnosis.contacts import seats_of
 from spindle_fem.diagnosis.layout import CHANNEL_WALL, SHAFT_GAP, Layout, segment_volume, volume
 from spindle_fem.diagnosis.network_view import view_of_network
-from spindle_fem.diagnosis.usual_sizes import LEAST_HEAT, input_series, lowest_speed, usual_rise
+from spindle_fem.diagnosis.usual_sizes import (
+    LEAST_HEAT,
+    input_series,
+    lowest_speed,
+    quantities_of,
+    usual_rise,
+)
 from spindle_fem.effects.coolant_film import reynolds_number
 from spindle_fem.effects.view import ChannelFlow, FrictionTable, MachineView
 from spindle_fem.recordings.align import Recording
@@ -68,7 +74,7 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
         parameters=free_parameters(spec),
         channels=recording.temperature_names,
         inputs=tuple(dict.fromkeys((*known, *recording.input_names))),
-        covariates=recording.covariate_names,
+        quantities=quantities_of(recording, ("speed",)),
         has=_switched_on(spec),
         reference_temperature=float(np.nanmean(inputs["ambient"])),
         highest_speed=float(speed.max()),

@@ -328,6 +328,8 @@ Intervals = Sequence[tuple[float, float]]
 class IntervalEffect(Effect):
     """An effect that is on in intervals of time, found in the data rather than searched blindly.
 
+    Its forms besides these follow laws, as those of any other effect.
+
     Attributes
     ----------
     interval_forms : tuple of str
@@ -337,7 +339,7 @@ class IntervalEffect(Effect):
     interval_forms: tuple[str, ...] = ("",)
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """None: its candidates come from intervals."""
+        """Those that follow laws; candidates for intervals come from the data."""
         return ()
 
     @abstractmethod
@@ -362,4 +364,9 @@ class IntervalEffect(Effect):
 
     @abstractmethod
     def intervals(self, candidate: Candidate, values: Mapping[str, float]) -> list[tuple[float, float]]:
-        """Fitted intervals, [s]."""
+        """Fitted intervals, [s]; none where it follows a law."""
+
+
+def in_intervals(effect: Effect, candidate: Candidate) -> bool:
+    """Whether a candidate of an effect is on in intervals."""
+    return isinstance(effect, IntervalEffect) and bool(effect.intervals(candidate, {}))

@@ -193,7 +193,8 @@ def definition_entry(candidate: Candidate, values: Mapping[str, float]) -> dict[
     edges: set[str] = set()
     if isinstance(effect, IntervalEffect):
         pairs = effect.intervals(candidate, values)
-        entry["intervals"] = [[f"{start:.10g} s", f"{end:.10g} s"] for start, end in pairs]
+        if pairs:
+            entry["intervals"] = [[f"{start:.10g} s", f"{end:.10g} s"] for start, end in pairs]
         edges = {f"{side}_{number}" for number in range(1, len(pairs) + 1) for side in ("start", "end")}
     entry["parameters"] = {
         item.name: _text(item, values.get(outer, item.value))
@@ -237,9 +238,16 @@ def _seconds(intervals: Sequence[tuple[Any, Any]], where: str) -> Intervals:
 def _matching(
     effect: Effect, component: str, form: str, view: MachineView, intervals: Intervals, where: str
 ) -> Candidate:
-    if isinstance(effect, IntervalEffect):
-        if not intervals:
-            raise SpecError(f"{where}.intervals", f"{effect.name} has none.", "Give at least one.")
+    laws = list(effect.forms(view))
+    if isinstance(effect, IntervalEffect) and not intervals:
+        known = dict.fromkeys(item.form for item in laws if item.component == component)
+        if form not in known:
+            laws_of_it = f", or a form: {', '.join(map(repr, known))}" if known else ""
+            raise SpecError(
+                f"{where}.intervals", f"{effect.name} has none.", f"Give at least one{laws_of_it}."
+            )
+        offered = laws
+    elif isinstance(effect, IntervalEffect):
         offered = [
             effect.over(view, place, intervals, kind)
             for place in effect.places(view)
@@ -248,7 +256,7 @@ def _matching(
     else:
         if intervals:
             raise SpecError(f"{where}.intervals", f"{effect.name} takes none.", "Leave them out.")
-        offered = list(effect.forms(view))
+        offered = laws
     for candidate in offered:
         if candidate.component == component and candidate.form == form:
             return candidate

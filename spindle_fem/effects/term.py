@@ -116,6 +116,8 @@ class Term:
         Places whose mean temperatures it needs.
     n_states : int
         Numbers that it remembers from step to step.
+    follows : tuple of str
+        Inputs, beyond those that every machine has, that it needs.
     """
 
     name: str = ""
@@ -125,6 +127,7 @@ class Term:
     bearings: tuple[str, ...] = ()
     reads: tuple[str, ...] = ()
     n_states: int = 0
+    follows: tuple[str, ...] = ()
 
     def heat(self, context: TermContext) -> NDArray[np.complex128]:
         """Heat of every heat place, (n_heat_places, k) W; K for fluids."""

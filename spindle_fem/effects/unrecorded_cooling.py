@@ -1,40 +1,44 @@
-"""Extra loss at a place in intervals that no input explains."""
+"""Extra loss at a place that no effect explains."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from spindle_fem.effects.base import Candidate, Intervals, Reported, place_words, quantity
+from spindle_fem.effects.base import Candidate, Reported, place_words, quantity
 from spindle_fem.effects.laws import Complex, amplitude, fluid_temperature
 from spindle_fem.effects.spread import Spread
-from spindle_fem.effects.term import Term, TermContext
-from spindle_fem.effects.unrecorded import IntervalHeatTerm, IntervalTerm, UnrecordedEffect, interval_words
-from spindle_fem.effects.view import MachineView
+from spindle_fem.effects.term import TermContext, TermParameter
+from spindle_fem.effects.unrecorded import (
+    Share,
+    UnrecordedEffect,
+    UnrecordedHeatTerm,
+    UnrecordedTerm,
+    when_words,
+)
+from spindle_fem.effects.view import MachineView, RecordedQuantity
 
 
-class CoolingTerm(IntervalTerm):
+class CoolingTerm(UnrecordedTerm):
     """Conductance from places to the surroundings.
 
     Parameters
     ----------
     name : str
+    size : TermParameter
     spread : Spread
+    on : Share
     fluid : str or float
         Input of the surroundings, or their temperature [K].
-    usual : float, [W/K]
-    intervals : sequence of (float, float), [s]
     """
 
-    def __init__(
-        self, name: str, spread: Spread, fluid: str | float, usual: float, intervals: Intervals
-    ) -> None:
-        super().__init__(name, amplitude("conductance", usual, "W/K"), spread, intervals)
+    def __init__(self, name: str, size: TermParameter, spread: Spread, on: Share, fluid: str | float) -> None:
+        super().__init__(name, size, spread, on)
         self.reads = self.heat_places
         self._fluid = fluid
 
     def heat(self, context: TermContext) -> Complex:
         """Of every place, (n, k) W."""
-        size = context.parameters["conductance"] * self.share(context)
+        size = context.parameters["conductance"] * self.on.share(context)
         fluid = fluid_temperature(context, self._fluid)
         if self.spread.sides:
             return self.spread.heat(context, -size * (self.spread.temperature(context) - fluid))
@@ -47,10 +51,11 @@ class UnrecordedCooling(UnrecordedEffect):
 
     name = "unrecorded_cooling"
     kind = "missing_physics"
-    title = "something cools this place in intervals that no recorded input explains"
+    title = "something cools this place that no recorded input explains"
     check = (
         "What runs in these intervals: cutting fluid, air blast, an open door or guard, a second coolant "
-        "circuit; compare the intervals with the machine's programme and record the suspect."
+        "circuit; compare the intervals with the machine's programme and record the suspect. Where the loss "
+        "follows a recorded quantity: what blows or flows with it at this place."
     )
     interval_forms = ("conductance", "heat")
 
@@ -59,19 +64,23 @@ class UnrecordedCooling(UnrecordedEffect):
         heat = 0.2 * machine.typical_heat
         return heat if form == "heat" else heat / machine.typical_rise
 
-    def term(self, machine: MachineView, spot: str, intervals: Intervals, form: str) -> Term:
-        """Loss at a spot."""
-        spread, usual, own = self.spread(machine, spot), self.usual(machine, form), tuple(intervals)
+    def followed(self, machine: MachineView) -> Sequence[RecordedQuantity]:
+        """What was recorded beside the inputs: inputs that cool have laws of their own."""
+        return tuple(item for item in machine.quantities if item.beside and not item.changes)
+
+    def term(self, machine: MachineView, name: str, spread: Spread, on: Share, form: str) -> UnrecordedTerm:
+        """Loss over a spot."""
+        usual = self.usual(machine, form)
         if form == "heat":
-            return IntervalHeatTerm(self.term_name(spot, form), spread, usual, own, sign=-1.0)
+            return UnrecordedHeatTerm(name, amplitude("heat", usual, "W"), spread, on, sign=-1.0)
         fluid = "ambient" if "ambient" in machine.inputs else machine.reference_temperature
-        return CoolingTerm(self.term_name(spot), spread, fluid, usual, own)
+        return CoolingTerm(name, amplitude("conductance", usual, "W/K"), spread, on, fluid)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and how often."""
         size = reported.get("conductance") or reported["heat"]
         way = " to the surroundings" if size.unit == "W/K" else ""
         return (
-            f"A further {quantity(size)}{way} is lost from {place_words(candidate.component)} in "
-            f"{interval_words(candidate)} that no recorded input explains."
+            f"A further {quantity(size)}{way} is lost from {place_words(candidate.component)} "
+            f"{when_words(candidate)}."
         )

@@ -1,12 +1,14 @@
-"""Heat at a place in intervals that no input explains."""
+"""Heat at a place that no effect explains."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from spindle_fem.effects.base import Candidate, Intervals, Reported, capital, place_words, quantity
-from spindle_fem.effects.unrecorded import IntervalHeatTerm, UnrecordedEffect, interval_words
-from spindle_fem.effects.view import MachineView
+from spindle_fem.effects.base import Candidate, Reported, capital, place_words, quantity
+from spindle_fem.effects.laws import amplitude
+from spindle_fem.effects.spread import Spread
+from spindle_fem.effects.unrecorded import Share, UnrecordedEffect, UnrecordedHeatTerm, when_words
+from spindle_fem.effects.view import MachineView, RecordedQuantity
 
 
 class UnrecordedHeatSource(UnrecordedEffect):
@@ -14,10 +16,11 @@ class UnrecordedHeatSource(UnrecordedEffect):
 
     name = "unrecorded_heat_source"
     kind = "missing_physics"
-    title = "something heats this place in intervals that no recorded input explains"
+    title = "something heats this place that no recorded input explains"
     check = (
         "What runs in these intervals: cutting, hydraulic clamping, chip heap, lamp, neighbouring drive; "
-        "compare the intervals with the machine's programme and record the suspect."
+        "compare the intervals with the machine's programme and record the suspect. Where the heat follows a "
+        "recorded quantity: what rubs, brakes or is driven with it at this place."
     )
     interval_forms = ("heat",)
 
@@ -25,15 +28,19 @@ class UnrecordedHeatSource(UnrecordedEffect):
         """A fifth of all heat."""
         return 0.2 * machine.typical_heat
 
-    def term(self, machine: MachineView, spot: str, intervals: Intervals, form: str) -> IntervalHeatTerm:
-        """Heat at a spot."""
-        return IntervalHeatTerm(
-            self.term_name(spot), self.spread(machine, spot), self.usual(machine, form), tuple(intervals)
-        )
+    def followed(self, machine: MachineView) -> Sequence[RecordedQuantity]:
+        """All of them, speeds only by their changes: what grows with speed has laws of its own."""
+        return machine.quantities
+
+    def term(
+        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str
+    ) -> UnrecordedHeatTerm:
+        """Heat over a spot."""
+        return UnrecordedHeatTerm(name, amplitude("heat", self.usual(machine, form), "W"), spread, on)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and how often."""
         return (
-            f"{capital(quantity(reported['heat']))} of heat enters {place_words(candidate.component)} in "
-            f"{interval_words(candidate)} that no recorded input explains."
+            f"{capital(quantity(reported['heat']))} of heat enters {place_words(candidate.component)} "
+            f"{when_words(candidate)}."
         )

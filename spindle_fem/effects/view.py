@@ -85,6 +85,36 @@ class ChannelFlow:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordedQuantity:
+    """Something recorded that heat may follow by a law.
+
+    Attributes
+    ----------
+    name : str
+        In findings: ``thrust``, ``change of speed``, a covariate's column.
+    input : str
+        As :class:`spindle_fem.reduced.drive.Drive` names it.
+    highest : float
+        Largest magnitude in the recording, SI.
+    varies : float
+        Range of the magnitude as a share of ``highest``.
+    unit : str
+    changes : bool
+        Whether its changes are followed instead of itself.
+    beside : bool
+        Whether it was recorded beside the inputs (a covariate).
+    """
+
+    name: str
+    input: str
+    highest: float
+    varies: float
+    unit: str = ""
+    changes: bool = False
+    beside: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class MachineView:
     """Names of one machine.
 
@@ -113,7 +143,8 @@ class MachineView:
         Temperature channels of the recording.
     inputs : tuple of str
         Inputs of the recording.
-    covariates : tuple of str
+    quantities : tuple of RecordedQuantity
+        Recorded quantities that heat without a law of the catalogue may follow.
     has : frozenset of str
         Effects that the definition already switches on, by id, or
         ``<id> @ <component>`` where that is all they concern.
@@ -180,7 +211,7 @@ class MachineView:
     parameters: Mapping[str, float]
     channels: tuple[str, ...]
     inputs: tuple[str, ...]
-    covariates: tuple[str, ...]
+    quantities: tuple[RecordedQuantity, ...]
     has: frozenset[str]
     reference_temperature: float
     highest_speed: float

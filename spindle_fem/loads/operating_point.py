@@ -19,6 +19,8 @@ class OperatingPoint:
     ambient_temperature, coolant_inlet_temperature : float, [K]
     coolant_flow : float, [m³/s]
     extra_heat : mapping of source name to float, [W]
+    beside : mapping of str to float
+        What was recorded beside the inputs and only terms may follow, ``covariate.<column>``.
     """
 
     speed: float
@@ -27,6 +29,7 @@ class OperatingPoint:
     coolant_inlet_temperature: float
     coolant_flow: float
     extra_heat: Mapping[str, float] = field(default_factory=dict)
+    beside: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, spec: MachineSpec) -> OperatingPoint:

@@ -69,6 +69,8 @@ class Recording:
     covariate_names : tuple of str
     covariates : (N, k) float64 ndarray
         SI.
+    covariate_units : tuple of str
+        SI base units.
     segments : (S, 2) int64 ndarray
         Start and stop of the stretches between long gaps.
     defects : DefectReport
@@ -91,6 +93,7 @@ class Recording:
     input_units: tuple[str, ...]
     covariate_names: tuple[str, ...]
     covariates: Array
+    covariate_units: tuple[str, ...]
     segments: NDArray[np.int64]
     defects: DefectReport
 
@@ -137,6 +140,15 @@ class Recording:
             values[:, position] = self.input_at(name, self.times)
         held = np.array([self.held[self.input_names.index(name)] for name in chosen], dtype=bool)
         return InputHistory(self.times, tuple(chosen), values, held)
+
+    def covariate_history(self) -> dict[str, Array]:
+        """Covariates that have readings, (N,) each by column, on straight lines between these."""
+        found = {}
+        for name, values in zip(self.covariate_names, self.covariates.T, strict=True):
+            present = np.isfinite(values)
+            if present.any():
+                found[name] = np.interp(self.times, self.times[present], values[present])
+        return found
 
     def first_readings(self, segment: int = 0) -> dict[str, float]:
         """First usable reading, [K], of each probe in a segment."""
@@ -241,6 +253,7 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
         input_units=tuple(units[c.column].unit for c in inputs),
         covariate_names=tuple(c.column for c in by_role["covariate"]),
         covariates=_stack([aligned[c.column] for c in by_role["covariate"]], times),
+        covariate_units=tuple(units[c.column].unit for c in by_role["covariate"]),
         segments=segments,
         defects=report,
     )

@@ -79,6 +79,7 @@ def _recording(
         input_units=tuple(units.get(name, "") for name in inputs),
         covariate_names=(),
         covariates=np.empty((2, 0)),
+        covariate_units=(),
         segments=np.array([[0, 2]]),
         defects=DefectReport(
             name=source,

@@ -28,6 +28,7 @@ WALL_BIN, MOST_WALLS = 0.5, 200
 LARGEST_STEP = 60.0
 MOST_STEP_SIZES = 200
 
+COVARIATE = "covariate."
 STANDARD = ("speed", "thrust", "ambient", "coolant_inlet", "coolant_flow")
 
 
@@ -56,7 +57,8 @@ class Drive:
         Ends of the steps.
     names : tuple of str
         ``speed`` [rad/s], ``thrust`` [N], ``ambient``, ``coolant_inlet`` [K],
-        ``coolant_flow`` [m³/s], then ``heat.<source>`` [W].
+        ``coolant_flow`` [m³/s], then ``heat.<source>`` [W] and
+        ``covariate.<column>``, which only terms may follow.
     start, end : (G, m) ndarray
         Inputs just after the start and just before the end of each step.
     step_class : (G,) int ndarray
@@ -144,6 +146,10 @@ def drive_of_recording(
         else:
             columns.append(np.full(recording.times.size, known[name]))
             held.append(True)
+    beside = recording.covariate_history()
+    names = (*names, *(COVARIATE + name for name in beside))
+    columns += beside.values()
+    held += [False] * len(beside)
     return make_drive(
         recording.times,
         names,

@@ -25,7 +25,7 @@ from spindle_fem.recordings.simulate_network import (
     require_compatible,
 )
 from spindle_fem.reduced.directions import ConductingDirections
-from spindle_fem.reduced.drive import LARGEST_STEP, STANDARD, Drive, inputs_on_steps
+from spindle_fem.reduced.drive import COVARIATE, LARGEST_STEP, STANDARD, Drive, inputs_on_steps
 from spindle_fem.reduced.exact_step import build_exact_propagator
 from spindle_fem.reduced.fast_model import NO_CHANGES, ClassOperators
 from spindle_fem.reduced.network_parts import (
@@ -353,6 +353,9 @@ class NetworkFastModel:
             room = np.full(len(values), first) if driven is None else values[:, names.index(driven)]
             names, values = (*names, "ambient"), np.column_stack((values, room))
             held = np.append(held, driven is None or held[names.index(driven)])
+        for name, column in recording.covariate_history().items():
+            names, values = (*names, COVARIATE + name), np.column_stack((values, column))
+            held = np.append(held, False)
         breaks = recording.times[recording.segments[1:, 0]]
         grid, start, end = inputs_on_steps(recording.times, values, held, largest_step, breaks)
         restarts = tuple(int(i) for i in np.searchsorted(grid, breaks - 1e-9))

@@ -25,8 +25,8 @@ FIELD_OF = {
 }
 # Changes below this pass inside a step: share of the largest value, or K for temperatures.
 RELATIVE_RESOLUTION = {"speed": 2.0e-3, "thrust": 1.0e-2, "coolant_flow": 1.0e-2}
-# Heat that the inputs give for a place, in W, and its resolution.
-HEAT = "heat."
+# Heat that the inputs give for a place, in W, what was recorded beside the inputs, and their resolution.
+HEAT, BESIDE = "heat.", "covariate."
 HEAT_RESOLUTION = 1.0e-2
 TEMPERATURE_RESOLUTION = 0.05
 # A held input that jumps by this many resolutions starts the steps anew.
@@ -41,7 +41,8 @@ class OperatingHistory:
     ----------
     inputs : InputHistory
         Columns named ``speed`` [rad/s], ``thrust`` [N], ``ambient``,
-        ``coolant_inlet`` [K], ``coolant_flow`` [m³/s], ``heat.<place>`` [W];
+        ``coolant_inlet`` [K], ``coolant_flow`` [m³/s], ``heat.<place>`` [W],
+        ``covariate.<column>``;
         before the first time the first value holds, after the last one the last.
     defined : OperatingPoint
         The definition's own values.
@@ -60,7 +61,7 @@ class OperatingHistory:
             An input that a machine with geometry does not have.
         """
         for name in inputs.names:
-            if name not in FIELD_OF and not name.startswith(HEAT):
+            if name not in FIELD_OF and not name.startswith((HEAT, BESIDE)):
                 raise RecordingError(
                     "inputs", f'"{name}" drives nothing in this machine.', did_you_mean(name, FIELD_OF)
                 )
@@ -69,7 +70,7 @@ class OperatingHistory:
     def at(self, time: float) -> OperatingPoint:
         """Operating point just after a time [s]; friction does not know which way a spindle turns."""
         values = {field: getattr(self.defined, field) for field in FIELD_OF.values()}
-        extra_heat = {}
+        extra_heat, beside = {}, {}
         times = self.inputs.times
         left = max(int(np.searchsorted(times, time, side="right")) - 1, 0)
         for column, name in enumerate(self.inputs.names):
@@ -78,10 +79,12 @@ class OperatingHistory:
             value = float(samples[left] if held else np.interp(time, times, samples))
             if name in FIELD_OF:
                 values[FIELD_OF[name]] = value
+            elif name.startswith(BESIDE):
+                beside[name] = value
             else:
                 extra_heat[name.removeprefix(HEAT)] = value
         values["speed"] = abs(values["speed"])
-        return OperatingPoint(**values, extra_heat=extra_heat)
+        return OperatingPoint(**values, extra_heat=extra_heat, beside=beside)
 
     def given_heat(self) -> tuple[RecordedHeat, ...]:
         """Terms that put the heat of the inputs into their places."""
@@ -89,7 +92,7 @@ class OperatingHistory:
 
     def _resolution(self, column: int, temperature: float = TEMPERATURE_RESOLUTION) -> float:
         name = self.inputs.names[column]
-        share = HEAT_RESOLUTION if name.startswith(HEAT) else RELATIVE_RESOLUTION.get(name)
+        share = HEAT_RESOLUTION if name.startswith((HEAT, BESIDE)) else RELATIVE_RESOLUTION.get(name)
         if share is None:
             return temperature
         largest = float(np.abs(self.inputs.values[:, column]).max())

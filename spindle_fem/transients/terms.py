@@ -419,6 +419,7 @@ def inputs_of(point: OperatingPoint) -> dict[str, float]:
         "coolant_inlet": point.coolant_inlet_temperature,
         "coolant_flow": point.coolant_flow,
         **{f"heat.{name}": heat for name, heat in point.extra_heat.items()},
+        **point.beside,
     }
 
 

@@ -11,10 +11,11 @@ from spindle_fem.conduction.assemble import assemble_capacity
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.coupling import prepare_machine, solve_coupled
 from spindle_fem.effects.coolant_film import TransitionTerm, reynolds_number
+from spindle_fem.effects.laws import amplitude
 from spindle_fem.effects.spread import Spread
 from spindle_fem.effects.term import Term, TermParameter
 from spindle_fem.effects.thermal_preload import ThermalPreloadTerm
-from spindle_fem.effects.unrecorded import IntervalHeatTerm
+from spindle_fem.effects.unrecorded import InIntervals, UnrecordedHeatTerm
 from spindle_fem.effects.view import ChannelFlow
 from spindle_fem.errors import SpecError
 from spindle_fem.loads.operating_point import OperatingPoint
@@ -101,7 +102,8 @@ TIMES = np.arange(0.0, HOUR + 1.0, 30.0)
 @pytest.mark.slow
 def test_catalogue_terms_agree_with_the_fast_model_at_every_probe(machine, fast):
     place = Spread(("housing.front_body",), ("up.housing.front_body", "across.housing.front_body"))
-    source = IntervalHeatTerm("source", place, 60.0, [(0.2 * HOUR, 0.5 * HOUR), (0.6 * HOUR, 0.9 * HOUR)])
+    on = InIntervals([(0.2 * HOUR, 0.5 * HOUR), (0.6 * HOUR, 0.9 * HOUR)])
+    source = UnrecordedHeatTerm("source", amplitude("heat", 60.0, "W"), place, on)
     each = {
         "preload": of_size(preload(), 0.4),
         "source": of_size(source, 80.0, lag=60.0, up=0.5, across=-0.3),

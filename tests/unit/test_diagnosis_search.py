@@ -114,14 +114,15 @@ def test_an_amplitude_of_the_wrong_sign_is_not_offered(problem):
     assert right[2] == pytest.approx(screened(columns, data).singles()[2] + np.log(2.0))
 
 
-def test_the_best_at_some_places_or_at_all_of_them(problem):
+def test_the_best_of_some_candidates(problem):
     columns, data = problem
     keys = [(f"effect{i}", "ab"[i % 2], "") for i in range(columns.shape[1])]
     found = screened(columns, data, keys=keys)
     singles = found.singles()
     order = [int(i) for i in np.argsort(-singles) if i != 2]
-    assert [i for i, _ in found.best_at(None, {"effect2"}, 4)] == order[:4]
-    assert [i for i, _ in found.best_at({"b"}, {"effect2"}, 4)] == [i for i in order if i % 2][:4]
+    other = [i for i, _ in found.best_of(lambda c: c.effect != "effect2", 4)]
+    assert other == order[:4]
+    assert [i for i, _ in found.best_of(lambda c: c.component == "b", 4)] == [i for i in order if i % 2][:4]
 
 
 def test_forms_of_one_effect_at_one_place_never_come_together(problem):

@@ -13,7 +13,7 @@ from spindle_fem.effects.gap_closure import GapClosureTerm
 from spindle_fem.effects.grease_churning import GreaseChurningTerm
 from spindle_fem.effects.heat_capacity import ContactCapacityTerm
 from spindle_fem.effects.heat_split import HeatSplitTerm
-from spindle_fem.effects.laws import linear, power, relaxed, shape, smooth_step, softplus, switched
+from spindle_fem.effects.laws import amplitude, linear, power, relaxed, shape, smooth_step, softplus, switched
 from spindle_fem.effects.mount_sink import MountSinkTerm
 from spindle_fem.effects.natural_convection import NaturalConvectionTerm
 from spindle_fem.effects.radiation import RadiationTerm
@@ -22,9 +22,9 @@ from spindle_fem.effects.spread import Spread
 from spindle_fem.effects.starvation import StarvationTerm
 from spindle_fem.effects.term import TermContext
 from spindle_fem.effects.thermal_preload import NAME, ThermalPreloadTerm
-from spindle_fem.effects.unrecorded import IntervalHeatTerm
+from spindle_fem.effects.unrecorded import Followed, InIntervals, UnrecordedHeatTerm
 from spindle_fem.effects.unrecorded_cooling import CoolingTerm
-from spindle_fem.effects.view import ChannelFlow, FrictionTable
+from spindle_fem.effects.view import ChannelFlow, FrictionTable, RecordedQuantity
 from spindle_fem.effects.viscosity_heat import ViscosityHeatTerm, Walther
 from spindle_fem.surroundings.air import STEFAN_BOLTZMANN
 
@@ -306,9 +306,52 @@ def test_a_frame_is_away_at_once_and_builds_up_the_rest(at_once):
     assert shift == pytest.approx([-8.0 * at_once, -8.0 * later, -8.0])
 
 
-# ------------------------------------------------------------------ intervals
+# ------------------------------------------------------------------ unrecorded
+def heat_in(spread, *intervals):
+    return UnrecordedHeatTerm("t", amplitude("heat", 50.0, "W"), spread, InIntervals(intervals))
+
+
+def heat_following(**quantity):
+    law = Followed(
+        RecordedQuantity(**({"name": "q", "input": "q", "highest": 200.0, "varies": 1.0} | quantity))
+    )
+    return UnrecordedHeatTerm("t", amplitude("heat", 50.0, "W"), Spread(("a", "b")), law)
+
+
+def marched(term, series, step=60.0, **own):
+    """Heat of all places before each step of inputs that hold over it, W."""
+    state, found = np.zeros(term.n_states), []
+    for number, value in enumerate(series):
+        seen = context(term, state=state, time=number * step, inputs={"q": value}, **own)
+        found.append(term.heat(seen).real.sum())
+        state = term.advance(seen, step)[:, 0].real
+    return np.array(found)
+
+
+def test_heat_follows_a_power_of_what_was_recorded_with_a_lag():
+    heat = marched(heat_following(), np.full(400, -100.0), heat=80.0, exponent=2.0, lag=600.0)
+    # A quarter of 80 W at half the highest load, whatever its sign.
+    assert heat[0] == 0.0
+    assert heat[10] == pytest.approx(20.0 * (1.0 - np.exp(-1.0)), rel=1e-9)
+    assert heat[-1] == pytest.approx(20.0, rel=1e-9)
+
+
+def test_heat_follows_changes_of_the_squared_speed_up_and_down_alike():
+    series = np.concatenate((np.full(300, 200.0), np.full(300, 100.0)))
+    heat = marched(heat_following(changes=True), series, step=20.0, heat=80.0, lag=600.0)
+    # Each change turns over what 600 s of the heat are, times the change of (q / q0)^2.
+    assert heat[300] == pytest.approx(80.0 * 0.75, rel=1e-3)
+    assert heat[[299, -1]] == pytest.approx(0.0, abs=0.01)
+    assert 20.0 * heat[300:].sum() / (80.0 * 600.0) == pytest.approx(0.75, rel=0.02)
+
+
+def test_a_law_keeps_what_it_refers_to():
+    own = {item.name: item for item in heat_following(unit="newton").parameters}
+    assert (own["reference"].value, own["reference"].sigma, own["reference"].unit) == (200.0, 0.0, "newton")
+
+
 def test_an_unrecorded_source_gives_its_heat_while_on():
-    term = IntervalHeatTerm("t", Spread(("a", "b")), 50.0, ((1000.0, 3000.0), (6000.0, 9000.0)))
+    term = heat_in(Spread(("a", "b")), (1000.0, 3000.0), (6000.0, 9000.0))
     own = {"heat": 40.0, "factor_2": 0.9, "lag": 100.0}
     total = [term.heat(context(term, time=t, **own)).real.sum() for t in (0.0, 2700.0, 5500.0, 8700.0, 2e4)]
     assert total == pytest.approx([0.0, 40.0, 0.0, 36.0, 0.0], abs=1e-4)
@@ -323,7 +366,7 @@ def test_heat_beside_a_gap_is_shared_by_both_walls():
 
 
 def test_what_heats_one_side_gives_the_same_heat_there():
-    term = IntervalHeatTerm("t", Spread(("a",), ("up.a", "across.a")), 50.0, ((1000.0, 3000.0),))
+    term = heat_in(Spread(("a",), ("up.a", "across.a")), (1000.0, 3000.0))
     own = {"heat": 40.0, "up": 0.5, "across": -0.25, "lag": 100.0}
     heat = term.heat(context(term, time=2700.0, **own)).real[:, 0]
     # A pattern 1 + 2 (up cos + across sin): the mean is the heat, half a squared cosine is left of each side.
@@ -335,7 +378,13 @@ def test_what_heats_one_side_gives_the_same_heat_there():
 
 
 def test_a_loss_of_one_side_follows_the_temperature_there():
-    term = CoolingTerm("t", Spread(("a",), ("up.a", "across.a")), 290.0, 5.0, ((1000.0, 3000.0),))
+    term = CoolingTerm(
+        "t",
+        amplitude("conductance", 5.0, "W/K"),
+        Spread(("a",), ("up.a", "across.a")),
+        InIntervals(((1000.0, 3000.0),)),
+        290.0,
+    )
     own = {"conductance": 3.0, "up": 1.0, "across": 0.0, "lag": 100.0}
     # Field 300 + 10 cos: means of T, T cos, T sin.
     heat = term.heat(context(term, time=2700.0, temperatures=[300.0, 5.0, 0.0], **own)).real[:, 0]
@@ -343,7 +392,7 @@ def test_a_loss_of_one_side_follows_the_temperature_there():
 
 
 def test_edges_of_neighbouring_intervals_cannot_cross():
-    term = IntervalHeatTerm("t", Spread(("a",)), 50.0, ((0.0, 100.0), (140.0, 900.0), (950.0, 1000.0)))
+    term = heat_in(Spread(("a",)), (0.0, 100.0), (140.0, 900.0), (950.0, 1000.0))
     own = {item.name: item for item in term.parameters}
     for number in (1, 2):
         assert own[f"end_{number}"].high <= own[f"start_{number + 1}"].low
