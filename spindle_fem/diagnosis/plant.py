@@ -21,7 +21,7 @@ from spindle_fem.effects.base import Candidate, Reading
 from spindle_fem.effects.term import Term
 from spindle_fem.recordings.align import Recording
 from spindle_fem.reduced.coefficients import INNER_SHARE
-from spindle_fem.reduced.drive import Drive, classes_of, drive_of_recording
+from spindle_fem.reduced.drive import Drive, classes_of, covariate_columns, drive_of_recording
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.network_model import NetworkFastModel
 from spindle_fem.reduced.start import Start
@@ -614,7 +614,9 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     """Inputs on steps from change to change, none longer than ``step``; outputs at their ends."""
     fine = _centred(drive_of_recording(spec, recording), recording)
     begin, finish = fine.grid[0], fine.grid[-1]
-    jumps = fine.grid[1:-1][np.any(fine.start[1:] != fine.end[:-1], axis=1)]
+    beside = covariate_columns(fine.names)
+    inputs = np.setdiff1d(np.arange(len(fine.names)), beside)
+    jumps = fine.grid[1:-1][np.any(fine.start[1:, inputs] != fine.end[:-1, inputs], axis=1)]
     edges = np.unique(np.concatenate(([begin], jumps, [finish])))
     # Stamps a second apart that all jump (an input that flickers) would only cost.
     pieces = [
@@ -629,6 +631,7 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     for ends, owner, at in ((start, first, grid[:-1]), (end, last, grid[1:])):
         part = ((at - fine.grid[owner]) / fine.steps[owner])[:, None]
         ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
+    start[:, beside] = end[:, beside] = _means(fine, grid)[:, beside]
     step_class, points = classes_of(0.5 * (start + end), INLET_BIN, SPEED_BIN)
     # Within the range that occurs, so that no property is asked for outside it.
     inlets = np.array([p.coolant_inlet_temperature for p in points])
@@ -638,6 +641,22 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
         replace(p, coolant_inlet_temperature=inlet) for p, inlet in zip(points, shared, strict=True)
     )
     return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
+
+
+def _means(fine: Drive, grid: Array) -> Array:
+    """Means of inputs over the steps of another grid, their integral kept, (G, m)."""
+    total = np.vstack(
+        (
+            np.zeros(fine.start.shape[1]),
+            np.cumsum(0.5 * (fine.start + fine.end) * fine.steps[:, None], axis=0),
+        )
+    )
+    integral = np.column_stack([np.interp(grid, fine.grid, column) for column in total.T])
+    # Beyond the last reading of a segment the last input goes on; the gap that follows counts for nothing.
+    covered = np.diff(np.minimum(grid, fine.grid[-1]))
+    means = np.diff(integral, axis=0) / np.maximum(covered, 1e-9)[:, None]
+    means[covered <= 1e-9] = fine.end[-1]
+    return means
 
 
 def even_drive(fast: NetworkFastModel, recording: Recording) -> Drive:
@@ -664,18 +683,7 @@ def even_drive(fast: NetworkFastModel, recording: Recording) -> Drive:
         pieces.append(edges)
         count += len(edges)
     grid = np.concatenate(pieces)
-    total = np.vstack(
-        (
-            np.zeros(fine.start.shape[1]),
-            np.cumsum(0.5 * (fine.start + fine.end) * fine.steps[:, None], axis=0),
-        )
-    )
-    integral = np.column_stack([np.interp(grid, fine.grid, column) for column in total.T])
-    # Beyond the last reading of a segment the last input goes on; the gap that follows counts for nothing.
-    covered = np.diff(np.minimum(grid, fine.grid[-1]))
-    means = np.diff(integral, axis=0) / np.maximum(covered, 1e-9)[:, None]
-    lost = covered <= 1e-9
-    means[lost] = fine.end[-1]
+    means = _means(fine, grid)
     classes = np.zeros(len(means), dtype=np.int64)
     return replace(
         fine, times=grid, grid=grid, start=means, end=means, step_class=classes, restarts=tuple(restarts)

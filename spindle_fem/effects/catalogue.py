@@ -242,10 +242,9 @@ def _matching(
     if isinstance(effect, IntervalEffect) and not intervals:
         known = dict.fromkeys(item.form for item in laws if item.component == component)
         if form not in known:
-            laws_of_it = f", or a form: {', '.join(map(repr, known))}" if known else ""
-            raise SpecError(
-                f"{where}.intervals", f"{effect.name} has none.", f"Give at least one{laws_of_it}."
-            )
+            own = f'form "{form}" follows nothing that is recorded, and ' if form else ""
+            law = f", or a form that follows a law: {', '.join(map(repr, known))}" if known else ""
+            raise SpecError(f"{where}.intervals", f"{own}{effect.name} has none.", f"Give at least one{law}.")
         offered = laws
     elif isinstance(effect, IntervalEffect):
         offered = [

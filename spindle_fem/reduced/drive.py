@@ -58,7 +58,7 @@ class Drive:
     names : tuple of str
         ``speed`` [rad/s], ``thrust`` [N], ``ambient``, ``coolant_inlet`` [K],
         ``coolant_flow`` [m³/s], then ``heat.<source>`` [W] and
-        ``covariate.<column>``, which only terms may follow.
+        ``covariate.<column>``, which only terms may follow: means over each step.
     start, end : (G, m) ndarray
         Inputs just after the start and just before the end of each step.
     step_class : (G,) int ndarray
@@ -184,6 +184,7 @@ def make_drive(
     if names[: len(STANDARD)] != STANDARD:
         raise RecordingError("inputs", f"named {names}.", f"Allowed: {STANDARD} first.")
     grid, start, end = inputs_on_steps(np.asarray(times, dtype=float), values, held, largest_step)
+    level_covariates(names, start, end)
     step_class, points = classes_of(0.5 * (start + end))
     return Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
 
@@ -212,6 +213,17 @@ def inputs_on_steps(
             on_grid = np.interp(grid, times, values[:, column])
             start[:, column], end[:, column] = on_grid[:-1], on_grid[1:]
     return grid, start, end
+
+
+def level_covariates(names: Sequence[str], start: Array, end: Array) -> None:
+    """Let covariates keep their mean over each step, in place: what follows them sees one value."""
+    for column in covariate_columns(names):
+        start[:, column] = end[:, column] = 0.5 * (start[:, column] + end[:, column])
+
+
+def covariate_columns(names: Sequence[str]) -> list[int]:
+    """Columns that were recorded beside the inputs."""
+    return [column for column, name in enumerate(names) if name.startswith(COVARIATE)]
 
 
 def _grid(times: Array, held: Array, largest: float, breaks: Array) -> Array:

@@ -25,7 +25,14 @@ from spindle_fem.recordings.simulate_network import (
     require_compatible,
 )
 from spindle_fem.reduced.directions import ConductingDirections
-from spindle_fem.reduced.drive import COVARIATE, LARGEST_STEP, STANDARD, Drive, inputs_on_steps
+from spindle_fem.reduced.drive import (
+    COVARIATE,
+    LARGEST_STEP,
+    STANDARD,
+    Drive,
+    inputs_on_steps,
+    level_covariates,
+)
 from spindle_fem.reduced.exact_step import build_exact_propagator
 from spindle_fem.reduced.fast_model import NO_CHANGES, ClassOperators
 from spindle_fem.reduced.network_parts import (
@@ -358,6 +365,7 @@ class NetworkFastModel:
             held = np.append(held, False)
         breaks = recording.times[recording.segments[1:, 0]]
         grid, start, end = inputs_on_steps(recording.times, values, held, largest_step, breaks)
+        level_covariates(names, start, end)
         restarts = tuple(int(i) for i in np.searchsorted(grid, breaks - 1e-9))
         means = dict(zip(names, (0.5 * (start + end)).mean(axis=0).tolist(), strict=True))
         point = OperatingPoint(*(means.get(name, np.nan) for name in STANDARD))

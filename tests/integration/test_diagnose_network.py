@@ -136,8 +136,11 @@ def hot(time):
     return HEAT if any(start <= time < end for start, end in HOT) else 0.0
 
 
-def record(folder, seed, *, built=None, extra=lambda time: 0.0, reading=None, times=None):
-    """Write a recording; ``reading`` turns the temperatures (N, 3) into what the sensors tell."""
+def record(folder, seed, *, built=None, extra=lambda time: 0.0, reading=None, times=None, beside=None):
+    """Write a recording; ``reading`` turns the temperatures (N, 3) into what the sensors tell.
+
+    ``beside`` is what a covariate told over time.
+    """
     folder.mkdir(parents=True)
     times = np.arange(0.0, DURATION + 1.0, STEP) if times is None else times
     told = temperatures(as_built(seed) if built is None else built, times, extra)
@@ -146,8 +149,13 @@ def record(folder, seed, *, built=None, extra=lambda time: 0.0, reading=None, ti
     told = told + np.random.default_rng(seed).normal(0.0, 0.1, told.shape)
     power, speed, room = np.array([inputs_at(time) for time in times]).T
     columns = {"t": times, "Tw": told[:, 0], "Tl": told[:, 1], "Tb": told[:, 2], "room": room}
-    pd.DataFrame(columns | {"P": power, "n": speed}).to_csv(folder / "data.csv", index=False)
-    (folder / "recording.toml").write_text(MANIFEST % folder.name)
+    columns |= {"P": power, "n": speed}
+    manifest = MANIFEST % folder.name
+    if beside is not None:
+        columns["load"] = [beside(time) for time in times]
+        manifest = manifest.replace("]\n", '{column = "load", role = "covariate", unit = "percent"},\n]\n')
+    pd.DataFrame(columns).to_csv(folder / "data.csv", index=False)
+    (folder / "recording.toml").write_text(manifest)
     return folder
 
 
@@ -256,6 +264,50 @@ def test_heat_that_nobody_recorded_is_found_with_its_intervals(heated):
     assert content["mismatch"]["where"]["component"] == "body"
     assert content["mismatch"]["missing_heat_W"]["body"]["peak"] == pytest.approx(HEAT, rel=0.5)
     require_probabilities(content)
+
+
+LOADS = (0.0, 30.0, 80.0, 50.0, 100.0, 20.0, 0.0, 70.0, 40.0, 90.0, 10.0, 60.0)
+
+
+def load(time):
+    """Percent of a neighbouring drive, another one every 20 minutes."""
+    return LOADS[min(int(time / 1200.0), len(LOADS) - 1)]
+
+
+@pytest.fixture(scope="module")
+def loaded(machine, tmp_path_factory):
+    """Heat that grows with something that was recorded and drives nothing in the model."""
+    folder = tmp_path_factory.mktemp("loaded")
+    run = record(folder / "run", 9, extra=lambda time: HEAT * (load(time) / 100.0) ** 1.3, beside=load)
+    return run, folder / "out", diagnose(machine, [run], folder / "out", report=False)
+
+
+def test_heat_that_follows_a_covariate_comes_out_as_its_law(loaded):
+    _, out, content = loaded
+    assert effects(content) == {("unrecorded_heat_source", "body")}
+    (finding,) = content["findings"]
+    assert finding["follows"] == "load"
+    assert "load" in finding["statement"]
+    assert finding["intervals"] == []
+    assert not (out / "states.csv").exists()
+    heat, exponent = finding["parameters"]["heat"], finding["parameters"]["exponent"]
+    assert heat["low"] < HEAT < heat["high"]
+    assert heat["value"] == pytest.approx(HEAT, rel=0.15)
+    assert exponent["value"] == pytest.approx(1.3, abs=0.25)
+    assert content["fit"]["after"]["heldout_rmse_K"] < 0.13 < content["fit"]["before"]["heldout_rmse_K"]
+    require_probabilities(content)
+
+
+def test_the_improved_machine_follows_the_covariate_of_a_recording(machine, loaded, tmp_path):
+    run, out, content = loaded
+    simulated = simulate_machine(out / "improved_machine.toml", run, tmp_path / "simulated")
+    after = {row["channel"]: row["rmse_K"] for row in content["fit"]["channels_after"]}
+    for row in simulated["channels"]:
+        assert row["rmse_K"] == pytest.approx(after[row["channel"]], abs=0.02)
+    # Where it was not recorded the law has nothing to follow, which is said.
+    without = record(tmp_path / "without", 9)
+    with pytest.raises(BadInputError, match="following load"):
+        simulate_machine(out / "improved_machine.toml", without, tmp_path / "refused")
 
 
 def test_what_is_held_out_does_not_touch_the_findings(machine, heated, tmp_path):

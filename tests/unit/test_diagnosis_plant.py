@@ -232,6 +232,30 @@ def test_steps_end_where_inputs_jump_and_keep_their_course(plant, recording):
     assert np.isin(jumps, drive.grid).all()
 
 
+def test_covariates_are_means_over_the_steps_and_end_none(plant, recording):
+    """What is recorded beside the inputs flickers as it likes: it costs no steps and keeps its integral."""
+    flicker = np.random.default_rng(3).uniform(0.0, 80.0, recording.times.size)
+    flicker[::7] = np.nan
+    beside = replace(
+        recording,
+        covariate_names=("load", "silent"),
+        covariates=np.column_stack((flicker, np.full(flicker.size, np.nan))),
+        covariate_units=("", "watt"),
+    )
+    drive, without = (coarse_drive(plant.fast.spec, item, 100.0) for item in (beside, recording))
+    assert drive.grid == pytest.approx(without.grid)
+    assert drive.names == (*without.names, "covariate.load")
+    assert drive.start[:, -1] == pytest.approx(drive.end[:, -1])
+    read = np.isfinite(flicker)
+    exact = np.trapezoid(flicker[read], recording.times[read])
+    exact += flicker[read][0] * recording.times[read][0]
+    assert float(drive.start[:, -1] @ drive.steps) == pytest.approx(exact, rel=1e-9)
+    quantities = {item.name: item for item in view_of(plant.fast, beside).quantities}
+    assert list(quantities) == ["change of speed", "load"]
+    assert (quantities["load"].input, quantities["load"].beside) == ("covariate.load", True)
+    assert quantities["load"].highest == np.nanmax(flicker)
+
+
 def test_the_small_basis_reads_what_the_large_one_does(plant, candidates):
     places = [name for name in plant.fast.model.place_names if "raceway" in name]
     small = plant.compressed([name for name, *_ in plant.uncertain()], places)

@@ -14,6 +14,9 @@ from spindle_fem.diagnosis.inference import Coordinate, Fit
 from spindle_fem.diagnosis.reliability import reliable, share_of_last
 from spindle_fem.diagnosis.verdict import (
     LEAST_TEMPERATURE_RATIO,
+    LISTED,
+    NEAR,
+    NEAR_REASON,
     PRIOR_SIGMAS,
     SMALLEST_SIZE,
     TEMPERATURE,
@@ -75,8 +78,8 @@ def hypothesis(*candidates, misfit, evidence=None, log_prior=0.0, position=(), r
     return Hypothesis(fit, log_prior)
 
 
-def verdict(*found, calibrated=False, trials=100, overlapping=None):
-    return judge(list(found), trials=trials, calibrated=calibrated, overlapping=overlapping)
+def verdict(*found, calibrated=False, trials=100, overlapping=None, **more):
+    return judge(list(found), trials=trials, calibrated=calibrated, overlapping=overlapping, **more)
 
 
 PRELOAD = candidate("thermal_preload")
@@ -255,6 +258,46 @@ def test_a_clear_single_effect_gets_the_verdict_of_its_kind(member, expected):
     assert found.evidence > 0.99
     assert 0.9 < found.chosen.probability < found.evidence
     assert found.alternatives == ()
+
+
+# What tells these apart counts for 20 in the logarithm where their readings are apart.
+LIKE = (hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0), hypothesis(CHURNING, misfit=460.0))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.9])
+def test_sets_that_read_alike_are_named_together_however_unlike_their_likelihood(share):
+    found = verdict(*LIKE, apart=lambda one, other: share * NEAR)
+    assert (found.verdict, found.reason) == ("ambiguous", NEAR_REASON)
+    assert found.chosen.fit is LIKE[1].fit
+    (other,) = found.alternatives
+    assert other.fit is LIKE[2].fit
+    # The likelihood counts less the nearer they are, and never turns against the first.
+    ratio = other.probability / found.chosen.probability
+    assert ratio == pytest.approx(np.exp(-20.0 * share**2))
+    assert found.chosen.probability + other.probability + found.other == pytest.approx(1.0)
+
+
+def test_sets_that_read_apart_are_decided_by_their_likelihood():
+    asked = []
+
+    def apart(one, other):
+        asked.append((one, other))
+        return 1.01 * NEAR
+
+    found = verdict(*LIKE, apart=apart)
+    assert asked == [(LIKE[1].fit, LIKE[2].fit)]
+    assert found.verdict == "missing_physics"
+    assert found.evidence > 1.0 - 1e-6
+    assert found.alternatives == ()
+
+
+def test_the_same_elsewhere_in_a_set_and_sets_of_another_size_are_no_rivals():
+    elsewhere = hypothesis(candidate("thermal_preload", "F1"), misfit=410.0)
+    pair = hypothesis(PRELOAD, CHURNING, misfit=399.0)
+    one = {"front_bearings": frozenset({"front_bearings", "F1"})}
+    found = verdict(*LIKE[:2], elsewhere, pair, overlapping=one, apart=lambda one, other: 0.0)
+    assert found.verdict == "missing_physics"
+    assert all(item.probability >= LISTED for item in found.alternatives)
 
 
 def test_physics_comes_before_parameters_before_sensors():
