@@ -1,4 +1,4 @@
-"""Fits of several hypotheses at once, in processes of their own where there are cores for it."""
+"""Work on one problem at once, fits of several hypotheses above all, in processes of their own."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from uuid import uuid4
 
 from joblib.externals.loky import BrokenProcessPool, ProcessPoolExecutor
@@ -77,9 +78,9 @@ def _others(number: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(number, timeout=IDLE, env=ONE_THREAD)
 
 
-def _fit_there(path: str, order: FitOrder) -> Fit | None:
-    """Fit in another process."""
-    return fit_order(_problem_at(path), order)
+def _done_there(path: str, job: Callable[[Problem], Any]) -> Any:
+    """Do a job in another process."""
+    return job(_problem_at(path))
 
 
 class Workers:
@@ -104,35 +105,49 @@ class Workers:
         problem : Problem
         orders : sequence of FitOrder
         """
-        if self._number == 1 or len(orders) == 1:
-            return [fit_order(problem, order) for order in orders]
-        path, beside = self._send(problem), min(self._number, len(orders)) - 1
-        executor = _others(self._number - 1)
-        waiting = deque(enumerate(orders))
-        found: list[Fit | None] = [None] * len(orders)
+        fits = self.done(problem, [partial(fit_order, order=order) for order in orders])
+        # Candidates are known by identity; those that come back are copies.
+        return [
+            None if fit is None else replace(fit, candidates=order.candidates)
+            for fit, order in zip(fits, orders, strict=True)
+        ]
 
-        def work_off(fit: Callable[[FitOrder], Fit | None]) -> None:
+    def done(self, problem: Problem, jobs: Sequence[Callable[[Problem], Any]]) -> list[Any]:
+        """What each job makes of the problem, in their order.
+
+        Parameters
+        ----------
+        problem : Problem
+        jobs : sequence of callable
+            That can be sent to another process: functions of modules, perhaps with some arguments given.
+        """
+        if self._number == 1 or len(jobs) == 1:
+            return [job(problem) for job in jobs]
+        path, beside = self._send(problem), min(self._number, len(jobs)) - 1
+        executor = _others(self._number - 1)
+        waiting = deque(enumerate(jobs))
+        found: list[Any] = [None] * len(jobs)
+
+        def work_off(do: Callable[[Callable[[Problem], Any]], Any]) -> None:
             while waiting:
                 try:
-                    position, order = waiting.popleft()
+                    position, job = waiting.popleft()
                 except IndexError:
                     # Another thread was quicker.
                     return
-                found[position] = fit(order)
+                found[position] = do(job)
 
-        def there(order: FitOrder) -> Fit | None:
+        def there(job: Callable[[Problem], Any]) -> Any:
             try:
-                fit = executor.submit(_fit_there, path, order).result()
+                return executor.submit(_done_there, path, job).result()
             except BrokenProcessPool:
                 # One of them was killed: the next diagnosis gets new ones.
                 _others.cache_clear()
                 raise
-            # Candidates are known by identity; those that come back are copies.
-            return None if fit is None else replace(fit, candidates=order.candidates)
 
         with ThreadPoolExecutor(beside) as threads, threadpool_limits(1):
             others = [threads.submit(work_off, there) for _ in range(beside)]
-            work_off(partial(fit_order, problem))
+            work_off(lambda job: job(problem))
         for other in others:
             other.result()
         return found

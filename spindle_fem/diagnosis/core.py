@@ -161,7 +161,9 @@ def diagnose_recordings(
     about = problem.fit((), null.values)
     patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]
     for number in range(len(recordings)):
-        explanations += [explain(item) for item in onset_answers(problem, about, patterns, number)]
+        explanations += [
+            explain(item) for item in onset_answers(problem, about, patterns, number, workers=workers)
+        ]
     clock.lap("location")
     return Diagnosis(
         plant,

@@ -322,7 +322,7 @@ class Search:
                 variant = Variant(candidate, {})
                 intervals[id(candidate)] = found
                 variants.append(variant)
-        found = screen(self.problem, fit, variants, self.weights, families, trust)
+        found = screen(self.problem, fit, variants, self.weights, families, trust, self.workers)
         if trust is None:
             self._screenings[_identity(fit.candidates)] = found
         return found, intervals
@@ -347,7 +347,12 @@ class Search:
         found: list[tuple[IntervalEffect, OnOff]] = []
         for recording in range(len(self.problem.plant.recordings)):
             answers: list[Onsets] = onset_answers(
-                self.problem, fit, [pattern for _, pattern in patterns], recording, trust=trust
+                self.problem,
+                fit,
+                [pattern for _, pattern in patterns],
+                recording,
+                trust=trust,
+                workers=self.workers,
             )
             stop = float(self.problem.plant.drives[recording].grid[-1])
             for (effect, pattern), onsets in zip(patterns, answers, strict=True):

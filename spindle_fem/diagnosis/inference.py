@@ -287,12 +287,13 @@ class Problem:
             pull = root @ (at - mean)
             return float(np.sum(_huber(residual)) + pull @ pull), residual, predicted
 
-        def slopes_at(at: Array, near: list[Prediction]) -> Array:
+        def slopes_at(at: Array, near: list[Prediction]) -> tuple[Array, list[Prediction]]:
             predicted = self.predict(candidates, coordinates, at, near=near)
-            return self.whitened([p.sensitivity for p in predicted])
+            return self.whitened([p.sensitivity for p in predicted]), predicted
 
+        scale = np.array([c.sigma for c in coordinates])
         cost, residual, predicted = cost_at(position, None)
-        jacobian = slopes_at(position, predicted)
+        jacobian, predicted = slopes_at(position, predicted)
         damping = 1e-3
         for iteration in range(iterations):
             weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
@@ -308,7 +309,7 @@ class Problem:
                     damping *= 10.0
                     continue
                 try:
-                    trial = cost_at(position + move, predicted)
+                    trial = cost_at(position + move, [item.moved(scale * move) for item in predicted])
                 except (ConvergenceError, OutOfValidityError, SpecError):
                     # Outside what can be simulated (a share above one, a runaway): a shorter step.
                     trial = (np.inf, residual, None)
@@ -316,7 +317,7 @@ class Problem:
                     gain = cost - trial[0]
                     position = position + move
                     cost, residual, predicted = trial
-                    jacobian = slopes_at(position, predicted)
+                    jacobian, predicted = slopes_at(position, predicted)
                     damping = max(damping / 10.0, 1e-6)
                     improved = True
                     break

@@ -16,10 +16,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.diagnosis.abreast import Workers
 from spindle_fem.diagnosis.inference import Fit, Problem
 from spindle_fem.diagnosis.linear import LinearProblem
 from spindle_fem.diagnosis.screening import BaseRun
@@ -27,6 +29,8 @@ from spindle_fem.diagnosis.screening import BaseRun
 Array = NDArray[np.float64]
 
 ONSETS = 40
+# Answers that are marched together.
+COLUMNS = 320
 WALK_SCALES = (1.0, 3.0, 10.0, 30.0, 100.0)
 MOST_INTERVALS = 3
 # Moves of edges that gain less (natural logarithm) are none.
@@ -125,6 +129,7 @@ def onset_answers(
     *,
     number: int = ONSETS,
     trust: Fit | None = None,
+    workers: Workers | None = None,
 ) -> list[Onsets]:
     """Inner products of all spots' answers about a fit.
 
@@ -139,15 +144,35 @@ def onset_answers(
         Instants.
     trust : Fit or None
         As :meth:`LinearProblem.about` has it.
+    workers : Workers or None
+        Who work them out; the result does not depend on it.
     """
+    linear = LinearProblem.about(problem, fit, trust)
+    chunk = max(1, COLUMNS // number)
+    chunks = [patterns[first : first + chunk] for first in range(0, len(patterns), chunk)]
+    jobs = [
+        partial(_onsets_of, fit=fit, linear=linear, chunks=own, recording=recording, number=number)
+        for own in (chunks[0::2], chunks[1::2])
+    ]
+    found = (workers or Workers()).done(problem, jobs)
+    # One after the other again.
+    return [item for position in range(len(chunks)) for item in found[position % 2][position // 2]]
+
+
+def _onsets_of(
+    problem: Problem,
+    fit: Fit,
+    linear: LinearProblem,
+    chunks: Sequence[Sequence[Pattern]],
+    recording: int,
+    number: int,
+) -> list[list[Onsets]]:
+    """Inner products of some spots' answers, by chunks that are marched together."""
     base = BaseRun(problem.plant, recording, fit.values, fit.candidates)
     grid = base.drive.grid
     onsets = np.linspace(grid[0], grid[-1], number + 1)[:-1]
-    linear = LinearProblem.about(problem, fit, trust)
     found = []
-    chunk = max(1, 320 // number)
-    for first in range(0, len(patterns), chunk):
-        chosen = patterns[first : first + chunk]
+    for chosen in chunks:
         answers = _march(base, chosen, onsets)
         on_grid = [
             answers
@@ -156,9 +181,13 @@ def onset_answers(
             for other, columns in enumerate(problem.plant.columns)
         ]
         gram, data, _ = linear.gram(problem.whitened(on_grid))
-        for index, pattern in enumerate(chosen):
-            own = slice(index * number, (index + 1) * number)
-            found.append(Onsets(pattern, recording, onsets, gram[own, own], data[own]))
+        own = [slice(index * number, (index + 1) * number) for index in range(len(chosen))]
+        found.append(
+            [
+                Onsets(pattern, recording, onsets, gram[rows, rows].copy(), data[rows].copy())
+                for pattern, rows in zip(chosen, own, strict=True)
+            ]
+        )
     return found
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -106,12 +106,36 @@ class Prediction:
         Unknowns of the model.
     run : TransientRun
         Whose states they are.
+    tangents : (G + 1, r, q) ndarray or None
+        Of the states, to what the run knows of the coordinates asked for; None where none were.
+    columns : (p,) int ndarray
+        Which of them each coordinate is, -1 for none.
     """
 
     temperature: Array
     sensitivity: Array
     states: Array
     run: TransientRun
+    tangents: Array | None = None
+    columns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def moved(self, move: Array) -> Prediction:
+        """The same run with states where they go to first order with the coordinates (p,)."""
+        if self.tangents is None or self.run.dynamic is None:
+            # What follows straight lines gains nothing from a start that is nearer.
+            return self
+        inside = self.columns >= 0
+        own = np.zeros(self.tangents.shape[2])
+        np.add.at(own, self.columns[inside], move[inside])
+        return replace(self, states=self.states + self.tangents @ own, tangents=None)
+
+    def slopes_at(self, places: Array) -> Array:
+        """Derivatives (G + 1, n, p) of the temperatures of places (n, r) to the coordinates asked for."""
+        found = np.zeros((len(self.states), len(places), len(self.columns)))
+        if self.tangents is not None:
+            inside = self.columns >= 0
+            found[:, :, inside] = (places @ self.tangents)[:, :, self.columns[inside]]
+        return found
 
 
 class Plant:
@@ -346,7 +370,10 @@ class Plant:
         for candidate in candidates:
             if candidate.reading is not None:
                 self._read(number, candidate.reading, values, derivatives, temperature, sensitivity)
-        return Prediction(temperature, sensitivity, found.states, run)
+        owners = [-1 if inner[name] is None else of_run.index(inner[name]) for name in derivatives]
+        return Prediction(
+            temperature, sensitivity, found.states, run, found.tangents, np.array(owners, dtype=np.int64)
+        )
 
     def displacements(self) -> tuple[str, ...]:
         """Names of the displacements of every point probe that is read."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.diagnosis.abreast import Workers
 from spindle_fem.diagnosis.inference import Fit, Problem
 from spindle_fem.diagnosis.linear import BoxedColumns, LinearProblem
 from spindle_fem.diagnosis.screening import BaseRun, Variant
@@ -18,6 +20,8 @@ Array = NDArray[np.float64]
 # An effect more must make the data so much likelier (natural logarithm) to be looked at.
 SMALLEST_GAIN = 3.0
 KEPT_FOR_TRIPLES = 40
+# In which variants are screened.
+PIECES = 2
 # Where bounds matter: sets of several effects that are solved within them, by their gain without bounds, and
 # the single effects whose pairs all are.
 WITHIN_BOUNDS, GOOD_MEMBERS = 120, 24
@@ -221,6 +225,7 @@ def screen(
     weights: Mapping[str, float],
     families: Mapping[str, str],
     trust: Fit | None = None,
+    workers: Workers | None = None,
 ) -> Screened:
     """Answers of all variants about a fit, and their inner products.
 
@@ -236,15 +241,21 @@ def screen(
     trust : Fit or None
         Fit without the variants that gains count from, and whose residuals tell which readings went
         astray; None for the first one.
+    workers : Workers or None
+        Who work out the answers; the result does not depend on it.
     """
-    known = {c.name for c in fit.coordinates}
-    values = fit.values
-    on_grid = []
-    for number in range(len(problem.plant.recordings)):
-        base = BaseRun(problem.plant, number, {k: v for k, v in values.items() if k in known}, fit.candidates)
-        on_grid.append(base.responses(variants))
-    columns = problem.whitened(on_grid)
-    linear = LinearProblem.about(problem, fit, trust)
+    # As many pieces whether or not there are workers for them, so that the result is the same.
+    pieces = [tuple(variants[first::PIECES]) for first in range(PIECES)]
+    *answers, linear = (workers or Workers()).done(
+        problem,
+        [
+            *(partial(_answers, fit=fit, variants=piece) for piece in pieces),
+            partial(LinearProblem.about, fit=fit, trust=trust),
+        ],
+    )
+    columns = np.empty((len(problem.data), len(variants)))
+    for first, found in enumerate(answers):
+        columns[:, first::PIECES] = found
     gram, data, total = linear.gram(columns)
     spread = np.array([_spread(v) for v in variants])
     signs = np.array([_one_sided(v) for v in variants])
@@ -254,6 +265,16 @@ def screen(
     if trust is not None:
         base = float(np.sum((linear.weight * trust.residual) ** 2)) + trust.misfit_with_prior - trust.misfit
     return Screened(tuple(variants), gram, data, total, spread, signs, priors, families, boxed, base)
+
+
+def _answers(problem: Problem, fit: Fit, variants: Sequence[Variant]) -> Array:
+    """Whitened answers of all recordings to variants, (n, m)."""
+    return problem.whitened(
+        [
+            BaseRun(problem.plant, number, fit.values, fit.candidates).responses(variants)
+            for number in range(len(problem.plant.recordings))
+        ]
+    )
 
 
 def _spread(variant: Variant) -> float:

@@ -91,16 +91,6 @@ class TrialPlant(Plant):
             return drive.first("ambient")
         return float(np.mean(list(self.recordings[0].first_readings().values())))
 
-    def run_name(self, name: str, fit: Fit) -> str | None:
-        """What a coordinate of a fit is called in a run; None where it concerns readings only."""
-        readings = {
-            f"{c.reading.name}.{item.name}": c
-            for c in fit.candidates
-            if c.reading is not None
-            for item in c.reading.parameters
-        }
-        return self._run_name(0, name, readings)
-
 
 @dataclass(frozen=True, slots=True)
 class Answer:
@@ -144,19 +134,9 @@ def answer(plant: Plant, fit: Fit, trial: Trial, places: Sequence[Place], spacin
     told = own.predict(0, values, fit.candidates, names)
     readings, slopes = [told.temperature], [told.sensitivity]
     if places:
-        run_names = tuple(dict.fromkeys(n for n in (own.run_name(name, fit) for name in names) if n))
-        run = own.transient(0, values, fit.candidates, run_names)
-        states, tracks = run.march(own.start(0))
-        tangent = run.tangents(run.forcing_of(states, tracks), tracks, explicit=True)
-        means = np.array([_weights(plant, place) for place in places]).T
-        readings.append(states @ means)
-        by_place = np.zeros((len(states), len(places), len(names)))
-        moved = np.einsum("nrp,rc->ncp", tangent, means)
-        for position, name in enumerate(names):
-            inner = own.run_name(name, fit)
-            if inner:
-                by_place[:, :, position] = moved[:, :, run_names.index(inner)]
-        slopes.append(by_place)
+        means = np.array([_weights(plant, place) for place in places])
+        readings.append(told.states @ means.T)
+        slopes.append(told.slopes_at(means))
     grid = own.drives[0].grid
     times = np.arange(grid[0] + spacing, grid[-1] + 0.5 * spacing, spacing)
     times = times[times <= grid[-1]]

@@ -79,16 +79,13 @@ def run_operators(
     factors = fast.table.factors(machine)
     asked = tuple(name for name in derivatives if name not in owned)
     changes = _Changes(fast, terms)
-    classes = []
-    for point in points:
-        found = fast.operators(
-            point,
-            factors,
-            asked,
-            changes=changes.coefficients(point, parameters),
-            conductances=changes.conductances(parameters),
-        )
-        classes.append(found)
+    parts = [changes.parts(point, parameters) for point in points]
+    scaled = [changes.together(own) for own in parts]
+    added = changes.conductances(parameters)
+    classes = [
+        fast.operators(point, factors, asked, changes=own, conductances=added)
+        for point, own in zip(points, scaled, strict=True)
+    ]
     storage = fast.storage(factors, changes.capacities(parameters))
     storage_by = fast.storage_by(factors, asked)
     for name in derivatives:
@@ -105,12 +102,15 @@ def run_operators(
                 )
             conductances = (changes.conductances(upper), changes.conductances(lower))
             for number, point in enumerate(points):
-                ends = (changes.coefficients(point, upper), changes.coefficients(point, lower))
+                ends = tuple(
+                    changes.together(changes.with_part(parts[number], owned[name][0], point, values))
+                    for values in (upper, lower)
+                )
                 if ends[0] != ends[1] or conductances[0] != conductances[1]:
                     change = fast.change(point, factors, ends, conductances)
                     classes[number] = _with_change(classes[number], name, change, scale)
     coefficients = tuple(
-        fast.coefficients(point, factors, changes.coefficients(point, parameters)) for point in points
+        fast.coefficients(point, factors, own) for point, own in zip(points, scaled, strict=True)
     )
     targets = {i: set(fast.table.targets(n)) for i, n in enumerate(derivatives) if n not in owned}
     touched = {
@@ -150,13 +150,37 @@ class _Changes:
             for name in ("operating_factor", "place_capacity", "place_conductance")
         )
 
-    def coefficients(self, point: OperatingPoint, values: Mapping[str, float]) -> dict[str, float]:
+    def parts(self, point: OperatingPoint, values: Mapping[str, float]) -> list[dict[str, float]]:
+        """Factors that each term puts on coefficients at an operating point."""
+        return [self._part(term, point, values) for term in self.terms]
+
+    def with_part(
+        self,
+        parts: Sequence[dict[str, float]],
+        term: Term,
+        point: OperatingPoint,
+        values: Mapping[str, float],
+    ) -> list[dict[str, float]]:
+        """The factors of all terms with those of one of them at other values."""
+        return [
+            self._part(own, point, values) if own is term else part
+            for own, part in zip(self.terms, parts, strict=True)
+        ]
+
+    @staticmethod
+    def together(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
+        """Factors of all terms by coefficient."""
         found: dict[str, float] = {}
-        for term in self.terms:
-            for name, factor in term.operating_factor(point, term.values(values)).items():
-                if name not in self.known:
-                    raise SpecError(f"term {term.name}", f'scales "{name}".', did_you_mean(name, self.known))
+        for part in parts:
+            for name, factor in part.items():
                 found[name] = found.get(name, 1.0) * factor
+        return found
+
+    def _part(self, term: Term, point: OperatingPoint, values: Mapping[str, float]) -> dict[str, float]:
+        found = term.operating_factor(point, term.values(values))
+        for name in found:
+            if name not in self.known:
+                raise SpecError(f"term {term.name}", f'scales "{name}".', did_you_mean(name, self.known))
         return found
 
     def capacities(self, values: Mapping[str, float]) -> dict[str, float]:

@@ -90,6 +90,8 @@ def film_derivative(
 
 # Of the logarithm of film over capacity rate: distance of nodes, and how many share an interpolation.
 SPACING, STENCIL = 0.05, 10
+# Interpolations that are kept, for the classes of a run.
+MOST_STENCILS = 8
 
 
 class UniformFilmMaps:
@@ -127,7 +129,9 @@ class UniformFilmMaps:
             for node in range(first, first + STENCIL):
                 if node not in self._nodes:
                     self._nodes[node] = self._worked_out(node)
-            self._stencils = {first: np.array([self._nodes[first + i] for i in range(STENCIL)])}
+            if len(self._stencils) >= MOST_STENCILS:
+                self._stencils.clear()
+            self._stencils[first] = np.array([self._nodes[first + i] for i in range(STENCIL)])
         return position - first, self._stencils[first]
 
     def _worked_out(self, node: int) -> Array:

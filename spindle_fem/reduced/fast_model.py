@@ -94,6 +94,7 @@ class FastModel:
         self._films: dict[tuple[float, float, bytes], tuple[Array, float, float]] = {}
         self._maps = UniformFilmMaps(model)
         self._sums: dict[tuple[tuple[int, ...], bytes], Array] = {}
+        self._coolants: dict[tuple[float, float, float, bool], CoolantMaps] = {}
         self._scales: tuple[dict[str, float], Array] | None = None
         self._reached: dict[str, frozenset[str]] = {}
         self._rows: dict[str, tuple[int, ...]] = {}
@@ -114,7 +115,7 @@ class FastModel:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without sums that another process makes as fast as it reads them."""
-        return {**self.__dict__, "_sums": {}}
+        return {**self.__dict__, "_sums": {}, "_coolants": {}}
 
     def sigmas(self, names: Sequence[str]) -> dict[str, float]:
         """1 σ of the logarithm of some of the machine's parameters; 0 for those that are not uncertain."""
@@ -361,8 +362,14 @@ class FastModel:
     def _coolant(self, film: Array, rate: float, friction: float, *, by_film: bool = False) -> CoolantMaps:
         """Maps of the coolant or their derivative to the film; of one film for all cells, interpolated."""
         if film[0] > 0.0 and rate > 0.0 and np.ptp(film) <= ROUND_OFF * film[0]:
-            kind = self._maps.film_derivative if by_film else self._maps.maps
-            return kind(float(film[0]), rate, friction)
+            key = (float(film[0]), rate, friction, by_film)
+            if key not in self._coolants:
+                # The classes of a run share a few films.
+                if len(self._coolants) * self.model.size**2 >= MOST_SUMS:
+                    self._coolants.clear()
+                kind = self._maps.film_derivative if by_film else self._maps.maps
+                self._coolants[key] = kind(*key[:3])
+            return self._coolants[key]
         return (film_derivative if by_film else coolant_maps)(self.model, film, rate, friction)
 
     def _add_coolant(self, loads: Array, outputs: Array, output_inputs: Array, maps: CoolantMaps) -> None:

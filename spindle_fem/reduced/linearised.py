@@ -111,8 +111,14 @@ class Linearised:
             raise ConvergenceError(
                 "terms of the fast model", "they leave a step without an answer.", "Take smaller steps."
             ) from error
-        self._by_sensed = self._solve @ lines.end_by_sensed
-        self._by_state = self._solve @ lines.end_by_state
+        self._answered: tuple[Array, Array] | None = None
+
+    def _end_lines(self, columns: int) -> tuple[Array, Array]:
+        """What is added at the end, by what is sensed and remembered: answered for many columns."""
+        if columns > 1 and self._answered is None:
+            lines = self.lines
+            self._answered = self._solve @ lines.end_by_sensed, self._solve @ lines.end_by_state
+        return self._answered or (self.lines.end_by_sensed, self.lines.end_by_state)
 
     def follow(
         self,
@@ -138,11 +144,15 @@ class Linearised:
         answers, lines = self.answers, self.lines
         n_sensed, size = answers.sense.shape
         steps, _, number = forcing.shape
-        n_added, n_states = self._by_state.shape[1:]
+        n_added, n_states = lines.end_by_state.shape[1:]
+        by_sensed, by_state = self._end_lines(number)
+        # A single column is solved for as it comes.
+        solved = self._answered is not None
         states = np.zeros((steps + 1, size, number))
         sensed = np.zeros((steps + 1, n_sensed, number))
         added_start, added_end = np.zeros((2, steps, n_added, number))
-        own = None if end is None else self._solve @ end
+        own = self._solve @ end if solved and end is not None else end
+        right = np.empty((n_added, number))
         now, base = np.zeros((size + n_added, number)), np.empty((size + n_sensed, number))
         memory = np.zeros((n_states, number))
         for step, group in enumerate(answers.group_of_step.tolist()):
@@ -167,11 +177,14 @@ class Linearised:
             np.dot(answers.follows[group], now, out=base)
             base += forcing[step]
             added = added_end[step]
-            np.dot(self._by_sensed[step], base[size:], out=added)
+            total = added if solved else right
+            np.dot(by_sensed[step], base[size:], out=total)
             if n_states:
-                added += self._by_state[step] @ memory
+                total += by_state[step] @ memory
             if own is not None:
-                added += own[step]
+                total += own[step]
+            if not solved:
+                np.dot(self._solve[step], total, out=added)
             base += np.dot(answers.replies[group], added)
             states[step + 1], sensed[step + 1] = base[:size], base[size:]
         return Followed(states, sensed, added_start, added_end)

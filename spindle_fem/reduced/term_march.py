@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 # Rounds over a whole run; one that needs more is marched step by step.
 MOST_ROUNDS = 8
+# A round is not made where it would move by so much less than the last may.
+CERTAIN = 0.02
 # A round that moves what is sensed by more than this, K, has left what the terms can answer.
 LOST = 1000.0
 
@@ -179,11 +181,14 @@ class TermMarch:
         forcing = answers.with_sensed(self.response[:, :, None])
         given = start.states[:, :, None]
         # From a run that is near the first round may be the last, which needs the derivatives to parameters.
-        slopes = near is not None and bool(self.dynamic.derivatives)
+        near_given = near is not None
+        slopes = near_given and bool(self.dynamic.derivatives)
         if near is None:
             near = start.states[np.searchsorted(start.points, np.arange(steps + 1), side="right") - 1]
         sensed = near @ answers.sense.T
-        memory = None
+        memory, before_that = None, np.nan
+        # Where derivatives follow, the lines must be those of the last round.
+        only_values = near_given and not self.dynamic.derivatives
         for _ in range(MOST_ROUNDS):
             if not np.all(np.isfinite(sensed)):
                 return None
@@ -198,7 +203,10 @@ class TermMarch:
             sensed = found.sensed[:, :, 0]
             if not moved < LOST:
                 return None
-            if moved <= TEMPERATURE_TOLERANCE:
+            # Newton's method squares what is left: what the next round would move follows from the last two.
+            left = moved * (moved / before_that) ** 2 if only_values else np.inf
+            before_that = moved
+            if moved <= TEMPERATURE_TOLERANCE or left <= CERTAIN * TEMPERATURE_TOLERANCE:
                 if self.dynamic.derivatives and not slopes:
                     told = self._told(before, after, begins, sensed, memory, slopes=True)
                 return found.states[:, :, 0], self._tracks(found, linearised, told)

@@ -53,6 +53,8 @@ class FastTransient:
         Reduced unknowns at the ends of the steps.
     added : (G + 1, m) ndarray
         What the terms added just before each of them.
+    tangents : (G + 1, r, p) ndarray or None
+        Derivatives of the states; None where none were asked for.
     """
 
     times: Array
@@ -63,6 +65,7 @@ class FastTransient:
     grid: Array
     states: Array
     added: Array
+    tangents: Array | None = None
 
 
 def simulate_fast(
@@ -391,6 +394,7 @@ class TransientRun:
             drive.grid,
             states,
             added,
+            sensitivities,
         )
 
     def _shift_inlet(self, inputs: Array, tracks: Tracks | None) -> Array | None:
