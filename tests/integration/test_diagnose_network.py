@@ -12,10 +12,13 @@ from scipy.integrate import solve_ivp
 from spindle_fem.diagnosis import abreast
 from spindle_fem.diagnosis.abreast import FitOrder, Workers, fit_order
 from spindle_fem.diagnosis.inference import Problem
+from spindle_fem.diagnosis.locate import Pattern, onset_answers
 from spindle_fem.diagnosis.machines import open_machine
 from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.diagnosis.prepare import all_stamps, calibrate
 from spindle_fem.diagnosis.run import diagnose
+from spindle_fem.diagnosis.screening import variants_of
+from spindle_fem.diagnosis.search import screen
 from spindle_fem.effects.catalogue import candidates_for
 from spindle_fem.errors import BadInputError, ConvergenceError
 from spindle_fem.recordings.align import read_recording
@@ -360,6 +363,33 @@ def test_fits_abreast_are_those_of_one_process(machine, tmp_path):
         assert other.log_evidence == pytest.approx(one.log_evidence, rel=1e-9)
         assert other.candidates[0] is order.candidates[0]
     assert len({round(fit.log_evidence, 3) for fit in alone}) == len(orders)
+
+
+def test_screening_is_that_of_one_process(machine, tmp_path):
+    folder = record(tmp_path / "r", 5, extra=hot)
+    opened = open_machine(machine, (), [read_recording(folder)], [])
+    plant = Plant(opened.fast, opened.recordings, all_stamps(opened.recordings), opened.effects)
+    calibrated = calibrate(None, plant)
+    problem = Problem(plant, calibrated.belief, calibrated.slow, plant.observations)
+    null = problem.fit(iterations=3)
+    variants = variants_of(candidates_for(opened.view))
+    weights = dict.fromkeys((variant.candidate.effect for variant in variants), 1.0)
+    patterns = [Pattern(spot, places) for spot, places in opened.view.spots.items()] * 4
+    found, onsets = [], []
+    for workers in (None, Workers(2)):
+        found.append(screen(problem, null, variants, weights, {}, workers=workers))
+        onsets.append(onset_answers(problem, null, patterns, 0, workers=workers))
+    one, other = found
+    assert np.abs(one.gram).max() > 0.0
+    assert np.array_equal(one.gram, other.gram)
+    assert np.array_equal(one.data, other.data)
+    assert [item.pattern for item in onsets[1]] == patterns
+    for item, same in zip(*onsets, strict=True):
+        assert np.array_equal(item.gram, same.gram)
+        assert np.array_equal(item.data, same.data)
+    # Every variant has its own answer.
+    alone = screen(problem, null, variants[3:4], weights, {})
+    assert alone.gram[0, 0] == pytest.approx(one.gram[3, 3], rel=1e-9)
 
 
 def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine, tmp_path, monkeypatch):

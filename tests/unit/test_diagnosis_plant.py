@@ -211,6 +211,33 @@ def test_two_terms_on_the_same_friction(plant, candidates):
     require_derivatives(plant, values, pair, {"heat.front": None, **steps_of(pair[0]), **steps_of(pair[1])})
 
 
+def test_slopes_of_states_lead_to_runs_nearby_and_to_places(plant, candidates):
+    closing = candidates["gap_closure", "ring over start"]
+    values = {**NOW, **values_of(closing)}
+    names = [name for name, *_ in plant.uncertain()] + coordinate_names(closing) + ["probe.SP01.r"]
+    found = plant.predict(0, values, [closing], names)
+    logarithmic = {**dict.fromkeys(names, True), "probe.SP01.r": False}
+    logarithmic |= {n: closing.free[n].logarithmic for n in coordinate_names(closing) if n in closing.free}
+    move = np.array([0.02 if logarithmic[name] else -0.005 for name in names])
+    there = {
+        name: values.get(name, 1.0) * np.exp(step) if logarithmic[name] else values.get(name, 0.0) + step
+        for name, step in zip(names, move, strict=True)
+    }
+    exact = plant.predict(0, values | there, [closing]).states
+    away = np.abs(exact - found.states).max()
+    assert away > 0.1
+    assert np.abs(exact - found.moved(move).states).max() < 0.05 * away
+    model = plant.fast.model
+    rows = [model.probe_names.index(name) for name in PROBES if name in model.probe_names]
+    columns = [PROBES.index(model.probe_names[row]) for row in rows]
+    slopes = found.slopes_at(model.probes[rows])
+    assert not slopes[:, :, -1].any()
+    assert slopes[:, :, :-1] == pytest.approx(found.sensitivity[:, columns, :-1], abs=1e-9)
+    # From there the run is the same, whatever it begins from.
+    again = plant.predict(0, values | there, [closing], near=found.moved(move))
+    assert np.abs(again.states - exact).max() < 1e-5
+
+
 def test_two_recordings_do_not_know_of_one_another(plant, recording):
     both = Plant(plant.fast, [recording, recording], [plant.use[0]] * 2, step=60.0)
     assert both.predict(1, NOW).temperature == pytest.approx(plant.predict(0, NOW).temperature, abs=1e-12)
