@@ -25,7 +25,7 @@ from spindle_fem.diagnosis.prepare import (
     slow_error_of,
 )
 from spindle_fem.diagnosis.screening import variants_of
-from spindle_fem.diagnosis.verdict import NEAR, Judgement, judge, may_stand_for, rank, tempered
+from spindle_fem.diagnosis.verdict import NEAR, NEAR_MISFIT, Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.effects.catalogue import candidates_for, catalogue, interval_effects
 from spindle_fem.effects.view import MachineView
 
@@ -39,9 +39,9 @@ ALWAYS_REFITTED = 2
 MOST_WORKERS = 4
 # Less likely than the best by so much (natural logarithm): of no account.
 NEGLIGIBLE = 8.0
-# Of so many rivals of the first set, so many that read nearly as it does are fitted again, whatever their
-# likelihood: those this much farther than what counts as near may come nearer.
-MOST_RIVALS, NEAREST, LOOKED_AT = 16, 3, 1.3
+# So many rivals of the first set that are near it, or this much farther than what counts as near, are fitted
+# again whatever their probability: on the whole basis they may come nearer.
+NEAREST, LOOKED_AT = 3, 1.3
 #: Prior weight of effects; the ways out for what no other fits count less.
 WEIGHTS = {"unrecorded_heat_source": 0.5, "unrecorded_cooling": 0.5}
 
@@ -246,8 +246,15 @@ def _refit(
     smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
     chosen += [h for h in smaller if h not in chosen]
     chosen += [h for h in ranked if not h.fit.candidates and h not in chosen]
-    rivals = [h for h in ranked if h not in chosen and may_stand_for(h.fit, ranked[0].fit, overlapping)]
-    nearest = sorted((readings.apart(ranked[0].fit, h.fit), i, h) for i, h in enumerate(rivals[:MOST_RIVALS]))
+    first = ranked[0].fit
+    rivals = [
+        h
+        for h in ranked
+        if h not in chosen
+        and may_stand_for(h.fit, first, overlapping)
+        and h.fit.misfit_with_prior < first.misfit_with_prior + LOOKED_AT * NEAR_MISFIT
+    ]
+    nearest = sorted((readings.apart(first, h.fit), i, h) for i, h in enumerate(rivals))
     chosen += [h for distance, _, h in nearest[:NEAREST] if distance < LOOKED_AT * NEAR]
     orders = [FitOrder(h.fit.candidates, h.fit.values, iterations=12) for h in chosen]
     # What ran before on a part of the basis may run away on the whole of it: it is no hypothesis then.
