@@ -42,9 +42,10 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         sets = [(content["findings"], content.get("set_probability"))]
         sets += [(item["findings"], item["probability"]) for item in content["alternatives"]]
         options = [f"{set_words(items)} ({chance(value)})" for items, value in sets]
+        reason = str(content.get("reason") or "several sets explain the data").rstrip(".")
         return (
             f"{_when(content)}the readings differ from the model by more than noise and uncertain "
-            f"parameters, but the data cannot tell apart {_or(options)}. {_improvement(fit)}"
+            f"parameters, but the data cannot tell apart {_or(options)}: {reason}. {_improvement(fit)}"
         )
     statements = " ".join(item["statement"] for item in content["findings"])
     lead = "" if verdict == "sensor" else _heat_words(content)
@@ -68,11 +69,13 @@ def set_words(findings: Sequence[Mapping[str, Any]]) -> str:
 def chance(value: float | None) -> str:
     """Probability as text.
 
-    >>> chance(0.934), chance(0.9999), chance(None)
-    ('0.93', 'above 0.99', 'not known')
+    >>> chance(0.934), chance(0.9999), chance(0.004), chance(None)
+    ('0.93', 'above 0.99', 'below 0.01', 'not known')
     """
     if value is None:
         return "not known"
+    if value < 0.01:
+        return "below 0.01"
     return "above 0.99" if value > 0.99 else f"{value:.2f}"
 
 
