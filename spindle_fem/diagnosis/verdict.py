@@ -50,7 +50,7 @@ UNEXPLAINED_MISFIT = 1.6
 # Right sets leave what the noise does, to a few hundredths (concealed study); a best set that leaves more
 # may be one for something that is not in the catalogue, and loses so much of its probability.
 EXACT_MISFIT, OTHER_RANGE, LARGEST_OTHER = 1.04, 0.2, 0.5
-NEAR_REASON = (
+NEAR_REASON = "several sets read the same within the noise; what tells them apart is how exact their laws are"
     "several sets read the same within the noise: what tells them apart is the exactness of their laws"
 )
 # Shift of an uncertain parameter that its prior holds with at least 1 %.
