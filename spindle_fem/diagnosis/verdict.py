@@ -51,8 +51,6 @@ UNEXPLAINED_MISFIT = 1.6
 # may be one for something that is not in the catalogue, and loses so much of its probability.
 EXACT_MISFIT, OTHER_RANGE, LARGEST_OTHER = 1.04, 0.2, 0.5
 NEAR_REASON = "several sets read the same within the noise; what tells them apart is how exact their laws are"
-    "several sets read the same within the noise: what tells them apart is the exactness of their laws"
-)
 # Shift of an uncertain parameter that its prior holds with at least 1 %.
 PRIOR_SIGMAS = float(norm.ppf(0.995))
 
