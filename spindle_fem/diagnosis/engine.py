@@ -428,11 +428,12 @@ class Search:
         return in_intervals(self.effects[candidate.effect], candidate)
 
     def _within_gaps(self, intervals: Sequence[tuple[float, float]], recording: int) -> bool:
+        """Whether any interval lies in gaps by more than ``HIDDEN`` of it."""
         gaps = self.problem.plant.gap_intervals(recording)
-        hidden = sum(
-            max(0.0, min(end, stop) - max(start, begin)) for start, end in intervals for begin, stop in gaps
+        return any(
+            sum(max(0.0, min(end, stop) - max(start, begin)) for begin, stop in gaps) > HIDDEN * (end - start)
+            for start, end in intervals
         )
-        return hidden > HIDDEN * sum(end - start for start, end in intervals)
 
     def _hopeless(self, size: int) -> float:
         """Misfit beyond which a set of some size does not matter."""

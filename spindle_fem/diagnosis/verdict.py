@@ -33,7 +33,7 @@ TEMPERATURE_OF_A_SIZE = 1.5
 # When sets are compared, amplitudes from this share of their usual size up to it are as likely in every
 # decade: what a normal prior says of an effect a tenth as large is a convention, and another one for each
 # effect. Beyond the usual size the normal prior holds.
-SMALLEST_SIZE = 0.01
+SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
 # Below this the most probable set is named together with what else may be.
 DECIDED = 0.75
 # Sets of as many effects are named together where in every channel their readings differ by less than this
@@ -162,13 +162,16 @@ def any_magnitude(fit: Fit) -> float:
     """Logarithm of the prior density of a fit's amplitudes, even in their logarithm, over the normal one.
 
     Two effects that leave the same then have the same complexity, whatever widths
-    their priors were given.
+    their priors were given. What is less than ``SEEN_FROM`` of its own standard
+    deviations may be as large as that: nothing is not made likely by its smallness.
     """
     width = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / SMALLEST_SIZE))
+    places = {c.name: index for index, c in enumerate(fit.coordinates)}
     found = 0.0
     for candidate in fit.candidates:
-        name = amplitude_name(candidate)
-        size = abs(next(u for c, u in zip(fit.coordinates, fit.position, strict=True) if c.name == name))
+        place = places[amplitude_name(candidate)]
+        least = SEEN_FROM * float(np.sqrt(fit.covariance[place, place]))
+        size = max(abs(fit.position[place]), least)
         found += float(np.log(width / np.clip(size, SMALLEST_SIZE, 1.0)))
     return found
 

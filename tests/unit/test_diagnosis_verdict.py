@@ -20,6 +20,7 @@ from spindle_fem.diagnosis.verdict import (
     NEAR_MISFIT,
     NEAR_REASON,
     PRIOR_SIGMAS,
+    SEEN_FROM,
     SMALLEST_SIZE,
     TEMPERATURE,
     TEMPERATURE_OF_A_SIZE,
@@ -136,19 +137,16 @@ def test_complexity_and_prior_count_in_full():
 
 
 def test_amplitudes_of_any_magnitude_are_as_likely():
-    usual, small = (
-        hypothesis(PRELOAD, misfit=400.0, position=(0.0, u)) for u in (AS_NORMAL, 0.1 * AS_NORMAL)
-    )
-    assert any_magnitude(usual.fit) == pytest.approx(0.0, abs=1e-12)
-    # Ten times as dense in the amplitude where the amplitude is a tenth.
-    assert any_magnitude(small.fit) == pytest.approx(np.log(10.0))
-    beyond, far = (hypothesis(PRELOAD, misfit=400.0, position=(0.0, u)) for u in (1.0, 3.0))
-    assert any_magnitude(far.fit) == any_magnitude(beyond.fit) == pytest.approx(np.log(AS_NORMAL))
-    # Known to a fifth and a fiftieth of priors that differ by ten, both to a tenth of themselves: the same.
-    wide = hypothesis(CHURNING, misfit=400.0, evidence=-200.0 - np.log(10.0), position=(0.0, 0.05))
-    narrow = hypothesis(PRELOAD, misfit=400.0, evidence=-200.0, position=(0.0, 0.5))
-    ranked = rank([wide, narrow, hypothesis(misfit=900.0)])
-    assert ranked[0].probability == pytest.approx(ranked[1].probability)
+    def weight(size, sigma=1e-6):
+        fit = hypothesis(PRELOAD, misfit=400.0, position=(0.0, size)).fit
+        return any_magnitude(replace(fit, covariance=sigma**2 * np.eye(2)))
+
+    assert weight(AS_NORMAL) == pytest.approx(0.0, abs=1e-12)
+    assert weight(0.1 * AS_NORMAL) == weight(-0.1 * AS_NORMAL) == pytest.approx(np.log(10.0))
+    # Beyond its usual size the normal prior has it.
+    assert weight(3.0) == weight(30.0) == pytest.approx(np.log(AS_NORMAL))
+    # Nothing, to within so much, is not likelier than so much is.
+    assert weight(1e-3, sigma=0.1) == weight(0.0, sigma=0.1) == pytest.approx(weight(SEEN_FROM * 0.1))
 
 
 def test_what_a_strong_effect_leaves_counts_less_for_one_more():
