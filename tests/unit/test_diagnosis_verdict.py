@@ -137,9 +137,11 @@ def test_complexity_and_prior_count_in_full():
 
 
 def test_amplitudes_of_any_magnitude_are_as_likely():
+    def known(found, sigma=1e-6):
+        return replace(found, fit=replace(found.fit, covariance=sigma**2 * np.eye(2)))
+
     def weight(size, sigma=1e-6):
-        fit = hypothesis(PRELOAD, misfit=400.0, position=(0.0, size)).fit
-        return any_magnitude(replace(fit, covariance=sigma**2 * np.eye(2)))
+        return any_magnitude(known(hypothesis(PRELOAD, misfit=400.0, position=(0.0, size)), sigma).fit)
 
     assert weight(AS_NORMAL) == pytest.approx(0.0, abs=1e-12)
     assert weight(0.1 * AS_NORMAL) == weight(-0.1 * AS_NORMAL) == pytest.approx(np.log(10.0))
@@ -147,6 +149,11 @@ def test_amplitudes_of_any_magnitude_are_as_likely():
     assert weight(3.0) == weight(30.0) == pytest.approx(np.log(AS_NORMAL))
     # Nothing, to within so much, is not likelier than so much is.
     assert weight(1e-3, sigma=0.1) == weight(0.0, sigma=0.1) == pytest.approx(weight(SEEN_FROM * 0.1))
+    # Known to a fifth and a fiftieth of priors that differ by ten, both to a tenth of themselves: the same.
+    wide = known(hypothesis(CHURNING, misfit=400.0, evidence=-200.0 - np.log(10.0), position=(0.0, 0.05)))
+    narrow = known(hypothesis(PRELOAD, misfit=400.0, evidence=-200.0, position=(0.0, 0.5)))
+    ranked = rank([wide, narrow, hypothesis(misfit=900.0)])
+    assert ranked[0].probability == pytest.approx(ranked[1].probability)
 
 
 def test_what_a_strong_effect_leaves_counts_less_for_one_more():
