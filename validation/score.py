@@ -96,6 +96,7 @@ def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | 
         "first_effect": named is not None,
         "place": all(places) if places else None,
         "located": located,
+        "law": followed(answer, found),
         "coverage": coverage(answer, found),
         "after_over_noise": after / noise if noise and after is not None else None,
         "before_over_noise": fit["before"]["heldout_rmse_K"] / noise
@@ -113,6 +114,12 @@ def noise_of(answer: dict[str, Any]) -> float:
     """
     noise = answer["noise"]
     return float(np.sqrt(noise["white_K"] ** 2 + noise["slow_K"] ** 2 + noise["rounding_K"] ** 2 / 12.0))
+
+
+def followed(answer: dict[str, Any], found: list[dict[str, Any]]) -> bool | None:
+    """Whether a finding names the recorded quantity that concealed heat follows; None where it follows none."""
+    wanted = {effect["follows"] for effect in answer["effects"] if effect.get("follows")}
+    return wanted <= {finding.get("follows") for finding in found} if wanted else None
 
 
 def coverage(answer: dict[str, Any], found: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -226,6 +233,7 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
         "pair_one_effect_named": _share(pairs, "first_effect"),
         "place_of_named": _share([r for r in rows if r["detectable"]], "place"),
         "located": _share(visible, "located"),
+        "law_of_recorded_quantity": _share(visible, "law"),
         "ambiguous_truth_kept": _share(twins, "truth_kept"),
         "ambiguous_called": _share(twins, "called_ambiguous"),
         "confident_wrong": _share(rows, "confident_wrong"),

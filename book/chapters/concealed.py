@@ -238,6 +238,7 @@ def _places(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> li
                     table.setdefault(place, Counter())[here] += 1
     places = summary["place_of_named"]
     located = summary["located"]
+    law = summary["law_of_recorded_quantity"]
     listed = [
         [place, ", ".join(f"{name} {count}" for name, count in counts.most_common())]
         for place, counts in sorted(table.items())
@@ -248,6 +249,12 @@ def _places(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> li
             f"acceptable place (a bearing of the set counts for the set). Of {located['of']} detectable "
             f"cases with any mismatch found, {_percent(located)} point at a place where something was "
             "concealed, whatever it was called."
+            + (
+                f" In {law['of']} cases heat follows a recorded quantity by a law that no effect has; "
+                f"{_percent(law)} of them are answered with that quantity."
+                if law["of"]
+                else ""
+            )
         ),
         Table(
             (column("concealed at"), column("named at, with the number of cases")),

@@ -182,6 +182,20 @@ def test_score_counts_false_alarms():
     assert summarise(rows, [])["false_alarms"] == {"share": 0.5, "of": 2}
 
 
+def test_score_counts_laws_of_recorded_quantities():
+    answer = _answer([("unrecorded_heat_source", "flange")])
+    answer["effects"][0]["follows"] = "thrust"
+    rows = []
+    for quantity in ("thrust", "change of speed", None):
+        said = _diagnosis("missing_physics", [("unrecorded_heat_source", "flange")])
+        said["findings"][0]["follows"] = quantity
+        rows.append(score_case(answer, said, None))
+    # Nothing to follow in this one.
+    rows.append(score_case(_answer([("windage", "shaft")]), _diagnosis("missing_physics", []), None))
+    assert [row["law"] for row in rows] == [True, False, False, None]
+    assert summarise(rows, [])["law_of_recorded_quantity"]["of"] == 3
+
+
 def test_sets_match_each_effect_once():
     wanted = [{"effect": "windage", "components": ["shaft"]}, {"effect": "windage", "components": ["shaft"]}]
     found = [{"effect": "windage", "component": "shaft"}, {"effect": "heat_scale", "component": "F1"}]
