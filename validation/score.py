@@ -117,7 +117,7 @@ def noise_of(answer: dict[str, Any]) -> float:
 
 
 def followed(answer: dict[str, Any], found: list[dict[str, Any]]) -> bool | None:
-    """Whether a finding names the recorded quantity that concealed heat follows; None where it follows none."""
+    """Whether findings name the recorded quantity that concealed heat follows; None where it follows none."""
     wanted = {effect["follows"] for effect in answer["effects"] if effect.get("follows")}
     return wanted <= {finding.get("follows") for finding in found} if wanted else None
 
