@@ -121,7 +121,7 @@ class Workers:
         jobs : sequence of callable
             That can be sent to another process: functions of modules, perhaps with some arguments given.
         """
-        if self._number == 1 or len(jobs) == 1:
+        if self._number == 1 or len(jobs) <= 1:
             return [job(problem) for job in jobs]
         path, beside = self._send(problem), min(self._number, len(jobs)) - 1
         executor = _others(self._number - 1)
@@ -151,6 +151,20 @@ class Workers:
         for other in others:
             other.result()
         return found
+
+    def ahead(self, job: Callable[[], Any]) -> Callable[[], Any]:
+        """Start a job in another process; the returned function waits for what it makes.
+
+        Where there is no other process the job is done when it is waited for.
+
+        Parameters
+        ----------
+        job : callable
+            That can be sent, as those of :meth:`done`.
+        """
+        if self._number == 1:
+            return job
+        return _others(self._number - 1).submit(job).result
 
     def _send(self, problem: Problem) -> str:
         """File from which other processes take a problem, written once."""

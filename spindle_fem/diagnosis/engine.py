@@ -50,8 +50,9 @@ BEAM, ADDITIONS = 3, 6
 # that feeds on its own heat has no state at amplitudes that are too large, and first order does not know
 # where that begins.
 MILDER = (1.0, 0.5, 0.2)
-# Sets that are fitted abreast before the best of them says what is hopeless.
-ABREAST = 2
+# Sets that are fitted abreast before the best of them says what is hopeless: of those that promise most, and
+# of the others, of which fewer are the best and more keep all workers busy.
+ABREAST, FURTHER = 2, 5
 # A hypothesis this much less likely (natural logarithm) than the best is not extended, but for one effect
 # that explains a fair share of what the best does: half of a strong pair leaves a lot.
 HOPELESS, FAIR_SHARE = 100.0, 0.55
@@ -402,8 +403,8 @@ class Search:
             if key not in self.found:
                 waiting.setdefault(key, (candidates, start))
         queue = list(waiting.values())
-        for first in range(0, len(queue), ABREAST):
-            together = queue[first : first + ABREAST]
+        rest = range(ABREAST, len(queue), FURTHER)
+        for together in (queue[:ABREAST], *(queue[first : first + FURTHER] for first in rest)):
             orders = [
                 FitOrder(candidates, start, MILDER, self._hopeless(len(candidates)))
                 for candidates, start in together

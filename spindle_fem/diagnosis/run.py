@@ -5,13 +5,16 @@ from __future__ import annotations
 import csv
 import json
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from spindle_fem.diagnosis.core import Diagnosis, diagnose_recordings
+from spindle_fem.conduction.threads import thread_count
+from spindle_fem.diagnosis.abreast import Workers
+from spindle_fem.diagnosis.core import MOST_WORKERS, Diagnosis, diagnose_recordings
 from spindle_fem.diagnosis.findings import (
     channel_errors,
     findings_of,
@@ -92,6 +95,7 @@ def diagnose(
     earlier = [read_recording(path) for path in calibrate]
     opened = open_machine(machine, tuple(overrides), read, earlier, heldout=heldout, progress=tell)
     with output_folder(folder) as place:
+        drawn = None
         reason = says_too_little(opened)
         if reason:
             content = _unexplained(opened, reason)
@@ -99,9 +103,13 @@ def diagnose(
                 OFF if full_model == AUTO else full_model, "Nothing was fitted."
             )
         else:
-            diagnosis = diagnose_recordings(opened, heldout=heldout, progress=tell)
+            workers = Workers(min(thread_count(), MOST_WORKERS))
+            diagnosis = diagnose_recordings(opened, heldout=heldout, progress=tell, workers=workers)
             tell("writing")
+            proposed = workers.ahead(partial(next_measurement, diagnosis))
             content = _write(diagnosis, opened, place, report=report, progress=tell)
+            if report:
+                drawn = workers.ahead(partial(_draw, place, json.loads(json.dumps(_plain(content)))))
             content["fit"]["full_model"] = full_model_errors(
                 diagnosis,
                 opened,
@@ -111,14 +119,22 @@ def diagnose(
                 ),
                 progress=tell,
             )
+            content["next_measurement"] = proposed()
         content["wall_time_s"] = time.perf_counter() - started
         replace_text(place / "diagnosis.json", json.dumps(_plain(content), indent=1) + "\n")
         if report:
             from spindle_fem.reporting.diagnosis_report import write_diagnosis_report
 
             tell("report")
-            write_diagnosis_report(place)
+            write_diagnosis_report(place, None if drawn is None else drawn())
         return content
+
+
+def _draw(place: Path, content: Mapping[str, Any]) -> Mapping[str, list[Any]]:
+    """Figures of a diagnosis, in whatever process."""
+    from spindle_fem.reporting.diagnosis_report import draw_figures
+
+    return draw_figures(place, content)
 
 
 def _write(
@@ -158,7 +174,6 @@ def _write(
             "heldout": diagnosis.heldout,
             "channels_after": channel_errors(plant, after),
         },
-        "next_measurement": next_measurement(diagnosis),
         "improved_model": "improved_machine.toml",
         "machine_parameters": _machine_parameters(diagnosis),
         "slow_error": {"sigma_K": diagnosis.final.slow.sigma, "time_s": diagnosis.final.slow.time},

@@ -33,6 +33,7 @@ from spindle_fem.reporting.diagnosis_words import (
 )
 from spindle_fem.reporting.document import (
     Bullets,
+    Illustration,
     Notice,
     Section,
     Text,
@@ -59,13 +60,46 @@ CAPTIONS = {
 }
 
 
-def write_diagnosis_report(folder: str | Path) -> Path:
-    """``report.html`` and ``figures`` of a folder that holds ``diagnosis.json`` and ``diagnosis.nc``.
+def draw_figures(folder: str | Path, content: Mapping[str, Any]) -> dict[str, list[Illustration]]:
+    """``figures`` of a folder that holds ``diagnosis.nc``, as pictures for its report.
 
     Parameters
     ----------
     folder : str or Path
         The drawing of the machine needs ``improved_machine.toml`` or ``machine.toml`` too.
+    content : mapping
+        Of ``diagnosis.json``; neither the full model nor what to measure next is drawn.
+
+    Returns
+    -------
+    dict of kind to list of Illustration
+
+    Raises
+    ------
+    BadInputError
+    """
+    folder = Path(folder)
+    data = _read_data(folder / "diagnosis.nc")
+    place = folder / "figures"
+    place.mkdir(exist_ok=True)
+    pictures: dict[str, list[Illustration]] = {}
+    for name, figure in _figures(content, data, folder):
+        path = save_png(figure, place / f"{name}.png")
+        kind = name.rpartition("_recording_")[0] or name
+        pictures.setdefault(kind, []).append(illustration_of(path, CAPTIONS[kind]))
+    return pictures
+
+
+def write_diagnosis_report(
+    folder: str | Path, pictures: Mapping[str, list[Illustration]] | None = None
+) -> Path:
+    """``report.html`` and ``figures`` of a folder that holds ``diagnosis.json`` and ``diagnosis.nc``.
+
+    Parameters
+    ----------
+    folder : str or Path
+    pictures : mapping of kind to list of Illustration, optional
+        What :func:`draw_figures` has drawn already.
 
     Returns
     -------
@@ -79,14 +113,7 @@ def write_diagnosis_report(folder: str | Path) -> Path:
     """
     folder = Path(folder)
     content = read_diagnosis(folder)
-    data = _read_data(folder / "diagnosis.nc")
-    place = folder / "figures"
-    place.mkdir(exist_ok=True)
-    pictures: dict[str, list[Any]] = {}
-    for name, figure in _figures(content, data, folder):
-        path = save_png(figure, place / f"{name}.png")
-        kind = name.rpartition("_recording_")[0] or name
-        pictures.setdefault(kind, []).append(illustration_of(path, CAPTIONS[kind]))
+    pictures = draw_figures(folder, content) if pictures is None else pictures
     return replace_text(folder / "report.html", render(content, pictures))
 
 

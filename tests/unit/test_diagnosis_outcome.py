@@ -5,6 +5,7 @@ import json
 import re
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -38,7 +39,7 @@ from spindle_fem.errors import BadInputError
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reporting.diagnosis_data import diagnosis_dataset
-from spindle_fem.reporting.diagnosis_report import SCHEMA, write_diagnosis_report
+from spindle_fem.reporting.diagnosis_report import SCHEMA, draw_figures, write_diagnosis_report
 from spindle_fem.reporting.diagnosis_words import verdict_sentence
 from spindle_fem.spec.load import load_machine, write_machine
 
@@ -473,6 +474,28 @@ def test_the_dataset_keeps_readings_and_what_was_held_out(reported, heated):
     assert np.sqrt(np.mean(error**2)) == pytest.approx(content["fit"]["after"]["heldout_rmse_K"], rel=1e-4)
     assert data["spot_share"].sum() == pytest.approx(1.0)
     assert data["measured"].attrs["units"] == "degC"
+
+
+def test_figures_may_be_drawn_by_another_process_before_the_report(reported, tmp_path):
+    folder, content, path = reported
+    for name in ("diagnosis.nc", "diagnosis.json", "improved_machine.toml"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    known = {key: value for key, value in content.items() if key != "next_measurement"}
+    pictures = Workers(2).ahead(partial(draw_figures, tmp_path, known))()
+    assert {item.name for item in (tmp_path / "figures").iterdir()} == {
+        item.name for item in (folder / "figures").iterdir()
+    }
+    assert write_diagnosis_report(tmp_path, pictures).read_text(encoding="utf-8") == path.read_text(
+        encoding="utf-8"
+    )
+    assert "data:image" not in write_diagnosis_report(tmp_path, {}).read_text(encoding="utf-8")
+
+
+def test_what_to_measure_next_is_the_same_from_another_process(heated, proposal):
+    found = Workers(2).ahead(partial(next_measurement, heated))()
+    assert (found["where"], found["condition"]) == (proposal["where"], proposal["condition"])
+    assert found["expected_information"] == pytest.approx(proposal["expected_information"], rel=1e-6)
+    assert len(found["options"]) == len(proposal["options"]) > 0
 
 
 def test_a_consistent_report_draws_no_place(consistent, tmp_path):
