@@ -42,15 +42,20 @@ START_PREFIX = "start."
 # How long before the middle of a gap an input had changed, s: ``jump.<recording>.<number>``.
 JUMP_PREFIX = "jump."
 GAP_STEPS = 1.5
-# Friction that the bearings gave within a gap beyond what the inputs beside it say, as a share of
-# the highest that they give: ``within_gap.<recording>.<number>``. Shorter gaps hide nothing that matters.
+# What happened within a piece of a gap beyond what the inputs beside it say,
+# ``within_gap.<recording>.<number>``: friction of a bearing set, as a share of the highest that it gives; an
+# input temperature that is another after the gap, as a share of its change. Shorter gaps and smaller changes
+# [K] hide nothing that matters.
 GAP_PREFIX = "within_gap."
 SHORTEST_GAP = 120.0
+LEAST_CHANGE = 1.0
 # Coordinates that say nothing about other recordings.
 OF_ONE_RECORDING = (START_PREFIX, JUMP_PREFIX, GAP_PREFIX)
 GAP_PIECE, MOST_PIECES = 150.0, 8
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")
+# Input temperatures, by the name of their load.
+WARMTH = ("ambient", "coolant_inlet")
 # Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
 INLET_BIN = 3.0
 # Of the highest speed: the films that follow it are small beside the oil's.
@@ -182,6 +187,10 @@ class Plant:
             for item, drive in zip(self.recordings, self.drives, strict=True)
         ]
         self._gaps = [() if self.is_network else _gaps(item) for item in self.recordings]
+        self._hidden = [
+            _hidden(recording, gaps, [group.name for group in fast.spec.bearing_set]) if gaps else ()
+            for recording, gaps in zip(self.recordings, self._gaps, strict=True)
+        ]
         self._slopes: dict[tuple[str, int], Array] = {}
         self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
         self.observations = self._observe(self.use)
@@ -234,10 +243,10 @@ class Plant:
         ]
 
     def gaps(self) -> list[str]:
-        """Names of what the bearings gave within gaps."""
+        """Names of what may have happened within gaps."""
         return [
             f"{GAP_PREFIX}{number}.{index}"
-            for number, items in enumerate(self._gaps)
+            for number, items in enumerate(self._hidden)
             for index in range(len(items))
         ]
 
@@ -454,16 +463,22 @@ class Plant:
         return forcing
 
     def _gap_forcing(self, run: TransientRun, number: int) -> Array:
-        n_heat = len(self.fast.heat_places)
-        highest = run.start[:, :n_heat].max(axis=0)
-        forcing = np.zeros((len(run.drive.steps), self.fast.model.size, len(self._gaps[number])))
+        highest = run.start.max(axis=0)
+        members = {
+            group.name: [row for item in group.bearing for row in self.fast.heat_rows(item.name)]
+            for group in self.fast.spec.bearing_set
+        }
+        hidden = self._hidden[number]
+        forcing = np.zeros((len(run.drive.steps), self.fast.model.size, len(hidden)))
         for key, rows in run.groups.items():
-            propagator = run.propagators[key]
-            load = run.loads[key[0]][:, :n_heat] @ highest
-            answer = (propagator.from_start + propagator.from_end) @ load
+            propagator, loads = run.propagators[key], run.loads[key[0]]
+            along = {name: loads[:, own] @ highest[own] for name, own in members.items()}
+            along |= {name: loads[:, self.fast.load_names.index(name)] for name in WARMTH}
             middles = 0.5 * (run.drive.grid[rows] + run.drive.grid[rows + 1])
-            for index, (begin, end) in enumerate(self._gaps[number]):
-                forcing[rows[(middles > begin) & (middles < end)], :, index] = answer
+            for index, item in enumerate(hidden):
+                inside = rows[(middles > item.begin) & (middles < item.end)]
+                answer = (propagator.from_start + propagator.from_end) @ along[item.what]
+                forcing[inside, :, index] = item.size * answer
         return forcing
 
     def read(
@@ -597,6 +612,31 @@ def _gaps(recording: Recording) -> tuple[tuple[float, float], ...]:
         first, last = recording.times[row : row + 2]
         edges = np.linspace(first, last, 1 + min(MOST_PIECES, int(np.ceil((last - first) / GAP_PIECE))))
         found += [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Hidden:
+    """What may have happened between two times: heat of a bearing set, or an input temperature."""
+
+    begin: float
+    end: float
+    what: str
+    size: float
+
+
+def _hidden(
+    recording: Recording, pieces: Sequence[tuple[float, float]], sets: Sequence[str]
+) -> tuple[_Hidden, ...]:
+    found = [_Hidden(begin, end, name, 1.0) for begin, end in pieces for name in sets]
+    for name in WARMTH:
+        if name not in recording.input_names:
+            continue
+        for begin, end in pieces:
+            row = int(np.searchsorted(recording.times, begin + 1e-6))
+            before, after = recording.input_at(name, recording.times[row - 1 : row + 1])
+            if abs(after - before) >= LEAST_CHANGE:
+                found.append(_Hidden(begin, end, name, float(after - before)))
     return tuple(found)
 
 

@@ -145,8 +145,8 @@ class Term:
         """State at time zero, (n_states,); must not depend on parameters that are fitted."""
         return np.zeros(self.n_states)
 
-    def advance(self, context: TermContext, step: float) -> NDArray[np.complex128]:
-        """State after a step, (n_states, k), from what holds at its start."""
+    def advance(self, context: TermContext, step: float | Array) -> NDArray[np.complex128]:
+        """State after a step [s], or (k,) steps, (n_states, k), from what holds at its start."""
         return context.state
 
     def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:

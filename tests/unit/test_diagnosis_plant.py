@@ -283,6 +283,41 @@ def test_covariates_are_means_over_the_steps_and_end_none(plant, recording):
     assert quantities["load"].highest == np.nanmax(flicker)
 
 
+def test_what_happens_in_a_gap_is_open_for_each_set_and_for_inputs_that_changed(plant, recording):
+    """Friction of each bearing set in every piece, the coolant where it is another afterwards; no air."""
+    kept = (recording.times <= 1500.0) | (recording.times > 2000.0)
+    column = recording.input_names.index("coolant_inlet")
+    inputs = recording.inputs.copy()
+    inputs[recording.times > 2000.0, column] += 9.0
+    gap = replace(
+        recording,
+        times=recording.times[kept],
+        temperature=recording.temperature[kept],
+        flags=recording.flags[kept],
+        inputs=inputs[kept],
+        covariates=recording.covariates[kept],
+    )
+    own = Plant(plant.fast, [gap], [np.ones(gap.times.size, dtype=bool)], step=60.0)
+    pieces = own.gap_intervals(0)
+    assert pieces[0][0] == 1500.0
+    assert pieces[-1][1] == 2050.0
+    sets = len(plant.fast.spec.bearing_set)
+    names = own.gaps()
+    assert len(names) == (sets + 1) * len(pieces)
+    still = own.predict(0, {}).temperature
+    change = {name: own.predict(0, {name: 1.0}).temperature - still for name in names}
+    grid = own.drives[0].grid
+    for moved in change.values():
+        assert np.abs(moved[grid <= 1500.0]).max() == 0.0
+        assert np.abs(moved[grid > 2050.0]).max() > 1e-3
+    first, last = names[0], names[-1]
+    front, rear = PROBES.index("SP01"), PROBES.index("SP05")
+    after = int(np.searchsorted(grid, 2100.0))
+    # The first set warms its own end; coolant that is warmer all the time warms everything.
+    assert change[first][after, front] > change[first][after, rear] >= 0.0
+    assert (change[last][after:] > 0.0).all()
+
+
 def test_the_small_basis_reads_what_the_large_one_does(plant, candidates):
     places = [name for name in plant.fast.model.place_names if "raceway" in name]
     small = plant.compressed([name for name, *_ in plant.uncertain()], places)

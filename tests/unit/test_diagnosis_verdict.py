@@ -24,6 +24,7 @@ from spindle_fem.diagnosis.verdict import (
     SMALLEST_SIZE,
     TEMPERATURE,
     TEMPERATURE_OF_A_SIZE,
+    TEMPERATURE_OF_CHANCE,
     any_magnitude,
     counted,
     detection_p_value,
@@ -192,7 +193,7 @@ CHURNING_KEY = frozenset({("grease_churning", "front_bearings")})
 # ---------------------------------------------------------------------- detection
 def test_the_p_value_corrects_for_the_number_of_trials():
     null, better = hypothesis(misfit=430.0), hypothesis(PRELOAD, misfit=400.0)
-    alone = chi2.sf(30.0 / np.sqrt(TEMPERATURE), 1)
+    alone = chi2.sf(30.0 / TEMPERATURE_OF_CHANCE, 1)
     assert detection_p_value([null, better], 1) == pytest.approx(alone)
     assert detection_p_value([null, better], 50) == pytest.approx(1.0 - (1.0 - alone) ** 50, rel=1e-9)
 
@@ -200,7 +201,7 @@ def test_the_p_value_corrects_for_the_number_of_trials():
 def test_pairs_are_corrected_for_the_number_of_pairs():
     null = hypothesis(misfit=430.0)
     pair = hypothesis(PRELOAD, CHURNING, misfit=400.0)
-    alone = chi2.sf(30.0 / np.sqrt(TEMPERATURE), 2)
+    alone = chi2.sf(30.0 / TEMPERATURE_OF_CHANCE, 2)
     assert detection_p_value([null, pair], 50) == pytest.approx(-np.expm1(1225 * np.log1p(-alone)), rel=1e-9)
 
 
