@@ -6,17 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.base import Candidate, Effect
-from spindle_fem.effects.laws import Complex, amplitude, relaxed, repeated, shape
+from spindle_fem.effects.laws import RPM, Complex, amplitude, linear, power, relaxed, repeated, shape
 from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 
 # Below this share of the highest speed nothing churns.
 TURNING_SHARE = 1e-3
 RESTARTS = "after every rest"
+# At which the time constant is stated, rad/s.
+RUN_IN_SPEED = 3000.0 * RPM
+Array = NDArray[np.float64]
 
 
 class GreaseChurningTerm(Term):
-    """Factor ``1 + a f`` on friction; the fresh share f decays with running time.
+    """Factor ``1 + a exp(-x^s)`` on friction; x counts how far the grease is run in.
+
+    While the machine turns x grows by ``(n / 3000 rpm)^m`` in a time constant:
+    with time alone (m = 0) or with revolutions (m = 1). At rest it stays, or
+    goes back.
 
     Parameters
     ----------
@@ -28,37 +35,49 @@ class GreaseChurningTerm(Term):
         Magnitude of it above which it does.
     restarts : bool
         Whether grease flows back at rest, so that every start begins anew.
+    revolutions : bool
+        Whether the input is a speed, with which it may run in the faster.
     """
 
     n_states = 1
 
     def __init__(
-        self, name: str, bearings: tuple[str, ...], speed: str, threshold: float, *, restarts: bool
+        self,
+        name: str,
+        bearings: tuple[str, ...],
+        speed: str,
+        threshold: float,
+        *,
+        restarts: bool,
+        revolutions: bool = False,
     ) -> None:
         self.name, self.bearings = name, bearings
-        self._speed, self._threshold, self._restarts = speed, threshold, restarts
+        self._speed, self._threshold = speed, threshold
+        self._restarts, self._revolutions = restarts, revolutions
         self.parameters = (
             amplitude("extra_friction", 0.4, high=10.0),
             shape("time_constant", 1800.0, 0.9, "s", low=30.0, high=50000.0),
+            shape("stretch", 1.0, 0.15, low=0.4, high=2.0),
         )
+        if revolutions:
+            self.parameters += (linear("speed_exponent", 0.5, 0.5, low=0.0, high=1.5),)
         if restarts:
             self.parameters += (shape("settling_time", 300.0, 1.0, "s", low=1.0, high=20000.0),)
 
-    def initial_state(self, parameters: dict[str, float]) -> NDArray[np.float64]:
-        """All of the grease is fresh."""
-        return np.ones(1)
-
     def friction(self, context: TermContext) -> Complex:
         """Factor on every bearing, (n, k)."""
-        factor = 1.0 + context.parameters["extra_friction"] * context.state[0]
-        return repeated(context, factor, len(self.bearings))
-
-    def advance(self, context: TermContext, step: float) -> Complex:
-        """Fresh share, (1, k)."""
         own = context.parameters
-        turning = np.abs(context.inputs[self._speed]) > self._threshold
-        run = relaxed(context.state, 0.0, step, own["time_constant"])
-        rest = relaxed(context.state, 1.0, step, own["settling_time"]) if self._restarts else context.state
+        fresh = np.exp(-power(context.state[0], own["stretch"]))
+        return repeated(context, 1.0 + own["extra_friction"] * fresh, len(self.bearings))
+
+    def advance(self, context: TermContext, step: float | Array) -> Complex:
+        """How far the grease is run in, (1, k)."""
+        own = context.parameters
+        speed = np.abs(context.inputs[self._speed])
+        turning = speed > self._threshold
+        faster = power(speed / RUN_IN_SPEED, own["speed_exponent"]) if self._revolutions else 1.0
+        run = context.state + step * faster / own["time_constant"]
+        rest = relaxed(context.state, 0.0, step, own["settling_time"]) if self._restarts else context.state
         return np.where(turning, run, rest)
 
 
@@ -67,7 +86,7 @@ class GreaseChurning(Effect):
 
     Source: Lugt (2009), Tribol. Trans. 52, 470-480, churning phase of grease
     lubrication; its duration is taken from run-in instructions of spindle
-    bearings (minutes to hours).
+    bearings (minutes to hours), which count time at rising speeds.
     """
 
     name = "grease_churning"
@@ -92,6 +111,7 @@ class GreaseChurning(Effect):
                         speed,
                         TURNING_SHARE * machine.highest(speed),
                         restarts=restarts,
+                        revolutions=speed in machine.speeds(key),
                     )
                     times = [600.0, 1800.0, 5000.0]
                     found.append(

@@ -118,14 +118,25 @@ def test_friction_halves_where_viscosity_does_with_exponent_one():
 
 def test_grease_counts_only_running_time_and_may_begin_anew():
     once = GreaseChurningTerm("t", ("F1",), "speed", 0.1, restarts=False)
-    assert once.initial_state({}) == pytest.approx([1.0])
-    run = once.advance(context(once, state=[0.8], time_constant=500.0), 500.0)
-    assert run[0, 0].real == pytest.approx(0.8 * np.exp(-1.0))
+    assert once.initial_state({}) == pytest.approx([0.0])
+    run = once.advance(context(once, state=[0.2], time_constant=500.0), 500.0)
+    assert run[0, 0].real == pytest.approx(1.2)
+    own = {"extra_friction": 0.5, "stretch": 0.8}
+    extra = [once.friction(context(once, state=[x], **own))[0, 0].real - 1.0 for x in (0.0, 1.2)]
+    assert extra == pytest.approx([0.5, 0.5 * np.exp(-(1.2**0.8))])
     still = {"inputs": {"speed": 0.0}}
     assert once.advance(context(once, state=[0.3], **still), 1e4)[0, 0].real == pytest.approx(0.3)
     again = GreaseChurningTerm("t", ("F1",), "speed", 0.1, restarts=True)
     rested = again.advance(context(again, state=[0.3], settling_time=100.0, **still), 100.0)
-    assert rested[0, 0].real == pytest.approx(1.0 - 0.7 * np.exp(-1.0))
+    assert rested[0, 0].real == pytest.approx(0.3 * np.exp(-1.0))
+
+
+@pytest.mark.parametrize(("exponent", "faster"), [(0.0, 1.0), (1.0, 1.5), (0.5, 1.5**0.5)])
+def test_grease_is_run_in_by_time_or_by_revolutions(exponent, faster):
+    term = GreaseChurningTerm("t", ("F1",), "speed", 0.1, restarts=False, revolutions=True)
+    own = {"time_constant": 600.0, "speed_exponent": exponent}
+    run = term.advance(context(term, state=[0.0], inputs={"speed": -4500.0 * RPM}, **own), 600.0)
+    assert run[0, 0].real == pytest.approx(faster)
 
 
 def test_starvation_is_half_at_its_onset():
