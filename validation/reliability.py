@@ -20,19 +20,26 @@ Array = NDArray[np.float64]
 
 # As the tool has them.
 LARGEST_PROBABILITY, SMALLEST_SHARE = 0.9999, 1e-3
-NAMES = ("constant", "by the logit of evidence", "by each effect beyond two", "by the last effect's share")
+NAMES = (
+    "constant",
+    "by the logit of evidence",
+    "by each effect beyond two",
+    "by the last effect's share",
+    "by what a larger set gains",
+)
 # Precision of the normal prior of every coefficient but the constant: few cases are wrong.
 RIDGE = 0.6
 
 
-def features(size: int, probability: float, share: float) -> list[float]:
+def features(size: int, probability: float, share: float, more: float) -> list[float]:
     """What a set's reliability is told by.
 
-    >>> features(3, 0.5, 0.1)
-    [1.0, 0.0, 1.0, -1.0]
+    >>> features(3, 0.5, 0.1, 9.0)
+    [1.0, 0.0, 1.0, -1.0, 1.0]
     """
     given = float(logit(np.clip(probability, 1.0 - LARGEST_PROBABILITY, LARGEST_PROBABILITY)))
-    return [1.0, given, float(max(0, size - 2)), float(np.log10(max(share, SMALLEST_SHARE)))]
+    by_share = float(np.log10(max(share, SMALLEST_SHARE)))
+    return [1.0, given, float(max(0, size - 2)), by_share, float(np.log10(1.0 + more))]
 
 
 def experience(study: Path, results: Path) -> tuple[Array, Array]:
@@ -45,7 +52,7 @@ def experience(study: Path, results: Path) -> tuple[Array, Array]:
 
     Returns
     -------
-    features : (n, 4) ndarray
+    features : (n, 5) ndarray
     right : (n,) ndarray
         0 or 1.
     """
@@ -60,15 +67,14 @@ def experience(study: Path, results: Path) -> tuple[Array, Array]:
             evidence = diagnosis.get("evidence")
             if evidence is None:
                 raise SystemExit(f"{found}: says nothing of evidence. Diagnose the study anew.")
-            rows.append(
-                features(len(diagnosis["findings"]), evidence["probability"], evidence["share_of_last"])
-            )
+            told = (evidence[key] for key in ("probability", "share_of_last", "gain_of_more"))
+            rows.append(features(len(diagnosis["findings"]), *told))
             right.append(float(first_right(answer, diagnosis["findings"])))
     return np.array(rows).reshape(-1, len(NAMES)), np.array(right)
 
 
 def fitted(rows: Array, right: Array) -> Array:
-    """Coefficients of the logistic regression, (4,)."""
+    """Coefficients of the logistic regression, (5,)."""
 
     def cost(coefficients: Array) -> float:
         score = rows @ coefficients

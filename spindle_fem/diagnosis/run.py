@@ -166,7 +166,11 @@ def _write(
         "set_probability": judgement.chosen.probability,
         "alternatives": alternatives,
         "something_else_probability": judgement.other,
-        "evidence": {"probability": judgement.evidence, "share_of_last": judgement.share_of_last},
+        "evidence": {
+            "probability": judgement.evidence,
+            "share_of_last": judgement.share_of_last,
+            "gain_of_more": judgement.gain_of_more,
+        },
         "fit": {
             "before": _errors(diagnosis, before),
             "after": _errors(diagnosis, after),

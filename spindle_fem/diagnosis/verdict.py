@@ -12,7 +12,7 @@ from scipy.stats import chi2, norm
 
 from spindle_fem.diagnosis.engine import Hypothesis
 from spindle_fem.diagnosis.inference import EFFECT_PREFIX, Fit, amplitude_name
-from spindle_fem.diagnosis.reliability import reliable, share_of_last
+from spindle_fem.diagnosis.reliability import gain_of_more, reliable, share_of_last
 from spindle_fem.effects.base import Candidate, in_intervals
 from spindle_fem.effects.catalogue import effect_of
 
@@ -95,6 +95,8 @@ class Judgement:
         Probability of the chosen set by evidence alone.
     share_of_last : float
         Of its gain, what no set with fewer effects has.
+    gain_of_more : float
+        What the best set with more effects gains beyond it.
     """
 
     verdict: Verdict
@@ -105,6 +107,7 @@ class Judgement:
     reason: str
     evidence: float = 1.0
     share_of_last: float = 1.0
+    gain_of_more: float = 0.0
 
 
 def rank(hypotheses: Sequence[Hypothesis]) -> list[Ranked]:
@@ -283,7 +286,8 @@ def judge(
     evidence = sum(item.probability for item in alike)
     share = share_of_last(hypotheses, chosen.best)
     size = len(chosen.fit.candidates)
-    known = (1.0 - inexact) * reliable(evidence, size, share) / evidence
+    more = gain_of_more(hypotheses, chosen.best)
+    known = (1.0 - inexact) * reliable(evidence, size, share, more) / evidence
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in ranked[1:]
@@ -299,6 +303,7 @@ def judge(
         "" if decided else NEAR_REASON if near else "several sets explain the data",
         evidence,
         share,
+        more,
     )
 
 

@@ -11,7 +11,7 @@ from spindle_fem.calibration.noise import SlowError
 from spindle_fem.diagnosis.engine import Hypothesis
 from spindle_fem.diagnosis.heldout import heldout_stamps
 from spindle_fem.diagnosis.inference import Coordinate, Fit
-from spindle_fem.diagnosis.reliability import reliable, share_of_last
+from spindle_fem.diagnosis.reliability import gain_of_more, reliable, share_of_last
 from spindle_fem.diagnosis.verdict import (
     DECIDED,
     LEAST_TEMPERATURE_RATIO,
@@ -410,6 +410,11 @@ def test_a_small_last_effect_makes_a_set_less_reliable():
     assert share_of_last([null, one, other, pair], one) == 1.0
     # Nothing smaller was fitted but nothing itself: all of the gain is the set's.
     assert share_of_last([null, pair], pair) == 1.0
+    assert gain_of_more([null, one, other, pair], one) == pytest.approx(
+        0.5 * (one.fit.misfit_with_prior - pair.fit.misfit_with_prior)
+    )
+    assert gain_of_more([null, one, other, pair], pair) == 0.0
+    assert reliable(0.999, 1, 1.0, more=50.0) < reliable(0.999, 1, 1.0)
     assert reliable(0.999, 2, 0.05) < reliable(0.999, 2, 0.5) < reliable(0.999, 1, 1.0) < 0.999
     assert reliable(0.999, 3, 0.5) < reliable(0.999, 2, 0.5)
 

@@ -19,14 +19,15 @@ from validation.reliability import (
 
 def test_the_regression_finds_what_made_the_experience():
     generator = np.random.default_rng(1)
-    true = np.array([0.5, 0.3, -1.2, 0.9])
+    true = np.array([0.5, 0.3, -1.2, 0.9, -0.8])
     rows = np.array(
         [
-            features(int(size), float(p), float(share))
-            for size, p, share in zip(
+            features(int(size), float(p), float(share), float(more))
+            for size, p, share, more in zip(
                 generator.integers(1, 4, 20_000),
                 expit(generator.uniform(-2.0, 9.0, 20_000)),
                 10.0 ** generator.uniform(-2.5, 0.0, 20_000),
+                10.0 ** generator.uniform(0.0, 2.0, 20_000) - 1.0,
                 strict=True,
             )
         ]
@@ -38,10 +39,11 @@ def test_the_regression_finds_what_made_the_experience():
 
 def test_features_are_those_that_are_stated_by():
     assert (LARGEST_PROBABILITY, SMALLEST_SHARE) == (stated.LARGEST_PROBABILITY, stated.SMALLEST_SHARE)
-    own = [stated.CONSTANT, stated.BY_LOGIT, stated.BY_FURTHER, stated.BY_SHARE]
-    for size, probability, share in ((1, 0.99, 1.0), (2, 0.999, 0.04), (3, 1.0, 0.0)):
-        seen = expit(np.dot(own, features(size, probability, share)))
-        assert stated.reliable(probability, size, share) == pytest.approx(min(probability, seen))
+    own = [stated.CONSTANT, stated.BY_LOGIT, stated.BY_FURTHER, stated.BY_SHARE, stated.BY_MORE]
+    for told in ((1, 0.99, 1.0, 30.0), (2, 0.999, 0.04, 0.0), (3, 1.0, 0.0, 2.0)):
+        size, probability, share, more = told
+        seen = expit(np.dot(own, features(*told)))
+        assert stated.reliable(probability, size, share, more) == pytest.approx(min(probability, seen))
 
 
 def test_only_diagnoses_that_name_something_count(tmp_path):
@@ -60,10 +62,13 @@ def test_only_diagnoses_that_name_something_count(tmp_path):
         answer = {"case": name, "effects": concealed, "acceptable_sets": [wanted]}
         (study / "answers" / f"{name}.json").write_text(json.dumps(answer))
         (results / name).mkdir(parents=True)
-        said = {"findings": findings, "evidence": {"probability": 0.9, "share_of_last": 1.0}}
+        said = {
+            "findings": findings,
+            "evidence": {"probability": 0.9, "share_of_last": 1.0, "gain_of_more": 0.0},
+        }
         (results / name / "diagnosis.json").write_text(json.dumps(said))
     rows, right = experience(study, results)
-    assert rows.shape == (2, 4)
+    assert rows.shape == (2, 5)
     assert right.tolist() == [1.0, 0.0]
     (results / "a" / "diagnosis.json").write_text(json.dumps({"findings": [finding]}))
     with pytest.raises(SystemExit, match=r"a/diagnosis.json: says nothing of evidence"):
