@@ -270,10 +270,16 @@ def quantity_followed(machine: MachineView, candidate: Candidate) -> RecordedQua
     return next((item for item in machine.quantities if item.name == name), None)
 
 
-def when_words(candidate: Candidate) -> str:
-    """When it is on, to the end of a sentence."""
+def when_words(candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+    """When it is on, to the end of a sentence that begins with its place."""
     name = followed_name(candidate)
     if name:
-        return f"as the {name.replace('_', ' ')} does, by no law of the catalogue"
+        power_of = f" with the power {reported['exponent'].value:.1f}" if "exponent" in reported else ""
+        return f", following the {name.replace('_', ' ')}{power_of} as no effect of the catalogue does"
     count = sum(item.name.startswith("start_") for item in candidate.parameters.values())
-    return f"in {'one interval' if count == 1 else f'{count} intervals'} that no recorded input explains"
+    return f" in {'one interval' if count == 1 else f'{count} intervals'} that no recorded input explains"
+
+
+def up_to(candidate: Candidate) -> str:
+    """What stands before a size: it is the largest where a law is followed."""
+    return "up to " if followed_name(candidate) else ""
