@@ -38,10 +38,10 @@ SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
 # Below this the most probable set is named together with what else may be.
 DECIDED = 0.75
 # Sets of as many effects are named together where in every channel their readings differ by less than this
-# share of the noise (root mean square) and their misfits by less than that: both explain the data to within
-# the noise, and what tells them apart is the exactness of their laws. (On seed 14 of the concealed study this
-# held for nine of the twelve detected cases that its generator calls undecidable.)
-NEAR, NEAR_MISFIT = 0.22, 14.0
+# share of the noise (root mean square), their misfits by less than that, and evidence gives the other at
+# least so much: both explain the data to within the noise, and what tells them apart is how exact their laws
+# are. A richer law that only repeats what the simple one does has less.
+NEAR, NEAR_MISFIT, NEAR_PROBABILITY = 0.22, 14.0, 0.01
 LISTED = 0.02
 SIGNIFICANT = 0.01
 # Below this nothing missing is ruled out, however much any one set pays for its complexity.
@@ -277,7 +277,8 @@ def judge(
     near = [
         item
         for item in ranked[1:]
-        if may_stand_for(item.fit, chosen.fit, known_as_one)
+        if item.probability >= NEAR_PROBABILITY
+        and may_stand_for(item.fit, chosen.fit, known_as_one)
         and item.fit.misfit_with_prior < chosen.fit.misfit_with_prior + NEAR_MISFIT
         and apart(chosen.fit, item.fit) < NEAR
     ]

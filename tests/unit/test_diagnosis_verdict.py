@@ -281,6 +281,12 @@ def test_sets_that_read_alike_are_named_together_however_probable_one_is():
     assert other.probability < LISTED < found.chosen.probability
 
 
+def test_a_richer_law_that_repeats_a_simple_one_is_no_rival():
+    dear = hypothesis(CHURNING, misfit=400.0, evidence=-200.0 - 2.0 - 6.0)
+    found = verdict(*LIKE[:2], dear, apart=lambda one, other: 0.0)
+    assert (found.verdict, found.alternatives) == ("missing_physics", ())
+
+
 def test_sets_that_read_apart_or_fit_apart_are_decided_by_their_likelihood():
     asked = []
 
