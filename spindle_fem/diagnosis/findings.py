@@ -99,7 +99,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
         "intervals": intervals,
         "follows": followed_name(candidate) or None,
         "statement": effect.statement(candidate, reported),
-        "check": effect.check,
+        "check": effect.check_of(candidate),
     }
 
 

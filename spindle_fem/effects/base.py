@@ -276,6 +276,10 @@ class Effect(ABC):
         order = [candidate.amplitude, *(name for name in candidate.free if name != candidate.amplitude)]
         return {own[name].name: stated(own[name], values.get(name, own[name].value)) for name in order}
 
+    def check_of(self, candidate: Candidate) -> str:
+        """What to look at where this candidate is found."""
+        return self.check
+
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """One sentence for a report."""
         numbers = ", ".join(f"{name.replace('_', ' ')} {quantity(item)}" for name, item in reported.items())

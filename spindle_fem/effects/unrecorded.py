@@ -175,9 +175,15 @@ class UnrecordedEffect(IntervalEffect):
 
     Spots reach round the machine, what heats or cools them need not: a sensor
     near it sees up to twice the mean, one opposite half of it.
+
+    Attributes
+    ----------
+    check_law : str
+        What to look at where it follows a recorded quantity.
     """
 
     law_sigma = MappingProxyType({"heat": 0.45, "conductance": 0.45})
+    check_law: str
 
     def places(self, machine: MachineView) -> tuple[str, ...]:
         """Every spot of the view."""
@@ -231,6 +237,11 @@ class UnrecordedEffect(IntervalEffect):
             reference=self.usual(machine, form),
             form=machine.form(spot, own),
         )
+
+    def check_of(self, candidate: Candidate) -> str:
+        """What runs in its intervals, or with what it follows."""
+        name = followed_name(candidate)
+        return self.check_law.format(name.replace("_", " ")) if name else self.check
 
     def intervals(self, candidate: Candidate, values: Mapping[str, float]) -> list[tuple[float, float]]:
         """Fitted intervals, [s]; none where it follows a law."""

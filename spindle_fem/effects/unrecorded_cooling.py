@@ -55,9 +55,9 @@ class UnrecordedCooling(UnrecordedEffect):
     title = "something cools this place that no recorded input explains"
     check = (
         "What runs in these intervals: cutting fluid, air blast, an open door or guard, a second coolant "
-        "circuit; compare the intervals with the machine's programme and record the suspect. Where the loss "
-        "follows a recorded quantity: what blows or flows with it at this place."
+        "circuit; compare the intervals with the machine's programme and record the suspect."
     )
+    check_law = "What blows or flows at this place with the {}; vary it alone and watch this place."
     interval_forms = ("conductance", "heat")
 
     def usual(self, machine: MachineView, form: str) -> float:

@@ -19,8 +19,10 @@ class UnrecordedHeatSource(UnrecordedEffect):
     title = "something heats this place that no recorded input explains"
     check = (
         "What runs in these intervals: cutting, hydraulic clamping, chip heap, lamp, neighbouring drive; "
-        "compare the intervals with the machine's programme and record the suspect. Where the heat follows a "
-        "recorded quantity: what rubs, brakes or is driven with it at this place."
+        "compare the intervals with the machine's programme and record the suspect."
+    )
+    check_law = (
+        "What rubs, brakes or is driven at this place with the {}; vary it alone and watch this place."
     )
     interval_forms = ("heat",)
 

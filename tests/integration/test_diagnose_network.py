@@ -290,7 +290,8 @@ def test_heat_that_follows_a_covariate_comes_out_as_its_law(loaded):
     assert effects(content) == {("unrecorded_heat_source", "body")}
     (finding,) = content["findings"]
     assert finding["follows"] == "load"
-    assert "load" in finding["statement"]
+    assert "following the load" in finding["statement"]
+    assert "with the load" in finding["check"]
     assert finding["intervals"] == []
     assert not (out / "states.csv").exists()
     heat, exponent = finding["parameters"]["heat"], finding["parameters"]["exponent"]
