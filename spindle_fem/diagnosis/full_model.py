@@ -24,9 +24,10 @@ from spindle_fem.diagnosis.inference import Fit
 from spindle_fem.diagnosis.machines import DiagnosedMachine
 from spindle_fem.diagnosis.plant import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX, Plant
 from spindle_fem.effects.base import Candidate
+from spindle_fem.effects.term import COVARIATE
 from spindle_fem.errors import SpecError, SpindleFemError
 from spindle_fem.network.history import InputHistory
-from spindle_fem.reduced.drive import COVARIATE, Drive
+from spindle_fem.reduced.drive import Drive
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.transients.history import OperatingHistory
 from spindle_fem.transients.records import MachineTransient, TransientOptions

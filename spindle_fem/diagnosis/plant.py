@@ -7,7 +7,6 @@ cut down to what these recordings can excite.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -16,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.calibration.noise import ChannelBins, channel_bins
+from spindle_fem.diagnosis.drives import coarse_drive, even_drive
+from spindle_fem.diagnosis.gaps import WARMTH, gap_pieces, hidden_in, unseen_jumps
 from spindle_fem.effect_entries import NO_EFFECTS, ActiveEffects
 from spindle_fem.effects.base import Candidate, Reading
 from spindle_fem.effects.term import Term
 from spindle_fem.recordings.align import Recording
 from spindle_fem.reduced.coefficients import INNER_SHARE
-from spindle_fem.reduced.drive import Drive, classes_of, covariate_columns, drive_of_recording
+from spindle_fem.reduced.drive import Drive
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.network_model import NetworkFastModel
 from spindle_fem.reduced.start import Start
@@ -41,27 +42,14 @@ PROBE_PREFIX = "probe."
 START_PREFIX = "start."
 # How long before the middle of a gap an input had changed, s: ``jump.<recording>.<number>``.
 JUMP_PREFIX = "jump."
-GAP_STEPS = 1.5
 # What happened within a piece of a gap beyond what the inputs beside it say,
 # ``within_gap.<recording>.<number>``: friction of a bearing set, as a share of the highest that it gives; an
-# input temperature that is another after the gap, as a share of its change. Shorter gaps and smaller changes
-# [K] hide nothing that matters.
+# input temperature that is another after the gap, as a share of its change.
 GAP_PREFIX = "within_gap."
-SHORTEST_GAP = 120.0
-LEAST_CHANGE = 1.0
 # Coordinates that say nothing about other recordings.
 OF_ONE_RECORDING = (START_PREFIX, JUMP_PREFIX, GAP_PREFIX)
-GAP_PIECE, MOST_PIECES = 150.0, 8
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")
-# Input temperatures, by the name of their load.
-WARMTH = ("ambient", "coolant_inlet")
-# Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
-INLET_BIN = 3.0
-# Of the highest speed: the films that follow it are small beside the oil's.
-SPEED_BIN = 0.01
-# Classes of one oil temperature share what the channel does.
-INLET_STEP = 0.5
 BASIS_TOLERANCE = 3.0e-4
 
 
@@ -183,12 +171,12 @@ class Plant:
         self.drives = tuple(replace(drive, times=drive.grid) for drive in drives)
         self._initial = [fast.initial_parameters(item) if self.is_network else () for item in self.recordings]
         self._jumps = [
-            () if self.is_network else _unseen_jumps(item, drive)
+            () if self.is_network else unseen_jumps(item, drive)
             for item, drive in zip(self.recordings, self.drives, strict=True)
         ]
-        self._gaps = [() if self.is_network else _gaps(item) for item in self.recordings]
+        self._gaps = [() if self.is_network else gap_pieces(item) for item in self.recordings]
         self._hidden = [
-            _hidden(recording, gaps, [group.name for group in fast.spec.bearing_set]) if gaps else ()
+            hidden_in(recording, gaps, [group.name for group in fast.spec.bearing_set]) if gaps else ()
             for recording, gaps in zip(self.recordings, self._gaps, strict=True)
         ]
         self._slopes: dict[tuple[str, int], Array] = {}
@@ -601,157 +589,3 @@ def _acting(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candida
         for name in c.parameters
     }
     return acting, idle
-
-
-def _gaps(recording: Recording) -> tuple[tuple[float, float], ...]:
-    """Gaps long enough for something to have happened in them, in pieces of some minutes, [s]."""
-    spacing = np.diff(recording.times)
-    rows = np.flatnonzero((spacing > GAP_STEPS * np.median(spacing)) & (spacing >= SHORTEST_GAP))
-    found = []
-    for row in rows:
-        first, last = recording.times[row : row + 2]
-        edges = np.linspace(first, last, 1 + min(MOST_PIECES, int(np.ceil((last - first) / GAP_PIECE))))
-        found += [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
-    return tuple(found)
-
-
-@dataclass(frozen=True, slots=True)
-class _Hidden:
-    """What may have happened between two times: heat of a bearing set, or an input temperature."""
-
-    begin: float
-    end: float
-    what: str
-    size: float
-
-
-def _hidden(
-    recording: Recording, pieces: Sequence[tuple[float, float]], sets: Sequence[str]
-) -> tuple[_Hidden, ...]:
-    found = [_Hidden(begin, end, name, 1.0) for begin, end in pieces for name in sets]
-    for name in WARMTH:
-        if name not in recording.input_names:
-            continue
-        for begin, end in pieces:
-            row = int(np.searchsorted(recording.times, begin + 1e-6))
-            before, after = recording.input_at(name, recording.times[row - 1 : row + 1])
-            if abs(after - before) >= LEAST_CHANGE:
-                found.append(_Hidden(begin, end, name, float(after - before)))
-    return tuple(found)
-
-
-def _unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, float], ...]:
-    """Changes of held inputs that fell into gaps, which :func:`coarse_drive` puts amid them.
-
-    Returns
-    -------
-    tuple of (int, float, float)
-        Step at whose start each is put; how much earlier [s], least and most,
-        it may have been.
-    """
-    usual = float(np.median(np.diff(recording.times)))
-    found = []
-    for step in 1 + np.flatnonzero(np.any(drive.start[1:] != drive.end[:-1], axis=1)):
-        time = drive.grid[step]
-        row = int(np.searchsorted(recording.times, time - 1e-6))
-        if not 0 < row < recording.times.size:
-            continue
-        first, last = recording.times[row - 1], recording.times[row]
-        if last - first > GAP_STEPS * usual:
-            found.append((int(step), float(time - last), float(time - first)))
-    return tuple(found)
-
-
-def _centred(fine: Drive, recording: Recording) -> Drive:
-    """The drive with changes that fell into gaps put amid them instead of at their ends."""
-    usual = float(np.median(np.diff(recording.times)))
-    held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
-    columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
-    start, end = fine.start.copy(), fine.end.copy()
-    for row in 1 + np.flatnonzero(np.diff(recording.times) > GAP_STEPS * usual):
-        first, last = recording.times[row - 1], recording.times[row]
-        begin, stop = np.searchsorted(fine.grid, [first - 1e-6, last - 1e-6])
-        if stop < len(start) and stop - begin > 1:
-            middle = begin + int(np.argmin(np.abs(fine.grid[begin:stop] - 0.5 * (first + last))))
-            start[middle:stop, columns] = end[middle:stop, columns] = fine.start[stop, columns]
-    return replace(fine, start=start, end=end)
-
-
-def coarse_drive(spec, recording: Recording, step: float) -> Drive:
-    """Inputs on steps from change to change, none longer than ``step``; outputs at their ends."""
-    fine = _centred(drive_of_recording(spec, recording), recording)
-    begin, finish = fine.grid[0], fine.grid[-1]
-    beside = covariate_columns(fine.names)
-    inputs = np.setdiff1d(np.arange(len(fine.names)), beside)
-    jumps = fine.grid[1:-1][np.any(fine.start[1:, inputs] != fine.end[:-1, inputs], axis=1)]
-    edges = np.unique(np.concatenate(([begin], jumps, [finish])))
-    # Stamps a second apart that all jump (an input that flickers) would only cost.
-    pieces = [
-        np.linspace(a, b, max(1, int(np.ceil((b - a) / step - 1e-6))) + 1)[:-1]
-        for a, b in itertools.pairwise(edges)
-    ]
-    grid = np.append(np.concatenate(pieces), finish)
-    middle = 0.5 * (grid[:-1] + grid[1:])
-    start, end = np.empty((middle.size, len(fine.names))), np.empty((middle.size, len(fine.names)))
-    first = np.clip(np.searchsorted(fine.grid, grid[:-1], side="right") - 1, 0, fine.steps.size - 1)
-    last = np.clip(np.searchsorted(fine.grid, grid[1:], side="left") - 1, 0, fine.steps.size - 1)
-    for ends, owner, at in ((start, first, grid[:-1]), (end, last, grid[1:])):
-        part = ((at - fine.grid[owner]) / fine.steps[owner])[:, None]
-        ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
-    start[:, beside] = end[:, beside] = _means(fine, grid)[:, beside]
-    step_class, points = classes_of(0.5 * (start + end), INLET_BIN, SPEED_BIN)
-    # Within the range that occurs, so that no property is asked for outside it.
-    inlets = np.array([p.coolant_inlet_temperature for p in points])
-    steps = np.round((inlets - inlets.min()) / INLET_STEP) * INLET_STEP
-    shared = np.minimum(inlets.min() + steps, inlets.max()).tolist()
-    points = tuple(
-        replace(p, coolant_inlet_temperature=inlet) for p, inlet in zip(points, shared, strict=True)
-    )
-    return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
-
-
-def _means(fine: Drive, grid: Array) -> Array:
-    """Means of inputs over the steps of another grid, their integral kept, (G, m)."""
-    total = np.vstack(
-        (
-            np.zeros(fine.start.shape[1]),
-            np.cumsum(0.5 * (fine.start + fine.end) * fine.steps[:, None], axis=0),
-        )
-    )
-    integral = np.column_stack([np.interp(grid, fine.grid, column) for column in total.T])
-    # Beyond the last reading of a segment the last input goes on; the gap that follows counts for nothing.
-    covered = np.diff(np.minimum(grid, fine.grid[-1]))
-    means = np.diff(integral, axis=0) / np.maximum(covered, 1e-9)[:, None]
-    means[covered <= 1e-9] = fine.end[-1]
-    return means
-
-
-def even_drive(fast: NetworkFastModel, recording: Recording) -> Drive:
-    """Inputs of a network on equal steps of the recording's usual spacing, means over each step.
-
-    The means keep the integral of every input; one length of step makes one
-    matrix of the model.
-    """
-    fine = fast.drive(recording, largest_step=np.inf)
-    begins = np.array([0, *fine.restarts])
-    ends = np.array([*(begins[1:] - 1), len(fine.grid) - 1])
-    inside = np.ones(len(fine.steps), dtype=bool)
-    inside[begins[1:] - 1] = False
-    step = float(np.median(fine.steps[inside])) if inside.any() else float(fine.steps[0])
-    pieces, restarts, count = [], [], 0
-    for number, (begin, end) in enumerate(zip(begins, ends, strict=True)):
-        first, last = fine.grid[begin], fine.grid[end]
-        whole = max(1, int(np.ceil((last - first) / step - 1e-6)))
-        edges = first + step * np.arange(whole + 1)
-        if number + 1 < len(begins) and edges[-1] >= fine.grid[begins[number + 1]]:
-            edges[-1] = 0.5 * (last + fine.grid[begins[number + 1]])
-        if number:
-            restarts.append(count)
-        pieces.append(edges)
-        count += len(edges)
-    grid = np.concatenate(pieces)
-    means = _means(fine, grid)
-    classes = np.zeros(len(means), dtype=np.int64)
-    return replace(
-        fine, times=grid, grid=grid, start=means, end=means, step_class=classes, restarts=tuple(restarts)
-    )

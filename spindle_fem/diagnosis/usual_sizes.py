@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import COVARIATE
 from spindle_fem.effects.view import RecordedQuantity
 from spindle_fem.recordings.align import Recording
-from spindle_fem.reduced.drive import COVARIATE
+from spindle_fem.recordings.smooth import TEMPERATURE_UNIT
 from spindle_fem.units import registry
 
 Array = NDArray[np.float64]
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 # Channels rise at least this much, K, and heat is at least this much, W, for usual sizes of effects.
 LEAST_RISE = 2.0
 LEAST_HEAT = 1.0
-KELVIN = "kelvin"
+# Units that have a name, by what they come out as from SI base units.
 NAMED = {"kg*m/s**2": "N", "kg*m**2/s**3": "W"}
 
 
@@ -54,13 +55,13 @@ def quantities_of(recording: Recording, speeds: Collection[str]) -> tuple[Record
     """
     found = []
     for name, unit in zip(recording.input_names, recording.input_units, strict=True):
-        if unit != KELVIN and name != "coolant_flow" and not name.startswith("heat."):
+        if unit != TEMPERATURE_UNIT and name != "coolant_flow" and not name.startswith("heat."):
             changes = name in speeds
             values = recording.input_at(name, recording.times)
             found.append(_quantity(f"change of {name}" if changes else name, name, values, unit, changes))
     units = dict(zip(recording.covariate_names, recording.covariate_units, strict=True))
     for name, values in recording.covariate_history().items():
-        if units[name] != KELVIN:
+        if units[name] != TEMPERATURE_UNIT:
             found.append(replace(_quantity(name, COVARIATE + name, values, units[name]), beside=True))
     return tuple(item for item in found if item.highest > 0.0)
 

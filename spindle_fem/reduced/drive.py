@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.term import COVARIATE
 from spindle_fem.errors import RecordingError
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.recordings.align import Recording
@@ -28,7 +29,6 @@ WALL_BIN, MOST_WALLS = 0.5, 200
 LARGEST_STEP = 60.0
 MOST_STEP_SIZES = 200
 
-COVARIATE = "covariate."
 STANDARD = ("speed", "thrust", "ambient", "coolant_inlet", "coolant_flow")
 
 

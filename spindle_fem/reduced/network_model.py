@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.term import FLUID_PREFIX, RecordedHeat, Term
+from spindle_fem.effects.term import COVARIATE, FLUID_PREFIX, RecordedHeat, Term
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.network.model import Parameter, ThermalNetwork
@@ -26,7 +26,6 @@ from spindle_fem.recordings.simulate_network import (
 )
 from spindle_fem.reduced.directions import ConductingDirections
 from spindle_fem.reduced.drive import (
-    COVARIATE,
     LARGEST_STEP,
     STANDARD,
     Drive,

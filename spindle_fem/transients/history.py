@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.term import RecordedHeat
+from spindle_fem.effects.term import COVARIATE, RecordedHeat
 from spindle_fem.errors import RecordingError, did_you_mean
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.network.history import InputHistory
@@ -25,8 +25,8 @@ FIELD_OF = {
 }
 # Changes below this pass inside a step: share of the largest value, or K for temperatures.
 RELATIVE_RESOLUTION = {"speed": 2.0e-3, "thrust": 1.0e-2, "coolant_flow": 1.0e-2}
-# Heat that the inputs give for a place, in W, what was recorded beside the inputs, and their resolution.
-HEAT, BESIDE = "heat.", "covariate."
+# Heat that the inputs give for a place, in W; its resolution is that of covariates, too.
+HEAT = "heat."
 HEAT_RESOLUTION = 1.0e-2
 TEMPERATURE_RESOLUTION = 0.05
 # A held input that jumps by this many resolutions starts the steps anew.
@@ -61,7 +61,7 @@ class OperatingHistory:
             An input that a machine with geometry does not have.
         """
         for name in inputs.names:
-            if name not in FIELD_OF and not name.startswith((HEAT, BESIDE)):
+            if name not in FIELD_OF and not name.startswith((HEAT, COVARIATE)):
                 raise RecordingError(
                     "inputs", f'"{name}" drives nothing in this machine.', did_you_mean(name, FIELD_OF)
                 )
@@ -79,7 +79,7 @@ class OperatingHistory:
             value = float(samples[left] if held else np.interp(time, times, samples))
             if name in FIELD_OF:
                 values[FIELD_OF[name]] = value
-            elif name.startswith(BESIDE):
+            elif name.startswith(COVARIATE):
                 beside[name] = value
             else:
                 extra_heat[name.removeprefix(HEAT)] = value
@@ -92,7 +92,7 @@ class OperatingHistory:
 
     def _resolution(self, column: int, temperature: float = TEMPERATURE_RESOLUTION) -> float:
         name = self.inputs.names[column]
-        share = HEAT_RESOLUTION if name.startswith((HEAT, BESIDE)) else RELATIVE_RESOLUTION.get(name)
+        share = HEAT_RESOLUTION if name.startswith((HEAT, COVARIATE)) else RELATIVE_RESOLUTION.get(name)
         if share is None:
             return temperature
         largest = float(np.abs(self.inputs.values[:, column]).max())

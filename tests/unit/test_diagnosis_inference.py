@@ -11,6 +11,7 @@ from scipy.optimize import lsq_linear
 from scipy.stats import chi2, multivariate_normal
 
 from spindle_fem.calibration.noise import ChannelBins, SlowError, Whitener, likely_slow_error
+from spindle_fem.diagnosis.drives import even_drive
 from spindle_fem.diagnosis.inference import (
     Belief,
     Coordinate,
@@ -21,7 +22,7 @@ from spindle_fem.diagnosis.inference import (
 )
 from spindle_fem.diagnosis.linear import LinearProblem
 from spindle_fem.diagnosis.network_view import view_of_network
-from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Plant, even_drive
+from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Plant
 from spindle_fem.diagnosis.prepare import calibrate, machine_coordinates, slow_error_of
 from spindle_fem.diagnosis.screening import BaseRun, Variant
 from spindle_fem.effects.catalogue import candidates_for, interval_effects

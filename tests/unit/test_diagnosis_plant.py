@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.diagnosis.plant import EFFECT_PREFIX, PROBE_PREFIX, Plant, coarse_drive
+from spindle_fem.diagnosis.drives import coarse_drive
+from spindle_fem.diagnosis.plant import EFFECT_PREFIX, PROBE_PREFIX, Plant
 from spindle_fem.diagnosis.screening import BaseRun, Variant, variants_of
 from spindle_fem.diagnosis.view import view_of
 from spindle_fem.effects.catalogue import candidates_for, effect_of, interval_effects
