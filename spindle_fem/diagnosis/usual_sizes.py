@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 # Channels rise at least this much, K, and heat is at least this much, W, for usual sizes of effects.
 LEAST_RISE = 2.0
 LEAST_HEAT = 1.0
+# Above this share of its largest a quantity is on; its levels are told by so many quantiles.
+LEAST_ON, QUANTILES = 0.05, 32
 # Units that have a name, by what they come out as from SI base units.
 NAMED = {"kg*m/s**2": "N", "kg*m**2/s**3": "W"}
 
@@ -53,25 +55,40 @@ def quantities_of(recording: Recording, speeds: Collection[str]) -> tuple[Record
     speeds : collection of str
         Inputs that are speeds.
     """
-    found = []
+    found, times = [], recording.times
     for name, unit in zip(recording.input_names, recording.input_units, strict=True):
         if unit != TEMPERATURE_UNIT and name != "coolant_flow" and not name.startswith("heat."):
             changes = name in speeds
-            values = recording.input_at(name, recording.times)
-            found.append(_quantity(f"change of {name}" if changes else name, name, values, unit, changes))
+            values = recording.input_at(name, times)
+            found.append(
+                _quantity(f"change of {name}" if changes else name, name, times, values, unit, changes)
+            )
     units = dict(zip(recording.covariate_names, recording.covariate_units, strict=True))
     for name, values in recording.covariate_history().items():
         if units[name] != TEMPERATURE_UNIT:
-            found.append(replace(_quantity(name, COVARIATE + name, values, units[name]), beside=True))
+            found.append(replace(_quantity(name, COVARIATE + name, times, values, units[name]), beside=True))
     return tuple(item for item in found if item.highest > 0.0)
 
 
-def _quantity(name: str, own: str, values: Array, unit: str, changes: bool = False) -> RecordedQuantity:
+def _quantity(
+    name: str, own: str, times: Array, values: Array, unit: str, changes: bool = False
+) -> RecordedQuantity:
     size = np.abs(values)
     highest = float(size.max())
+    if changes:
+        sizes = np.abs(np.diff(size**2))
+        levels = sizes[sizes > LEAST_ON * highest**2]
+    else:
+        on = np.flatnonzero(size > LEAST_ON * highest)
+        order = on[np.argsort(size[on])]
+        passed = np.cumsum(np.gradient(times)[order]) if order.size else np.zeros(0)
+        wanted = (np.arange(QUANTILES) + 0.5) / QUANTILES
+        levels = np.interp(wanted * passed[-1], passed, size[order]) if order.size else order
     short = f"{registry().Unit(unit):~C}"
     varies = float(np.ptp(size)) / max(highest, 1e-300)
-    return RecordedQuantity(name, own, highest, varies, NAMED.get(short, short), changes)
+    return RecordedQuantity(
+        name, own, highest, varies, tuple(levels.tolist()), NAMED.get(short, short), changes
+    )
 
 
 def common_quantities(
@@ -82,6 +99,12 @@ def common_quantities(
     for item in by_recording[0]:
         same = [other for own in by_recording for other in own if other.name == item.name]
         if len(same) == len(by_recording):
-            highest = max(other.highest for other in same)
-            found.append(replace(item, highest=highest, varies=max(other.varies for other in same)))
+            found.append(
+                replace(
+                    item,
+                    highest=max(other.highest for other in same),
+                    varies=max(other.varies for other in same),
+                    levels=tuple(level for other in same for level in other.levels),
+                )
+            )
     return tuple(found)

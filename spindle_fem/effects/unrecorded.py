@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spindle_fem.effects.base import Candidate, IntervalEffect, Intervals, Reported
 from spindle_fem.effects.laws import Complex, linear, power, relaxed, shape, switched
@@ -24,6 +25,9 @@ EDGE_WIDTH = 20.0
 EDGE_SIGMA = 300.0
 JITTER = 0.1
 FOLLOWING = "following"
+# Share of its beginning at which a pulse after a change counts as over.
+PULSE_ENDS = 0.05
+Array = NDArray[np.float64]
 # A quantity is followed where it varies by more than this share of its largest value.
 SMALLEST_VARIATION = 0.05
 
@@ -46,7 +50,10 @@ class Share(Protocol):
     def share(self, context: TermContext) -> Complex:
         """How far it is on, (k,)."""
 
-    def advance(self, context: TermContext, step: float) -> Complex:
+    def mean_share(self, own: Mapping[str, float]) -> float:
+        """Mean while it is on, from values by inner name."""
+
+    def advance(self, context: TermContext, step: float | Array) -> Complex:
         """State after a step, (n_states, k)."""
 
 
@@ -94,7 +101,13 @@ class InIntervals:
             found = found + (own[f"factor_{number}"] * on if self._number > 1 else on)
         return found
 
-    def advance(self, context: TermContext, step: float) -> Complex:
+    def mean_share(self, own: Mapping[str, float]) -> float:
+        """Mean of the share over the intervals, by their length."""
+        numbers = range(1, self._number + 1)
+        lengths = [own[f"end_{number}"] - own[f"start_{number}"] for number in numbers]
+        return float(np.average([own.get(f"factor_{number}", 1.0) for number in numbers], weights=lengths))
+
+    def advance(self, context: TermContext, step: float | Array) -> Complex:
         """Nothing is remembered."""
         return context.state
 
@@ -114,6 +127,7 @@ class Followed:
 
     def __init__(self, quantity: RecordedQuantity) -> None:
         self.follows, self._changes = (quantity.input,), quantity.changes
+        self._levels = np.array(quantity.levels)
         # Fixed: a definition keeps what its law refers to.
         reference = TermParameter("reference", quantity.highest, 0.0, quantity.unit)
         exponent = () if quantity.changes else (linear("exponent", 1.0, 0.3, low=0.2, high=4.0),)
@@ -130,7 +144,20 @@ class Followed:
         apart = self._target(context) - context.state[0]
         return np.where(apart.real < 0.0, -apart, apart)
 
-    def advance(self, context: TermContext, step: float) -> Complex:
+    def mean_share(self, own: Mapping[str, float]) -> float:
+        """Mean of the share while it is on in the recording that the quantity is known of.
+
+        Of changes: while a pulse is above ``PULSE_ENDS`` of what it begins with.
+        """
+        if self._levels.size == 0:
+            # Nothing that it follows ever happens: no mean but the size itself.
+            return 1.0
+        if self._changes:
+            of_pulse = (1.0 - PULSE_ENDS) / np.log(1.0 / PULSE_ENDS)
+            return float(of_pulse * np.mean(self._levels) / own["reference"] ** 2)
+        return float(np.mean((self._levels / own["reference"]) ** own["exponent"]))
+
+    def advance(self, context: TermContext, step: float | Array) -> Complex:
         """Lagging quantity, (1, k)."""
         return relaxed(context.state, self._target(context), step, context.parameters["lag"])
 
@@ -153,7 +180,7 @@ class UnrecordedTerm(Term):
         self.n_states, self.follows = on.n_states, on.follows
         self.parameters = (size, *spread.parameters, *on.parameters)
 
-    def advance(self, context: TermContext, step: float) -> Complex:
+    def advance(self, context: TermContext, step: float | Array) -> Complex:
         """State after a step, (n_states, k)."""
         return self.on.advance(context, step)
 
@@ -202,12 +229,16 @@ class UnrecordedEffect(IntervalEffect):
         """Recorded quantities that it may follow."""
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """Laws of recorded quantities, each at every spot, in the first form."""
-        quantities = self.followed(machine)
+        """Laws of recorded quantities, each at every spot, in the first form.
+
+        Not where a source of a network follows the same input already: that is a matter of its size.
+        """
+        driven = {(machine.inner[source], name) for source, name in machine.source_inputs.items()}
         return tuple(
             self._candidate(machine, spot, Followed(quantity), self.interval_forms[0], quantity)
             for spot in self.places(machine)
-            for quantity in quantities
+            for quantity in self.followed(machine)
+            if quantity.changes or (spot, quantity.input) not in driven
         )
 
     def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
@@ -250,15 +281,11 @@ class UnrecordedEffect(IntervalEffect):
         return [(own[f"start_{number}"], own[f"end_{number}"]) for number in range(1, count + 1)]
 
     def report(self, candidate: Candidate, values: Mapping[str, float]) -> dict[str, Reported]:
-        """Size and lag; over intervals the mean by their length, with its power where it follows a law."""
+        """Mean size while on, and the lag, with its power where it follows a law."""
         term = candidate.terms[0]
         own, size = term.values(values), term.parameters[0]
-        lengths = [end - start for start, end in self.intervals(candidate, values)]
-        mean = 1.0
-        if lengths:
-            factors = [own.get(f"factor_{number}", 1.0) for number in range(1, len(lengths) + 1)]
-            mean = float(np.average(factors, weights=lengths))
-        found = {size.name: Reported(own[size.name] * mean, size.unit), "lag": Reported(own["lag"], "s")}
+        mean = own[size.name] * term.on.mean_share(own)
+        found = {size.name: Reported(mean, size.unit), "lag": Reported(own["lag"], "s")}
         if "exponent" in own:
             found["exponent"] = Reported(own["exponent"], "")
         return found
@@ -285,12 +312,9 @@ def when_words(candidate: Candidate, reported: Mapping[str, Reported]) -> str:
     """When it is on, to the end of a sentence that begins with its place."""
     name = followed_name(candidate)
     if name:
-        power_of = f" with the power {reported['exponent'].value:.1f}" if "exponent" in reported else ""
-        return f", following the {name.replace('_', ' ')}{power_of} as no effect of the catalogue does"
+        law = f"the {name.replace('_', ' ')}"
+        if "exponent" in reported:
+            law += f" with the power {reported['exponent'].value:.1f}"
+        return f" on average while on, following {law} as no effect of the catalogue does"
     count = sum(item.name.startswith("start_") for item in candidate.parameters.values())
     return f" in {'one interval' if count == 1 else f'{count} intervals'} that no recorded input explains"
-
-
-def up_to(candidate: Candidate) -> str:
-    """What stands before a size: it is the largest where a law is followed."""
-    return "up to " if followed_name(candidate) else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from spindle_fem.effects.base import Candidate, Reported, capital, place_words, quantity
+from spindle_fem.effects.base import Candidate, Reported, place_words, quantity
 from spindle_fem.effects.laws import Complex, amplitude, fluid_temperature
 from spindle_fem.effects.spread import Spread
 from spindle_fem.effects.term import TermContext, TermParameter
@@ -13,7 +13,6 @@ from spindle_fem.effects.unrecorded import (
     UnrecordedEffect,
     UnrecordedHeatTerm,
     UnrecordedTerm,
-    up_to,
     when_words,
 )
 from spindle_fem.effects.view import MachineView, RecordedQuantity
@@ -82,6 +81,6 @@ class UnrecordedCooling(UnrecordedEffect):
         size = reported.get("conductance") or reported["heat"]
         way = " to the surroundings" if size.unit == "W/K" else ""
         return (
-            f"{capital(up_to(candidate) + 'a further ')}{quantity(size)}{way} is lost from "
+            f"A further {quantity(size)}{way} is lost from "
             f"{place_words(candidate.component)}{when_words(candidate, reported)}."
         )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from spindle_fem.effects.base import Candidate, Reported, capital, place_words, quantity
 from spindle_fem.effects.laws import amplitude
 from spindle_fem.effects.spread import Spread
-from spindle_fem.effects.unrecorded import Share, UnrecordedEffect, UnrecordedHeatTerm, up_to, when_words
+from spindle_fem.effects.unrecorded import Share, UnrecordedEffect, UnrecordedHeatTerm, when_words
 from spindle_fem.effects.view import MachineView, RecordedQuantity
 
 
@@ -43,6 +43,6 @@ class UnrecordedHeatSource(UnrecordedEffect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and how often."""
         return (
-            f"{capital(up_to(candidate) + quantity(reported['heat']))} of heat enters "
+            f"{capital(quantity(reported['heat']))} of heat enters "
             f"{place_words(candidate.component)}{when_words(candidate, reported)}."
         )

@@ -98,6 +98,8 @@ class RecordedQuantity:
         Largest magnitude in the recording, SI.
     varies : float
         Range of the magnitude as a share of ``highest``.
+    levels : tuple of float
+        Magnitudes while it is on, quantiles over time, SI; of changes the sizes of those of the square.
     unit : str
     changes : bool
         Whether its changes are followed instead of itself.
@@ -109,6 +111,7 @@ class RecordedQuantity:
     input: str
     highest: float
     varies: float
+    levels: tuple[float, ...]
     unit: str = ""
     changes: bool = False
     beside: bool = False

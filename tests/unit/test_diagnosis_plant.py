@@ -282,6 +282,11 @@ def test_covariates_are_means_over_the_steps_and_end_none(plant, recording):
     assert list(quantities) == ["change of speed", "load"]
     assert (quantities["load"].input, quantities["load"].beside) == ("covariate.load", True)
     assert quantities["load"].highest == np.nanmax(flicker)
+    on = np.interp(beside.times, beside.times[read], flicker[read])
+    assert np.mean(quantities["load"].levels) == pytest.approx(on[on > 4.0].mean(), rel=0.02)
+    # 0, 3000, 0, 4000 rpm.
+    turned = np.array([3000.0, 3000.0, 4000.0]) ** 2 * (np.pi / 30.0) ** 2
+    assert quantities["change of speed"].levels == pytest.approx(turned)
 
 
 def test_what_happens_in_a_gap_is_open_for_each_set_and_for_inputs_that_changed(plant, recording):

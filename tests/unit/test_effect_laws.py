@@ -324,7 +324,9 @@ def heat_in(spread, *intervals):
 
 def heat_following(**quantity):
     law = Followed(
-        RecordedQuantity(**({"name": "q", "input": "q", "highest": 200.0, "varies": 1.0} | quantity))
+        RecordedQuantity(
+            **({"name": "q", "input": "q", "highest": 200.0, "varies": 1.0, "levels": ()} | quantity)
+        )
     )
     return UnrecordedHeatTerm("t", amplitude("heat", 50.0, "W"), Spread(("a", "b")), law)
 
@@ -354,6 +356,18 @@ def test_heat_follows_changes_of_the_squared_speed_up_and_down_alike():
     assert heat[300] == pytest.approx(80.0 * 0.75, rel=1e-3)
     assert heat[[299, -1]] == pytest.approx(0.0, abs=0.01)
     assert 20.0 * heat[300:].sum() / (80.0 * 600.0) == pytest.approx(0.75, rel=0.02)
+
+
+def test_the_size_of_a_law_is_its_mean_while_on():
+    levels = (200.0, 100.0, 100.0, 50.0)
+    own = {"reference": 200.0, "exponent": 2.0}
+    assert heat_following(levels=levels).on.mean_share(own) == pytest.approx((1.0 + 0.5 + 0.0625) / 4.0)
+    # A pulse of 600 s that is followed down to a twentieth, by quadrature.
+    time = np.linspace(0.0, 600.0 * np.log(20.0), 200_001)
+    pulse = np.trapezoid(np.exp(-time / 600.0), time) / time[-1]
+    squares = (200.0**2, 0.75 * 200.0**2)
+    mean = heat_following(levels=squares, changes=True).on.mean_share({"reference": 200.0})
+    assert mean == pytest.approx(pulse * 0.875, rel=1e-6)
 
 
 def test_a_law_keeps_what_it_refers_to():
