@@ -31,6 +31,7 @@ from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reporting.diagnosis_full_model import full_model_sections
 from spindle_fem.spec.load import load_machine
 from spindle_fem.transients.history import OperatingHistory
+from spindle_fem.transients.terms import inputs_of
 
 MANIFEST = """
 schema = "spindle-fem/recording/1"
@@ -269,6 +270,26 @@ def test_recorded_heat_goes_into_the_full_model(plant):
     (term,) = history.given_heat()
     assert term.heat_places == ("housing",)
     assert history.at(0.0).extra_heat == {"housing": 40.0}
+
+
+def test_a_covariate_reaches_the_full_model_where_a_term_follows_it(plant):
+    drive = plant.drives[0]
+    load = np.linspace(10.0, 70.0, len(drive.start))[:, None]
+    beside = replace(
+        drive,
+        names=(*drive.names, "covariate.load", "covariate.other"),
+        start=np.hstack((drive.start, load, load)),
+        end=np.hstack((drive.end, load, load)),
+    )
+    inputs = inputs_of_drive(beside, {"covariate.load"})
+    assert inputs.names == (*drive.names, "covariate.load")
+    assert inputs_of_drive(beside).names == drive.names
+    history = OperatingHistory.of(plant.fast.spec, inputs)
+    middle = 0.5 * (drive.grid[5] + drive.grid[6])
+    seen = inputs_of(history.at(middle))
+    assert seen["covariate.load"] == pytest.approx(load[5, 0])
+    assert seen["speed"] == history.at(middle).speed
+    assert history.given_heat() == ()
 
 
 def test_another_mesh_is_refused():
