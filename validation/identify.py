@@ -20,7 +20,8 @@ from .reduction import ReducedSpindle
 from .stepping import PRIORS, run
 
 EVERY = 6
-_DELTA = 0.02
+# Fits through the model: rounds at most, the gain in chi squared that is the last, the shortest step.
+MOST_ROUNDS, CONVERGED, SHORTEST = 20, 0.2, 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -312,14 +313,14 @@ class Study:
         )
 
     def fit_through_model(
-        self, truth: NDArray[np.float64], mimic: Mimic | None, column: NDArray[np.float64], rounds: int = 4
+        self, truth: NDArray[np.float64], mimic: Mimic | None, column: NDArray[np.float64]
     ) -> tuple[float, float]:
         """Gauss-Newton through the model itself with the Jacobian of the true machine kept."""
         position = np.zeros(len(self.names) + (mimic is not None))
         best = (np.inf, np.inf)
         reach = np.ones_like(position)
         anchor, step, anchor_change = position, np.zeros_like(position), np.zeros(0)
-        for _ in range(rounds):
+        for _ in range(MOST_ROUNDS):
             built = dict(self.as_built)
             for name, x in zip(self.names, position, strict=False):
                 built = perturbed(built, name, float(np.clip(x, -8, 8)))
@@ -329,24 +330,28 @@ class Study:
             change = self._stack(
                 [truth - guess[0], *[p - g for p, g in zip(self.plain[1:], guess[1:], strict=True)]]
             )
-            if not np.isfinite(change).all():
-                reach *= 0.3
-                position = anchor + reach * step
-                continue
-            rest = self._whiten(change[:, None])[:, 0]
-            pull = position[: len(self.names)] + self.offset
-            chi2 = max(0.0, float(rest @ rest + pull @ pull) - self._null)
-            if chi2 < best[1]:
-                best, anchor, anchor_change = (self.ratio(change), chi2), position.copy(), change
-            else:
+            chi2 = np.inf
+            if np.isfinite(change).all():
+                rest = self._whiten(change[:, None])[:, 0]
+                pull = position[: len(self.names)] + self.offset
+                chi2 = max(0.0, float(rest @ rest + pull @ pull) - self._null)
+            if not chi2 < best[1]:
                 reach *= 0.4
+                if reach.max() < SHORTEST:
+                    break
                 position = anchor + reach * step
                 continue
+            gain = best[1] - chi2
+            best, anchor, anchor_change = (self.ratio(change), chi2), position.copy(), change
+            if gain < CONVERGED:
+                break
             saved = self.offset
             self.offset = saved + anchor[: len(self.names)]
             step, _ = self.solve(
                 anchor_change, column[:, None] if mimic is not None else np.empty((change.size, 0))
             )
             self.offset = saved
+            # A step that had to be shortened may be long again where the next one starts.
+            reach = np.minimum(1.0, 2.0 * reach)
             position = anchor + reach * step
         return best
