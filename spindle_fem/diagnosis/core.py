@@ -181,13 +181,21 @@ def diagnose_recordings(
 
 
 def _overlapping(view: MachineView) -> dict[str, frozenset[str]]:
-    """Components that a decision does not tell apart from each: a set, its bearings, its other bearings."""
+    """Components that a decision does not tell apart from each.
+
+    A set, its bearings, its other bearings; a probe and what it sits in.
+    """
     found: dict[str, set[str]] = {}
     for group in view.groups:
         members = set(view.sets[group])
         family = {name for name, own in view.sets.items() if set(own) <= members}
         for name in family:
             found.setdefault(name, set()).update(family)
+    for probe, component in view.near.items():
+        whole = found.setdefault(component, {component})
+        found[probe] = {probe, *(whole - set(view.near))}
+        for name in found[probe] - {probe}:
+            found.setdefault(name, {name}).add(probe)
     return {name: frozenset(family) for name, family in found.items()}
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from spindle_fem.spec.exchange import Gap
 from spindle_fem.spec.model import AnnulusSegment, MachineSpec, Part, Surface
 
 # A segment is a flange where its diameter passes the next largest by this share.
@@ -14,6 +15,8 @@ FLANGE_STEP = 1.1
 CHANNEL_WALL = "channel_wall"
 # Spot of the shaft between its bearings: a rotor, a drawbar, what runs through the bore.
 SHAFT_GAP = "shaft_gap"
+# Spot of what faces it: a stator, the bore of the housing.
+STANDING_GAP = "standing_gap"
 
 
 class Layout:
@@ -100,14 +103,11 @@ class Layout:
                 found["nose"] = (self.segment_place(self.shaft, min(ahead, key=lambda s: s.z[0]).name),)
             if behind:
                 found["drive_end"] = (self.segment_place(self.shaft, max(behind, key=lambda s: s.z[1]).name),)
-            gaps = [g for g in self.spec.gap if g.rise > 0.0 or g.kind != "power_law"]
-            gaps = [
-                g for g in gaps if self._part_of(g.rotating) == self.shaft.name and g.rotating in self.places
-            ]
+            gaps = [g for g in self.gaps() if g.rotating in self.places]
             found[SHAFT_GAP] = tuple(g.rotating for g in gaps) or found["shaft"]
             standing = tuple(name for g in gaps for name in g.standing if name in self.places)
             if standing:
-                found["standing_gap"] = standing
+                found[STANDING_GAP] = standing
         for part in self.spec.part:
             # What holds the seal at an end of the shaft.
             end = "" if part in (self.shaft, self.housing) else self.component_of(part.name)
@@ -121,6 +121,14 @@ class Layout:
             walls = [f"{self.spec.channel.part}.channel_wall", self.spec.channel.part]
             found["channel"] = (next((w for w in walls if w in self.places), walls[-1]),)
         return found
+
+    def gaps(self) -> list[Gap]:
+        """Gaps around the shaft whose air it stirs."""
+        return [
+            gap
+            for gap in self.spec.gap
+            if (gap.rise > 0.0 or gap.kind != "power_law") and self._part_of(gap.rotating) == self.shaft.name
+        ]
 
     def _part_of(self, surface: str) -> str:
         return self.surface(surface).part

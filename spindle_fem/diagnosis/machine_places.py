@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from spindle_fem.diagnosis.layout import CHANNEL_WALL, SHAFT_GAP, Layout
-from spindle_fem.reduced.probe_places import NEAR
+from spindle_fem.diagnosis.layout import CHANNEL_WALL, SHAFT_GAP, STANDING_GAP, Layout
+from spindle_fem.reduced.probe_places import AROUND, NEAR, STANDARD_DISTANCE
 from spindle_fem.spec.model import MachineSpec
 
 
@@ -43,7 +43,7 @@ def regions_of(spec: MachineSpec, name: str) -> tuple[Region, ...]:
     name : str
         ``front_bearings``, ``F2``, ``F2.outer_ring``, ``shaft``, ``housing``,
         ``housing.flange``, ``nose``, ``drive_end``, ``flange``, ``channel``,
-        ``near.SP01``, ``SP01``, ...; two joined by ``|`` are both.
+        ``near.SP01``, ``around.SP04``, ``SP01``, ...; two joined by ``|`` are both.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def regions_of(spec: MachineSpec, name: str) -> tuple[Region, ...]:
     if "|" in name:
         both = name.partition("@")[0].removesuffix(":face").split("|")
         return tuple(region for part in both for region in regions_of(spec, part))
-    for find in (_of_bearings, _of_probe, _of_channel, _of_ends, _of_part):
+    for find in (_of_bearings, _of_probe, _of_channel, _of_ring, _of_gap, _of_ends, _of_part):
         found = find(spec, name)
         if found:
             return found
@@ -72,7 +72,9 @@ def centre_of(spec: MachineSpec, name: str) -> tuple[float, float] | None:
     weights = [region.volume for region in regions]
     total = sum(weights)
     if total <= 0.0:
-        weights, total = [1.0] * len(regions), float(len(regions))
+        # Cylinders of no thickness by their area, points alike.
+        weights = [region.middle[0] * (region.z[1] - region.z[0]) or 1.0 for region in regions]
+        total = sum(weights)
     radius = sum(w * region.middle[0] for w, region in zip(weights, regions, strict=True)) / total
     place = sum(w * region.middle[1] for w, region in zip(weights, regions, strict=True)) / total
     return radius, place
@@ -122,6 +124,33 @@ def _of_channel(spec: MachineSpec, name: str) -> tuple[Region, ...]:
     )
 
 
+def _of_ring(spec: MachineSpec, name: str) -> tuple[Region, ...]:
+    """What a ring through a probe covers of its part, one standard deviation to either side."""
+    reach = STANDARD_DISTANCE / 3.0**0.5
+    for probe in spec.probe:
+        if name == f"{AROUND}{probe.name}":
+            part = next(p for p in spec.part if p.name == probe.part)
+            whole = [r for r in _sections(part.segment) if r.z[0] <= probe.z <= r.z[1]]
+            low = max(probe.r - reach, min(region.r[0] for region in whole))
+            high = min(probe.r + reach, max(region.r[1] for region in whole))
+            return (Region((probe.z - reach, probe.z + reach), (low, high)),)
+    return ()
+
+
+def _of_gap(spec: MachineSpec, name: str) -> tuple[Region, ...]:
+    """Standing walls of the gaps around the shaft."""
+    layout = Layout(spec, set())
+    if name != STANDING_GAP or layout.shaft is None:
+        return ()
+    return tuple(
+        Region(_ends(where.z), _ends(where.r))
+        for gap in layout.gaps()
+        for surface in gap.standing
+        for where in layout.surface(surface).where
+        if where.z is not None and where.r is not None
+    )
+
+
 def _of_ends(spec: MachineSpec, name: str) -> tuple[Region, ...]:
     if name not in ("shaft", SHAFT_GAP, "housing", "nose", "drive_end", "flange"):
         return ()
@@ -154,6 +183,11 @@ def _of_part(spec: MachineSpec, name: str) -> tuple[Region, ...]:
             if name == f"{part.name}.{segment.name}":
                 return _sections([segment])
     return ()
+
+
+def _ends(value: float | Sequence[float]) -> tuple[float, float]:
+    both = (value, value) if isinstance(value, (int, float)) else value
+    return float(min(both)), float(max(both))
 
 
 def _sections(segments: Sequence) -> tuple[Region, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from spindle_fem.coolant.properties import coolant_by_name
 from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.diagnosis.contacts import seats_of
-from spindle_fem.diagnosis.layout import CHANNEL_WALL, SHAFT_GAP, Layout, segment_volume, volume
+from spindle_fem.diagnosis.layout import CHANNEL_WALL, SHAFT_GAP, STANDING_GAP, Layout, segment_volume, volume
 from spindle_fem.diagnosis.network_view import view_of_network
 from spindle_fem.diagnosis.usual_sizes import (
     LEAST_HEAT,
@@ -25,7 +25,7 @@ from spindle_fem.recordings.align import Recording
 from spindle_fem.reduced.coefficients import free_parameters
 from spindle_fem.reduced.drive import heat_of_table, standard_inputs
 from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.probe_places import ACROSS, UP
+from spindle_fem.reduced.probe_places import ACROSS, AROUND, NEAR, UP, ringed_probes
 from spindle_fem.spec.model import MachineSpec, NaturalFilm
 
 Array = NDArray[np.float64]
@@ -88,6 +88,7 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
             if not more and {UP + place, ACROSS + place} <= places
         },
         reported=reported,
+        near={p.name: layout.component_of(p.part) for p in spec.probe if f"{NEAR}{p.name}" in spots},
         walls=walls,
         fluids=fluids,
         probes=dict(zip(recording.temperature_names, recording.probes, strict=True)),
@@ -159,6 +160,9 @@ def _spots(
     reported: dict[str, str] = {}
     if SHAFT_GAP in heat and heat[SHAFT_GAP] != heat["shaft"]:
         spots[SHAFT_GAP], reported[SHAFT_GAP] = heat[SHAFT_GAP], "shaft"
+    if STANDING_GAP in heat:
+        spots[STANDING_GAP] = heat[STANDING_GAP]
+        reported[STANDING_GAP] = layout.component_of(layout.surface(heat[STANDING_GAP][0]).part)
     places = layout.places
     housing = layout.housing
     channel = layout.spec.channel
@@ -176,9 +180,13 @@ def _spots(
         if not known and part.name in places:
             spots[part.name], reported[part.name] = (part.name,), layout.component_of(part.name)
     for probe in layout.spec.probe:
-        place = f"near.{probe.name}"
+        place = f"{NEAR}{probe.name}"
         if place in places:
             spots[place], reported[place] = (place,), probe.name
+    for probe in ringed_probes(layout.spec):
+        place = f"{AROUND}{probe.name}"
+        if place in places:
+            spots[place], reported[place] = (place,), layout.component_of(probe.part)
     return spots, reported
 
 

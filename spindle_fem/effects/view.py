@@ -166,6 +166,8 @@ class MachineView:
         First harmonics around the axis, along y and along -x, of the spots that have them.
     reported : mapping of str to str
         Component that a finding names for a spot, source or link; itself where absent.
+    near : mapping of str to str
+        Component in which each probe lies that a finding may name.
     walls : mapping of coefficient to str
         Place whose temperature drives a film.
     fluids : mapping of coefficient to str or float
@@ -224,6 +226,7 @@ class MachineView:
     spots: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     sides: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     reported: Mapping[str, str] = field(default_factory=dict)
+    near: Mapping[str, str] = field(default_factory=dict)
     walls: Mapping[str, str] = field(default_factory=dict)
     fluids: Mapping[str, str | float] = field(default_factory=dict)
     probes: Mapping[str, str] = field(default_factory=dict)

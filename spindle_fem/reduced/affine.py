@@ -25,10 +25,12 @@ from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.probe_places import (
     ACROSS,
     UP,
+    around_places,
     harmonics,
     near_places,
     probe_positions,
     probe_slopes,
+    ringed_probes,
     sided_names,
 )
 from spindle_fem.spec.model import MachineSpec
@@ -60,7 +62,7 @@ class AffineSystem:
     place_names : tuple of str
         Volumes (``<part>.<segment>``, ``<bearing>.inner_ring``), surfaces,
         ``<bearing>.balls``, seats (``<contact>@0``, ``@1``) and the
-        neighbourhoods of point probes (``near.<probe>``).
+        neighbourhoods of point probes (``near.<probe>``, ``around.<probe>``).
     places : (n_places, n) csr_array
         Mean over each place; its transpose is the load of 1 W spread over it.
     probe_names : tuple of str
@@ -364,6 +366,8 @@ def _places(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> Ite
         yield f"{bearing.name}.balls", vector
     for name, near in near_places(operators, [probe for probe in spec.probe if probe.kind == "point"]):
         yield name, padded(near)
+    for name, ring in around_places(operators, ringed_probes(spec)):
+        yield name, padded(ring)
     for name, mean in sided.items():
         if mean is not None:
             for prefix, harmonic in zip((UP, ACROSS), harmonics(operators, mean), strict=True):

@@ -23,7 +23,7 @@ from spindle_fem.reduced.coefficients import (
 )
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reduced.model import ReducedModel, family_of, project, reduced_digest, reduced_path
-from spindle_fem.reduced.probe_places import ACROSS, NEAR, UP
+from spindle_fem.reduced.probe_places import ACROSS, AROUND, NEAR, UP
 from spindle_fem.reduced.snapshots import (
     Sample,
     SnapshotSpace,
@@ -296,7 +296,7 @@ def _source_places(affine: AffineSystem, spec: MachineSpec) -> tuple[list[str], 
     single = {f"{part.name}.{part.segment[0].name}" for part in spec.part if len(part.segment) == 1}
     other = [name for name in affine.place_names if name in segments - single or name in rings]
     other += [part.name for part in spec.part if len(part.segment) == 1]
-    other += [name for name in affine.place_names if name.startswith((NEAR, UP, ACROSS))]
+    other += [name for name in affine.place_names if name.startswith((NEAR, AROUND, UP, ACROSS))]
     return friction, other
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from spindle_fem.geometry.assembly import build_assembly
 from spindle_fem.geometry.faces import MeridianEdge
 from spindle_fem.reduced.coefficients import CoefficientTable, build_coefficient_table
-from spindle_fem.reduced.probe_places import ACROSS, NEAR, UP, sided_names
+from spindle_fem.reduced.probe_places import ACROSS, AROUND, NEAR, UP, ringed_probes, sided_names
 from spindle_fem.spec.model import MachineSpec
 from spindle_fem.units import Uncertain
 
@@ -50,6 +50,7 @@ class MachineNames:
             *(f"{name}@{side}" for name in contacts if not name.endswith(":face") for side in (0, 1)),
             *(f"{name}.balls" for name in bearings),
             *(NEAR + probe.name for probe in spec.probe if probe.kind == "point"),
+            *(AROUND + probe.name for probe in ringed_probes(spec)),
             *(prefix + name for name in sided_names(spec) for prefix in (UP, ACROSS)),
         ]
         edges = assembly.edges

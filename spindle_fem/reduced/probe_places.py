@@ -1,7 +1,8 @@
 """What the reduced model knows of the neighbourhood of each point probe, and of the sides of standing parts.
 
 A patch of the probe's own part around it, where an unmodelled source may sit,
-and how the reading changes when the probe sits a little elsewhere.
+the ring about the axis through it, and how the reading changes when the probe
+sits a little elsewhere.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from spindle_fem.spec.model import MachineSpec, Probe
 
 Array = NDArray[np.float64]
 
-NEAR = "near."
+NEAR, AROUND = "near.", "around."
 # First harmonics around the axis of a standing place: along y, where a probe's angle is 0, and along -x.
 UP, ACROSS = "up.", "across."
 # Root mean square distance from the probe, in space, of a patch that no wall cuts.
@@ -46,17 +47,45 @@ def near_places(operators: ThermalOperators, probes: Sequence[Probe]) -> Iterato
     str, (n_unknowns,) ndarray
         The weights sum to 1.
     """
-    corners = operators.mesh.points[: operators.n_unknowns]
-    if operators.prolongation is not None:
-        corners = corners[: operators.prolongation.shape[1]]
+    corners = _corners(operators)
     for probe, position in zip(probes, probe_positions(probes), strict=True):
-        squared = np.sum((corners - position) ** 2, axis=1)
-        # Linear between corners: a quadratic interpolation could undershoot zero.
-        weight = np.exp(-1.5 * squared / STANDARD_DISTANCE**2)
-        if operators.prolongation is not None:
-            weight = operators.prolongation @ weight
-        vector = operators.part_storage(probe.part) @ weight
-        yield NEAR + probe.name, vector / vector.sum()
+        yield NEAR + probe.name, _patch(operators, probe.part, np.sum((corners - position) ** 2, axis=1))
+
+
+def around_places(operators: ThermalOperators, probes: Sequence[Probe]) -> Iterator[tuple[str, Array]]:
+    """The same of the distance in the meridian plane, by name ``around.<probe>``: a ring about the axis."""
+    x, y, z = _corners(operators).T
+    radius = np.hypot(x, y)
+    for probe in probes:
+        yield AROUND + probe.name, _patch(operators, probe.part, (radius - probe.r) ** 2 + (z - probe.z) ** 2)
+
+
+def _corners(operators: ThermalOperators) -> Array:
+    corners = operators.mesh.points[: operators.n_unknowns]
+    return corners if operators.prolongation is None else corners[: operators.prolongation.shape[1]]
+
+
+def _patch(operators: ThermalOperators, part: str, squared: Array) -> Array:
+    """Weights that fall with the squared distance [m²] of corner nodes."""
+    # Linear between corners: a quadratic interpolation could undershoot zero.
+    weight = np.exp(-1.5 * squared / STANDARD_DISTANCE**2)
+    if operators.prolongation is not None:
+        weight = operators.prolongation @ weight
+    vector = operators.part_storage(part) @ weight
+    return vector / vector.sum()
+
+
+def ringed_probes(spec: MachineSpec) -> tuple[Probe, ...]:
+    """Point probes in standing parts, away from the bearings: a bearing is a ring itself."""
+    standing = {part.name for part in spec.part if not part.rotating}
+    sets = [[z for bearing in group.bearing for z in bearing.z] for group in spec.bearing_set]
+    return tuple(
+        probe
+        for probe in spec.probe
+        if probe.kind == "point"
+        and probe.part in standing
+        and not any(min(ends) <= probe.z <= max(ends) for ends in sets)
+    )
 
 
 def sided_names(spec: MachineSpec) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 from spindle_fem.diagnosis.abreast import Workers
-from spindle_fem.diagnosis.core import Diagnosis
+from spindle_fem.diagnosis.core import Diagnosis, _overlapping
 from spindle_fem.diagnosis.engine import OTHER_SPOTS, Hypothesis, Search
 from spindle_fem.diagnosis.findings import findings_of, noise_level, predictions_at_stamps, rmse
 from spindle_fem.diagnosis.inference import Problem
@@ -223,12 +223,32 @@ def test_the_shaft_between_its_bearings_ends_where_they_sit():
     assert max(r.z[1] for r in found) <= min(z[0] for z in seats if z[0] > 0.3)
 
 
+def test_walls_that_face_the_shaft_and_rings_have_a_place():
+    spec = load_machine("recorded_spindle")
+    walls = regions_of(spec, "standing_gap")
+    assert [region.z for region in walls] == [pytest.approx((0.157, 0.180)), pytest.approx((0.180, 0.410))]
+    assert [region.r for region in walls] == [pytest.approx((0.095, 0.095)), pytest.approx((0.090, 0.090))]
+    # By their areas.
+    assert centre_of(spec, "standing_gap")[1] == pytest.approx(0.282, abs=1e-3)
+    (ring,) = regions_of(spec, "around.SP04")
+    assert ring.z == pytest.approx((0.27845, 0.30155), abs=1e-4)
+    assert ring.r == pytest.approx((0.090, 0.10255), abs=1e-4)
+
+
 def test_the_cover_holds_the_seal_of_the_nose():
     spec = load_machine("recorded_spindle")
     heat = Layout(spec, {"cover", "front_outer_spacer"}).heat()
     assert heat["standing_nose"] == ("cover",)
     assert "standing_drive_end" not in heat
     assert "standing_nose" not in Layout(spec, set()).heat()
+
+
+def test_a_decision_does_not_wait_for_which_part_of_a_component_it_is(case):
+    one = _overlapping(case.view)
+    assert one["F1"] == one["front_bearings"] >= {"F1", "F2", "F3", "front_bearings"}
+    assert one["SP04"] == {"SP04", "housing"}
+    assert one["housing"] >= {"housing", "SP04", "SP05"}
+    assert "flange" not in one["housing"]
 
 
 # ---------------------------------------------------------------------- search

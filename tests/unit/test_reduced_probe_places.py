@@ -7,7 +7,15 @@ from spindle_fem.conduction.evaluate import probe_matrix
 from spindle_fem.conduction.operators import build_operators
 from spindle_fem.errors import GeometryError
 from spindle_fem.meshing.simple import build_joined_tubes
-from spindle_fem.reduced.probe_places import harmonics, near_places, probe_positions, probe_slopes
+from spindle_fem.reduced.probe_places import (
+    around_places,
+    harmonics,
+    near_places,
+    probe_positions,
+    probe_slopes,
+    ringed_probes,
+)
+from spindle_fem.spec.load import load_machine
 from spindle_fem.spec.model import Probe
 
 # Two tubes, radii 100, 150 and 200 mm, 100 mm long.
@@ -47,6 +55,26 @@ def test_a_neighbourhood_spreads_over_some_20_mm():
     spread = np.sqrt(vector @ np.sum(offset**2, axis=1))
     # The walls, 25 mm away inside and outside, cut the Gaussian's tails.
     assert 0.018 < spread < 0.0215
+
+
+def test_a_ring_goes_round_the_axis_through_its_probe():
+    operators = build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((6, 6), 96, 12)), 2)
+    [(name, vector)] = around_places(operators, [probe("A", 125, 50, "30 deg")])
+    x, y, z = operators.mesh.points.T
+    radius = np.hypot(x, y)
+    assert name == "around.A"
+    assert vector.sum() == pytest.approx(1.0, abs=1e-12)
+    # Tetrahedra are not quite alike at both ends and on all sides.
+    assert [vector @ x, vector @ y, vector @ z] == pytest.approx([0.0, 0.0, 0.05], abs=1e-4)
+    # Two of the three directions of a patch; the walls cut the tails, and outer radii have more room.
+    spread = np.sqrt(vector @ ((radius - 0.125) ** 2 + (z - 0.05) ** 2))
+    assert 0.9 * 0.02 * np.sqrt(2.0 / 3.0) < spread < 1.02 * 0.02 * np.sqrt(2.0 / 3.0)
+    assert 0.125 < vector @ radius < 0.128
+
+
+def test_probes_at_bearings_have_no_ring_of_their_own():
+    spec = load_machine("recorded_spindle")
+    assert [item.name for item in ringed_probes(spec)] == ["SP04"]
 
 
 def test_harmonics_of_a_place_tell_which_side_is_warmer(operators):
