@@ -133,7 +133,7 @@ def machine_mimics(model: ReducedSpindle, plan: Plan) -> list[Mimic]:
                 "coolant_film",
                 "channel",
                 f"Re{re:.0f}",
-                lambda a, r=re: laws.FilmTransition(a, r, 40.0),
+                lambda a, r=re: laws.FilmTransition(max(a, -0.95), r, 40.0),
                 0.05,
             )
     add("ambient_drift", "ambient", "ramp", lambda a: laws.RoomDrift(a, "ramp", total=total), 1.0)

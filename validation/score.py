@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import kstest
 
 from .asked import held_against_asked
 
@@ -87,6 +88,7 @@ def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | 
         "clear": answer["clear"],
         "detectable": answer["detectable"],
         "ambiguous": bool(answer.get("indistinguishable")),
+        "undecidable": undecidable(answer),
         "foreign": any(e.get("outside_catalogue") for e in answer["effects"]),
         "ratio": (answer["identifiability"] or {}).get("ratio"),
         "calibrated": answer["two_recordings"],
@@ -104,6 +106,22 @@ def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | 
         else None,
         "wall_s": wall,
     }
+
+
+def undecidable(answer: dict[str, Any]) -> bool:
+    """Whether something reads like an effect that has to be named.
+
+    What is so faint that the sets that count as right are without it may be left unsaid, and what reads
+    like it as well.
+    """
+    names = [e["effect"] for e in answer["effects"]]
+    right = [sorted(e["effect"] for e in accepted) for accepted in answer["acceptable_sets"]]
+    for twin in answer.get("indistinguishable", []):
+        left = list(names)
+        left.remove(twin.get("instead_of", names[0]))
+        if sorted(left) not in right:
+            return True
+    return False
 
 
 def noise_of(answer: dict[str, Any]) -> float:
@@ -159,6 +177,21 @@ def same_extent(concealed: str, named: str) -> bool:
     return len(both) == 1 or not sets or not any(name[0] in "FR" and name[1:].isdigit() for name in both)
 
 
+def evenness(levels: list[float]) -> dict[str, Any]:
+    """How far p-values of consistent recordings are from even (Kolmogorov and Smirnov), and how many are low.
+
+    >>> evenness([0.1, 0.3, 0.5, 0.7, 0.9])["below_0.05"]
+    0.0
+    """
+    if not levels:
+        return {"of": 0}
+    return {
+        "of": len(levels),
+        "even": round(float(kstest(levels, "uniform").pvalue), 3),
+        **{f"below_{level}": round(float(np.mean(np.array(levels) < level)), 4) for level in (0.01, 0.05)},
+    }
+
+
 def _share(rows: list[dict[str, Any]], key: str) -> dict[str, Any]:
     values = [bool(r[key]) for r in rows if r[key] is not None]
     return {"share": round(float(np.mean(values)), 4) if values else None, "of": len(values)}
@@ -193,6 +226,7 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
     clear_pairs = [r for r in pairs if r["clear"]]
     visible = [r for r in rows if r["truth"] and r["detectable"]]
     twins = [r for r in visible if r["ambiguous"]]
+    undecidable_ones = [r for r in twins if r["undecidable"]]
     for row in clear + clear_pairs:
         row["within_three"] = row["rank"] is not None and row["rank"] <= 3
     for row in twins:
@@ -223,6 +257,7 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
         "cases": len(rows),
         "failed": failed,
         "false_alarms": _share(null, "false_alarm"),
+        "p_value_of_consistent": evenness([r["p_value"] for r in null if r["p_value"] is not None]),
         "verdict_acceptable": _share(rows, "verdict_right"),
         "clear_single_first": _share(clear, "exact"),
         "clear_single_within_three": _share(clear, "within_three"),
@@ -234,8 +269,9 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
         "place_of_named": _share([r for r in rows if r["detectable"]], "place"),
         "located": _share(visible, "located"),
         "law_of_recorded_quantity": _share(visible, "law"),
-        "ambiguous_truth_kept": _share(twins, "truth_kept"),
-        "ambiguous_called": _share(twins, "called_ambiguous"),
+        "ambiguous_truth_kept": _share(undecidable_ones, "truth_kept"),
+        "ambiguous_called": _share(undecidable_ones, "called_ambiguous"),
+        "ambiguous_called_faint_ones_too": _share(twins, "called_ambiguous"),
         "confident_wrong": _share(rows, "confident_wrong"),
         "reliability": reliability(rows),
         "by_strength": by_strength(rows),

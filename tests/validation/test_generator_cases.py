@@ -10,7 +10,7 @@ from validation.generate import choose_effects, judge, make_case
 from validation.laws import Intervals, Sensor, Starvation, first_order
 from validation.recorder import Noise, record, slow_error
 from validation.reduction import load_reduced
-from validation.score import matches, score_case, summarise
+from validation.score import matches, score_case, summarise, undecidable
 from validation.stepping import Moment
 
 
@@ -180,6 +180,38 @@ def test_score_counts_false_alarms():
         score_case(_answer([]), _diagnosis("sensor", [("sensor_gain", "SP01")]), None),
     ]
     assert summarise(rows, [])["false_alarms"] == {"share": 0.5, "of": 2}
+
+
+def test_undecidable_is_what_reads_like_an_effect_that_has_to_be_named():
+    pair = [("mount_sink", "flange"), ("radiation", "housing")]
+    twin = {"effect": "natural_convection", "component": "housing", "instead_of": "radiation"}
+    asked = _answer(pair, indistinguishable=[twin])
+    assert undecidable(asked)
+    # The second effect may be left unsaid; the first may not.
+    asked["acceptable_sets"].append([{"effect": "mount_sink", "components": ["flange"]}])
+    assert not undecidable(asked)
+    assert undecidable(asked | {"indistinguishable": [twin, twin | {"instead_of": "mount_sink"}]})
+    single = _answer([("radiation", "housing")], indistinguishable=[{"effect": "natural_convection"}])
+    assert undecidable(single)
+    assert not undecidable(_answer([("radiation", "housing")]))
+    said = score_case(single, _diagnosis("missing_physics", [("radiation", "housing")]), None)
+    faint = single | {"acceptable_sets": [*single["acceptable_sets"], []]}
+    summary = summarise([said, score_case(faint, _diagnosis("consistent", []), None)], [])
+    assert summary["ambiguous_called"] == {"share": 0.0, "of": 1}
+    assert summary["ambiguous_called_faint_ones_too"]["of"] == 2
+    assert summary["ambiguous_truth_kept"] == {"share": 1.0, "of": 1}
+
+
+def test_score_says_whether_p_values_are_even():
+    rows = [score_case(_answer([]), _diagnosis("consistent", []), None) for _ in range(40)]
+    for number, row in enumerate(rows):
+        row["p_value"] = (number + 0.5) / 40
+    assert summarise(rows, [])["p_value_of_consistent"] == {
+        "of": 40, "even": 1.0, "below_0.01": 0.0, "below_0.05": 0.05
+    }  # fmt: skip
+    for row in rows:
+        row["p_value"] = 1.0 - 0.1 * row["p_value"]
+    assert summarise(rows, [])["p_value_of_consistent"]["even"] < 1e-3
 
 
 def test_score_counts_laws_of_recorded_quantities():
