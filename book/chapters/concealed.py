@@ -216,8 +216,9 @@ def _alarms(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> li
         blocks.append(
             Text(
                 f"Their p-values: median {significant(float(np.median(values)), 2)}, smallest "
-                f"{', '.join(significant(value, 2) for value in values[:5])}. An exact p-value would have "
-                "the median 0.5; a larger one says that the test is careful, and weak effects pay."
+                f"{', '.join(significant(value, 2) for value in values[:5])}. Were they drawn from even "
+                f"levels, they would be farther from even with probability "
+                f"{significant(summary['p_value_of_consistent']['even'], 2)} (Kolmogorov and Smirnov)."
             )
         )
     if alarms:

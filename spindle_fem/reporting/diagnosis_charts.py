@@ -86,12 +86,15 @@ def before_after(data: xr.Dataset, number: int) -> Figure:
     figure = new_figure(top + rows * cell + foot)
     for position, name in enumerate(names):
         row, column = divmod(position, 2)
-        left = 95.0 + 800.0 * column
-        upper = pixel_axes(figure, left, top + row * cell, 670.0, 235.0)
-        lower = pixel_axes(figure, left, top + row * cell + 260.0, 670.0, 130.0, sharex=upper)
+        left = 115.0 + 795.0 * column
+        upper = pixel_axes(figure, left, top + row * cell, 655.0, 235.0)
+        lower = pixel_axes(figure, left, top + row * cell + 260.0, 655.0, 130.0, sharex=upper)
         _draw_channel(upper, lower, own, number, name, scale)
         upper.set_ylabel("°C")
         lower.set_ylabel("residual / K")
+        for axes in (upper, lower):
+            # Beyond the widest tick label, in every row alike.
+            axes.yaxis.set_label_coords(-0.128, 0.5)
         if row == rows - 1 or position + 2 >= len(names):
             lower.set_xlabel(f"time / {unit}")
     width, height = figure.get_size_inches() * figure.dpi

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _MM = 1.0e3
+# As thick as a wall is drawn, m.
+WALL = 3.0e-3
 PLAIN = "#e9ecef"
 BAR_LABEL = "evidence for heat missing here, in % of the best place's"
 
@@ -86,7 +88,8 @@ def located_on_machine(
     }
     for regions, share in sorted(areas.values(), key=lambda item: -sum(r.volume for r in item[0])):
         for region in regions:
-            _patch(axes, *region.z, *region.r, bar.colours(share))
+            inner, outer = region.r
+            _patch(axes, *region.z, inner, max(outer, inner + WALL), bar.colours(share))
     for edge in assembly.edges:
         if not edge.is_axis:
             axes.plot(
