@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 
 from spindle_fem.calibration.noise import SlowError, likely_slow_error
 from spindle_fem.diagnosis.inference import THETA_BOUND, Belief, Coordinate, Fit, Problem
-from spindle_fem.diagnosis.plant import Plant
+from spindle_fem.diagnosis.plant import DIRECTIONS, PROBE_PREFIX, Plant
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
 
-# Holes for probes are drilled and sensors fill them to about a millimetre.
-PROBE_PLACE_SIGMA = 1.0e-3
+# Where a probe feels the temperature, m: holes are drilled and filled to half a millimetre. How far from the
+# bearings a temperature is found differs by as much again between the discretised and the real machine, alike
+# for all probes of one part.
+PROBE_PLACE_SIGMA, COMMON_RADIAL_SIGMA = 0.3e-3, 0.8e-3
+RADIAL = f".{DIRECTIONS[0]}"
+RADIAL_SIGMA = float(np.hypot(PROBE_PLACE_SIGMA, COMMON_RADIAL_SIGMA))
 # Error that neighbouring readings share: of logger and sensor, and of the model against its machine.
 EXPECTED_SLOW = SlowError(0.045, 1500.0)
 # Of the highest friction, within a gap: most machines went on as they did before and after it.
@@ -55,7 +59,15 @@ def machine_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
         for name, sigma, highest in plant.uncertain()
     ]
     found += [
-        Coordinate(name, 0.0, PROBE_PLACE_SIGMA, False, -THETA_BOUND, THETA_BOUND, "m")
+        Coordinate(
+            name,
+            0.0,
+            RADIAL_SIGMA if name.endswith(RADIAL) else PROBE_PLACE_SIGMA,
+            False,
+            -THETA_BOUND,
+            THETA_BOUND,
+            "m",
+        )
         for name in plant.displacements()
     ]
     return tuple(found)
@@ -74,6 +86,23 @@ def start_coordinates(plant: Plant) -> tuple[Coordinate, ...]:
         Coordinate(name, 0.0, GAP_SIGMA, False, -1.0 / GAP_SIGMA, 1.0 / GAP_SIGMA) for name in plant.gaps()
     ]
     return (*starts, *jumps, *gaps)
+
+
+def known_before(plant: Plant) -> Belief:
+    """Belief before any recording: each coordinate for itself, but for what radial places of probes share."""
+    belief = Belief.prior((*machine_coordinates(plant), *start_coordinates(plant)))
+    owner = {} if plant.is_network else {probe.name: probe.part for probe in plant.fast.spec.probe}
+    of_part: dict[str, list[int]] = {}
+    for index, coordinate in enumerate(belief.coordinates):
+        if coordinate.name.startswith(PROBE_PREFIX) and coordinate.name.endswith(RADIAL):
+            probe = coordinate.name.removeprefix(PROBE_PREFIX).removesuffix(RADIAL)
+            of_part.setdefault(owner[probe], []).append(index)
+    shared = (COMMON_RADIAL_SIGMA / RADIAL_SIGMA) ** 2
+    for rows in of_part.values():
+        correlation = np.full((len(rows), len(rows)), shared)
+        np.fill_diagonal(correlation, 1.0)
+        belief.root[np.ix_(rows, rows)] = np.linalg.cholesky(np.linalg.inv(correlation)).T
+    return belief
 
 
 def expected_slow_error(plant: Plant) -> SlowError:
@@ -135,9 +164,9 @@ def calibrate(earlier: Plant | None, plant: Plant) -> Calibrated:
     """
     shared, begun = machine_coordinates(plant), start_coordinates(plant)
     if earlier is None:
-        return Calibrated(Belief.prior((*shared, *begun)), expected_slow_error(plant), None)
+        return Calibrated(known_before(plant), expected_slow_error(plant), None)
     slow, fit = expected_slow_error(earlier), None
-    prior = Belief.prior((*shared, *start_coordinates(earlier)))
+    prior = known_before(earlier)
     for _ in range(2):
         problem = Problem(earlier, prior, slow, earlier.observations)
         fit = problem.fit((), None if fit is None else fit.values)
