@@ -29,7 +29,13 @@ from spindle_fem.diagnosis.next_measurement import (
     pairwise_distances,
 )
 from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.diagnosis.prepare import EXPECTED_SLOW, calibrate
+from spindle_fem.diagnosis.prepare import (
+    COMMON_RADIAL_SIGMA,
+    EXPECTED_SLOW,
+    PROBE_PLACE_SIGMA,
+    calibrate,
+    known_before,
+)
 from spindle_fem.diagnosis.trials import AGAIN, answer, reachable_places, trials_of
 from spindle_fem.diagnosis.verdict import Judgement, Ranked
 from spindle_fem.diagnosis.view import view_of
@@ -249,6 +255,21 @@ def test_a_decision_does_not_wait_for_which_part_of_a_component_it_is(case):
     assert one["SP04"] == {"SP04", "housing"}
     assert one["housing"] >= {"housing", "SP04", "SP05"}
     assert "flange" not in one["housing"]
+
+
+def test_probes_of_a_part_are_off_along_the_radius_together(heated):
+    belief = known_before(heated.plant)
+    names = [c.name for c in belief.coordinates]
+    sigmas = np.array([c.sigma for c in belief.coordinates])
+    covariance = np.linalg.inv(belief.root.T @ belief.root) * np.outer(sigmas, sigmas)
+    radial = [names.index(f"probe.{name}.r") for name in ("SP01", "SP05")]
+    along = [names.index(f"probe.{name}.z") for name in ("SP01", "SP05")]
+    own, common = PROBE_PLACE_SIGMA**2, COMMON_RADIAL_SIGMA**2
+    assert covariance[np.ix_(radial, radial)] == pytest.approx(own * np.eye(2) + common, rel=1e-9)
+    assert covariance[np.ix_(along, along)] == pytest.approx(own * np.eye(2), rel=1e-9, abs=1e-18)
+    # What the probes share is no matter of the machine's parameters.
+    rest = [i for i, name in enumerate(names) if not name.startswith("probe.")]
+    assert covariance[np.ix_(rest, radial)] == pytest.approx(0.0)
 
 
 # ---------------------------------------------------------------------- search

@@ -168,12 +168,12 @@ def test_what_a_strong_effect_leaves_counts_less_for_one_more():
 
     single = hypothesis(PRELOAD, misfit=420.0)
     pair, rival = hypothesis(PRELOAD, CHURNING, misfit=400.0), hypothesis(CHURNING, misfit=400.0)
-    weak, strong = (counted(x + 10.0) - counted(x) for x in (90.0, 9790.0))
+    weak, strong = (counted(x + 10.0) - counted(x) for x in (90.0, 24790.0))
     assert strong == pytest.approx(10.0 / LEAST_TEMPERATURE_RATIO)
     assert weak > 1.5 * strong
-    ratio = odds(600.0, pair, single) / odds(20000.0, pair, single)
+    ratio = odds(600.0, pair, single) / odds(50000.0, pair, single)
     assert ratio == pytest.approx(np.exp((weak - strong) / TEMPERATURE))
-    assert odds(20000.0, rival, single) == pytest.approx(np.exp(10.0 / TEMPERATURE_OF_A_SIZE))
+    assert odds(50000.0, rival, single) == pytest.approx(np.exp(10.0 / TEMPERATURE_OF_A_SIZE))
 
 
 def test_the_most_probable_set_of_a_size_stands_for_it():
