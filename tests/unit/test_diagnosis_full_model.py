@@ -25,7 +25,7 @@ from spindle_fem.diagnosis.full_model import (
 from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.diagnosis.view import view_of
 from spindle_fem.effects.catalogue import candidates_for, effect_of
-from spindle_fem.errors import MeshQualityError, SpecError
+from spindle_fem.errors import EnergyBalanceError, MeshQualityError, SpecError
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.reduced.fast_model import FastModel
 from spindle_fem.reporting.diagnosis_full_model import full_model_sections
@@ -212,6 +212,30 @@ def test_where_nothing_was_found_one_run_is_both(plant, monkeypatch):
     other = full_model_errors(diagnosis_of(plant, nothing, heat), machine)
     assert len(runs) == 3
     assert other["after"]["train_rmse_K"] != other["before"]["train_rmse_K"]
+
+
+def test_a_balance_that_asks_for_a_better_fixed_point_gets_it(plant, monkeypatch):
+    tried = []
+
+    def run_fit(machine, plant, fit, options):
+        tried.append(options.coupling_tolerance)
+        if options.coupling_tolerance > needed:
+            raise EnergyBalanceError("transient", "heat stored, in and out differ.", "Lower it.")
+        return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7, 1.0)
+
+    prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
+    monkeypatch.setattr(full_model, "run_fit", run_fit)
+    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
+    asked = options_for(plant).coupling_tolerance
+    both = diagnosis_of(plant, fit_of((), {}), fit_of((), {}))
+    needed = 0.3 * asked
+    found = full_model_errors(both, machine)
+    assert found["reason"] is None
+    assert found["coupling_tolerance_K"] == tried[-1] == pytest.approx(0.25 * asked)
+    needed = 0.1 * asked
+    assert full_model_errors(both, machine)["reason"].startswith("It could not be run: transient: heat")
+    assert len(tried) == 4
 
 
 def test_a_process_that_ends_before_its_time_is_said_and_done_without(plant, monkeypatch):
