@@ -74,7 +74,7 @@ def _identify(study: Study, effects: list[Concealed]) -> dict[str, object]:
     columns = [study.mimic_column(mimic, []) for mimic in mimics]
     table = []
     for mimic, column in zip(mimics, columns, strict=True):
-        left = study.fit_linear(change, column[:, None])
+        left = study.fit_mimic(change, mimic, column)
         table.append([mimic, column, *left])
     table.sort(key=lambda row: row[3])
     # Far from an explanation already in the linear fit, a mimic is not worth runs of the model.
@@ -121,7 +121,7 @@ def _pair_twins(study, effects, parts, change, mimics, columns) -> list[dict[str
         for mimic, column in zip(mimics, columns, strict=True):
             if mimic.effect in (effect.effect, kept.effect):
                 continue
-            left = study.fit_linear(change, np.column_stack([direction, column]))
+            left = study.fit_mimic(change, mimic, column, direction[:, None])
             rows.append((left[1], left[0], mimic))
         chi2, ratio, mimic = min(rows, key=lambda row: row[0])
         out.append(

@@ -24,6 +24,27 @@ EVERY = 6
 MOST_ROUNDS, CONVERGED, SHORTEST = 20, 0.2, 0.05
 
 
+# What can only add: heat, mass, films and friction that grow, a reading that lags or nears the air's.
+ONE_SIDED = frozenset(
+    {
+        "seal_friction",
+        "windage",
+        "drive_heat",
+        "unrecorded_heat_source",
+        "thermal_preload",
+        "viscosity_heat",
+        "grease_churning",
+        "heat_capacity",
+        "radiation",
+        "natural_convection",
+        "shaft_convection",
+        "coolant_bypass",
+        "sensor_lag",
+        "sensor_detached",
+    }
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Mimic:
     """A simple effect with one amplitude; zero is none."""
@@ -33,7 +54,11 @@ class Mimic:
     form: str
     make: Callable[[float], Law | Sensor]
     small: float
-    scale: float = 1.0
+
+    @property
+    def least(self) -> float:
+        """Amplitude that it has at least."""
+        return 0.0 if self.effect in ONE_SIDED else -np.inf
 
 
 def _bearing_mimics() -> list[Mimic]:
@@ -302,6 +327,19 @@ class Study:
         columns = np.column_stack([self.jacobian, extra]) if extra.size else self.jacobian
         return self.ratio(change - columns @ solution), chi2
 
+    def fit_mimic(
+        self,
+        change: NDArray[np.float64],
+        mimic: Mimic,
+        column: NDArray[np.float64],
+        beside: NDArray[np.float64] | None = None,
+    ) -> tuple[float, float]:
+        """The same of a mimic, whose amplitude may not be what it cannot be, beside other columns (n, k)."""
+        kept = np.empty((change.size, 0)) if beside is None else beside
+        extra = np.column_stack([kept, column])
+        solution, _ = self.solve(change, extra)
+        return self.fit_linear(change, extra if solution[-1] >= mimic.least else kept)
+
     def mimic_column(self, mimic: Mimic, beside: list[Law | Sensor]) -> NDArray[np.float64]:
         """Change by a small amplitude of a mimic, per unit of amplitude."""
         without = self.simulate(beside) if beside else self.plain[0]
@@ -321,6 +359,8 @@ class Study:
         reach = np.ones_like(position)
         anchor, step, anchor_change = position, np.zeros_like(position), np.zeros(0)
         for _ in range(MOST_ROUNDS):
+            if mimic is not None:
+                position[-1] = max(position[-1], mimic.least)
             built = dict(self.as_built)
             for name, x in zip(self.names, position, strict=False):
                 built = perturbed(built, name, float(np.clip(x, -8, 8)))
