@@ -46,13 +46,18 @@ DECIDED = 0.75
 NEAR, NEAR_MISFIT, NEAR_PROBABILITY = 0.22, 14.0, 0.01
 LISTED = 0.02
 SIGNIFICANT = 0.01
-# Below this nothing missing is ruled out, however much any one set pays for its complexity.
-RULED_OUT = 0.001
+# Below this nothing missing is ruled out, however much any one set pays for its complexity. Between both it
+# is no likelier than something is, whatever evidence says: the p-value is even on consistent recordings.
+RULED_OUT, STILL_POSSIBLE = 0.001, 0.5
 # A residual this much above the noise after the best set: something else is there.
 UNEXPLAINED_MISFIT = 1.6
 # Right sets leave what the noise does, to a few hundredths (concealed study); a best set that leaves more
 # may be one for something that is not in the catalogue, and loses so much of its probability.
 EXACT_MISFIT, OTHER_RANGE, LARGEST_OTHER = 1.04, 0.2, 0.5
+SEVERAL_REASON = "several sets explain the data"
+NOTHING_REASON = (
+    "few recordings without anything missing are like this one, and no set is much likelier than nothing"
+)
 NEAR_REASON = "several sets read the same within the noise; what tells them apart is how exact their laws are"
 # Shift of an uncertain parameter that its prior holds with at least 1 %.
 PRIOR_SIGMAS = float(norm.ppf(0.995))
@@ -272,7 +277,9 @@ def judge(
     ranked = rank(hypotheses)
     p_value = detection_p_value(hypotheses, trials)
     empty = next(item for item in ranked if not item.fit.candidates)
-    if p_value < RULED_OUT:
+    nothing = 0.0
+    if p_value <= SIGNIFICANT:
+        nothing = min(empty.probability, STILL_POSSIBLE) if p_value >= RULED_OUT else 0.0
         ranked = _without(ranked, empty)
     chosen = ranked[0]
     if p_value > SIGNIFICANT or not chosen.fit.candidates or within_prior(chosen.fit, calibrated):
@@ -299,20 +306,29 @@ def judge(
     share = share_of_last(hypotheses, chosen.best)
     size = len(chosen.fit.candidates)
     more = gain_of_more(hypotheses, chosen.best)
-    known = (1.0 - inexact) * reliable(evidence, size, share, more) / evidence
+    known = (1.0 - nothing) * (1.0 - inexact) * reliable(evidence, size, share, more) / evidence
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in ranked[1:]
         if (known * item.probability >= LISTED or item in near) and item.fit.candidates and item not in alike
     )
-    decided = evidence >= DECIDED and not near
+    decided = evidence * (1.0 - nothing) >= DECIDED and not near
+    undecided = NEAR_REASON if near else SEVERAL_REASON
+    if nothing > 1.0 - DECIDED:
+        undecided = NOTHING_REASON
     return Judgement(
         kind_of(chosen.fit.candidates) if decided else "ambiguous",
         p_value,
         Ranked(chosen.best, known * evidence),
         alternatives,
         1.0 - known,
-        "" if decided else NEAR_REASON if near else "several sets explain the data",
+        ""
+        if decided
+        else NOTHING_REASON
+        if nothing > 1.0 - DECIDED
+        else NEAR_REASON
+        if near
+        else SEVERAL_REASON,
         evidence,
         share,
         more,

@@ -21,9 +21,13 @@ from spindle_fem.diagnosis.verdict import (
     NEAR,
     NEAR_MISFIT,
     NEAR_REASON,
+    NOTHING_REASON,
     PRIOR_SIGMAS,
+    RULED_OUT,
     SEEN_FROM,
+    SIGNIFICANT,
     SMALLEST_SIZE,
+    STILL_POSSIBLE,
     TEMPERATURE,
     TEMPERATURE_OF_A_SIZE,
     any_magnitude,
@@ -248,6 +252,21 @@ def test_complexity_alone_does_not_make_an_impossible_recording_consistent():
     # What chance makes in so many trials is nothing.
     less = [none, hypothesis(dear, misfit=440.0, evidence=-220.0 - 30.0)]
     assert verdict(*less).verdict == "consistent"
+
+
+def test_what_few_consistent_recordings_show_is_ambiguous_where_evidence_prefers_nothing():
+    dear, none = candidate("grease_churning"), hypothesis(misfit=430.0, log_prior=-0.5)
+    found = [none, hypothesis(dear, misfit=400.0, evidence=-200.0 - 30.0)]
+    assert rank(found)[0].fit is none.fit
+    said = verdict(*found)
+    assert RULED_OUT < said.p_value < SIGNIFICANT
+    assert (said.verdict, said.reason) == ("ambiguous", NOTHING_REASON)
+    assert said.chosen.fit.candidates == (dear,)
+    assert said.chosen.probability <= STILL_POSSIBLE
+    assert said.chosen.probability + said.other == pytest.approx(1.0)
+    # Where evidence prefers something as well, it is said.
+    clear = [none, hypothesis(dear, misfit=400.0, evidence=-200.0, log_prior=-0.5)]
+    assert verdict(*clear).verdict == "missing_physics"
 
 
 def test_a_misfit_that_nothing_explains_is_unexplained():
