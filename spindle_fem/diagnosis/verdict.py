@@ -313,22 +313,19 @@ def judge(
         if (known * item.probability >= LISTED or item in near) and item.fit.candidates and item not in alike
     )
     decided = evidence * (1.0 - nothing) >= DECIDED and not near
-    undecided = NEAR_REASON if near else SEVERAL_REASON
-    if nothing > 1.0 - DECIDED:
-        undecided = NOTHING_REASON
+    if decided:
+        reason = ""
+    elif nothing > 1.0 - DECIDED:
+        reason = NOTHING_REASON
+    else:
+        reason = NEAR_REASON if near else SEVERAL_REASON
     return Judgement(
         kind_of(chosen.fit.candidates) if decided else "ambiguous",
         p_value,
         Ranked(chosen.best, known * evidence),
         alternatives,
         1.0 - known,
-        ""
-        if decided
-        else NOTHING_REASON
-        if nothing > 1.0 - DECIDED
-        else NEAR_REASON
-        if near
-        else SEVERAL_REASON,
+        reason,
         evidence,
         share,
         more,
