@@ -78,9 +78,14 @@ def _others(number: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(number, timeout=IDLE, env=ONE_THREAD)
 
 
-def _done_there(path: str, job: Callable[[Problem], Any]) -> Any:
-    """Do a job in another process."""
-    return job(_problem_at(path))
+def _done_there(path: str, job: bytes) -> Any:
+    """Do a job on a problem, both as they were sent, in another process."""
+    return pickle.loads(job)(_problem_at(path))
+
+
+def _done_ahead(job: bytes) -> Any:
+    """Do a job as it was sent, in another process."""
+    return pickle.loads(job)()
 
 
 class Workers:
@@ -125,21 +130,22 @@ class Workers:
             return [job(problem) for job in jobs]
         path, beside = self._send(problem), min(self._number, len(jobs)) - 1
         executor = _others(self._number - 1)
-        waiting = deque(enumerate(jobs))
+        # Sent as they are now, by this thread: what they hold is worked with, and remembers, while others wait.
+        waiting = deque((position, job, dumps(job)) for position, job in enumerate(jobs))
         found: list[Any] = [None] * len(jobs)
 
-        def work_off(do: Callable[[Callable[[Problem], Any]], Any]) -> None:
+        def work_off(do: Callable[[Callable[[Problem], Any], bytes], Any]) -> None:
             while waiting:
                 try:
-                    position, job = waiting.popleft()
+                    position, job, sent = waiting.popleft()
                 except IndexError:
                     # Another thread was quicker.
                     return
-                found[position] = do(job)
+                found[position] = do(job, sent)
 
-        def there(job: Callable[[Problem], Any]) -> Any:
+        def there(job: Callable[[Problem], Any], sent: bytes) -> Any:
             try:
-                return executor.submit(_done_there, path, job).result()
+                return executor.submit(_done_there, path, bytes(sent)).result()
             except BrokenProcessPool:
                 # One of them was killed: the next diagnosis gets new ones.
                 _others.cache_clear()
@@ -147,7 +153,7 @@ class Workers:
 
         with ThreadPoolExecutor(beside) as threads, threadpool_limits(1):
             others = [threads.submit(work_off, there) for _ in range(beside)]
-            work_off(lambda job: job(problem))
+            work_off(lambda job, sent: job(problem))
         for other in others:
             other.result()
         return found
@@ -164,7 +170,7 @@ class Workers:
         """
         if self._number == 1:
             return job
-        return _others(self._number - 1).submit(job).result
+        return _others(self._number - 1).submit(_done_ahead, bytes(dumps(job))).result
 
     def _send(self, problem: Problem) -> str:
         """File from which other processes take a problem, written once."""

@@ -405,7 +405,13 @@ def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine
     orders = [FitOrder((candidate,), {}, iterations=1) for candidate in offsets]
     sent, here = [], []
     plain_dumps, plain_fit = abreast.dumps, abreast.fit_order
-    monkeypatch.setattr(abreast, "dumps", lambda item: sent.append(item) or plain_dumps(item))
+
+    def dumps(item):
+        if isinstance(item, Problem):
+            sent.append(item)
+        return plain_dumps(item)
+
+    monkeypatch.setattr(abreast, "dumps", dumps)
     monkeypatch.setattr(
         abreast, "fit_order", lambda problem, order: here.append(problem) or plain_fit(problem, order)
     )
