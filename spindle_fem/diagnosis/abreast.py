@@ -130,7 +130,7 @@ class Workers:
             return [job(problem) for job in jobs]
         path, beside = self._send(problem), min(self._number, len(jobs)) - 1
         executor = _others(self._number - 1)
-        # Sent as they are now, by this thread: what they hold is worked with, and remembers, while others wait.
+        # Sent as they are now, by this thread: what they hold goes on changing while others wait.
         waiting = deque((position, job, dumps(job)) for position, job in enumerate(jobs))
         found: list[Any] = [None] * len(jobs)
 
