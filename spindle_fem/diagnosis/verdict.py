@@ -220,7 +220,7 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
             lowest = min(lowest, float(chi2.logsf(gain, freedom)))
     if lowest == 0.0:
         return 1.0
-    single = np.exp(lowest / CHANCE_TEMPERATURE)
+    single = min(float(np.exp(lowest / CHANCE_TEMPERATURE)), 1.0 - 1e-16)
     return float(-np.expm1((1.0 + trials / CANDIDATES_A_TRIAL) * np.log1p(-single)))
 
 
