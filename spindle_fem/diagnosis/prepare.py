@@ -15,9 +15,9 @@ from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
 
-# Where a probe feels the temperature, m: holes are drilled and filled to a third of a millimetre. How far from
-# the bearings a temperature is found differs by more between the discretised and the real machine, but alike
-# for all probes of one part.
+# Where a probe feels the temperature, m: holes are drilled and filled to a third of a millimetre. How far
+# from the bearings a temperature is found differs by more between the discretised and the real machine, but
+# alike for all probes of one part.
 PROBE_PLACE_SIGMA, COMMON_RADIAL_SIGMA = 0.3e-3, 0.8e-3
 RADIAL = f".{DIRECTIONS[0]}"
 RADIAL_SIGMA = float(np.hypot(PROBE_PLACE_SIGMA, COMMON_RADIAL_SIGMA))
