@@ -101,6 +101,7 @@ def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | 
         "law": followed(answer, found),
         "coverage": coverage(answer, found),
         "after_over_noise": after / noise if noise and after is not None else None,
+        "changes_unseen": changes_unseen(answer, diagnosis),
         "before_over_noise": fit["before"]["heldout_rmse_K"] / noise
         if noise and fit["before"]["heldout_rmse_K"]
         else None,
@@ -122,6 +123,18 @@ def undecidable(answer: dict[str, Any]) -> bool:
         if sorted(left) not in right:
             return True
     return False
+
+
+def changes_unseen(answer: dict[str, Any], diagnosis: dict[str, Any]) -> bool:
+    """Whether a sensor came off amid a held-out stretch: when it did, no reading that was fitted tells.
+
+    Heat that comes and goes shows in the readings after the stretch; a lie leaves nothing behind.
+    """
+    moments = [
+        effect["truth_form"].get("onset", 0.0) for effect in answer["effects"] if effect["kind"] == "sensor"
+    ]
+    hidden = diagnosis["fit"].get("heldout_s") or [[]]
+    return any(start < moment < end for moment in moments for start, end in hidden[0])
 
 
 def noise_of(answer: dict[str, Any]) -> float:
@@ -245,8 +258,9 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
     after = [
         r["after_over_noise"]
         for r in rows
-        if r["truth"] and r["exact"] and r["detectable"] and r["after_over_noise"]
+        if r["truth"] and r["exact"] and r["detectable"] and r["after_over_noise"] and not r["changes_unseen"]
     ]
+    after_unseen = [r["after_over_noise"] for r in visible if r["changes_unseen"] and r["after_over_noise"]]
     after_all = [r["after_over_noise"] for r in visible if r["after_over_noise"]]
     walls = [r["wall_s"] for r in rows if r["wall_s"]]
     confusion = {true: dict.fromkeys(VERDICTS, 0) for true in VERDICTS[:4]}
@@ -284,6 +298,7 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
             }
         },
         "heldout_after_over_noise": _quantiles(after),
+        "heldout_after_over_noise_sensor_changes_unseen": _quantiles(after_unseen),
         "heldout_after_over_noise_every_visible": _quantiles(after_all),
         "wall_s": _quantiles(walls),
         "confusion": confusion,

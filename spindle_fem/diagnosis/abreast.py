@@ -88,6 +88,10 @@ def _done_ahead(job: bytes) -> Any:
     return pickle.loads(job)()
 
 
+def _ready() -> None:
+    """Nothing; but whoever does it has read the modules that fits need."""
+
+
 class Workers:
     """Who fit: this process alone, or several with it.
 
@@ -101,6 +105,11 @@ class Workers:
         self._number = number
         self._folder: TemporaryDirectory[str] | None = None
         self._sent: tuple[Problem, str] | None = None
+
+    def wake(self) -> None:
+        """Start the other processes, which takes them seconds, while this one has other things to do."""
+        for _ in range(self._number - 1):
+            _others(self._number - 1).submit(_ready)
 
     def fits(self, problem: Problem, orders: Sequence[FitOrder]) -> list[Fit | None]:
         """Fits in the order asked for, with the candidates that were given.

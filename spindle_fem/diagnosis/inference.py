@@ -34,7 +34,8 @@ LARGEST_MOVE = 2.0
 THETA_BOUND = 4.0
 # A step that differs from the one that was refused by less than this share is not tried.
 SAME_MOVE = 0.05
-# A fit is given up after so many steps when so many more like the last would not do.
+# A fit is given up after so many steps when so many more like the last would not do, and before when so many
+# times what straight lines promise would not.
 HOPELESS_AFTER, REACH = 3, 6.0
 
 
@@ -299,6 +300,11 @@ class Problem:
             weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
             hessian = jacobian.T @ (weight[:, None] * jacobian) + root.T @ root
             gradient = jacobian.T @ (weight * residual) - root.T @ (root @ (position - mean))
+            if iteration and np.isfinite(hopeless):
+                whole = _bounded_step(hessian, gradient, 0.0, position, low, high)
+                promised = float(2.0 * gradient @ whole - whole @ hessian @ whole)
+                if promised > 0.0 and cost - REACH * promised > hopeless:
+                    break
             improved, gain, refused = False, 0.0, None
             while damping < 1e8:
                 move = _bounded_step(hessian, gradient, damping, position, low, high)

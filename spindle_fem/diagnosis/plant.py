@@ -50,7 +50,9 @@ GAP_PREFIX = "within_gap."
 OF_ONE_RECORDING = (START_PREFIX, JUMP_PREFIX, GAP_PREFIX)
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 DIRECTIONS = ("r", "z")
-BASIS_TOLERANCE = 3.0e-4
+BASIS_TOLERANCE = 1.0e-3
+# While searching: a third of a per cent of a film is some millikelvins, and final fits go without.
+SAME_WITHIN = 3.0e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +147,8 @@ class Plant:
         What the definition itself switches on.
     step : float, [s]
         Longest step of the model; a network takes that of its recording.
+    same_within : float
+        Operating points whose coefficients differ by less than this share have the same operators.
     """
 
     def __init__(
@@ -156,8 +160,10 @@ class Plant:
         *,
         step: float = STEP,
         drives: Sequence[Drive] | None = None,
+        same_within: float = 0.0,
     ) -> None:
         self.fast = fast
+        self.same_within = same_within
         self.recordings = tuple(recordings)
         self.use = tuple(use)
         self.effects = effects
@@ -195,9 +201,17 @@ class Plant:
                 found.append(Observation(number, bins.channel, bins, values, right, part))
         return tuple(found)
 
-    def with_model(self, fast: FastModel) -> Plant:
+    def with_model(self, fast: FastModel, same_within: float = 0.0) -> Plant:
         """The same recordings on another reduction of the same machine."""
-        return Plant(fast, self.recordings, self.use, self.effects, step=self.step, drives=self.drives)
+        return Plant(
+            fast,
+            self.recordings,
+            self.use,
+            self.effects,
+            step=self.step,
+            drives=self.drives,
+            same_within=same_within,
+        )
 
     def uncertain(self) -> list[tuple[str, float, float]]:
         """The machine's uncertain parameters: name, 1 σ of the logarithm, highest factor."""
@@ -320,7 +334,15 @@ class Plant:
             if candidate.reading is not None:
                 readings |= {f"{candidate.reading.name}.{item.name}" for item in candidate.reading.parameters}
         factors = self._factors(number, values, known, readings)
-        return TransientRun(self.fast, drive, factors | known, tuple(derivatives), tuple(terms), like=like)
+        return TransientRun(
+            self.fast,
+            drive,
+            factors | known,
+            tuple(derivatives),
+            tuple(terms),
+            like=like,
+            same_within=self.same_within,
+        )
 
     def predict(
         self,
@@ -562,7 +584,7 @@ class Plant:
         vectors, values, _ = np.linalg.svd(rest, full_matrices=False)
         kept = int(np.sum(values > BASIS_TOLERANCE * values[0]))
         basis = np.column_stack((uniform, vectors[:, :kept]))
-        return self.with_model(self.fast.projected(basis))
+        return self.with_model(self.fast.projected(basis), SAME_WITHIN)
 
     def _place_snapshots(self, run: TransientRun, places: Sequence[str]) -> Array:
         loads = np.array([self.fast.model.place(name) for name in places]).T

@@ -25,6 +25,7 @@ from spindle_fem.diagnosis.findings import (
 )
 from spindle_fem.diagnosis.full_model import AUTO, OFF, full_model_errors, nothing_run, require_choice
 from spindle_fem.diagnosis.improved import improved_machine
+from spindle_fem.diagnosis.locate import stretches
 from spindle_fem.diagnosis.machines import DiagnosedMachine, open_machine
 from spindle_fem.diagnosis.next_measurement import next_measurement
 from spindle_fem.diagnosis.sufficiency import says_too_little
@@ -90,6 +91,8 @@ def diagnose(
     started = time.perf_counter()
     require_choice(full_model)
     tell = progress or (lambda stage: None)
+    workers = Workers(min(thread_count(), MOST_WORKERS))
+    workers.wake()
     tell("reading")
     read = [read_recording(path) for path in recordings]
     earlier = [read_recording(path) for path in calibrate]
@@ -103,7 +106,6 @@ def diagnose(
                 OFF if full_model == AUTO else full_model, "Nothing was fitted."
             )
         else:
-            workers = Workers(min(thread_count(), MOST_WORKERS))
             diagnosis = diagnose_recordings(opened, heldout=heldout, progress=tell, workers=workers)
             tell("writing")
             proposed = workers.ahead(partial(next_measurement, diagnosis))
@@ -176,6 +178,10 @@ def _write(
             "after": _errors(diagnosis, after),
             "noise_K": noise_level(plant),
             "heldout": diagnosis.heldout,
+            "heldout_s": [
+                [list(ends) for ends in stretches(~use, recording.times)]
+                for recording, use in zip(plant.recordings, plant.use, strict=True)
+            ],
             "channels_after": channel_errors(plant, after),
         },
         "improved_model": "improved_machine.toml",

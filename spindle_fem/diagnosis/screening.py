@@ -87,11 +87,11 @@ class BaseRun:
     # ------------------------------------------------------------------ answers
     def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
         """Channels' answer (G + 1, c, m) to changes of states (G + 1, r, m) and coolant inlet."""
-        owner = np.append(self.drive.step_class, self.drive.step_class[-1])
+        owner = np.append(self.run.step_class, self.run.step_class[-1])
         column = self.plant.fast.inlet_column if inlet is not None else None
         found = np.zeros((tangent.shape[0], len(self.columns), tangent.shape[2]))
-        for number, operators in enumerate(self.run.operators):
-            rows = np.flatnonzero(owner == number)
+        for number in np.unique(owner):
+            operators, rows = self.run.operators[number], np.flatnonzero(owner == number)
             found[rows] = np.einsum(
                 "or,nrm->nom", operators.outputs[self.columns], tangent[rows], optimize=True
             )

@@ -78,9 +78,12 @@ def _sine_power(times: Array, values: Array, angular: Array) -> Array:
     for start in range(0, angular.size, 256):
         part = angular[start : start + 256]
         angle = part[:, None] * times
-        delay = 0.5 * np.arctan2(np.sin(2.0 * angle).sum(axis=1), np.cos(2.0 * angle).sum(axis=1))
-        cosine, sine = np.cos(angle - delay[:, None]), np.sin(angle - delay[:, None])
-        found[start : start + 256] = (cosine @ values) ** 2 / np.maximum((cosine**2).sum(axis=1), 1e-12) + (
-            sine @ values
-        ) ** 2 / np.maximum((sine**2).sum(axis=1), 1e-12)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        by_cosine, by_sine = cosine @ values, sine @ values
+        cosines, both = np.einsum("ij,ij->i", cosine, cosine), np.einsum("ij,ij->i", cosine, sine)
+        sines = times.size - cosines
+        determinant = np.maximum(cosines * sines - both**2, 1e-12)
+        found[start : start + 256] = (
+            sines * by_cosine**2 - 2.0 * both * by_cosine * by_sine + cosines * by_sine**2
+        ) / determinant
     return found

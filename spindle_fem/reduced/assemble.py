@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.term import FLOW, Term
+from spindle_fem.effects.term import FLOW, Term, TermParameter
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.reduced.fast_model import ClassOperators, FastModel
@@ -30,6 +30,8 @@ class RunOperators:
     machine_derivatives : tuple of str
         Asked parameters that are the machine's.
     classes : tuple of ClassOperators
+    owner : (n_classes,) int64 ndarray
+        Class whose operators each class has: its own, or that of one that hardly differs.
     coefficients : tuple of mapping of str to float
         Of each class.
     touched : mapping of coefficient to tuple of int
@@ -41,6 +43,7 @@ class RunOperators:
     factors: Mapping[str, float]
     machine_derivatives: tuple[str, ...]
     classes: tuple[ClassOperators, ...]
+    owner: NDArray[np.int64]
     coefficients: tuple[Mapping[str, float], ...]
     touched: Mapping[str, tuple[int, ...]]
     storage: Array
@@ -53,6 +56,8 @@ def run_operators(
     parameters: Mapping[str, float],
     derivatives: Sequence[str],
     terms: Sequence[Term],
+    *,
+    same_within: float = 0.0,
 ) -> RunOperators:
     """Operators of the classes of a drive.
 
@@ -65,6 +70,9 @@ def run_operators(
         Factors of the machine's parameters and values of the terms'.
     derivatives : sequence of str
     terms : sequence of Term
+    same_within : float
+        Classes none of whose coefficients, flows and what terms do to them differ by more than this share
+        have the operators of one of them.
 
     Raises
     ------
@@ -82,36 +90,39 @@ def run_operators(
     parts = [changes.parts(point, parameters) for point in points]
     scaled = [changes.together(own) for own in parts]
     added = changes.conductances(parameters)
-    classes = [
-        fast.operators(point, factors, asked, changes=own, conductances=added)
-        for point, own in zip(points, scaled, strict=True)
-    ]
     storage = fast.storage(factors, changes.capacities(parameters))
     storage_by = fast.storage_by(factors, asked)
-    for name in derivatives:
-        if name in owned and changes.is_steady(owned[name][0]):
-            value = parameters.get(name, owned[name][1].value)
-            step = DIFFERENCE * (abs(value) if owned[name][1].logarithmic or value != 0.0 else 1.0)
-            # To the logarithm: d/d ln x = x d/dx.
-            scale = (value if owned[name][1].logarithmic else 1.0) / (2.0 * step)
-            upper, lower = ({**parameters, name: value + sign * step} for sign in (1.0, -1.0))
-            capacities = [changes.capacities(end) for end in (upper, lower)]
-            if capacities[0] != capacities[1]:
-                storage_by[name] = scale * (
-                    fast.storage(factors, capacities[0]) - fast.storage(factors, capacities[1])
-                )
-            conductances = (changes.conductances(upper), changes.conductances(lower))
-            for number, point in enumerate(points):
-                ends = tuple(
-                    changes.together(changes.with_part(parts[number], owned[name][0], point, values))
-                    for values in (upper, lower)
-                )
-                if ends[0] != ends[1] or conductances[0] != conductances[1]:
-                    change = fast.change(point, factors, ends, conductances)
-                    classes[number] = _with_change(classes[number], name, change, scale)
     coefficients = tuple(
         fast.coefficients(point, factors, own) for point, own in zip(points, scaled, strict=True)
     )
+    steady = [
+        _SteadyChange.of(changes, parts, points, parameters, name, *owned[name])
+        for name in derivatives
+        if name in owned and changes.is_steady(owned[name][0])
+    ]
+    owner = np.arange(len(points))
+    if same_within > 0.0:
+        flows = np.array([p.coolant_flow * own.get(FLOW, 1.0) for p, own in zip(points, scaled, strict=True)])
+        values = np.array([list(found.values()) for found in coefficients])
+        slopes = np.hstack([np.zeros((len(points), 0)), *(change.slopes() for change in steady)])
+        owner = _owners(np.column_stack((values, flows)), slopes, same_within)
+    classes = {
+        int(number): fast.operators(
+            points[number], factors, asked, changes=scaled[number], conductances=added
+        )
+        for number in np.unique(owner)
+    }
+    for change in steady:
+        upper, lower = change.capacities
+        if upper != lower:
+            storage_by[change.name] = change.scale * (
+                fast.storage(factors, upper) - fast.storage(factors, lower)
+            )
+        for number in classes:
+            ends = change.ends[number]
+            if ends[0] != ends[1] or change.conductances[0] != change.conductances[1]:
+                found = fast.change(points[number], factors, ends, change.conductances)
+                classes[number] = _with_change(classes[number], change.name, found, change.scale)
     targets = {i: set(fast.table.targets(n)) for i, n in enumerate(derivatives) if n not in owned}
     touched = {
         coefficient: tuple(
@@ -119,7 +130,98 @@ def run_operators(
         )
         for coefficient in fast.model.coefficient_names
     }
-    return RunOperators(factors, asked, tuple(classes), coefficients, touched, storage, storage_by)
+    return RunOperators(
+        factors,
+        asked,
+        tuple(classes[number] for number in owner.tolist()),
+        owner,
+        coefficients,
+        touched,
+        storage,
+        storage_by,
+    )
+
+
+def _owners(values: Array, slopes: Array, within: float) -> NDArray[np.int64]:
+    """Class that each class is taken for.
+
+    Parameters
+    ----------
+    values : (n_classes, n) ndarray
+        Compared by their ratios.
+    slopes : (n_classes, m) ndarray
+        Compared by their differences.
+    within : float
+
+    >>> _owners(np.array([[1.0], [1.001], [2.0], [0.999]]), np.zeros((4, 0)), 0.01).tolist()
+    [0, 0, 2, 0]
+    """
+    owner = np.full(len(values), -1)
+    for number in range(len(values)):
+        if owner[number] >= 0:
+            continue
+        near = np.all(np.abs(values - values[number]) <= within * np.abs(values[number]), axis=1)
+        near &= np.all(np.abs(slopes - slopes[number]) <= within, axis=1)
+        alike = np.flatnonzero(near & (owner < 0))
+        # The one amid them is nearest to all.
+        place = np.argsort(values[alike].sum(axis=1), kind="stable")[len(alike) // 2]
+        owner[alike] = alike[place]
+    return owner
+
+
+@dataclass(frozen=True, slots=True)
+class _SteadyChange:
+    """What a term's steady changes are a little above and below the value of one of its parameters.
+
+    Attributes
+    ----------
+    name : str
+    scale : float
+        From the difference of both to the derivative.
+    ends : list of pair of mapping of str to float
+        Factors on coefficients, of each class.
+    capacities, conductances : pair of mapping of str to float
+    """
+
+    name: str
+    scale: float
+    ends: list[tuple[dict[str, float], dict[str, float]]]
+    capacities: tuple[dict[str, float], dict[str, float]]
+    conductances: tuple[dict[str, float], dict[str, float]]
+
+    @classmethod
+    def of(
+        cls,
+        changes: _Changes,
+        parts: Sequence[Sequence[dict[str, float]]],
+        points: Sequence[OperatingPoint],
+        parameters: Mapping[str, float],
+        name: str,
+        term: Term,
+        item: TermParameter,
+    ) -> _SteadyChange:
+        value = parameters.get(name, item.value)
+        step = DIFFERENCE * (abs(value) if item.logarithmic or value != 0.0 else 1.0)
+        above, below = ({**parameters, name: value + sign * step} for sign in (1.0, -1.0))
+        return cls(
+            name,
+            # To the logarithm: d/d ln x = x d/dx.
+            (value if item.logarithmic else 1.0) / (2.0 * step),
+            [
+                tuple(changes.together(changes.with_part(own, term, point, end)) for end in (above, below))
+                for own, point in zip(parts, points, strict=True)
+            ],
+            (changes.capacities(above), changes.capacities(below)),
+            (changes.conductances(above), changes.conductances(below)),
+        )
+
+    def slopes(self) -> Array:
+        """Derivatives of all factors in each class, (n_classes, n)."""
+        names = sorted({name for ends in self.ends for end in ends for name in end})
+        upper, lower = (
+            np.array([[ends[side].get(name, 1.0) for name in names] for ends in self.ends]) for side in (0, 1)
+        )
+        return self.scale * (upper - lower)
 
 
 def _with_change(

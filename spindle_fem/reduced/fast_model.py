@@ -91,6 +91,9 @@ class FastModel:
         )
         self._point_rows = [row for row, probe in enumerate(spec.probe) if probe.kind == "point"]
         self._base: dict[tuple[float, float], Array] = {}
+        # Positions of coefficients that are the same at all operating points so far, and of the others.
+        self._alike: tuple[int, ...] = tuple(range(len(model.coefficient_names)))
+        self._moving: list[int] = []
         self._films: dict[tuple[float, float, bytes], tuple[Array, float, float]] = {}
         self._maps = UniformFilmMaps(model)
         self._sums: dict[tuple[tuple[int, ...], bytes], Array] = {}
@@ -197,6 +200,10 @@ class FastModel:
         if key not in self._base:
             base = self.table.base(point)
             self._base[key] = np.array([base[name] for name in self.model.coefficient_names])
+            moves = self._base[key] != next(iter(self._base.values()))
+            moves[self._moving] = True
+            self._moving = np.flatnonzero(moves).tolist()
+            self._alike = tuple(np.flatnonzero(~moves).tolist())
         values = self._base[key] * self._scales_of(factors)
         for name, change in changes.items():
             if name in self._positions:
@@ -228,7 +235,8 @@ class FastModel:
         """
         model = self.model
         values = self._values(point, factors, changes)
-        conduction = np.tensordot(values, model.operators, axes=1)
+        conduction = np.tensordot(values[self._moving], model.operators[self._moving], axes=1)
+        conduction += self._sum(self._alike, values)
         loads = np.zeros((model.size, len(self.load_names)))
         loads[:, : len(self.heat_places)] = self._heat_loads
         for name in model.fluid_names:

@@ -128,6 +128,8 @@ class TransientRun:
         Whether terms that follow no temperature join the load inputs.
     like : TransientRun, optional
         A run on the same drive; what it has in common with this one is taken from it.
+    same_within : float
+        As :func:`run_operators` takes it.
     """
 
     def __init__(
@@ -140,11 +142,15 @@ class TransientRun:
         *,
         open_loop: bool = True,
         like: TransientRun | None = None,
+        same_within: float = 0.0,
     ) -> None:
         self.fast, self.drive, self.derivatives = fast, drive, derivatives
-        self.built: RunOperators = run_operators(fast, drive.points, parameters, derivatives, terms)
+        self.built: RunOperators = run_operators(
+            fast, drive.points, parameters, derivatives, terms, same_within=same_within
+        )
         self.operators = self.built.classes
-        self.groups = group_steps(drive.step_class, _stepped(drive))
+        self.step_class = self.built.owner[drive.step_class]
+        self.groups = group_steps(self.step_class, _stepped(drive))
         self.propagators: dict[tuple[int, float], Propagator | ExactPropagator] = {
             key: self._propagator(key, like) for key in self.groups
         }
@@ -363,15 +369,15 @@ class TransientRun:
         at_grid = np.empty((len(states), n_out))
         by_grid = np.zeros((len(states), n_out, n_par))
         last = len(drive.steps) - 1
-        owner = np.append(drive.step_class, drive.step_class[last])
+        owner = np.append(self.step_class, self.step_class[last])
         inputs = np.vstack((self.start, self.end[last:]))
         added = np.zeros((len(states), 0)) if tracks is None else tracks.added()
         shift_by = self._shift_inlet(inputs, tracks)
         inlet = fast.inlet_column
         n_own = len(fast.load_names)
         inputs = inputs[:, :n_own]
-        for number, operators in enumerate(self.operators):
-            rows = np.flatnonzero(owner == number)
+        for number in np.unique(owner):
+            operators, rows = self.operators[number], np.flatnonzero(owner == number)
             at_grid[rows] = states[rows] @ operators.outputs.T + inputs[rows] @ operators.output_inputs.T
             if sensitivities is None:
                 continue

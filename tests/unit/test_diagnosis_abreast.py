@@ -3,6 +3,7 @@
 import threading
 from functools import partial
 
+from spindle_fem.diagnosis import abreast
 from spindle_fem.diagnosis.abreast import Workers
 
 
@@ -44,3 +45,14 @@ def test_alone_nothing_is_sent():
     assert Workers(1).ahead(partial(len, {"a": 1}))() == 1
     assert len(Workers(1).done(None, [partial(taken, told=Told(senders))])) == 1
     assert senders == []
+
+
+def test_other_processes_are_woken_where_there_are_any(monkeypatch):
+    started = []
+    monkeypatch.setattr(
+        abreast, "_others", lambda number: started.append(number) or abreast.ThreadPoolExecutor(1)
+    )
+    Workers(1).wake()
+    assert started == []
+    Workers(2).wake()
+    assert started == [1]

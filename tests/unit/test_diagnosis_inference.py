@@ -290,6 +290,29 @@ def test_steps_that_are_refused_cost_no_derivatives_and_are_not_tried_again(blan
         assert np.abs(first - second).max() > 0.04 * np.abs(first).max()
 
 
+def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeypatch):
+    plant = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(plant, calibrate(None, plant).belief, QUIET, plant.observations)
+    asked = []
+    plain = Problem.predict
+
+    def predict(self, candidates, coordinates, position, *, slopes=True, near=None):
+        asked.append(slopes)
+        return plain(self, candidates, coordinates, position, slopes=slopes, near=near)
+
+    monkeypatch.setattr(Problem, "predict", predict)
+    start = {name: 1.0 / value for name, value in TRUTH.items()}
+    whole = problem.fit((), start)
+    steps = asked.count(True)
+    asked.clear()
+    within_reach = problem.fit((), start, hopeless=1.01 * whole.misfit_with_prior)
+    assert within_reach.misfit_with_prior == whole.misfit_with_prior
+    assert asked.count(True) == steps
+    asked.clear()
+    problem.fit((), start, hopeless=-1e9)
+    assert asked.count(True) == 2 < steps
+
+
 def test_a_prediction_without_derivatives_is_the_same(blank):
     plant = blank
     belief = calibrate(None, plant).belief

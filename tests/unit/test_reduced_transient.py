@@ -531,6 +531,36 @@ def test_a_run_takes_from_another_what_both_have_in_common(fast, steps):
             assert not np.array_equal(other.propagators[key].advance, run.propagators[key].advance)
 
 
+def test_operating_points_that_hardly_differ_have_the_same_operators(fast, steps):
+    class Transition(Term):
+        """A film that changes where the oil warms."""
+
+        name = "transition"
+        parameters = (TermParameter("excess", 0.0, 0.3, logarithmic=False),)
+
+        def operating_factor(self, point, parameters):
+            share = 1.0 / (1.0 + np.exp(-(point.coolant_inlet_temperature - 289.0) / 0.1))
+            return {"channel.film": 1.0 + parameters["excess"] * share}
+
+    times = np.arange(0.0, 7200.0, 20.0)
+    drive = drive_of(times, np.where(times < 3000, 3000.0, 1500.0), inlet=289.0 + 4.0 * np.sin(times / 900.0))
+    names = ("film.outside", "coolant.film_factor")
+    exact = TransientRun(fast, drive, {}, names, ())
+    merged = TransientRun(fast, drive, {}, names, (), same_within=5e-3)
+    assert len(set(exact.step_class.tolist())) == len(drive.points) > 6
+    speeds = np.round([point.speed for point in drive.points], 6)
+    assert len(set(merged.step_class.tolist())) == len(set(speeds.tolist())) == 2
+    assert np.array_equal(speeds[merged.built.owner], speeds)
+    a, b = exact.solve(293.15), merged.solve(293.15)
+    assert 0.0 < np.abs(a.temperature - b.temperature).max() < 5e-3 * np.ptp(a.temperature)
+    assert np.abs(a.sensitivity - b.sensitivity).max() < 2e-2 * np.abs(a.sensitivity).max()
+    # What a term would do counts even where its amplitude is nothing.
+    asked = TransientRun(fast, drive, {}, ("transition.excess",), (Transition(),), same_within=5e-3)
+    assert len(set(asked.step_class.tolist())) > 4
+    unasked = TransientRun(fast, drive, {}, (), (Transition(),), same_within=5e-3)
+    assert len(set(unasked.step_class.tolist())) == 2
+
+
 def test_a_constant_factor_as_a_term_is_a_factor_of_the_machine(fast, steps):
     class Constant(Term):
         name = "constant"

@@ -20,6 +20,8 @@ def answer(number, effects, *, ratio=None):
             "effect": effect,
             "component": place,
             "acceptable_components": [place],
+            "kind": "parameter",
+            "truth_form": {},
             "parameters": {"factor": {"value": 1.3, "unit": ""}},
             "outside_catalogue": False,
         }

@@ -10,7 +10,7 @@ from validation.generate import choose_effects, judge, make_case
 from validation.laws import Intervals, Sensor, Starvation, first_order
 from validation.recorder import Noise, record, slow_error
 from validation.reduction import load_reduced
-from validation.score import matches, score_case, summarise, undecidable
+from validation.score import changes_unseen, matches, score_case, summarise, undecidable
 from validation.stepping import Moment
 
 
@@ -107,6 +107,8 @@ def _answer(effects, **known):
         {
             "effect": e,
             "component": c,
+            "kind": "sensor" if e.startswith("sensor_") else "physics",
+            "truth_form": {},
             "acceptable_components": [c],
             "outside_catalogue": False,
             "parameters": {"factor": {"value": 1.2, "unit": ""}},
@@ -172,6 +174,27 @@ def test_score_of_a_right_and_a_wrong_case():
     assert summary["confident_wrong"]["share"] == 0.5
     assert summary["confusion"]["parameter"]["missing_physics"] == 1
     assert [row["case"] for row in summary["wrong"]] == ["case_0001"]
+
+
+def test_a_sensor_that_comes_off_amid_a_held_out_stretch_does_so_unseen():
+    answer, diagnosis = (
+        _answer([("sensor_detached", "SP01")]),
+        _diagnosis("sensor", [("sensor_detached", "SP01")]),
+    )
+    diagnosis["fit"]["heldout_s"] = [[[100.0, 200.0], [500.0, 600.0]]]
+    found = []
+    for onset in (0.0, 150.0, 300.0, 599.0, 600.0):
+        answer["effects"][0]["truth_form"] = {"onset": onset}
+        found.append(changes_unseen(answer, diagnosis))
+    assert found == [False, True, False, True, False]
+    answer["effects"][0]["truth_form"]["onset"] = 150.0
+    rows = [score_case(answer, diagnosis, None)]
+    summary = summarise(rows, [])
+    assert summary["heldout_after_over_noise"] == {"of": 0}
+    assert summary["heldout_after_over_noise_sensor_changes_unseen"]["of"] == 1
+    # The speed at which starvation begins is no time.
+    answer["effects"][0]["kind"] = "physics"
+    assert not changes_unseen(answer, diagnosis)
 
 
 def test_score_counts_false_alarms():
