@@ -7,12 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words, quantity
-from spindle_fem.effects.laws import Complex, amplitude, linear, relaxed, rows, shape, smooth_step
+from spindle_fem.effects.laws import Complex, amplitude, linear, relaxed, repeated, shape, smooth_step
 from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 
 OVER_HOUSING, OVER_START = "ring over housing", "ring over start"
-EACH_OVER_HOUSING = "each ring over housing"
 
 
 class GapClosureTerm(Term):
@@ -27,26 +26,16 @@ class GapClosureTerm(Term):
         Places that expand.
     around : tuple of str
         Places that they expand into; none counts from the rings' own temperature at the start.
-    closed_by : tuple of tuple of int, optional
-        Positions of the rings whose mean closes each seat; all of them when absent.
     """
 
     def __init__(
-        self,
-        name: str,
-        seats: tuple[str, ...],
-        rings: tuple[str, ...],
-        around: tuple[str, ...],
-        closed_by: tuple[tuple[int, ...], ...] | None = None,
+        self, name: str, seats: tuple[str, ...], rings: tuple[str, ...], around: tuple[str, ...]
     ) -> None:
         self.name, self.coefficients = name, seats
         self.reads = (*rings, *around)
         self._rings = len(rings)
-        owners = closed_by or (tuple(range(len(rings))),) * len(seats)
-        self._means = tuple(dict.fromkeys(owners))
-        self._mean_of_seat = tuple(self._means.index(own) for own in owners)
-        # The lagged excesses; the temperatures that they count from, 0 until the first step knows them.
-        self.n_states = len(self._means) * (1 if around else 2)
+        # The lagged excess; the temperature that it counts from, 0 until the first step knows it.
+        self.n_states = 1 if around else 2
         self.parameters = (
             amplitude("opening", 1.0, high=0.995),
             linear("closing_difference", 8.0, 5.0, "K", low=-5.0, high=60.0),
@@ -57,27 +46,19 @@ class GapClosureTerm(Term):
     def factor(self, context: TermContext) -> Complex:
         """Of every seat, (n, k)."""
         own = context.parameters
-        excess = context.state[: len(self._means)]
-        factors = [
-            rows(
-                context,
-                1.0 - own["opening"] * (1.0 - smooth_step((x - own["closing_difference"]) / own["width"])),
-            )
-            for x in excess
-        ]
-        return np.concatenate([factors[mean] for mean in self._mean_of_seat])
+        closed = smooth_step((context.state[0] - own["closing_difference"]) / own["width"])
+        return repeated(context, 1.0 - own["opening"] * (1.0 - closed), len(self.coefficients))
 
     def advance(self, context: TermContext, step: float) -> Complex:
-        """Lagged excesses, and what they count from where that is the start, (n or 2 n, k) K."""
-        number = len(self._means)
-        rings = np.array([context.temperatures[list(mean)].mean(axis=0) for mean in self._means])
-        if self.n_states == number:
+        """Lagged excess, and what it counts from where that is the start, (1 or 2, k) K."""
+        ring = context.temperatures[: self._rings].mean(axis=0)
+        if self.n_states == 1:
             base = context.temperatures[self._rings :].mean(axis=0)
         else:
-            known = context.state[number:]
-            base = np.where(known.real == 0.0, rings, known)
-        lagged = relaxed(context.state[:number], rings - base, step, context.parameters["lag"])
-        return lagged if self.n_states == number else np.concatenate((lagged, base))
+            known = context.state[1]
+            base = np.where(known.real == 0.0, ring, known)
+        lagged = relaxed(context.state[0], ring - base, step, context.parameters["lag"])
+        return np.array([lagged] if self.n_states == 1 else [lagged, base])
 
 
 class GapClosure(Effect):
@@ -97,16 +78,11 @@ class GapClosure(Effect):
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """Outer seats of a set, together or one by one, over the housing or the start; links of a network."""
+        """Outer seats of a set, against the housing or the start; node to node in a network."""
         found = []
         for key, rings, around, seats in self._seats(machine):
-            together = (tuple(range(len(rings))),) * len(seats)
-            forms = {OVER_HOUSING: (around, together), OVER_START: ((), together)}
-            one_by_one = self._one_by_one(machine, key, seats)
-            if one_by_one:
-                forms[EACH_OVER_HOUSING] = (around, one_by_one)
-            for form, (reads, closed_by) in forms.items():
-                term = GapClosureTerm(self.term_name(key, form), seats, rings, reads, closed_by)
+            for form, reads in ((OVER_HOUSING, around), (OVER_START, ())):
+                term = GapClosureTerm(self.term_name(key, form), seats, rings, reads)
                 found.append(
                     self.candidate(
                         machine.component(key),
@@ -118,19 +94,6 @@ class GapClosure(Effect):
                     )
                 )
         return tuple(found)
-
-    @staticmethod
-    def _one_by_one(machine: MachineView, key: str, seats: tuple[str, ...]) -> tuple[tuple[int, ...], ...]:
-        """Ring that closes each seat of several bearings, all of them for a spacer; else empty."""
-        bearings = machine.sets.get(key, ())
-        if len(bearings) < 2:
-            return ()
-        own = {
-            seat: (position,)
-            for position, bearing in enumerate(bearings)
-            for seat in machine.joint_coefficients.get(bearing, ())
-        }
-        return tuple(own.get(seat, tuple(range(len(bearings)))) for seat in seats)
 
     @staticmethod
     def _seats(
