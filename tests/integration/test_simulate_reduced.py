@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.sparse.linalg import spsolve
 
 from spindle_fem.coupling import prepare_machine, solve_coupled
 from spindle_fem.loads.operating_point import OperatingPoint
@@ -100,6 +101,29 @@ def test_its_steady_state_is_that_of_the_coupled_full_model(machine, fast, speed
     for name in ("F1.inner_raceway", "F2.outer_raceway", "R2.inner_raceway", "housing.gap", "shaft.nose_end"):
         expected = machine.builder.surface_mean(name, state)
         assert fast.model.place(name) @ run.states[-1] == pytest.approx(expected, abs=5e-3), name
+
+
+@pytest.mark.parametrize(
+    ("seats", "factor"), [("F2", 0.26), ("F1", 0.05), ("R2", 4.0), ("F1 F2 F3", 0.1)], ids=lambda v: str(v)
+)
+def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(machine, fast, seats, factor):
+    affine, model = build_affine_system(machine), fast.model
+    point = replace(OperatingPoint.of(machine.spec), speed=3000.0 * RPM)
+    film = fast.channel_film(point, {})[0]
+    raceways = [f"{name}.{side}_raceway" for name in fast.bearings for side in ("inner", "outer")]
+    loads = 80.0 * sum(affine.place(name) for name in raceways)
+    reduced_loads = 80.0 * sum(model.place(name) for name in raceways)
+    scaled = {f"joint.{seat}.outer_ring|housing": factor for seat in seats.split()}
+    read = []
+    for factors in ({}, scaled):
+        values = {name: value * factors.get(name, 1.0) for name, value in fast.table.base(point).items()}
+        full = spsolve(affine.conduction(values, film).tocsc(), loads)
+        own = np.array([values[name] for name in model.coefficient_names])
+        matrix = np.tensordot(own, model.operators, axes=1) + np.tensordot(film, model.cell_film, axes=1)
+        read.append((affine.probes @ full, model.probes @ np.linalg.solve(matrix, reduced_loads)))
+    change, reduced_change = (after - before for before, after in zip(*read, strict=True))
+    assert np.abs(change).max() > 0.1
+    assert np.abs(reduced_change - change).max() < 0.03 * np.abs(change).max()
 
 
 def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fast):
