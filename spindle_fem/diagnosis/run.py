@@ -91,8 +91,6 @@ def diagnose(
     started = time.perf_counter()
     require_choice(full_model)
     tell = progress or (lambda stage: None)
-    workers = Workers(min(thread_count(), MOST_WORKERS))
-    workers.wake()
     tell("reading")
     read = [read_recording(path) for path in recordings]
     earlier = [read_recording(path) for path in calibrate]
@@ -106,6 +104,8 @@ def diagnose(
                 OFF if full_model == AUTO else full_model, "Nothing was fitted."
             )
         else:
+            workers = Workers(min(thread_count(), MOST_WORKERS))
+            workers.wake()
             diagnosis = diagnose_recordings(opened, heldout=heldout, progress=tell, workers=workers)
             tell("writing")
             proposed = workers.ahead(partial(next_measurement, diagnosis))
