@@ -133,7 +133,10 @@ def diagnose_recordings(
         | {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)}
     )
     known = [p for p in places if p in fast.model.place_names]
-    small = plant if machine.is_network else plant.compressed([name for name, *_ in plant.uncertain()], known)
+    small = plant
+    if not machine.is_network:
+        contacts = sorted({name for own in view.joint_coefficients.values() for name in own})
+        small = plant.compressed([name for name, *_ in plant.uncertain()], known, contacts)
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)

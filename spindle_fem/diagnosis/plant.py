@@ -53,6 +53,8 @@ DIRECTIONS = ("r", "z")
 BASIS_TOLERANCE = 1.0e-3
 # While searching: a third of a per cent of a film is some millikelvins, and final fits go without.
 SAME_WITHIN = 3.0e-3
+# Of the conductance of a contact, in the basis of a search.
+OPENED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -543,12 +545,13 @@ class Plant:
             sensitivity[:, column, position] += told[:, 1 + n_par + i].imag / 1e-30
 
     # ------------------------------------------------------------------ reduction
-    def compressed(self, names: Sequence[str], places: Sequence[str]) -> Plant:
+    def compressed(self, names: Sequence[str], places: Sequence[str], contacts: Sequence[str] = ()) -> Plant:
         """The plant on the smaller basis that its own recordings need.
 
         States and their sensitivities of every recording, with the machine's
         parameters at their prior values and two standard deviations to either
-        side in a few combinations, and what heat at every place leaves.
+        side in a few combinations, what heat at every place leaves, and states
+        with each contact all but opened.
 
         Parameters
         ----------
@@ -556,6 +559,8 @@ class Plant:
             Parameters of the machine.
         places : sequence of str
             Where candidates put heat.
+        contacts : sequence of str
+            Coefficients that candidates scale one by one; parameters scale them together.
         """
         model = self.fast.model
         snapshots = []
@@ -572,11 +577,17 @@ class Plant:
                 initial = self.start(number)
                 states, tracks = run.march(initial)
                 snapshots.append((states - initial * model.one).T)
+                if draw == 0:
+                    usual = states
                 if wanted:
                     tangent = run.tangents(run.forcing_of(states, tracks), tracks)
                     snapshots.append(tangent[::4].transpose(1, 0, 2).reshape(model.size, -1))
                     if number == 0:
                         snapshots.append(self._place_snapshots(run, places))
+            for contact in contacts if number == 0 else ():
+                opened, _ = self.transient(number, {contact: OPENED}).march(initial)
+                # States less those of the machine as it is: a share of them would drown the rest.
+                snapshots.append((opened - usual).T)
         # The uniform field stays exactly: a share of it would be a share of 293 K.
         uniform = model.one / np.linalg.norm(model.one)
         rest = np.hstack([_scaled(item) for item in snapshots])

@@ -9,8 +9,10 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from spindle_fem.coupling import prepare_machine, solve_coupled
+from spindle_fem.diagnosis.plant import Plant
 from spindle_fem.loads.operating_point import OperatingPoint
 from spindle_fem.network.history import InputHistory
+from spindle_fem.recordings.align import read_recording
 from spindle_fem.reduced.affine import build_affine_system
 from spindle_fem.reduced.build import ReductionOptions, build_reduced_model, reduced_model_of
 from spindle_fem.reduced.drive import STANDARD, make_drive
@@ -207,6 +209,27 @@ def test_simulate_writes_what_every_channel_should_have_read(fast, made, tmp_pat
     # The written machine predicts the same without a fit of its own.
     again = simulate_machine(folder / "calibrated_machine.toml", made, tmp_path / "again")
     assert again["channels"][0]["rmse_K"] == pytest.approx(errors["rear seat"], abs=2e-3)
+
+
+def test_the_basis_of_a_search_holds_what_a_single_seat_changes(fast, made):
+    recording = read_recording(made)
+    plant = Plant(fast, [recording], [np.ones(recording.times.size, dtype=bool)])
+    parameters = [name for name, *_ in plant.uncertain()]
+    places = [name for name in fast.model.place_names if name.endswith("_raceway")]
+    seats = [f"joint.{name}.outer_ring|housing" for name in ("R1", "R2")]
+    with_seats, without = plant.compressed(parameters, places, seats), plant.compressed(parameters, places)
+    assert without.fast.model.size < with_seats.fast.model.size < fast.model.size
+    errors = []
+    for seat in seats:
+        change, found, missed = (
+            own.predict(0, {seat: 0.05}).temperature - own.predict(0, {}).temperature
+            for own in (plant, with_seats, without)
+        )
+        assert np.abs(change).max() > 0.1
+        errors.append([np.abs(found - change).max(), np.abs(missed - change).max()])
+    with_error, without_error = np.max(errors, axis=0)
+    assert with_error < 0.03
+    assert without_error > 2.0 * with_error
 
 
 def test_speeds_beyond_the_table_get_a_range_of_their_own(fast, monkeypatch):
