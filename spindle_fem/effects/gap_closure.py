@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from spindle_fem.effects.base import Candidate, Effect, Reported, capital, place_words, quantity
-from spindle_fem.effects.laws import Complex, amplitude, linear, relaxed, repeated, shape, smooth_step
+from spindle_fem.effects.laws import Complex, amplitude, linear, relaxed, rows, shape, smooth_step
 from spindle_fem.effects.term import Term, TermContext
 from spindle_fem.effects.view import MachineView
 
@@ -26,16 +26,26 @@ class GapClosureTerm(Term):
         Places that expand.
     around : tuple of str
         Places that they expand into; none counts from the rings' own temperature at the start.
+    closed_by : tuple of tuple of int, optional
+        Positions of the rings whose mean closes each seat; all of them when absent.
     """
 
     def __init__(
-        self, name: str, seats: tuple[str, ...], rings: tuple[str, ...], around: tuple[str, ...]
+        self,
+        name: str,
+        seats: tuple[str, ...],
+        rings: tuple[str, ...],
+        around: tuple[str, ...],
+        closed_by: tuple[tuple[int, ...], ...] | None = None,
     ) -> None:
         self.name, self.coefficients = name, seats
         self.reads = (*rings, *around)
         self._rings = len(rings)
-        # The lagged excess; the temperature that it counts from, 0 until the first step knows it.
-        self.n_states = 1 if around else 2
+        # Excesses that are followed: every ring's, or that of all of them; those whose mean closes each seat.
+        self._followed = len(rings) if closed_by else 1
+        self._closed_by = [list(own) for own in closed_by or ((0,),) * len(seats)]
+        # The lagged excesses; the temperatures that they count from, 0 until the first step knows them.
+        self.n_states = self._followed * (1 if around else 2)
         self.parameters = (
             amplitude("opening", 1.0, high=0.995),
             linear("closing_difference", 8.0, 5.0, "K", low=-5.0, high=60.0),
@@ -46,19 +56,21 @@ class GapClosureTerm(Term):
     def factor(self, context: TermContext) -> Complex:
         """Of every seat, (n, k)."""
         own = context.parameters
-        closed = smooth_step((context.state[0] - own["closing_difference"]) / own["width"])
-        return repeated(context, 1.0 - own["opening"] * (1.0 - closed), len(self.coefficients))
+        excess = np.array([context.state[rings].mean(axis=0) for rings in self._closed_by])
+        closed = smooth_step((excess - own["closing_difference"]) / own["width"])
+        return rows(context, *(1.0 - own["opening"] * (1.0 - closed)))
 
     def advance(self, context: TermContext, step: float) -> Complex:
-        """Lagged excess, and what it counts from where that is the start, (1 or 2, k) K."""
-        ring = context.temperatures[: self._rings].mean(axis=0)
-        if self.n_states == 1:
+        """Lagged excesses, and what they count from where that is the start, (n or 2 n, k) K."""
+        rings = context.temperatures[: self._rings]
+        rings = rings if self._followed > 1 else rings.mean(axis=0, keepdims=True)
+        if self.n_states == self._followed:
             base = context.temperatures[self._rings :].mean(axis=0)
         else:
-            known = context.state[1]
-            base = np.where(known.real == 0.0, ring, known)
-        lagged = relaxed(context.state[0], ring - base, step, context.parameters["lag"])
-        return np.array([lagged] if self.n_states == 1 else [lagged, base])
+            known = context.state[self._followed :]
+            base = np.where(known.real == 0.0, rings, known)
+        lagged = relaxed(context.state[: self._followed], rings - base, step, context.parameters["lag"])
+        return lagged if self.n_states == self._followed else np.concatenate((lagged, base))
 
 
 class GapClosure(Effect):
@@ -78,11 +90,12 @@ class GapClosure(Effect):
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """Outer seats of a set, against the housing or the start; node to node in a network."""
+        """Outer seats of a set, one by one over the housing, together over the start; links of a network."""
         found = []
         for key, rings, around, seats in self._seats(machine):
             for form, reads in ((OVER_HOUSING, around), (OVER_START, ())):
-                term = GapClosureTerm(self.term_name(key, form), seats, rings, reads)
+                closed_by = self._closed_by(machine, key, seats) if reads else None
+                term = GapClosureTerm(self.term_name(key, form), seats, rings, reads, closed_by)
                 found.append(
                     self.candidate(
                         machine.component(key),
@@ -94,6 +107,17 @@ class GapClosure(Effect):
                     )
                 )
         return tuple(found)
+
+    @staticmethod
+    def _closed_by(machine: MachineView, key: str, seats: tuple[str, ...]) -> tuple[tuple[int, ...], ...]:
+        """Positions of the rings that close each seat: its bearing's own; all of them for a spacer."""
+        bearings = machine.sets.get(key, (key,))
+        own = {
+            seat: (position,)
+            for position, bearing in enumerate(bearings)
+            for seat in machine.joint_coefficients.get(bearing, ())
+        }
+        return tuple(own.get(seat, tuple(range(len(bearings)))) for seat in seats)
 
     @staticmethod
     def _seats(

@@ -37,6 +37,7 @@ class Bent(Term):
 TERMS = {
     "over start": GapClosureTerm("gap", ("seat",), ("a", "b"), ()),
     "over housing": GapClosureTerm("gap", ("seat",), ("a", "b"), ("c",)),
+    "ring by ring": GapClosureTerm("gap", ("seat", "spacer"), ("a", "b"), ("c",), ((0,), (0, 1))),
     "preload": ThermalPreloadTerm("preload", ("A",), ("a",), ("b",)),
     "starvation": StarvationTerm("dry", ("A",), "speed", 300.0),
     "bent": Bent(),
