@@ -145,19 +145,34 @@ class Search:
             self.progress(f"diagnosis: {size + 1} effects")
             # A third effect is rare: it is looked for only where two leave something.
             beam = (size == 1) if self._explained(best) else BEAM
-            for hypothesis in self._different(ranked)[:beam]:
+            for hypothesis in self._extended(ranked, int(beam)):
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
+        self._improve()
+        return self.ranked()
+
+    def _improve(self) -> None:
+        """Take whole sets for their bearings, leave members out and exchange them, as long as that helps."""
         for _ in range(ROUNDS):
             best = self.ranked()[0]
+            # Wider first: beside a whole set other members may be too many than beside one of its bearings.
+            self._widen()
             self._reduce()
             self._exchange()
             if self.ranked()[0] is best:
                 break
         else:
+            self._widen()
             self._reduce()
-        self._widen()
-        return self.ranked()
+
+    def _extended(self, ranked: Sequence[Hypothesis], number: int) -> list[Hypothesis]:
+        """The best of so many combinations, and of laws alone where all of those hold a way out."""
+        different = self._different(ranked)
+        chosen = different[:number]
+        if chosen and all(any(self._in_intervals(c) for c in h.fit.candidates) for h in chosen):
+            laws = [h for h in different if not any(self._in_intervals(c) for c in h.fit.candidates)]
+            chosen += laws[:1]
+        return chosen
 
     def _different(self, ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best hypothesis of each combination of effects.

@@ -249,6 +249,14 @@ def test_the_cover_holds_the_seal_of_the_nose():
     assert "standing_nose" not in Layout(spec, set()).heat()
 
 
+def test_a_probe_lies_in_the_largest_segment_around_it():
+    spec = load_machine("recorded_spindle")
+    probes = {probe.name: probe for probe in spec.probe}
+    layout = Layout(spec, {"housing.middle_body", "housing.flange"})
+    assert layout.place_of_probe(probes["SP04"]) == "housing.middle_body"
+    assert Layout(spec, set()).place_of_probe(probes["SP04"]) == "housing"
+
+
 def test_a_decision_does_not_wait_for_which_part_of_a_component_it_is(case):
     one = _overlapping(case.view)
     assert one["F1"] == one["front_bearings"] >= {"F1", "F2", "F3", "front_bearings"}
@@ -273,12 +281,19 @@ def test_probes_of_a_part_are_off_along_the_radius_together(heated):
 
 
 # ---------------------------------------------------------------------- search
-def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
-    problem = Problem(heated.plant, heated.calibrated.belief, EXPECTED_SLOW, heated.plant.observations)
-    effects = catalogue()
-    search = Search(
-        problem, case.view, effects, (), interval_effects(), dict.fromkeys(effects, 1.0), workers=Workers(1)
+def search_over(case, diagnosis, kind=Search):
+    problem = Problem(
+        diagnosis.plant, diagnosis.calibrated.belief, EXPECTED_SLOW, diagnosis.plant.observations
     )
+    effects = catalogue()
+    weights = dict.fromkeys(effects, 1.0)
+    candidates = candidates_for(case.view)
+    return kind(problem, case.view, effects, candidates, interval_effects(), weights, workers=Workers(1))
+
+
+def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
+    search = search_over(case, heated)
+    problem = search.problem
     search.found = {}
     wrong = effect_of("unrecorded_heat_source").over(case.view, "rear_bearings", [(FROM, UNTIL)])
     for candidates in ((), (wrong,)):
@@ -291,6 +306,47 @@ def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
     assert len(others) < OTHER_SPOTS
     search._exchange()
     assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings")}
+
+
+def test_laws_are_extended_beside_a_way_out(case, heated):
+    search = search_over(case, heated)
+    out, law = heated.hypotheses[:2]
+    assert search._extended([out, law], 1) == [out, law]
+    assert search._extended([law, out], 1) == [law]
+
+
+class Tabled(Search):
+    """A search whose fits have the evidence of a table."""
+
+    def _fit_all(self, tasks):
+        for candidates, values in tasks:
+            keys = frozenset((c.effect, c.component) for c in candidates)
+            fit = SimpleNamespace(
+                candidates=candidates, values=values, keys=keys, log_evidence=EVIDENCE.get(keys, -1e3)
+            )
+            self._keep(Hypothesis(fit, 0.0))
+
+    def _exchange(self):
+        pass
+
+
+DRY_BEARING, DRY_SET = ("starvation", "F2"), ("starvation", "front_bearings")
+LOOSE, SEAT = ("sensor_detached", "SP02"), ("joint_conductance", "F2")
+EVIDENCE = {
+    frozenset((DRY_BEARING, LOOSE)): -60.0,
+    frozenset((DRY_BEARING, LOOSE, SEAT)): -40.0,
+    frozenset((DRY_SET, LOOSE, SEAT)): -15.0,
+    frozenset((DRY_SET, LOOSE)): -10.0,
+}
+
+
+def test_what_a_single_bearing_needed_beside_it_is_left_out_beside_its_set(case, heated):
+    search = search_over(case, heated, Tabled)
+    search.found = {}
+    for keys in ((DRY_BEARING, LOOSE), (DRY_BEARING, LOOSE, SEAT)):
+        search._fit_all([(tuple(case.candidates[key] for key in keys), {})])
+    search._improve()
+    assert search.ranked()[0].keys == {DRY_SET, LOOSE}
 
 
 # ----------------------------------------------------------------------- where
