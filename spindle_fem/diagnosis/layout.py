@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from spindle_fem.spec.exchange import Gap
-from spindle_fem.spec.model import AnnulusSegment, MachineSpec, Part, Surface
+from spindle_fem.spec.model import AnnulusSegment, MachineSpec, Part, Probe, Surface
 
 # A segment is a flange where its diameter passes the next largest by this share.
 FLANGE_STEP = 1.1
@@ -57,6 +57,12 @@ class Layout:
         """Place of a segment; of its part where that is one, or where the mesh has no other."""
         place = f"{part.name}.{segment}"
         return place if place in self.places else part.name
+
+    def place_of_probe(self, probe: Probe) -> str:
+        """Place of the largest segment of its part that holds a point probe."""
+        part = next(part for part in self.spec.part if part.name == probe.part)
+        around = [s for s in part.segment if s.z[0] <= probe.z <= s.z[1] and _holds(s, probe.r)]
+        return self.segment_place(part, max(around, key=segment_volume).name) if around else part.name
 
     def is_spacer(self, part: Part) -> bool:
         """Whether a part lies between the bearings of one set."""
@@ -179,6 +185,10 @@ class Layout:
 
 def _both(value: float | Sequence[float]) -> tuple[float, ...]:
     return (float(value),) if isinstance(value, (int, float)) else tuple(float(v) for v in value)
+
+
+def _holds(segment: AnnulusSegment, radius: float) -> bool:
+    return segment.inner_diameter <= 2.0 * radius <= segment.outer_diameter
 
 
 def extent(part: Part) -> tuple[float, float]:

@@ -82,10 +82,11 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
         lowest_speed=lowest_speed(speed),
         seats=seats,
         spots=spots,
-        sides={
-            spot: (UP + place, ACROSS + place)
-            for spot, (place, *more) in spots.items()
-            if not more and {UP + place, ACROSS + place} <= places
+        sides=_sides(layout, spots),
+        focal={
+            ring: NEAR + ring.removeprefix(AROUND)
+            for ring in spots
+            if ring.startswith(AROUND) and NEAR + ring.removeprefix(AROUND) in places
         },
         reported=reported,
         near={p.name: layout.component_of(p.part) for p in spec.probe if f"{NEAR}{p.name}" in spots},
@@ -188,6 +189,17 @@ def _spots(
         if place in places:
             spots[place], reported[place] = (place,), layout.component_of(probe.part)
     return spots, reported
+
+
+def _sides(layout: Layout, spots: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, str]]:
+    """First harmonics of spots that are one place; of a ring through a probe those of its segment."""
+    of = {spot: place for spot, (place, *more) in spots.items() if not more}
+    of |= {f"{AROUND}{probe.name}": layout.place_of_probe(probe) for probe in ringed_probes(layout.spec)}
+    return {
+        spot: (UP + place, ACROSS + place)
+        for spot, place in of.items()
+        if spot in spots and {UP + place, ACROSS + place} <= layout.places
+    }
 
 
 def _switched_on(spec: MachineSpec) -> frozenset[str]:

@@ -116,7 +116,8 @@ class HeatCapacity(Effect):
                     )
         for spot, sides in machine.sides.items():
             housing = machine.component(spot)
-            if housing == "housing":
+            # A ring through a probe has the sides of its segment, which is a spot itself.
+            if housing == "housing" and spot not in machine.focal:
                 usual = SHARE * machine.capacity[housing]
                 term = ContactCapacityTerm(self.term_name(spot, ON_A_SIDE), machine.spots[spot], usual, sides)
                 found.append(

@@ -1,4 +1,4 @@
-"""How heat lies over places: evenly, or on one of them more on one side than on the other."""
+"""How heat lies over places: evenly, more on one side than on the other, or drawn to one spot of a ring."""
 
 from __future__ import annotations
 
@@ -6,52 +6,67 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spindle_fem.effects.laws import Complex, linear, repeated, rows
+from spindle_fem.effects.laws import Complex, linear, rows
 from spindle_fem.effects.term import TermContext, TermParameter
 
 # 1 σ of the first harmonic of heat around the axis, beside its mean: 2 is all of it along one line.
 UNEVEN = 1.0
+# Share of the heat on a ring that is usually at its spot, and 1 σ.
+FOCUSED, FOCUSED_SIGMA = 0.3, 0.3
 
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Places and, where the only one of them has sides, its first harmonics around the axis.
+    """Places, and where the only one of them has sides or a spot, how unevenly heat lies there.
 
-    With sides, heat lies as ``1 + 2 (up cos + across sin)`` of its mean, both free.
+    With sides, heat lies as ``1 + 2 (up cos + across sin)`` of its mean, both
+    free. With a spot, a free share ``focus`` of it is there and the rest all
+    round.
 
     Attributes
     ----------
     places : tuple of str
     sides : tuple of str
-        Along y and along -x.
+        First harmonics around the axis, along y and along -x.
+    spot : str
+        Place within the only one; none when empty.
     """
 
     places: tuple[str, ...]
     sides: tuple[str, ...] = ()
+    spot: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Everything that takes heat, or is read."""
-        return (*self.places, *self.sides)
+        return (*self.places, *((self.spot,) if self.spot else ()), *self.sides)
 
     @property
     def parameters(self) -> tuple[TermParameter, ...]:
         """What is free about it."""
+        focus = (linear("focus", FOCUSED, FOCUSED_SIGMA, low=0.0, high=1.0),) if self.spot else ()
         names = ("up", "across") if self.sides else ()
-        return tuple(linear(name, 0.0, 0.5 * UNEVEN, low=-1.0, high=1.0) for name in names)
+        return focus + tuple(linear(name, 0.0, 0.5 * UNEVEN, low=-1.0, high=1.0) for name in names)
+
+    def shares(self, context: TermContext) -> Complex:
+        """Of heat at each place, the spot included, (n, k); they sum to 1."""
+        if self.spot:
+            focus = context.parameters["focus"]
+            return rows(context, 1.0 - focus, focus)
+        return rows(context, *(1.0 / len(self.places) for _ in self.places))
 
     def heat(self, context: TermContext, total: Complex) -> Complex:
         """Heat (k,) over the names, (n, k)."""
-        even = repeated(context, total / len(self.places), len(self.places))
+        own, parts = context.parameters, self.shares(context) * total
         if not self.sides:
-            return even
-        own = context.parameters
-        return np.concatenate((even, rows(context, 2.0 * own["up"] * total, 2.0 * own["across"] * total)))
+            return parts
+        return np.concatenate((parts, rows(context, 2.0 * own["up"] * total, 2.0 * own["across"] * total)))
 
     def temperature(self, context: TermContext) -> Complex:
         """Temperature that what is spread so meets, (k,), where the names are what a term reads."""
-        mean = context.temperatures[: len(self.places)].mean(axis=0)
+        own, shares = context.parameters, self.shares(context)
+        mean = (shares * context.temperatures[: len(shares)]).sum(axis=0)
         if not self.sides:
             return mean
-        own, (up, across) = context.parameters, context.temperatures[len(self.places) :]
+        up, across = context.temperatures[len(shares) :]
         return mean + 2.0 * (own["up"] * up + own["across"] * across)

@@ -27,6 +27,8 @@ JITTER = 0.1
 FOLLOWING = "following"
 # Share of its beginning at which a pulse after a change counts as over.
 PULSE_ENDS = 0.05
+# Of the first harmonic around the axis (1: all along one line) from which on a side is named.
+ONE_SIDED = 0.3
 Array = NDArray[np.float64]
 # A quantity is followed where it varies by more than this share of its largest value.
 SMALLEST_VARIATION = 0.05
@@ -259,7 +261,7 @@ class UnrecordedEffect(IntervalEffect):
         own = "" if form == self.interval_forms[0] else form
         if quantity is not None:
             own = f"{own} {FOLLOWING} {quantity.name}".strip()
-        spread = Spread(machine.spots[spot], machine.sides.get(spot, ()))
+        spread = Spread(machine.spots[spot], machine.sides.get(spot, ()), machine.focal.get(spot, ""))
         term = self.term(machine, self.term_name(spot, own), spread, on, form)
         return self.candidate(
             machine.component(spot),
@@ -281,13 +283,14 @@ class UnrecordedEffect(IntervalEffect):
         return [(own[f"start_{number}"], own[f"end_{number}"]) for number in range(1, count + 1)]
 
     def report(self, candidate: Candidate, values: Mapping[str, float]) -> dict[str, Reported]:
-        """Mean size while on, and the lag, with its power where it follows a law."""
+        """Mean size while on, and the lag, with its power where it follows a law and how it lies about."""
         term = candidate.terms[0]
         own, size = term.values(values), term.parameters[0]
         mean = own[size.name] * term.on.mean_share(own)
         found = {size.name: Reported(mean, size.unit), "lag": Reported(own["lag"], "s")}
-        if "exponent" in own:
-            found["exponent"] = Reported(own["exponent"], "")
+        for name in ("exponent", *(item.name for item in term.spread.parameters)):
+            if name in own:
+                found[name] = Reported(own[name], "")
         return found
 
 
@@ -306,6 +309,18 @@ def quantity_followed(machine: MachineView, candidate: Candidate) -> RecordedQua
     """The same with what is known of it; None where it follows none."""
     name = followed_name(candidate)
     return next((item for item in machine.quantities if item.name == name), None)
+
+
+def side_words(reported: Mapping[str, Reported]) -> str:
+    """On which side of its place most of it is, by the angle from y as probes have it; empty where on none.
+
+    >>> side_words({"up": Reported(0.0, ""), "across": Reported(-0.6, "")})
+    ', mostly around θ = 270°'
+    """
+    up, across = (reported[name].value if name in reported else 0.0 for name in ("up", "across"))
+    if np.hypot(up, across) < ONE_SIDED:
+        return ""
+    return f", mostly around θ = {np.degrees(np.arctan2(across, up)) % 360.0:.0f}°"
 
 
 def when_words(candidate: Candidate, reported: Mapping[str, Reported]) -> str:

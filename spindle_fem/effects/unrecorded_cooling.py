@@ -13,6 +13,7 @@ from spindle_fem.effects.unrecorded import (
     UnrecordedEffect,
     UnrecordedHeatTerm,
     UnrecordedTerm,
+    side_words,
     when_words,
 )
 from spindle_fem.effects.view import MachineView, RecordedQuantity
@@ -43,7 +44,7 @@ class CoolingTerm(UnrecordedTerm):
         if self.spread.sides:
             return self.spread.heat(context, -size * (self.spread.temperature(context) - fluid))
         # Each place by its own temperature.
-        return -size / len(self.reads) * (context.temperatures - fluid)
+        return -size * self.spread.shares(context) * (context.temperatures - fluid)
 
 
 class UnrecordedCooling(UnrecordedEffect):
@@ -82,5 +83,5 @@ class UnrecordedCooling(UnrecordedEffect):
         way = " to the surroundings" if size.unit == "W/K" else ""
         return (
             f"A further {quantity(size)}{way} is lost from "
-            f"{place_words(candidate.component)}{when_words(candidate, reported)}."
+            f"{place_words(candidate.component)}{side_words(reported)}{when_words(candidate, reported)}."
         )

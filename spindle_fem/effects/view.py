@@ -164,6 +164,8 @@ class MachineView:
         Places where heat may come and go unrecorded, by a name of their own.
     sides : mapping of str to (str, str)
         First harmonics around the axis, along y and along -x, of the spots that have them.
+    focal : mapping of str to str
+        Place on a spot that is a ring, where its heat may be concentrated.
     reported : mapping of str to str
         Component that a finding names for a spot, source or link; itself where absent.
     near : mapping of str to str
@@ -225,6 +227,7 @@ class MachineView:
     seats: tuple[Seat, ...] = ()
     spots: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     sides: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    focal: Mapping[str, str] = field(default_factory=dict)
     reported: Mapping[str, str] = field(default_factory=dict)
     near: Mapping[str, str] = field(default_factory=dict)
     walls: Mapping[str, str] = field(default_factory=dict)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu, spsolve
 
 from spindle_fem.coupling import prepare_machine, solve_coupled
 from spindle_fem.diagnosis.plant import Plant
@@ -126,6 +126,33 @@ def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(machin
     change, reduced_change = (after - before for before, after in zip(*read, strict=True))
     assert np.abs(change).max() > 0.1
     assert np.abs(reduced_change - change).max() < 0.03 * np.abs(change).max()
+
+
+def test_ring_spot_and_sides_stand_for_heat_on_a_part_of_the_housing(machine, fast):
+    """72° of the top, 60 mm long, above the probe: at rest and while the heat changes."""
+    affine = build_affine_system(machine)
+    values = fast.table.base(point := OperatingPoint.of(machine.spec))
+    capacity = affine.capacity(fast.table.capacities())
+    conduction = affine.conduction(values, fast.channel_film(point, {})[0])
+    x, y, z = machine.operators.mesh.points[: affine.n_unknowns].T
+    on_top = (np.hypot(x, y) > 0.149) & (np.abs(np.arctan2(x, y)) < np.pi / 5) & (abs(z - 0.29) < 0.03)
+    heat = np.zeros(affine.size)
+    heat[: affine.n_unknowns] = on_top / on_top.sum()
+    places = ("around.SP04", "near.SP04", f"{UP}housing.middle_body")
+    wanted, offered = [], []
+    for shift in (0.0, 3.0e-4, 1.0e-3):
+        solve = splu((conduction + shift * capacity).tocsc()).solve
+        wanted.append(affine.probes @ solve(heat))
+        offered.append(affine.probes @ solve(np.column_stack([affine.place(name) for name in places])))
+    wanted, offered = np.concatenate(wanted), np.concatenate(offered)
+    left = {}
+    for number in (1, 3):
+        amplitudes = np.linalg.lstsq(offered[:, :number], wanted, rcond=None)[0]
+        left[number] = np.abs(wanted - offered[:, :number] @ amplitudes).max() / np.abs(wanted).max()
+    assert left[1] > 0.1
+    assert left[3] < 0.03
+    # Ring and spot share the heat, known to a tenth; the side adds none.
+    assert amplitudes[:2].sum() == pytest.approx(1.0, abs=0.1)
 
 
 def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fast):

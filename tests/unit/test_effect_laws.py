@@ -241,6 +241,17 @@ def test_a_ring_remembers_where_it_began():
     assert term.advance(later, 100.0)[:, 0].real == pytest.approx([10.0 * (1.0 - np.exp(-1.0)), 300.0])
 
 
+def test_each_ring_closes_its_own_seat_and_all_of_them_a_spacers():
+    owners = ((0,), (1,), (0, 1))
+    term = GapClosureTerm("t", ("joint.a", "joint.b", "joint.spacer"), ("r1", "r2"), ("bore",), owners)
+    own = {"opening": 0.9, "closing_difference": 8.0, "width": 0.5, "lag": 100.0}
+    seen = context(term, temperatures=[300.0, 320.0, 300.0], state=[0.0, 0.0], **own)
+    excess = term.advance(seen, 1e5)[:, 0].real
+    assert excess == pytest.approx([0.0, 20.0])
+    factor = term.factor(context(term, temperatures=[300.0, 320.0, 300.0], state=excess, **own)).real[:, 0]
+    assert factor == pytest.approx([0.1, 1.0, 1.0 - 0.9 / (1.0 + np.exp(4.0))], rel=1e-4)
+
+
 def test_a_room_drifts_from_one_instant_to_another():
     term = DriftTerm("t", ("film.a", "film.b"), RAMP, ())
     own = {"change": -6.0, "start": 3000.0, "ramp_time": 3000.0}
@@ -414,6 +425,25 @@ def test_a_loss_of_one_side_follows_the_temperature_there():
     # Field 300 + 10 cos: means of T, T cos, T sin.
     heat = term.heat(context(term, time=2700.0, temperatures=[300.0, 5.0, 0.0], **own)).real[:, 0]
     assert heat == pytest.approx([-60.0, -120.0, 0.0], abs=1e-3)
+
+
+def test_heat_of_a_ring_is_drawn_to_its_spot_and_to_a_side():
+    term = heat_in(Spread(("ring",), ("up", "across"), "spot"), (1000.0, 3000.0))
+    assert term.heat_places == ("ring", "spot", "up", "across")
+    own = {"heat": 40.0, "focus": 0.25, "up": 0.5, "across": -0.1, "lag": 100.0}
+    heat = term.heat(context(term, time=2700.0, **own)).real[:, 0]
+    assert heat == pytest.approx([30.0, 10.0, 40.0, -8.0], abs=1e-4)
+
+
+def test_a_loss_of_a_ring_follows_the_temperature_where_it_is():
+    spread = Spread(("ring",), ("up", "across"), "spot")
+    term = CoolingTerm(
+        "t", amplitude("conductance", 5.0, "W/K"), spread, InIntervals(((1000.0, 3000.0),)), 290.0
+    )
+    own = {"conductance": 2.0, "focus": 0.25, "up": 0.5, "across": 0.0, "lag": 100.0}
+    heat = term.heat(context(term, time=2700.0, temperatures=[300.0, 320.0, 4.0, 1.0], **own)).real[:, 0]
+    # Met: 0.75 · 300 + 0.25 · 320 + 2 · 0.5 · 4 = 309 K.
+    assert heat == pytest.approx([-28.5, -9.5, -38.0, 0.0], abs=1e-3)
 
 
 def test_edges_of_neighbouring_intervals_cannot_cross():
