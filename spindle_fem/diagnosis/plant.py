@@ -595,7 +595,8 @@ class Plant:
         vectors, values, _ = np.linalg.svd(rest, full_matrices=False)
         kept = int(np.sum(values > BASIS_TOLERANCE * values[0]))
         basis = np.column_stack((uniform, vectors[:, :kept]))
-        return self.with_model(self.fast.projected(basis), SAME_WITHIN)
+        spread = np.concatenate((values[:1], values[:kept]))
+        return self.with_model(self.fast.projected(basis, spread), SAME_WITHIN)
 
     def _place_snapshots(self, run: TransientRun, places: Sequence[str]) -> Array:
         loads = np.array([self.fast.model.place(name) for name in places]).T

@@ -76,13 +76,21 @@ class FastModel:
     extra_terms : sequence of Term
         Always there, as the machine's natural films are: with a tabulated
         machine, its :class:`spindle_fem.reduced.film_heat.FilmHeat`.
+    spread : (r,) ndarray, optional
+        How large each coordinate of the states is, as :class:`ConductingDirections` takes it.
     """
 
-    def __init__(self, model: ReducedModel, spec: MachineSpec, extra_terms: Sequence[Term] = ()) -> None:
+    def __init__(
+        self,
+        model: ReducedModel,
+        spec: MachineSpec,
+        extra_terms: Sequence[Term] = (),
+        spread: Array | None = None,
+    ) -> None:
         self.model = model
         self.spec = spec
         self.extra_terms = tuple(extra_terms)
-        self.directions = ConductingDirections(model)
+        self.directions = ConductingDirections(model, spread)
         self.table: CoefficientTable = model.table(spec)
         self.bearings = tuple(bearing.name for _, bearing in spec.bearings)
         self.channels = tuple(probe.name for probe in spec.probe)
@@ -125,9 +133,9 @@ class FastModel:
         known = {item.name: item.sigma_log for item in uncertain_parameters(self.spec)}
         return {name: known.get(name, 0.0) for name in names}
 
-    def projected(self, basis: Array) -> FastModel:
-        """The same machine on a smaller basis, (r, s)."""
-        return FastModel(self.model.projected(basis), self.spec, self.extra_terms)
+    def projected(self, basis: Array, spread: Array | None = None) -> FastModel:
+        """The same machine on a smaller basis, (r, s), in which states spread so far, (s,)."""
+        return FastModel(self.model.projected(basis), self.spec, self.extra_terms, spread)
 
     # ------------------------------------------------------------- operators
     def storage(self, factors: Mapping[str, float], added: Mapping[str, float] = NO_CHANGES) -> Array:
