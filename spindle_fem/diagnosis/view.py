@@ -83,11 +83,7 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
         seats=seats,
         spots=spots,
         sides=_sides(layout, spots),
-        focal={
-            ring: NEAR + ring.removeprefix(AROUND)
-            for ring in spots
-            if ring.startswith(AROUND) and NEAR + ring.removeprefix(AROUND) in places
-        },
+        focal=_focal(layout, spots, sets),
         reported=reported,
         near={p.name: layout.component_of(p.part) for p in spec.probe if f"{NEAR}{p.name}" in spots},
         walls=walls,
@@ -156,8 +152,7 @@ def _spots(
     sets: Mapping[str, tuple[str, ...]],
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
     """Places where heat may come and go, and the component that each is told as."""
-    groups = [key for key, members in sets.items() if members != (key,)]
-    spots = {key: heat[key] for key in (*groups, "shaft", "nose", "drive_end", "flange") if key in heat}
+    spots = {key: heat[key] for key in (*sets, "shaft", "nose", "drive_end", "flange") if key in heat}
     reported: dict[str, str] = {}
     if SHAFT_GAP in heat and heat[SHAFT_GAP] != heat["shaft"]:
         spots[SHAFT_GAP], reported[SHAFT_GAP] = heat[SHAFT_GAP], "shaft"
@@ -200,6 +195,16 @@ def _sides(layout: Layout, spots: Mapping[str, tuple[str, ...]]) -> dict[str, tu
         for spot, place in of.items()
         if spot in spots and {UP + place, ACROSS + place} <= layout.places
     }
+
+
+def _focal(
+    layout: Layout, spots: Mapping[str, tuple[str, ...]], sets: Mapping[str, tuple[str, ...]]
+) -> dict[str, str]:
+    """Of a ring through a probe the probe's own spot, of a single bearing its outer raceway."""
+    rings = {spot: NEAR + spot.removeprefix(AROUND) for spot in spots if spot.startswith(AROUND)}
+    bearings = {key: f"{key}.outer_raceway" for key, members in sets.items() if members == (key,)}
+    found = {**rings, **bearings}
+    return {spot: place for spot, place in found.items() if spot in spots and place in layout.places}
 
 
 def _switched_on(spec: MachineSpec) -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""How heat lies over places: evenly, more on one side than on the other, or drawn to one spot of a ring."""
+"""How heat lies over places: evenly, more on one side than on the other, or drawn to one spot."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from spindle_fem.effects.term import TermContext, TermParameter
 
 # 1 σ of the first harmonic of heat around the axis, beside its mean: 2 is all of it along one line.
 UNEVEN = 1.0
-# Share of the heat on a ring that is usually at its spot, and 1 σ.
+# Share of the heat that is usually at the spot, and 1 σ.
 FOCUSED, FOCUSED_SIGMA = 0.3, 0.3
 
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Places, and where the only one of them has sides or a spot, how unevenly heat lies there.
+    """Places, and how unevenly heat lies there where the only one of them has sides, or they have a spot.
 
     With sides, heat lies as ``1 + 2 (up cos + across sin)`` of its mean, both
-    free. With a spot, a free share ``focus`` of it is there and the rest all
-    round.
+    free. With a spot, a free share ``focus`` of it is there and the rest
+    spread evenly.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Spread:
     sides : tuple of str
         First harmonics around the axis, along y and along -x.
     spot : str
-        Place within the only one; none when empty.
+        A further place, within them or one of them; none when empty.
     """
 
     places: tuple[str, ...]
@@ -49,11 +49,10 @@ class Spread:
         return focus + tuple(linear(name, 0.0, 0.5 * UNEVEN, low=-1.0, high=1.0) for name in names)
 
     def shares(self, context: TermContext) -> Complex:
-        """Of heat at each place, the spot included, (n, k); they sum to 1."""
-        if self.spot:
-            focus = context.parameters["focus"]
-            return rows(context, 1.0 - focus, focus)
-        return rows(context, *(1.0 / len(self.places) for _ in self.places))
+        """Of heat at each place, the spot after them, (n, k); they sum to 1."""
+        focus = context.parameters["focus"] if self.spot else 0.0
+        even = [(1.0 - focus) / len(self.places)] * len(self.places)
+        return rows(context, *even, *([focus] if self.spot else ()))
 
     def heat(self, context: TermContext, total: Complex) -> Complex:
         """Heat (k,) over the names, (n, k)."""

@@ -165,7 +165,7 @@ class MachineView:
     sides : mapping of str to (str, str)
         First harmonics around the axis, along y and along -x, of the spots that have them.
     focal : mapping of str to str
-        Place on a spot that is a ring, where its heat may be concentrated.
+        Place of a spot where a share of its heat may be concentrated.
     reported : mapping of str to str
         Component that a finding names for a spot, source or link; itself where absent.
     near : mapping of str to str

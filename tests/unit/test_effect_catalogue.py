@@ -493,6 +493,18 @@ def test_values_come_out_in_the_units_of_engineers(machines):
     assert transition["factor_above"].value == pytest.approx(3.0)
 
 
+def test_heat_of_one_bearing_is_shared_by_its_raceways(machines):
+    view = machines["geometry"][2]
+    candidate = catalogue()["unrecorded_heat_source"].over(view, "F2", [(1000.0, 3000.0)])
+    assert candidate.component == "F2"
+    (term,) = candidate.terms
+    assert term.heat_places == ("F2.inner_raceway", "F2.outer_raceway", "F2.outer_raceway")
+    own = {item.name: np.array([item.value + 0j]) for item in term.parameters}
+    own |= {"heat": np.array([40.0 + 0j]), "focus": np.array([0.5 + 0j]), "lag": np.array([100.0 + 0j])}
+    heat = term.heat(TermContext(2700.0, {}, np.zeros((0, 1)), np.zeros((0, 1)), own)).real[:, 0]
+    assert heat == pytest.approx([10.0, 10.0, 20.0], abs=1e-4)
+
+
 def test_heat_while_on_is_the_mean_over_the_intervals(machines):
     effect = catalogue()["unrecorded_heat_source"]
     candidate = effect.over(machines["geometry"][2], "housing", [(0.0, 100.0), (200.0, 500.0)])
