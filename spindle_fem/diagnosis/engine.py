@@ -144,8 +144,8 @@ class Search:
             ranked = [h for h in self.ranked() if len(h.keys) == size and h.score > worst]
             self.progress(f"diagnosis: {size + 1} effects")
             # A third effect is rare: it is looked for only where two leave something.
-            beam = (size == 1) if self._explained(best) else BEAM
-            for hypothesis in self._extended(ranked, int(beam)):
+            beam = int(size == 1) if self._explained(best) else BEAM
+            for hypothesis in self._extended(ranked, beam):
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
         self._improve()

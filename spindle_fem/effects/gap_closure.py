@@ -15,7 +15,7 @@ OVER_HOUSING, OVER_START = "ring over housing", "ring over start"
 
 
 class GapClosureTerm(Term):
-    """Factor ``1 - a (1 - S((x - x0)/w))`` on the seats; x lags behind the ring's excess.
+    """Factor ``1 - a (1 - s)`` on the seats; s follows ``S((x - x0)/w)`` with a lag, x is the ring's excess.
 
     Parameters
     ----------
@@ -41,10 +41,10 @@ class GapClosureTerm(Term):
         self.name, self.coefficients = name, seats
         self.reads = (*rings, *around)
         self._rings = len(rings)
-        # Excesses that are followed: every ring's, or that of all of them; those whose mean closes each seat.
+        # What closes something: every ring, or all of them together; those whose mean closes each seat.
         self._followed = len(rings) if closed_by else 1
         self._closed_by = [list(own) for own in closed_by or ((0,),) * len(seats)]
-        # The lagged excesses; the temperatures that they count from, 0 until the first step knows them.
+        # How far each has closed; the temperatures that they count from, 0 until the first step knows them.
         self.n_states = self._followed * (1 if around else 2)
         self.parameters = (
             amplitude("opening", 1.0, high=0.995),
@@ -55,22 +55,22 @@ class GapClosureTerm(Term):
 
     def factor(self, context: TermContext) -> Complex:
         """Of every seat, (n, k)."""
-        own = context.parameters
-        excess = np.array([context.state[rings].mean(axis=0) for rings in self._closed_by])
-        closed = smooth_step((excess - own["closing_difference"]) / own["width"])
-        return rows(context, *(1.0 - own["opening"] * (1.0 - closed)))
+        closed = np.array([context.state[rings].mean(axis=0) for rings in self._closed_by])
+        return rows(context, *(1.0 - context.parameters["opening"] * (1.0 - closed)))
 
     def advance(self, context: TermContext, step: float) -> Complex:
-        """Lagged excesses, and what they count from where that is the start, (n or 2 n, k) K."""
+        """How far each has closed, and what excesses count from where that is the start, (n or 2 n, k)."""
+        own, number = context.parameters, self._followed
         rings = context.temperatures[: self._rings]
-        rings = rings if self._followed > 1 else rings.mean(axis=0, keepdims=True)
-        if self.n_states == self._followed:
+        rings = rings if number > 1 else rings.mean(axis=0, keepdims=True)
+        if self.n_states == number:
             base = context.temperatures[self._rings :].mean(axis=0)
         else:
-            known = context.state[self._followed :]
+            known = context.state[number:]
             base = np.where(known.real == 0.0, rings, known)
-        lagged = relaxed(context.state[: self._followed], rings - base, step, context.parameters["lag"])
-        return lagged if self.n_states == self._followed else np.concatenate((lagged, base))
+        target = smooth_step((rings - base - own["closing_difference"]) / own["width"])
+        closed = relaxed(context.state[:number], target, step, own["lag"])
+        return closed if self.n_states == number else np.concatenate((closed, base))
 
 
 class GapClosure(Effect):

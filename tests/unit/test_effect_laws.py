@@ -225,20 +225,25 @@ def test_a_seat_is_open_cold_and_closed_warm():
     term = GapClosureTerm("t", ("joint.a", "joint.b"), ("ring",), ("bore",))
     own = {"opening": 0.95, "closing_difference": 8.0, "width": 0.5, "lag": 600.0}
 
-    def factor(excess):
-        return term.factor(context(term, temperatures=[300, 300], state=[excess], **own)).real[:, 0]
+    def factor(excess, seconds):
+        seen = context(term, temperatures=[300.0 + excess, 300.0], state=[0.0], **own)
+        state = term.advance(seen, seconds)[:, 0].real
+        return term.factor(context(term, temperatures=[300, 300], state=state, **own)).real[:, 0]
 
-    assert factor(-10.0) == pytest.approx(0.05)
-    assert factor(8.0) == pytest.approx(1.0 - 0.95 / 2.0)
-    assert factor(30.0) == pytest.approx(1.0)
+    assert factor(-10.0, 1e6) == pytest.approx(0.05)
+    assert factor(8.0, 1e6) == pytest.approx(1.0 - 0.95 / 2.0)
+    assert factor(30.0, 1e6) == pytest.approx(1.0)
+    assert factor(30.0, 600.0) == pytest.approx(1.0 - 0.95 * np.exp(-1.0))
 
 
 def test_a_ring_remembers_where_it_began():
     term = GapClosureTerm("t", ("joint.a",), ("r1", "r2"), ())
-    begun = term.advance(context(term, temperatures=[299.0, 301.0], state=[0.0, 0.0], lag=100.0), 10.0)
-    assert begun[:, 0].real == pytest.approx([0.0, 300.0])
-    later = context(term, temperatures=[309.0, 311.0], state=[0.0, 300.0], lag=100.0)
-    assert term.advance(later, 100.0)[:, 0].real == pytest.approx([10.0 * (1.0 - np.exp(-1.0)), 300.0])
+    own = {"closing_difference": 10.0, "width": 2.0, "lag": 100.0}
+    seen = context(term, temperatures=[299.0, 301.0], state=[0.0, 0.0], **own)
+    closed, began = term.advance(seen, 1e5)[:, 0].real
+    assert (closed, began) == (pytest.approx(1.0 / (1.0 + np.exp(5.0))), pytest.approx(300.0))
+    later = context(term, temperatures=[309.0, 311.0], state=[0.0, 300.0], **own)
+    assert term.advance(later, 100.0)[:, 0].real == pytest.approx([0.5 * (1.0 - np.exp(-1.0)), 300.0])
 
 
 def test_each_ring_closes_its_own_seat_and_all_of_them_a_spacers():
@@ -246,10 +251,10 @@ def test_each_ring_closes_its_own_seat_and_all_of_them_a_spacers():
     term = GapClosureTerm("t", ("joint.a", "joint.b", "joint.spacer"), ("r1", "r2"), ("bore",), owners)
     own = {"opening": 0.9, "closing_difference": 8.0, "width": 0.5, "lag": 100.0}
     seen = context(term, temperatures=[300.0, 320.0, 300.0], state=[0.0, 0.0], **own)
-    excess = term.advance(seen, 1e5)[:, 0].real
-    assert excess == pytest.approx([0.0, 20.0])
-    factor = term.factor(context(term, temperatures=[300.0, 320.0, 300.0], state=excess, **own)).real[:, 0]
-    assert factor == pytest.approx([0.1, 1.0, 1.0 - 0.9 / (1.0 + np.exp(4.0))], rel=1e-4)
+    closed = term.advance(seen, 1e5)[:, 0].real
+    assert closed == pytest.approx([0.0, 1.0], abs=1e-6)
+    factor = term.factor(context(term, temperatures=[300.0, 320.0, 300.0], state=closed, **own)).real[:, 0]
+    assert factor == pytest.approx([0.1, 1.0, 0.55], abs=1e-6)
 
 
 def test_a_room_drifts_from_one_instant_to_another():
