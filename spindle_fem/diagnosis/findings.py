@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 LEVEL = 0.90
 DRAWS = 400
 # Laws of the catalogue are not exact: what the fit alone leaves open is less than what is not known.
-# Widened by 2, 95 % of 261 parameters of concealed recordings (seeds 20 and 22 to 24) lay inside, by 1.7
-# some 92 %.
+# Widened by 2, 95 % of 261 parameters of concealed recordings (seeds 20 and 22 to 24) lay inside; by how far
+# they lay, some 92 % do with 1.7.
 INTERVAL_WIDENING = 1.7
 
 
