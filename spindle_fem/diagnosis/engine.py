@@ -145,7 +145,7 @@ class Search:
             self.progress(f"diagnosis: {size + 1} effects")
             # A third effect is rare: it is looked for only where two leave something.
             beam = int(size == 1) if self._explained(best) else BEAM
-            for hypothesis in self._extended(ranked, beam):
+            for hypothesis in self._to_extend(ranked, beam):
                 screened, intervals = self.screened(hypothesis.fit)
                 self._extend(hypothesis.fit, screened, intervals, 1, ADDITIONS)
         self._improve()
@@ -165,14 +165,16 @@ class Search:
             self._widen()
             self._reduce()
 
-    def _extended(self, ranked: Sequence[Hypothesis], number: int) -> list[Hypothesis]:
+    def _to_extend(self, ranked: Sequence[Hypothesis], number: int) -> list[Hypothesis]:
         """The best of so many combinations, and of laws alone where all of those hold a way out."""
         different = self._different(ranked)
         chosen = different[:number]
-        if chosen and all(any(self._in_intervals(c) for c in h.fit.candidates) for h in chosen):
-            laws = [h for h in different if not any(self._in_intervals(c) for c in h.fit.candidates)]
-            chosen += laws[:1]
+        if chosen and not any(self._only_laws(h) for h in chosen):
+            chosen += [h for h in different if self._only_laws(h)][:1]
         return chosen
+
+    def _only_laws(self, hypothesis: Hypothesis) -> bool:
+        return not any(self._in_intervals(c) for c in hypothesis.fit.candidates)
 
     def _different(self, ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best hypothesis of each combination of effects.

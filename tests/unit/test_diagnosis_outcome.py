@@ -311,8 +311,8 @@ def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
 def test_laws_are_extended_beside_a_way_out(case, heated):
     search = search_over(case, heated)
     out, law = heated.hypotheses[:2]
-    assert search._extended([out, law], 1) == [out, law]
-    assert search._extended([law, out], 1) == [law]
+    assert search._to_extend([out, law], 1) == [out, law]
+    assert search._to_extend([law, out], 1) == [law]
 
 
 class Tabled(Search):
