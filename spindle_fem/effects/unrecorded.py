@@ -27,8 +27,6 @@ JITTER = 0.1
 FOLLOWING = "following"
 # Share of its beginning at which a pulse after a change counts as over.
 PULSE_ENDS = 0.05
-# Of the first harmonic around the axis (1: all along one line) from which on a side is named.
-ONE_SIDED = 0.3
 Array = NDArray[np.float64]
 # A quantity is followed where it varies by more than this share of its largest value.
 SMALLEST_VARIATION = 0.05
@@ -309,18 +307,6 @@ def quantity_followed(machine: MachineView, candidate: Candidate) -> RecordedQua
     """The same with what is known of it; None where it follows none."""
     name = followed_name(candidate)
     return next((item for item in machine.quantities if item.name == name), None)
-
-
-def side_words(reported: Mapping[str, Reported]) -> str:
-    """On which side of its place most of it is, by the angle from y as probes have it; empty where on none.
-
-    >>> side_words({"up": Reported(0.0, ""), "across": Reported(-0.6, "")})
-    ', mostly around θ = 270°'
-    """
-    up, across = (reported[name].value if name in reported else 0.0 for name in ("up", "across"))
-    if np.hypot(up, across) < ONE_SIDED:
-        return ""
-    return f", mostly around θ = {np.degrees(np.arctan2(across, up)) % 360.0:.0f}°"
 
 
 def when_words(candidate: Candidate, reported: Mapping[str, Reported]) -> str:

@@ -13,7 +13,6 @@ from spindle_fem.effects.unrecorded import (
     UnrecordedEffect,
     UnrecordedHeatTerm,
     UnrecordedTerm,
-    side_words,
     when_words,
 )
 from spindle_fem.effects.view import MachineView, RecordedQuantity
@@ -83,5 +82,5 @@ class UnrecordedCooling(UnrecordedEffect):
         way = " to the surroundings" if size.unit == "W/K" else ""
         return (
             f"A further {quantity(size)}{way} is lost from "
-            f"{place_words(candidate.component)}{side_words(reported)}{when_words(candidate, reported)}."
+            f"{place_words(candidate.component)}{when_words(candidate, reported)}."
         )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from spindle_fem.effects.base import Candidate, Reported, capital, place_words, quantity
 from spindle_fem.effects.laws import amplitude
 from spindle_fem.effects.spread import Spread
-from spindle_fem.effects.unrecorded import Share, UnrecordedEffect, UnrecordedHeatTerm, side_words, when_words
+from spindle_fem.effects.unrecorded import Share, UnrecordedEffect, UnrecordedHeatTerm, when_words
 from spindle_fem.effects.view import MachineView, RecordedQuantity
 
 
@@ -44,5 +44,5 @@ class UnrecordedHeatSource(UnrecordedEffect):
         """How much, and how often."""
         return (
             f"{capital(quantity(reported['heat']))} of heat enters "
-            f"{place_words(candidate.component)}{side_words(reported)}{when_words(candidate, reported)}."
+            f"{place_words(candidate.component)}{when_words(candidate, reported)}."
         )
