@@ -20,16 +20,16 @@ import numpy as np
 from scipy.optimize import root
 from scipy.special import ellipe, ellipk
 
-from spindle_fem.tribology.bearing import BearingGeometry
-from spindle_fem.tribology.bearing_set import (
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_set import (
     BearingSet,
     MountedBearing,
     solve_bearing,
     solve_bearing_set,
     uniform_temperatures,
 )
-from spindle_fem.tribology.grease import Lubricant
-from spindle_fem.tribology.hertz import INNER
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.hertz import INNER
 
 FRONT = BearingGeometry(
     14.2875e-3, 30, 165e-3, math.radians(15.0), 0.52, 0.52, bore_diameter=0.14, outer_diameter=0.19

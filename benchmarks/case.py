@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.coupling import CoupledState, PreparedMachine, solve_coupled
-from spindle_fem.meshing.tagged_mesh import Joint, TaggedMesh
+from spindle_fem.machine.meshing.tagged_mesh import Joint, TaggedMesh
+from spindle_fem.solvers.coupled_steady import CoupledState, PreparedMachine, solve_coupled
 
 STEPS = 100
 STEP_S = 60.0
@@ -135,7 +135,7 @@ def surface_loads(machine: PreparedMachine, coupled: CoupledState) -> dict[str, 
 
 def loads_of(machine: PreparedMachine) -> dict[str, SurfaceLoad]:
     """Loads of a machine at its own operating point, from its coupled solution."""
-    from spindle_fem.loads.operating_point import OperatingPoint
+    from spindle_fem.operation.operating_point import OperatingPoint
 
     return surface_loads(machine, solve_coupled(machine, OperatingPoint.of(machine.spec)))
 

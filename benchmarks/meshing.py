@@ -11,13 +11,13 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.geometry.solids import build_solids, gmsh_session
-from spindle_fem.meshing.generate import LADDER, mesh_once
-from spindle_fem.meshing.quality import area_errors, require_quality, volume_errors
-from spindle_fem.meshing.sizes import build_sizes
-from spindle_fem.meshing.tags import tag_mesh
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.machine.geometry.cad_solids import build_solids, gmsh_session
+from spindle_fem.machine.meshing.generate import LADDER, mesh_once
+from spindle_fem.machine.meshing.quality import area_errors, require_quality, volume_errors
+from spindle_fem.machine.meshing.sizes import build_sizes
+from spindle_fem.machine.meshing.tags import tag_mesh
 
 
 def timed(label: str, function: Callable[[], Any]) -> Any:

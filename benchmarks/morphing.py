@@ -3,7 +3,7 @@
     python benchmarks/morphing.py [--machine recorded_spindle] [--preset normal] [--random 0]
 
 For each design: processor seconds of a new mesh and of moving that of the
-design's lattice point (``spindle_fem.design.morphing``), the worst element of
+design's lattice point (``spindle_fem.studies.sweep.morphing``), the worst element of
 both, and how far the temperatures on both lie apart; beside it what a mesh of
 1.5 times the element size changes. With ``--random``, that many designs drawn
 around the machine's channel after those below.
@@ -16,18 +16,18 @@ import time
 
 import numpy as np
 
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.coupling import machine_on_mesh, prepare_machine
-from spindle_fem.design.channel_map import MOVABLE
-from spindle_fem.design.morphing import LATTICE, lattice_assembly, lattice_machine, move_mesh
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import MeshQualityError, SpindleFemError
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.meshing.build import build_mesh
-from spindle_fem.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.machine.meshing.build_mesh import build_mesh
+from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.results.thermal_result import ThermalResult
-from spindle_fem.solve import solve_prepared
-from spindle_fem.spec.load import load_machine
-from spindle_fem.spec.model import MachineSpec
+from spindle_fem.solvers.coupled_steady import machine_on_mesh, prepare_machine
+from spindle_fem.studies.solve_machine import solve_prepared
+from spindle_fem.studies.sweep.channel_map import MOVABLE
+from spindle_fem.studies.sweep.morphing import LATTICE, lattice_assembly, lattice_machine, move_mesh
 
 # Shares of a lattice step by which the channel differs from the machine's own; each alone, then together.
 SHARES = (0.3, 0.5, -0.3, -0.48)

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from spindle_fem.conduction.memory import room
-from spindle_fem.conduction.threads import fill_rows, unsigned, use_compiled
 from spindle_fem.errors import SpecError
-from spindle_fem.meshing.tagged_mesh import Joint, TaggedMesh
+from spindle_fem.machine.meshing.tagged_mesh import Joint, TaggedMesh
+from spindle_fem.model.mesh.huge_pages import room
+from spindle_fem.model.mesh.threads import fill_rows, unsigned, use_compiled
 
 # Rows in which neighbours in the order may change places.
 NUMBERED_TOGETHER = 512
@@ -79,7 +79,7 @@ def _graph(tetrahedra: NDArray[np.int64], n: int) -> sparse.csr_matrix:
 
 
 def _compiled_graph(tetrahedra: NDArray[np.int64], n: int) -> sparse.csr_matrix:
-    from spindle_fem.conduction import compiled_assembly as compiled
+    from spindle_fem.model.mesh.kernels import assembly_loops as compiled
 
     nodes = np.ascontiguousarray(tetrahedra, dtype=np.int32).view(np.uint32)
     around = room(nodes.size, np.int32)

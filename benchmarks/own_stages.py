@@ -15,20 +15,20 @@ import tempfile
 import time
 from pathlib import Path
 
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.steady import solve_steady
-from spindle_fem.conduction.transient import StepControl, integrate, uniform_state
-from spindle_fem.coupling import machine_on_mesh, solve_coupled
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.meshing.build import build_mesh
-from spindle_fem.network.machine import build_machine_network
-from spindle_fem.network.machine_steady import solve_machine_network
-from spindle_fem.reduced.build import build_reduced_model
-from spindle_fem.reporting.report import peak_memory_MB
-from spindle_fem.reporting.run_outputs import write_outputs
-from spindle_fem.solve import solve_prepared, with_heat_study
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.machine.meshing.build_mesh import build_mesh
+from spindle_fem.model.lumped.machine_network import build_machine_network
+from spindle_fem.model.lumped.machine_steady import solve_machine_network
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.steady_conduction import solve_steady
+from spindle_fem.model.mesh.time_stepper import StepControl, integrate, uniform_state
+from spindle_fem.model.reduced.build_reduced import build_reduced_model
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.report.run_outputs import write_outputs
+from spindle_fem.report.run_report import peak_memory_MB
+from spindle_fem.solvers.coupled_steady import machine_on_mesh, solve_coupled
+from spindle_fem.studies.solve_machine import solve_prepared, with_heat_study
 
 STEP_S = 60.0
 

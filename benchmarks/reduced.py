@@ -18,22 +18,22 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from spindle_fem.coupling import PreparedMachine, prepare_machine
-from spindle_fem.effects.term import Term, TermParameter
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.reduced.adjoint import fast_gradient
-from spindle_fem.reduced.coefficients import free_parameters
-from spindle_fem.reduced.drive import STANDARD, make_drive
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.start import Start
-from spindle_fem.reduced.steady import SteadyDesigns
-from spindle_fem.reduced.transient import TransientRun, simulate_fast
-from spindle_fem.simulate import fast_model_for
-from spindle_fem.solve import solve_prepared
-from spindle_fem.spec.load import load_machine, read_toml
-from spindle_fem.spec.model import MachineSpec
-from spindle_fem.spec.parameters import with_parameters
-from spindle_fem.transients.study import StudyResult, run_study, study_of
+from spindle_fem.definition.load import load_machine, read_toml
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.uncertain_parameters import with_parameters
+from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.model.reduced.adjoint import fast_gradient
+from spindle_fem.model.reduced.coefficients import free_parameters
+from spindle_fem.model.reduced.drive import STANDARD, make_drive
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
+from spindle_fem.model.reduced.run_start import Start
+from spindle_fem.model.reduced.steady_designs import SteadyDesigns
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
+from spindle_fem.studies.simulate import fast_model_for
+from spindle_fem.studies.solve_machine import solve_prepared
+from spindle_fem.studies.transient_study import StudyResult, run_study, study_of
 
 RPM = np.pi / 30.0
 HELD = np.array([True, True, False, False, True])

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from spindle_fem.conduction import threads
+from spindle_fem.model.mesh import threads
 
 HERE = Path(__file__).resolve().parent
 REPEATS = 20
@@ -60,7 +60,7 @@ def measure(case: Path) -> dict:
         "product_s": {"scipy": fastest(lambda: matrix @ vector)},
     }
     if threads.has_compiled():
-        from spindle_fem.conduction import compiled_solver
+        from spindle_fem.model.mesh.kernels import solver_loops as compiled_solver
 
         for count in (1, 2):
             bounds = np.linspace(0, n, count + 1).astype(np.int64)

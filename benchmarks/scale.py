@@ -22,10 +22,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from spindle_fem.design import run as runner
-from spindle_fem.design.evaluate import DesignTask, Question, evaluate_tasks
-from spindle_fem.design.sweep import PreparedStudy, prepare_study
-from spindle_fem.design.table import ResultTable, Row
+from spindle_fem.commands.sweep_command import PreparedStudy, prepare_study
+from spindle_fem.studies.sweep import run_tasks as runner
+from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, evaluate_tasks
+from spindle_fem.studies.sweep.results_table import ResultTable, Row
 
 MILLION = 1_000_000
 STUDY = """

@@ -22,10 +22,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from spindle_fem.design.evaluate import evaluate
-from spindle_fem.design.fast.backend import GroupTask, answer_tasks, model_of
-from spindle_fem.design.sweep import prepare_study, sweep_machine
-from spindle_fem.design.table import read_results
+from spindle_fem.commands.sweep_command import prepare_study, sweep_machine
+from spindle_fem.studies.sweep.evaluate_design import evaluate
+from spindle_fem.studies.sweep.fast.backend import GroupTask, answer_tasks, model_of
+from spindle_fem.studies.sweep.results_table import read_results
 
 STUDY = """
 schema = "spindle-fem/study/1"

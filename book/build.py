@@ -12,8 +12,8 @@ from book.chapters import ENTRIES
 from book.page import Chapter, Entry, Pictures, environment, render_chapter
 from book.work import Desk, fingerprint
 from spindle_fem.errors import BadInputError
-from spindle_fem.reporting.document import Section
-from spindle_fem.reporting.output import replace_text
+from spindle_fem.report.block_page import Section
+from spindle_fem.results.output_folder import replace_text
 
 CLAIMS = Path(__file__).parent / "claims.toml"
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
-from spindle_fem.reporting.figures import CYCLE, INK, MUTED, new_figure, set_title, styled
+from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, set_title, styled
 from validation.asked import wilson
 
 GOOD, FAIR, SILENT, WRONG = "#1b6e3c", "#8fc3a1", "#c9d1d9", "#a3131c"

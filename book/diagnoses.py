@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from book.page import Pictures
-from spindle_fem.reporting.diagnosis_report import CAPTIONS
-from spindle_fem.reporting.diagnosis_tables import (
+from spindle_fem.report.block_page import Bullets, Notice, Text, illustration_of
+from spindle_fem.report.diagnosis_report import CAPTIONS
+from spindle_fem.report.diagnosis_tables import (
     cards,
     channel_table,
     fit_table,
@@ -17,9 +18,8 @@ from spindle_fem.reporting.diagnosis_tables import (
     set_tables,
     where_text,
 )
-from spindle_fem.reporting.diagnosis_words import confidence_words, verdict_sentence
-from spindle_fem.reporting.document import Bullets, Notice, Text, illustration_of
-from spindle_fem.reporting.output import is_complete
+from spindle_fem.report.diagnosis_words import confidence_words, verdict_sentence
+from spindle_fem.results.output_folder import is_complete
 
 
 def finished(folder: Path) -> bool:

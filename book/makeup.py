@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.reporting.document import Table
-from spindle_fem.reporting.tables import column, rows_of
+from spindle_fem.report.block_page import Table
+from spindle_fem.report.run_tables import column, rows_of
 
 _DONE = ("gaps", "empty", "spikes", "doubled", "swapped")
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spindle_fem import __version__
-from spindle_fem.reporting.document import Illustration, Section, illustration_of
-from spindle_fem.reporting.figures import save_png
+from spindle_fem.report.block_page import Illustration, Section, illustration_of
+from spindle_fem.report.figure_style import save_png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -108,7 +108,7 @@ def environment() -> Any:
         loader=jinja2.ChoiceLoader(
             [
                 jinja2.FileSystemLoader(TEMPLATES),
-                jinja2.PackageLoader("spindle_fem.reporting", "templates"),
+                jinja2.PackageLoader("spindle_fem.report", "templates"),
             ]
         ),
         autoescape=jinja2.select_autoescape(["html", "j2"]),

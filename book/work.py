@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from spindle_fem.errors import BadInputError
-from spindle_fem.reporting.output import replace_text
+from spindle_fem.results.output_folder import replace_text
 
 ROOT = Path(__file__).parents[1]
 STAMP = "step.json"

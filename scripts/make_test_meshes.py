@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from spindle_fem.geometry.assembly import (
+from spindle_fem.machine.geometry.assembly import (
     AnnularSegment,
     AssemblyGeometry,
     FaceBox,
@@ -15,10 +15,10 @@ from spindle_fem.geometry.assembly import (
     SurfaceDefinition,
     assemble,
 )
-from spindle_fem.geometry.channel import ChannelDefinition
-from spindle_fem.meshing.build import build_mesh
-from spindle_fem.meshing.cache import file_checksum, save_npz
-from spindle_fem.meshing.io import CHECKSUMS, named_mesh_folder
+from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
+from spindle_fem.machine.meshing.build_mesh import build_mesh
+from spindle_fem.machine.meshing.mesh_cache import file_checksum, save_npz
+from spindle_fem.machine.meshing.mesh_files import CHECKSUMS, named_mesh_folder
 
 MILLIMETRE = 1.0e-3
 

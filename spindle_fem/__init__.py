@@ -12,13 +12,13 @@ from typing import Any
 __version__ = "0.1.0"
 
 _PLACES = {
-    "load_machine": "spindle_fem.spec.load",
-    "solve": "spindle_fem.solve",
-    "run_machine": "spindle_fem.commands",
-    "check_machine": "spindle_fem.commands",
-    "mesh_machine": "spindle_fem.commands",
-    "heat_table": "spindle_fem.commands",
-    "bearing_report": "spindle_fem.tribology.bearing_file",
+    "load_machine": "spindle_fem.definition.load",
+    "solve": "spindle_fem.studies.solve_machine",
+    "run_machine": "spindle_fem.commands.machine_commands",
+    "check_machine": "spindle_fem.commands.machine_commands",
+    "mesh_machine": "spindle_fem.commands.machine_commands",
+    "heat_table": "spindle_fem.commands.machine_commands",
+    "bearing_report": "spindle_fem.physics.bearings.bearing_file",
 }
 __all__ = ["__version__", *_PLACES]
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import sys
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
@@ -19,6 +20,10 @@ from numpy.typing import NDArray
 
 CACHE_VARIABLE = "SPINDLE_FEM_CACHE"
 _PACKAGE = Path(__file__).parent
+# Imports at the start of a line or inside a function, on one line or in parentheses.
+_IMPORT = re.compile(
+    rf"^\s*(?:from|import) ({_PACKAGE.name}(?:\.\w+)*)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE
+)
 
 
 def cache_directory() -> Path:
@@ -35,16 +40,16 @@ def cache_directory() -> Path:
 
 
 @cache
-def source_digest(*names: str) -> str:
-    """Hash of the source of some modules or subpackages of spindle_fem.
+def source_digest(*modules: str) -> str:
+    """Hash of the source of modules and of everything of this package that they import.
 
     Part of a cache key, so that what an older version of the code made is
     never taken for what this version would make.
 
     Parameters
     ----------
-    *names : str
-        Like ``"meshing"`` or ``"coupling"``.
+    *modules : str
+        Full names, as ``__name__`` has them.
 
     Raises
     ------
@@ -52,12 +57,39 @@ def source_digest(*names: str) -> str:
         There is no such module.
     """
     found = hashlib.sha256()
-    for name in names:
-        folder = _PACKAGE / name
-        for path in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]:
-            found.update(path.relative_to(_PACKAGE).as_posix().encode())
-            found.update(path.read_bytes())
+    for name, path in sorted(_with_imports(modules).items()):
+        found.update(name.encode())
+        found.update(path.read_bytes())
     return found.hexdigest()
+
+
+def _with_imports(modules: Sequence[str]) -> dict[str, Path]:
+    """Files of modules and of all that they import from this package, by module name."""
+    found: dict[str, Path] = {}
+    waiting = list(modules)
+    while waiting:
+        name = waiting.pop()
+        if name in found:
+            continue
+        path = _module_file(name)
+        if path is None:
+            raise FileNotFoundError(f"there is no module {name}")
+        found[name] = path
+        for package, listed in _IMPORT.findall(path.read_text(encoding="utf-8")):
+            # What is imported from a package may be a module of it or a name inside it.
+            members = (f"{package}.{member}" for member in re.findall(r"\w+", listed))
+            waiting += [item for item in (package, *members) if _module_file(item) is not None]
+    return found
+
+
+@cache
+def _module_file(name: str) -> Path | None:
+    package, *rest = name.split(".")
+    if package != _PACKAGE.name:
+        return None
+    path = _PACKAGE.joinpath(*rest)
+    candidates = (path / "__init__.py", path.with_suffix(".py"))
+    return next((file for file in candidates if file.is_file()), None)
 
 
 def save_record(record: Any, path: Path, schema: str) -> None:

@@ -66,8 +66,8 @@ def run(
     ] = False,
 ) -> None:
     """Geometry, mesh, heat, films, solve, pictures, report."""
-    from spindle_fem.commands import run_machine
-    from spindle_fem.console import print_run
+    from spindle_fem.commands.console import print_run
+    from spindle_fem.commands.machine_commands import run_machine
 
     summary = run_machine(
         machine, output, overrides=set_ or (), estimate_mesh_error=estimate_mesh_error, progress=not as_json
@@ -78,8 +78,8 @@ def run(
 @app.command()
 def check(machine: Machine, set_: Overrides = None, as_json: AsJson = False) -> None:
     """Validate a machine without solving; every fault at once."""
-    from spindle_fem.commands import check_machine
-    from spindle_fem.console import print_check
+    from spindle_fem.commands.console import print_check
+    from spindle_fem.commands.machine_commands import check_machine
 
     content = check_machine(machine, overrides=set_ or ())
     _print_json(content) if as_json else print_check(content)
@@ -93,8 +93,8 @@ def mesh(
     as_json: AsJson = False,
 ) -> None:
     """Write the mesh (.msh, .vtu with named parts and surfaces) or the solid model (.step)."""
-    from spindle_fem.commands import mesh_machine
-    from spindle_fem.console import print_pairs
+    from spindle_fem.commands.console import print_pairs
+    from spindle_fem.commands.machine_commands import mesh_machine
 
     content = mesh_machine(machine, output, overrides=set_ or ())
     _print_json(content) if as_json else print_pairs(f"wrote {output}", content)
@@ -118,8 +118,8 @@ def heat(
     as_json: AsJson = False,
 ) -> None:
     """Bearing loads, angles, films and heat term by term over speed."""
-    from spindle_fem.commands import heat_table
-    from spindle_fem.console import print_heat
+    from spindle_fem.commands.console import print_heat
+    from spindle_fem.commands.machine_commands import heat_table
 
     content = heat_table(
         machine,
@@ -138,8 +138,8 @@ def bearing(
     as_json: AsJson = False,
 ) -> None:
     """One bearing or one preloaded set, without a machine."""
-    from spindle_fem.console import print_bearing
-    from spindle_fem.tribology.bearing_file import bearing_report
+    from spindle_fem.commands.console import print_bearing
+    from spindle_fem.physics.bearings.bearing_file import bearing_report
 
     content = bearing_report(file)
     _print_json(content) if as_json else print_bearing(content)
@@ -148,9 +148,9 @@ def bearing(
 @app.command()
 def crosscheck(machine: Machine, output: Folder, set_: Overrides = None, as_json: AsJson = False) -> None:
     """Lumped network beside the FEM, node by node, and why they differ."""
-    from spindle_fem.commands import stages
-    from spindle_fem.console import print_crosscheck
-    from spindle_fem.crosscheck.run import crosscheck_machine
+    from spindle_fem.commands.console import print_crosscheck
+    from spindle_fem.commands.crosscheck_command import crosscheck_machine
+    from spindle_fem.commands.machine_commands import stages
 
     with stages(not as_json) as tell:
         content = crosscheck_machine(machine, output, overrides=set_ or (), progress=tell)
@@ -170,8 +170,8 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Channel design iterations: every design a solved machine; stopped studies go on."""
-    from spindle_fem.console import print_sweep
-    from spindle_fem.design.sweep import sweep_machine
+    from spindle_fem.commands.console import print_sweep
+    from spindle_fem.commands.sweep_command import sweep_machine
 
     content = sweep_machine(
         machine,
@@ -195,9 +195,9 @@ def transient(
     as_json: AsJson = False,
 ) -> None:
     """Heat-up, step test or cool-down by the full finite-element model."""
-    from spindle_fem.commands import stages
-    from spindle_fem.console import print_transient
-    from spindle_fem.transient_run import run_transient_study
+    from spindle_fem.commands.console import print_transient
+    from spindle_fem.commands.machine_commands import stages
+    from spindle_fem.commands.transient_command import run_transient_study
 
     with stages(not as_json) as tell:
         content = run_transient_study(
@@ -223,9 +223,9 @@ def simulate(
     as_json: AsJson = False,
 ) -> None:
     """What every channel of a recording should have read, beside what it read."""
-    from spindle_fem.commands import stages
-    from spindle_fem.console import print_simulation
-    from spindle_fem.simulate import simulate_machine
+    from spindle_fem.commands.console import print_simulation
+    from spindle_fem.commands.machine_commands import stages
+    from spindle_fem.studies.simulate import simulate_machine
 
     with stages(not as_json) as tell:
         content = simulate_machine(
@@ -271,9 +271,9 @@ def diagnose(
     as_json: AsJson = False,
 ) -> None:
     """Where a recording and the model differ, which physics was left out, and how the fit improves."""
-    from spindle_fem.commands import stages
-    from spindle_fem.console import print_diagnosis
-    from spindle_fem.diagnosis.run import diagnose as diagnose_machine
+    from spindle_fem.commands.console import print_diagnosis
+    from spindle_fem.commands.diagnose_command import diagnose as diagnose_machine
+    from spindle_fem.commands.machine_commands import stages
 
     with stages(not as_json) as tell:
         content = diagnose_machine(
@@ -294,7 +294,7 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier command.")],
 ) -> None:
     """Rebuild the report of an output folder."""
-    from spindle_fem.commands import rebuild
+    from spindle_fem.commands.machine_commands import rebuild
 
     typer.echo(f"wrote {rebuild(folder)}")
 

@@ -3,7 +3,7 @@
 ``python -m validation.frozen_numbers freeze`` runs every case below through the command line and keeps
 its numbers in ``validation/frozen/CASE.json``; ``... compare`` runs them again and lists every number
 that moved by more than the case allows, relative to its size. ``--case`` picks some, ``--work`` names the
-folder of the runs. Everything goes through the command line: a new layout of the package changes nothing here.
+folder of the runs. Everything goes through the command line, so a new layout of the package changes nothing.
 """
 
 import argparse
@@ -25,7 +25,19 @@ COARSE = ("--set", "mesh.preset=coarse")
 # The full model is compared to its linear solver's tolerance, fast models to their fits' stopping limits.
 FULL, FAST = 1e-9, 1e-6
 # Keys that tell of the machine and the moment, not of the result.
-PASSING = ("versions", "wall", "timings", "rss", "_MB", "seconds", "path", "created", "digest", "hash", "host")
+PASSING = (
+    "versions",
+    "wall",
+    "timings",
+    "rss",
+    "_MB",
+    "seconds",
+    "path",
+    "created",
+    "digest",
+    "hash",
+    "host",
+)
 
 
 @dataclass(frozen=True)
@@ -70,7 +82,9 @@ CASES = {
     "run_two_start": Case(("run", "small_two_start", *COARSE, "-o", "{out}", "--json")),
     "run_uncooled": Case(("run", "uncooled", *COARSE, "-o", "{out}", "--json")),
     "heat": Case(("heat", "wu_tan_2016", "--json")),
-    "crosscheck": Case(("crosscheck", "wu_tan_2016", *COARSE, "-o", "{out}", "--json"), FULL, ("crosscheck.json",)),
+    "crosscheck": Case(
+        ("crosscheck", "wu_tan_2016", *COARSE, "-o", "{out}", "--json"), FULL, ("crosscheck.json",)
+    ),
     "transient": Case(
         ("transient", "{root}/validation/frozen/heat_up.toml", *COARSE, "-o", "{out}", "--json"), FAST
     ),

@@ -1,6 +1,6 @@
 """How often a first set is right, by its evidence (``python -m validation.reliability STUDY=RESULTS``).
 
-Fits what :mod:`spindle_fem.diagnosis.reliability` states, by maximum likelihood
+Fits what :mod:`spindle_fem.inference.reliability` states, by maximum likelihood
 over diagnoses of concealed recordings that named something of the catalogue.
 """
 

@@ -190,7 +190,7 @@ def errors_by_speed(inputs: FilePath, simulated: FilePath) -> list[dict[str, Any
 
 def diagnose_riddle(folder: FilePath, result: FilePath, mesh: str, *, report: bool) -> dict[str, Any]:
     """Diagnose from the inputs alone."""
-    from spindle_fem.diagnosis.run import diagnose
+    from spindle_fem.commands.diagnose_command import diagnose
 
     inputs = folder / "inputs" / NAME
     calibration = inputs / "calibration.toml"

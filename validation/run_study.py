@@ -19,7 +19,7 @@ MACHINE = "recorded_spindle"
 
 def diagnose_case(inputs: Path, result: Path, machine: str, overrides: tuple[str, ...], report: bool) -> str:
     """Diagnose one case, in this process; returns the verdict or what went wrong."""
-    from spindle_fem.diagnosis.run import diagnose
+    from spindle_fem.commands.diagnose_command import diagnose
 
     result.mkdir(parents=True, exist_ok=True)
     calibration = inputs / "calibration.toml"

@@ -14,16 +14,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from case import STEP_S, divided, merged_nodes, read_case
 from numbering import numbered
 
-from spindle_fem.conduction import threads
-from spindle_fem.conduction.assemble import assemble_capacity, assemble_load, assemble_system
-from spindle_fem.conduction.guesses import SolvedSpace
-from spindle_fem.conduction.linear_solvers import build_preconditioner, multiply, solve_linear
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film
-from spindle_fem.conduction.stage import add_scaled
-from spindle_fem.conduction.system import ThermalSystem, merged
-from spindle_fem.meshing.simple import build_joined_tubes
-from spindle_fem.meshing.tagged_mesh import Joint, TaggedMesh
+from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
+from spindle_fem.machine.meshing.tagged_mesh import Joint, TaggedMesh
+from spindle_fem.model.mesh import threads
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film
+from spindle_fem.model.mesh.equations import assemble_capacity, assemble_load, assemble_system
+from spindle_fem.model.mesh.first_guesses import SolvedSpace
+from spindle_fem.model.mesh.linear_solvers import build_preconditioner, multiply, solve_linear
+from spindle_fem.model.mesh.linear_system import ThermalSystem, merged
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.time_stage import add_scaled
 
 # Estimated error that each step may leave.
 STEP_TOLERANCE_K = 1e-6

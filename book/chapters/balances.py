@@ -11,9 +11,9 @@ from typing import Any
 
 from book.page import Chapter, Pictures
 from book.work import ROOT, Desk, read_json
-from spindle_fem.reporting.document import Section, Table, Text
-from spindle_fem.reporting.output import replace_text
-from spindle_fem.reporting.tables import column, number, readable, rows_of, significant
+from spindle_fem.report.block_page import Section, Table, Text
+from spindle_fem.report.run_tables import column, number, readable, rows_of, significant
+from spindle_fem.results.output_folder import replace_text
 
 TITLE = "Energy balance and mesh independence"
 MACHINES = ("wu_tan_2016", "recorded_spindle", "small_two_start", "uncooled")
@@ -95,10 +95,10 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
 
 def _solved(desk: Desk, machine: str, preset: str) -> dict[str, Any]:
     def run(folder: Path) -> None:
-        from spindle_fem.checks import require_checks
-        from spindle_fem.results.summary import build_summary
-        from spindle_fem.solve import solve
-        from spindle_fem.spec.load import load_machine
+        from spindle_fem.definition.load import load_machine
+        from spindle_fem.results.run_summary import build_summary
+        from spindle_fem.studies.run_checks import require_checks
+        from spindle_fem.studies.solve_machine import solve
 
         started = time.perf_counter()
         result = solve(load_machine(machine, (f"mesh.preset={preset}",)))

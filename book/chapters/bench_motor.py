@@ -15,9 +15,9 @@ from book.diagnoses import (
 )
 from book.page import Chapter, Commands, Pictures
 from book.work import ROOT, Desk, read_json
-from spindle_fem.reporting.diagnosis_words import chance, set_words
-from spindle_fem.reporting.document import Notice, Section, Table, Text
-from spindle_fem.reporting.tables import column, number, rows_of, significant
+from spindle_fem.report.block_page import Notice, Section, Table, Text
+from spindle_fem.report.diagnosis_words import chance, set_words
+from spindle_fem.report.run_tables import column, number, rows_of, significant
 
 TITLE = "Bench motor: real recordings, blind"
 FOLDER = "bench_motor"
@@ -121,7 +121,7 @@ def _command(test: str, *, heldout: bool = False) -> str:
 
 
 def _run(place: Path, folder: Path) -> None:
-    from spindle_fem.diagnosis.run import diagnose
+    from spindle_fem.commands.diagnose_command import diagnose
 
     calibrate = [place / name for name in CALIBRATION]
     for test in TESTS:

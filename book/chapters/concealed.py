@@ -15,9 +15,9 @@ from book.causes import CAUSES, cause_counts, read_causes, study_seed, wrong_tab
 from book.makeup import makeup_tables
 from book.page import Chapter, Pictures
 from book.work import Desk
-from spindle_fem.reporting.document import Bullets, Notice, Section, Table, Text
-from spindle_fem.reporting.output import replace_text
-from spindle_fem.reporting.tables import column, number, rows_of, significant
+from spindle_fem.report.block_page import Bullets, Notice, Section, Table, Text
+from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.results.output_folder import replace_text
 from validation.asked import held_against_asked
 from validation.score import score_study
 

@@ -6,7 +6,7 @@ from book.measured import Test, read_tests, run_tests
 from book.page import Chapter, Pictures
 from book.tables import comparisons, tightest
 from book.work import Desk
-from spindle_fem.reporting.document import Section, Text
+from spindle_fem.report.block_page import Section, Text
 
 TITLE = "Networks, oil, fast model and transients against exact and full solutions"
 FILES = {

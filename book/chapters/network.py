@@ -9,8 +9,8 @@ from book.measured import read_tests, run_tests
 from book.page import Chapter, Pictures
 from book.tables import comparisons
 from book.work import Desk, read_json
-from spindle_fem.reporting.document import Section, Table, Text, illustration_of
-from spindle_fem.reporting.tables import column, number, rows_of, significant
+from spindle_fem.report.block_page import Section, Table, Text, illustration_of
+from spindle_fem.report.run_tables import column, number, rows_of, significant
 
 TITLE = "Lumped network against finite elements"
 MACHINE, MESH = "recorded_spindle", "coarse"
@@ -27,7 +27,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
     """Run the cross-check and the refinement tests."""
 
     def run(folder: Path) -> None:
-        from spindle_fem.crosscheck.run import crosscheck_machine
+        from spindle_fem.commands.crosscheck_command import crosscheck_machine
 
         crosscheck_machine(MACHINE, folder / "crosscheck", (f"mesh.preset={MESH}",))
 

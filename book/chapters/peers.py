@@ -15,9 +15,9 @@ import numpy as np
 from book.page import Chapter, Pictures
 from book.work import ROOT, Desk, read_json
 from spindle_fem.errors import BadInputError
-from spindle_fem.reporting.document import Section, Table, Text
-from spindle_fem.reporting.output import replace_text
-from spindle_fem.reporting.tables import column, number, rows_of, significant
+from spindle_fem.report.block_page import Section, Table, Text
+from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.results.output_folder import replace_text
 
 TITLE = "Other programs on the same mesh"
 SCRIPTS = ROOT / "benchmarks" / "peers"
@@ -179,8 +179,8 @@ def _plain_environment() -> dict[str, str]:
 def _write_case(folder: Path) -> Path:
     if (folder / "case.json").is_file():
         return folder
-    from spindle_fem.coupling import prepare_machine
-    from spindle_fem.spec.load import load_machine
+    from spindle_fem.definition.load import load_machine
+    from spindle_fem.solvers.coupled_steady import prepare_machine
 
     sys.path.insert(0, str(ROOT / "benchmarks"))
     try:

@@ -13,9 +13,9 @@ from book.causes import CAUSES, OPEN, read_causes
 from book.diagnoses import found_blocks, next_step_blocks, own_pictures, verdict_blocks
 from book.page import Chapter, Pictures
 from book.work import Desk, read_json
-from spindle_fem.reporting.diagnosis_words import chance, set_words
-from spindle_fem.reporting.document import Section, Table, Text
-from spindle_fem.reporting.tables import column, number, rows_of, significant
+from spindle_fem.report.block_page import Section, Table, Text
+from spindle_fem.report.diagnosis_words import chance, set_words
+from spindle_fem.report.run_tables import column, number, rows_of, significant
 from validation import riddle
 
 TITLE = "The paper's riddle: worst at 2000 and 2500 rpm"
@@ -162,7 +162,7 @@ def _draw(desk: Desk, seed: int) -> Draw:
 
 
 def _run(folder: Path, seed: int) -> None:
-    from spindle_fem.simulate import simulate_machine
+    from spindle_fem.studies.simulate import simulate_machine
     from validation.reduction import load_reduced
 
     inputs = folder / "inputs" / riddle.NAME

@@ -20,10 +20,10 @@ from book.diagnoses import (
 )
 from book.page import Chapter, Pictures
 from book.work import ROOT, Desk, read_json
-from spindle_fem.reporting.diagnosis_words import chance, set_words
-from spindle_fem.reporting.document import Section, Table, Text
-from spindle_fem.reporting.figures import CYCLE, MUTED, new_figure, set_title, styled
-from spindle_fem.reporting.tables import column, number, rows_of
+from spindle_fem.report.block_page import Section, Table, Text
+from spindle_fem.report.diagnosis_words import chance, set_words
+from spindle_fem.report.figure_style import CYCLE, MUTED, new_figure, set_title, styled
+from spindle_fem.report.run_tables import column, number, rows_of
 
 TITLE = "Turning centre: 200 days of a production machine, blind"
 FOLDER = "turning_centre"
@@ -45,7 +45,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
         )
 
     def run(folder: Path) -> None:
-        from spindle_fem.diagnosis.run import diagnose
+        from spindle_fem.commands.diagnose_command import diagnose
 
         if not finished(folder / "all_days"):
             diagnose(MACHINE, [place / "recording.toml"], folder / "all_days")

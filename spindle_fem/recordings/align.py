@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import RecordingError, did_you_mean
-from spindle_fem.network.history import InputHistory
-from spindle_fem.recordings.checks import (
+from spindle_fem.recordings.channel_checks import (
     ChannelNoise,
     Flag,
     channel_noise,
@@ -20,8 +19,9 @@ from spindle_fem.recordings.checks import (
     temperature_flags,
 )
 from spindle_fem.recordings.defects import ChannelDefects, DefectReport, Gap
+from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.recordings.manifest import Channel, ColumnUnit, Manifest, conversions, load_manifest
-from spindle_fem.recordings.read import RawTable, read_table
+from spindle_fem.recordings.read_data import RawTable, read_table
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Recording:
     temperature : (N, c) float64 ndarray, [K]
         As read; NaN where missing. Flagged readings are kept.
     flags : (N, c) uint8 ndarray
-        :class:`~spindle_fem.recordings.checks.Flag`; 0 is a reading to use.
+        :class:`~spindle_fem.recordings.channel_checks.Flag`; 0 is a reading to use.
     sigma : (c,) float64 ndarray, [K]
         Declared white noise, measured where none is declared.
     noise : tuple of ChannelNoise

@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from spindle_fem.recordings.checks import ChannelNoise
+from spindle_fem.recordings.channel_checks import ChannelNoise
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import pint
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from spindle_fem.definition.faults import validation_faults
+from spindle_fem.definition.load import read_toml
 from spindle_fem.errors import FaultsError, RecordingError, SpecError, SpindleFemError, UnitError
-from spindle_fem.spec.faults import validation_faults
-from spindle_fem.spec.load import read_toml
 from spindle_fem.units import registry
 
 RECORDING_SCHEMA = "spindle-fem/recording/1"

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import OutOfValidityError, RecordingError
 from spindle_fem.recordings.align import SMALLEST_SIGMA, Recording
-from spindle_fem.recordings.checks import Flag
+from spindle_fem.recordings.channel_checks import Flag
 from spindle_fem.recordings.defects import Thinning
-from spindle_fem.recordings.simulate_network import ROTATIONAL_DIMENSION
+from spindle_fem.studies.simulate_network import ROTATIONAL_DIMENSION
 
 Array = NDArray[np.float64]
 

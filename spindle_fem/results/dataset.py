@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from spindle_fem.definition.load import write_machine
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import BadInputError
-from spindle_fem.meshing.tagged_mesh import TaggedMesh
-from spindle_fem.results.summary import package_versions
+from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.results.run_summary import package_versions
 from spindle_fem.results.thermal_result import ThermalResult
-from spindle_fem.spec.load import write_machine
-from spindle_fem.spec.model import MachineSpec
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:

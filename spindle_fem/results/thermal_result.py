@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from spindle_fem.meshing.tagged_mesh import TaggedMesh
-    from spindle_fem.spec.model import MachineSpec
+    from spindle_fem.definition.machine_spec import MachineSpec
+    from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
     from spindle_fem.validity import CodedWarning
 
 

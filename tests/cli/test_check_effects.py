@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from spindle_fem.commands import check_machine
+from spindle_fem.commands.machine_commands import check_machine
+from spindle_fem.definition.load import find_machine
 from spindle_fem.errors import FaultsError
-from spindle_fem.spec.load import find_machine
 
 BROKEN_NETWORK = """
 schema = "spindle-fem/machine/1"

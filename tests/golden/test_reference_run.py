@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from spindle_fem.results.summary import build_summary
-from spindle_fem.solve import solve
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.results.run_summary import build_summary
+from spindle_fem.studies.solve_machine import solve
 
 CASES = {
     "wu_tan_2016": {"machine": "wu_tan_2016", "overrides": ["mesh.preset=coarse"]},

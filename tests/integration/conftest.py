@@ -2,9 +2,9 @@
 
 import pytest
 
-from spindle_fem.coupling import prepare_machine
-from spindle_fem.solve import solve_prepared
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.solvers.coupled_steady import prepare_machine
+from spindle_fem.studies.solve_machine import solve_prepared
 
 
 @pytest.fixture(scope="session")

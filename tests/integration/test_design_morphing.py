@@ -5,22 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.coupling import machine_on_mesh
-from spindle_fem.design import evaluate as evaluation
-from spindle_fem.design import morphing
-from spindle_fem.design.designs import Design
-from spindle_fem.design.evaluate import Question, TaskBuilder
-from spindle_fem.design.morphing import move_mesh
-from spindle_fem.design.run import run_tasks
-from spindle_fem.design.sweep import prepare_study
+from spindle_fem.commands.sweep_command import prepare_study
+from spindle_fem.definition.load import find_machine, load_machine, read_definition
 from spindle_fem.errors import FaultsError, MeshQualityError
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.meshing.build import build_mesh
-from spindle_fem.meshing.classify import port_coordinates
-from spindle_fem.meshing.quality import AREA_TOLERANCE, area_errors, gmsh_quality, volume_errors
-from spindle_fem.solve import solve_prepared
-from spindle_fem.spec.load import find_machine, load_machine, read_definition
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.machine.meshing.build_mesh import build_mesh
+from spindle_fem.machine.meshing.classify_faces import port_coordinates
+from spindle_fem.machine.meshing.quality import AREA_TOLERANCE, area_errors, gmsh_quality, volume_errors
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.solvers.coupled_steady import machine_on_mesh
+from spindle_fem.studies.solve_machine import solve_prepared
+from spindle_fem.studies.sweep import evaluate_design as evaluation
+from spindle_fem.studies.sweep import morphing
+from spindle_fem.studies.sweep.designs import Design
+from spindle_fem.studies.sweep.evaluate_design import Question, TaskBuilder
+from spindle_fem.studies.sweep.morphing import move_mesh
+from spindle_fem.studies.sweep.run_tasks import run_tasks
 
 MACHINE = "small_two_start"
 COARSE = ("mesh.preset=coarse", "mesh.order=1", "heat.model=palmgren")

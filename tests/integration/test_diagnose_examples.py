@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from spindle_fem.diagnosis.run import diagnose
+from spindle_fem.commands.diagnose_command import diagnose
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "spindle_examples"
 CASES = sorted(path.name for path in EXAMPLES.glob("example_*") if path.is_dir())

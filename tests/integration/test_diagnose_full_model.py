@@ -9,19 +9,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.coupling import prepare_machine
-from spindle_fem.diagnosis import full_model
-from spindle_fem.diagnosis.full_model import full_model_errors, inputs_of_drive, options_for, spec_on
-from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.diagnosis.view import view_of
-from spindle_fem.effects.catalogue import candidates_for, effect_of
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.uncertain_parameters import with_parameters
+from spindle_fem.effects.registry import candidates_for, effect_of
+from spindle_fem.inference import full_model_check as full_model
+from spindle_fem.inference.full_model_check import full_model_errors, inputs_of_drive, options_for, spec_on
+from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.machine.view.build_view import view_of
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reporting.diagnosis_full_model import full_model_sections
-from spindle_fem.spec.load import load_machine
-from spindle_fem.spec.parameters import with_parameters
-from spindle_fem.transients.run import simulate_full
-from spindle_fem.transients.terms import Physics
+from spindle_fem.report.diagnosis_full_model import full_model_sections
+from spindle_fem.solvers.coupled_steady import prepare_machine
+from spindle_fem.solvers.machine_transient import simulate_full
+from spindle_fem.solvers.mesh_terms import Physics
 
 PROBES = ("SP01", "SP05", "COOLANT_OUT")
 MANIFEST = """

@@ -9,20 +9,20 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
-from spindle_fem.diagnosis import abreast
-from spindle_fem.diagnosis.abreast import FitOrder, Workers, fit_order
-from spindle_fem.diagnosis.inference import Problem
-from spindle_fem.diagnosis.locate import Pattern, onset_answers
-from spindle_fem.diagnosis.machines import open_machine
-from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.diagnosis.prepare import all_stamps, calibrate
-from spindle_fem.diagnosis.run import diagnose
-from spindle_fem.diagnosis.screening import variants_of
-from spindle_fem.diagnosis.search import screen
-from spindle_fem.effects.catalogue import candidates_for
+from spindle_fem.commands.diagnose_command import diagnose
+from spindle_fem.effects.registry import candidates_for
 from spindle_fem.errors import BadInputError, ConvergenceError
+from spindle_fem.inference import worker_processes as abreast
+from spindle_fem.inference.candidate_response import variants_of
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.missing_heat import Pattern, onset_answers
+from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.prepared_problem import all_stamps, calibrate
+from spindle_fem.inference.screening import screen
+from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.worker_processes import FitOrder, Workers, fit_order
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.simulate import simulate_machine
+from spindle_fem.studies.simulate import simulate_machine
 
 MACHINE = """
 schema = "spindle-fem/machine/1"

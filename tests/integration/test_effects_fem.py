@@ -7,27 +7,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.conduction.assemble import assemble_capacity
-from spindle_fem.coolant.section import ChannelSection
-from spindle_fem.coupling import prepare_machine, solve_coupled
-from spindle_fem.effects.coolant_film import TransitionTerm, reynolds_number
-from spindle_fem.effects.laws import amplitude
-from spindle_fem.effects.spread import Spread
-from spindle_fem.effects.term import Term, TermParameter
-from spindle_fem.effects.thermal_preload import ThermalPreloadTerm
-from spindle_fem.effects.unrecorded import InIntervals, UnrecordedHeatTerm
-from spindle_fem.effects.view import ChannelFlow
+from spindle_fem.definition.load import load_machine
+from spindle_fem.effects.catalogue.coolant_film import TransitionTerm, reynolds_number
+from spindle_fem.effects.catalogue.thermal_preload import ThermalPreloadTerm
+from spindle_fem.effects.framework.laws import amplitude
+from spindle_fem.effects.framework.machine_view import ChannelFlow
+from spindle_fem.effects.framework.spread import Spread
+from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.effects.framework.unrecorded import InIntervals, UnrecordedHeatTerm
 from spindle_fem.errors import SpecError
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.history import InputHistory
-from spindle_fem.reduced.build import ReductionOptions, reduced_model_of
-from spindle_fem.reduced.drive import STANDARD, make_drive
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.transient import simulate_fast
-from spindle_fem.spec.load import load_machine
-from spindle_fem.transients.readings import ReadingRows
-from spindle_fem.transients.run import TransientOptions, simulate_full
-from spindle_fem.transients.terms import Physics, steady_physics, with_capacity, with_factors
+from spindle_fem.model.mesh.equations import assemble_capacity
+from spindle_fem.model.reduced.build_reduced import ReductionOptions, reduced_model_of
+from spindle_fem.model.reduced.drive import STANDARD, make_drive
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
+from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
+from spindle_fem.solvers.mesh_terms import Physics, steady_physics, with_capacity, with_factors
+from spindle_fem.solvers.readings import ReadingRows
 
 SMALL = ["mesh.preset=coarse", "mesh.order=1"]
 RPM = np.pi / 30.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from dataclasses import replace
 
@@ -9,18 +10,18 @@ import meshio
 import numpy as np
 import pytest
 
-from spindle_fem.cache import CACHE_VARIABLE, cache_directory, source_digest
+from spindle_fem.cache import CACHE_VARIABLE, _module_file, cache_directory, source_digest
 from spindle_fem.errors import BadInputError, MeshTagError
-from spindle_fem.geometry.assembly import AnnularSegment, PartGeometry, assemble
-from spindle_fem.meshing.cache import (
+from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+from spindle_fem.machine.meshing.mesh_cache import (
     cached_mesh,
     load_npz,
     mesh_digest,
     save_npz,
     store_mesh,
 )
-from spindle_fem.meshing.io import load_named_mesh, named_mesh_folder, write_mesh
-from spindle_fem.meshing.sizes import build_sizes
+from spindle_fem.machine.meshing.mesh_files import load_named_mesh, named_mesh_folder, write_mesh
+from spindle_fem.machine.meshing.sizes import build_sizes
 
 
 @pytest.fixture(scope="module")
@@ -56,21 +57,32 @@ def test_digest_follows_geometry_and_sizes():
     assert reference != mesh_digest(ring(), build_sizes(ring(), "coarse"))
 
 
-def test_a_key_follows_the_source_that_made_it(tmp_path, monkeypatch):
-    monkeypatch.setattr("spindle_fem.cache._PACKAGE", tmp_path)
-    (tmp_path / "mesher").mkdir()
-    (tmp_path / "mesher" / "one.py").write_text("SIZE = 1\n")
-    (tmp_path / "other.py").write_text("SIZE = 1\n")
-    source_digest.cache_clear()
-    first = source_digest("mesher", "other")
-    source_digest.cache_clear()
-    assert source_digest("mesher", "other") == first
-    (tmp_path / "mesher" / "one.py").write_text("SIZE = 2\n")
-    source_digest.cache_clear()
-    assert source_digest("mesher", "other") != first
+def test_a_key_follows_the_source_and_what_it_imports(tmp_path, monkeypatch):
+    package = tmp_path / "lathe"
+    (package / "mesher").mkdir(parents=True)
+    (package / "mesher" / "__init__.py").write_text("")
+    (package / "mesher" / "one.py").write_text("def f():\n    from lathe.mesher import two\n")
+    (package / "mesher" / "two.py").write_text("SIZE = 1\n")
+    (package / "unused.py").write_text("SIZE = 1\n")
+    monkeypatch.setattr("spindle_fem.cache._PACKAGE", package)
+    monkeypatch.setattr("spindle_fem.cache._IMPORT", re.compile(r"^\s*from (lathe[\w.]*) import (.*)", re.M))
+
+    def digest(name):
+        source_digest.cache_clear()
+        _module_file.cache_clear()
+        return source_digest(name)
+
+    first = digest("lathe.mesher.one")
+    assert digest("lathe.mesher.one") == first
+    (package / "unused.py").write_text("SIZE = 2\n")
+    assert digest("lathe.mesher.one") == first
+    (package / "mesher" / "two.py").write_text("SIZE = 2\n")
+    assert digest("lathe.mesher.one") != first
     with pytest.raises(FileNotFoundError):
-        source_digest("missing")
+        digest("lathe.missing")
+    monkeypatch.undo()
     source_digest.cache_clear()
+    _module_file.cache_clear()
 
 
 def test_round_trip_keeps_everything(tiny, tmp_path):

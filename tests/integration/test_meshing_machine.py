@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from spindle_fem.cache import CACHE_VARIABLE
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import GeometryError, MeshQualityError, MeshTagError
-from spindle_fem.geometry.assembly import (
+from spindle_fem.machine.geometry.assembly import (
     AnnularSegment,
     BallRowGeometry,
     FaceBox,
@@ -19,16 +20,15 @@ from spindle_fem.geometry.assembly import (
     assemble,
     build_assembly,
 )
-from spindle_fem.geometry.channel import ChannelDefinition
-from spindle_fem.geometry.design_space import draw_valid_designs
-from spindle_fem.geometry.solids import build_solids, gmsh_session
-from spindle_fem.geometry.step import export_step
-from spindle_fem.meshing.build import build_mesh, generate_mesh
-from spindle_fem.meshing.classify import classify_face
-from spindle_fem.meshing.generate import Attempt
-from spindle_fem.meshing.quality import area_errors, facet_areas, gmsh_quality, volume_errors
-from spindle_fem.meshing.sizes import build_sizes
-from spindle_fem.spec.load import load_machine
+from spindle_fem.machine.geometry.cad_solids import build_solids, gmsh_session
+from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
+from spindle_fem.machine.geometry.design_space import draw_valid_designs
+from spindle_fem.machine.geometry.step_file import export_step
+from spindle_fem.machine.meshing.build_mesh import build_mesh, generate_mesh
+from spindle_fem.machine.meshing.classify_faces import classify_face
+from spindle_fem.machine.meshing.generate import Attempt
+from spindle_fem.machine.meshing.quality import area_errors, facet_areas, gmsh_quality, volume_errors
+from spindle_fem.machine.meshing.sizes import build_sizes
 
 
 def ring(z_start, z_end, inner, outer):
@@ -197,7 +197,7 @@ def test_twenty_random_designs_mesh():
 def test_cache_returns_the_same_mesh(machine, tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
     made = build_mesh(machine, "coarse", threads=1)
-    monkeypatch.setattr("spindle_fem.meshing.build.generate_mesh", None)
+    monkeypatch.setattr("spindle_fem.machine.meshing.build_mesh.generate_mesh", None)
     read = build_mesh(machine, "coarse", threads=1)
     assert np.array_equal(made.points, read.points)
     assert made.digest == read.digest
@@ -211,7 +211,7 @@ def test_same_input_same_mesh(machine, mesh):
 
 
 def test_second_attempt_is_noted(machine, monkeypatch):
-    from spindle_fem.meshing import build
+    from spindle_fem.machine.meshing import build_mesh as build
 
     first, second = build.LADDER[:2]
     genuine = build.mesh_once
@@ -228,7 +228,7 @@ def test_second_attempt_is_noted(machine, monkeypatch):
 
 
 def test_best_attempt_below_the_aim_is_kept_and_said_so(machine, monkeypatch):
-    monkeypatch.setattr("spindle_fem.meshing.build.MINIMUM_QUALITY", 0.9)
+    monkeypatch.setattr("spindle_fem.machine.meshing.build_mesh.MINIMUM_QUALITY", 0.9)
     made = generate_mesh(machine, build_sizes(machine, "coarse"), ladder=(Attempt(6, 10, 1.0),))
     assert made.notes[-1] == f"worst element has minSICN {made.min_quality:.3f}, below the 0.9 aimed at"
 
@@ -237,7 +237,7 @@ def test_no_attempt_left(machine, monkeypatch):
     def fail(*_):
         raise MeshQualityError("mesh", "gmsh failed", "Change it.")
 
-    monkeypatch.setattr("spindle_fem.meshing.build.mesh_once", fail)
+    monkeypatch.setattr("spindle_fem.machine.meshing.build_mesh.mesh_once", fail)
     with pytest.raises(
         MeshQualityError, match="no settings gave a sound mesh: frontal Delaunay surfaces, HXT"
     ):

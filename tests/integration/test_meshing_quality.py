@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spindle_fem.errors import MeshQualityError
-from spindle_fem.meshing.improve import improve_elements
-from spindle_fem.meshing.io import load_named_mesh
-from spindle_fem.meshing.quality import (
+from spindle_fem.machine.meshing.improve_quality import improve_elements
+from spindle_fem.machine.meshing.mesh_files import load_named_mesh
+from spindle_fem.machine.meshing.quality import (
     TETRAHEDRON_EDGES,
     area_errors,
     enclosed_volume,

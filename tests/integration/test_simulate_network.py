@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.commands import rebuild
-from spindle_fem.console import print_simulation
+from spindle_fem.commands.console import print_simulation
+from spindle_fem.commands.machine_commands import rebuild
 from spindle_fem.errors import BadInputError, RecordingError
-from spindle_fem.simulate import simulate_machine
+from spindle_fem.studies.simulate import simulate_machine
 
 MACHINE = """
 schema = "spindle-fem/machine/1"

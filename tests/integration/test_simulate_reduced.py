@@ -8,21 +8,21 @@ import pandas as pd
 import pytest
 from scipy.sparse.linalg import splu, spsolve
 
-from spindle_fem.coupling import prepare_machine, solve_coupled
-from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.history import InputHistory
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.uncertain_parameters import with_parameters
+from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.model.reduced.affine_operators import build_affine_system
+from spindle_fem.model.reduced.build_reduced import ReductionOptions, build_reduced_model, reduced_model_of
+from spindle_fem.model.reduced.drive import STANDARD, make_drive
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.probe_places import ACROSS, UP
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.reduced.affine import build_affine_system
-from spindle_fem.reduced.build import ReductionOptions, build_reduced_model, reduced_model_of
-from spindle_fem.reduced.drive import STANDARD, make_drive
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.probe_places import ACROSS, UP
-from spindle_fem.reduced.transient import simulate_fast
-from spindle_fem.simulate import fast_model_for, simulate_machine
-from spindle_fem.spec.load import load_machine
-from spindle_fem.spec.parameters import with_parameters
-from spindle_fem.transients.run import TransientOptions, simulate_full
+from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
+from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
+from spindle_fem.studies.simulate import fast_model_for, simulate_machine
 
 RPM = np.pi / 30.0
 OVERRIDES = ("mesh.preset=coarse", "mesh.order=1")
@@ -172,7 +172,7 @@ def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fa
 def test_it_is_found_again_in_the_cache(machine, monkeypatch, tmp_path):
     monkeypatch.setenv("SPINDLE_FEM_CACHE", str(tmp_path))
     small = ReductionOptions(samples=1, checks=1, sigmas=0.1, tolerance=1e-3, error=5.0, largest=60)
-    from spindle_fem.reduced import build
+    from spindle_fem.model.reduced import build_reduced as build
 
     made = []
 
@@ -215,7 +215,7 @@ def made(fast, recorded_in, tmp_path_factory):
 
 
 def test_simulate_writes_what_every_channel_should_have_read(fast, made, tmp_path, monkeypatch):
-    monkeypatch.setattr("spindle_fem.simulate.reduced_model_of", lambda spec, **options: fast.model)
+    monkeypatch.setattr("spindle_fem.studies.simulate.reduced_model_of", lambda spec, **options: fast.model)
     folder = tmp_path / "out"
     plain = simulate_machine("recorded_spindle", made, folder, overrides=OVERRIDES)
     assert json.loads((folder / "simulation.json").read_text())["channels"] == plain["channels"]
@@ -266,7 +266,7 @@ def test_speeds_beyond_the_table_get_a_range_of_their_own(fast, monkeypatch):
         asked.append(options)
         return fast.model
 
-    monkeypatch.setattr("spindle_fem.simulate.reduced_model_of", remember)
+    monkeypatch.setattr("spindle_fem.studies.simulate.reduced_model_of", remember)
     for speed in (4000.0, 6000.0):
         recording = type("R", (), {"input_names": ("speed",), "inputs": np.array([[speed * RPM]])})()
         fast_model_for(fast.spec, [recording])

@@ -6,15 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from spindle_fem.checks import require_checks
-from spindle_fem.conduction.steady import solve_steady
-from spindle_fem.coupling import LINEAR_RESIDUAL_LIMIT, prepare_machine, solve_coupled
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import CheckFailedError, FaultsError, NoSteadyStateError
-from spindle_fem.loads.joints import group_of_contacts
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.runaway import HeatResponse, highest_stable_speed
-from spindle_fem.solve import estimate_refinement, solve_prepared
-from spindle_fem.spec.load import load_machine
+from spindle_fem.model.mesh.steady_conduction import solve_steady
+from spindle_fem.operation.joint_groups import group_of_contacts
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.coupled_steady import LINEAR_RESIDUAL_LIMIT, prepare_machine, solve_coupled
+from spindle_fem.solvers.preload_runaway import HeatResponse, highest_stable_speed
+from spindle_fem.studies.run_checks import require_checks
+from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
 
 RPM = math.pi / 30.0
 
@@ -48,7 +48,7 @@ def test_a_solution_is_not_taken_while_its_equations_are_not_solved(recorded, mo
         found = solve_steady(*arguments, **settings)
         return dataclasses.replace(found, residual=2e-9) if number <= usual.iterations else found
 
-    monkeypatch.setattr("spindle_fem.coupling.solve_steady", loose)
+    monkeypatch.setattr("spindle_fem.solvers.coupled_steady.solve_steady", loose)
     found = solve_coupled(recorded, point)
     assert found.iterations == usual.iterations + 1
     assert found.solution.residual <= LINEAR_RESIDUAL_LIMIT

@@ -9,18 +9,18 @@ import time
 
 import pytest
 
-from spindle_fem.coupling import prepare_machine
-from spindle_fem.design import run as runner
-from spindle_fem.design.evaluate import FILM_HIGH, FILM_LOW
-from spindle_fem.design.outputs import derived_values, output_paths, value_of
-from spindle_fem.design.sweep import sweep_machine
-from spindle_fem.design.table import RESULTS, read_results
+from spindle_fem.commands.sweep_command import sweep_machine
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError, FaultsError
-from spindle_fem.reporting.output import MARKER, is_complete
-from spindle_fem.reporting.sweep_report import rebuild_sweep_report
-from spindle_fem.results.summary import build_summary
-from spindle_fem.solve import solve_prepared
-from spindle_fem.spec.load import load_machine
+from spindle_fem.report.sweep_report import rebuild_sweep_report
+from spindle_fem.results.output_folder import MARKER, is_complete
+from spindle_fem.results.run_summary import build_summary
+from spindle_fem.solvers.coupled_steady import prepare_machine
+from spindle_fem.studies.solve_machine import solve_prepared
+from spindle_fem.studies.sweep import run_tasks as runner
+from spindle_fem.studies.sweep.evaluate_design import FILM_HIGH, FILM_LOW
+from spindle_fem.studies.sweep.outputs import derived_values, output_paths, value_of
+from spindle_fem.studies.sweep.results_table import RESULTS, read_results
 
 MACHINE = "small_two_start"
 QUICK = ("mesh.preset=coarse", "mesh.order=1", "heat.model=palmgren")
@@ -171,7 +171,7 @@ def test_killed_in_the_middle_and_run_again(grid, tmp_path):
     path, folder, _ = grid
     place = tmp_path / "out"
     code = (
-        "import sys; from spindle_fem.design.sweep import sweep_machine; "
+        "import sys; from spindle_fem.commands.sweep_command import sweep_machine; "
         "sweep_machine(sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4:])"
     )
     process = subprocess.Popen(

@@ -5,10 +5,10 @@ import signal
 
 import pytest
 
-from spindle_fem.design import run as runner
-from spindle_fem.design.sweep import sweep_machine
-from spindle_fem.design.table import RESULTS
+from spindle_fem.commands.sweep_command import sweep_machine
 from spindle_fem.errors import BadInputError
+from spindle_fem.studies.sweep import run_tasks as runner
+from spindle_fem.studies.sweep.results_table import RESULTS
 
 distributed = pytest.importorskip("distributed")
 

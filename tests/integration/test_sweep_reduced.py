@@ -4,17 +4,23 @@ import numpy as np
 import pytest
 
 from spindle_fem.cache import CACHE_VARIABLE
-from spindle_fem.design.designs import Design
-from spindle_fem.design.evaluate import Question, TaskBuilder, row_of, solve_checked
-from spindle_fem.design.fast.backend import LARGEST_ERROR, GroupTask, answer_group, answer_tasks, model_of
-from spindle_fem.design.fast.build import FIRST_TABLES
-from spindle_fem.design.fast.heat import BearingTables
-from spindle_fem.design.fast.inputs import refusal
-from spindle_fem.design.fast.model import SteadyModel
-from spindle_fem.design.sweep import prepare_study, sweep_machine
-from spindle_fem.design.table import RESULTS, read_results
+from spindle_fem.commands.sweep_command import prepare_study, sweep_machine
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import FaultsError
-from spindle_fem.spec.load import load_machine
+from spindle_fem.studies.sweep.designs import Design
+from spindle_fem.studies.sweep.evaluate_design import Question, TaskBuilder, row_of, solve_checked
+from spindle_fem.studies.sweep.fast.backend import (
+    LARGEST_ERROR,
+    GroupTask,
+    answer_group,
+    answer_tasks,
+    model_of,
+)
+from spindle_fem.studies.sweep.fast.build_steady import FIRST_TABLES
+from spindle_fem.studies.sweep.fast.design_inputs import refusal
+from spindle_fem.studies.sweep.fast.heat_tables import BearingTables
+from spindle_fem.studies.sweep.fast.steady_model import SteadyModel
+from spindle_fem.studies.sweep.results_table import RESULTS, read_results
 
 QUICK = ("mesh.preset=coarse", "mesh.order=1")
 STUDY = """

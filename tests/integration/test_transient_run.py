@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.conduction.transient import ThermalState
-from spindle_fem.coupling import prepare_machine, solve_coupled
-from spindle_fem.effects.term import Term, TermParameter
+from spindle_fem.commands.transient_command import run_transient_study
+from spindle_fem.definition.load import load_machine
+from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import (
     BadInputError,
     EnergyBalanceError,
@@ -21,17 +21,17 @@ from spindle_fem.errors import (
     RecordingError,
     SpecError,
 )
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.history import InputHistory
-from spindle_fem.solve import solve_prepared
-from spindle_fem.spec.load import load_machine
-from spindle_fem.transient_run import run_transient_study
-from spindle_fem.transients.coupled import CoupledInputs
-from spindle_fem.transients.history import OperatingHistory
-from spindle_fem.transients.run import MachineEnergy, TransientOptions, simulate_full, start_from
-from spindle_fem.transients.saved_state import load_state, save_state
-from spindle_fem.transients.study import load_study, run_study, study_of, time_to_stay_within
-from spindle_fem.transients.terms import Physics
+from spindle_fem.model.mesh.time_stepper import ThermalState
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
+from spindle_fem.solvers.coupled_transient import CoupledInputs
+from spindle_fem.solvers.input_history import OperatingHistory
+from spindle_fem.solvers.machine_transient import MachineEnergy, TransientOptions, simulate_full, start_from
+from spindle_fem.solvers.mesh_terms import Physics
+from spindle_fem.solvers.saved_state import load_state, save_state
+from spindle_fem.studies.solve_machine import solve_prepared
+from spindle_fem.studies.transient_study import load_study, run_study, study_of, time_to_stay_within
 
 SMALL = ["mesh.preset=coarse", "mesh.order=1"]
 RPM = np.pi / 30.0
@@ -91,7 +91,7 @@ def test_heat_in_less_out_is_stored(heat_up):
 
 def test_coolant_is_booked_by_its_own_enthalpy(quick, monkeypatch):
     """An enthalpy that is wrong by one part in a million is found."""
-    import spindle_fem.transients.run as run
+    import spindle_fem.solvers.machine_transient as run
 
     true = run.coolant_heat
     monkeypatch.setattr(

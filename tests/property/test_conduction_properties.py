@@ -8,12 +8,12 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spindle_fem.conduction.assemble import assemble_system
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
-from spindle_fem.conduction.steady import solve_steady
-from spindle_fem.conduction.transient import StepControl, integrate, uniform_state
-from spindle_fem.meshing.simple import build_joined_tubes
+from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.model.mesh.equations import assemble_system
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.steady_conduction import solve_steady
+from spindle_fem.model.mesh.time_stepper import StepControl, integrate, uniform_state
 
 OPERATORS = {
     order: build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((1, 1), 12, 1)), order)

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from spindle_fem.coolant.friction import channel_pressure_drop
-from spindle_fem.coolant.marching import linearise_march, march_channel, march_enthalpy
-from spindle_fem.coolant.properties import OilIsoVg32, Water
-from spindle_fem.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
-from spindle_fem.coolant.section import ChannelSection
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.duct_friction import channel_pressure_drop
+from spindle_fem.physics.coolant.march import linearise_march, march_channel, march_enthalpy
+from spindle_fem.physics.coolant.properties import OilIsoVg32, Water
+from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
 
 OIL = OilIsoVg32()
 

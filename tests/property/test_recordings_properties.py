@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from spindle_fem.errors import BadInputError
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.checks import temperature_flags, white_noise
+from spindle_fem.recordings.channel_checks import temperature_flags, white_noise
 
 MANIFEST = """
 schema = "spindle-fem/recording/1"

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from spindle_fem.definition.field_types import QuantityRule
+from spindle_fem.definition.inherit import merge
+from spindle_fem.definition.load import load_machine, machine_folder, read_definition, validate, write_machine
+from spindle_fem.definition.uncertain_parameters import uncertain_parameters, with_parameters
 from spindle_fem.errors import FaultsError, SpecError, UnitError
-from spindle_fem.spec.fields import QuantityRule
-from spindle_fem.spec.inherit import merge
-from spindle_fem.spec.load import load_machine, machine_folder, read_definition, validate, write_machine
-from spindle_fem.spec.parameters import uncertain_parameters, with_parameters
 from spindle_fem.units import Uncertain, registry, to_si, uncertain_to_si
 
 finite = st.floats(min_value=-1e12, max_value=1e12, allow_nan=False)

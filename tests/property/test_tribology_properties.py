@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spindle_fem.tribology.bearing import BearingGeometry
-from spindle_fem.tribology.bearing_set import (
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_set import (
     BearingSet,
     BearingTemperatures,
     ExternalLoad,
@@ -21,11 +21,11 @@ from spindle_fem.tribology.bearing_set import (
     solve_bearing_set,
     uniform_temperatures,
 )
-from spindle_fem.tribology.empirical import palmgren_moment
-from spindle_fem.tribology.grease import Lubricant
-from spindle_fem.tribology.heat import HeatOptions
-from spindle_fem.tribology.hertz import INNER, OUTER, bearing_contact_constants, contact_polynomials
-from spindle_fem.tribology.preload import axial_state
+from spindle_fem.physics.bearings.catalogue_friction import palmgren_moment
+from spindle_fem.physics.bearings.friction_heat import HeatOptions
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.hertz import INNER, OUTER, bearing_contact_constants, contact_polynomials
+from spindle_fem.physics.bearings.preload import axial_state
 
 GREASE = Lubricant(21e-6, 4.7e-6, density=990.0)
 BEARING = BearingGeometry(14.2875e-3, 30, 165e-3, math.radians(15.0), 0.52, 0.52)
@@ -75,10 +75,15 @@ def test_contact_polynomials_reproduce_the_elliptic_integrals(bearing: BearingGe
 @given(bearings)
 def test_heat_is_drag_torque_times_speed(bearing: BearingGeometry) -> None:
     """The moment that the shaft must supply, from the tractions on the inner ring, does all the work."""
-    from spindle_fem.tribology.ball_system import build_ball_rows, join_rows
-    from spindle_fem.tribology.equilibrium import solve_equilibrium
-    from spindle_fem.tribology.state_report import lubricant_state
-    from spindle_fem.tribology.traction import TractionOptions, ball_drag, build_patch, integrate_traction
+    from spindle_fem.physics.bearings.ball_system import build_ball_rows, join_rows
+    from spindle_fem.physics.bearings.equilibrium import solve_equilibrium
+    from spindle_fem.physics.bearings.state_records import lubricant_state
+    from spindle_fem.physics.bearings.traction import (
+        TractionOptions,
+        ball_drag,
+        build_patch,
+        integrate_traction,
+    )
 
     load, speed, options = moderate_load(bearing), moderate_speed(bearing), TractionOptions()
     system = join_rows([build_ball_rows(bearing, np.zeros(1), float(bearing.ball_count))], [0])
@@ -249,7 +254,7 @@ def test_ring_forces_balance_external_loads(radial: float, moment: float) -> Non
 
 
 def test_separate_stress_limits_let_the_resultant_exceed_the_limit() -> None:
-    from spindle_fem.tribology.traction import TractionOptions
+    from spindle_fem.physics.bearings.traction import TractionOptions
 
     totals = {
         limit: solve_bearing(

@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from spindle_fem.tribology.bearing import BearingGeometry
-from spindle_fem.tribology.bearing_set import solve_bearing
-from spindle_fem.tribology.empirical import palmgren_moment, skf_moment, static_load_rating
-from spindle_fem.tribology.film import film_central_hamrock_dowson, film_groups
-from spindle_fem.tribology.grease import Lubricant
-from spindle_fem.tribology.heat import HeatOptions, rolling_resistance_houpert
-from spindle_fem.tribology.hertz import jones_axial_constant, mean_load_constant
-from spindle_fem.tribology.preload import axial_state, unloading_thrust
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_set import solve_bearing
+from spindle_fem.physics.bearings.catalogue_friction import palmgren_moment, skf_moment, static_load_rating
+from spindle_fem.physics.bearings.friction_heat import HeatOptions, rolling_resistance_houpert
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.hertz import jones_axial_constant, mean_load_constant
+from spindle_fem.physics.bearings.lubricant_film import film_central_hamrock_dowson, film_groups
+from spindle_fem.physics.bearings.preload import axial_state, unloading_thrust
 
 Row = tuple[str, str, float, float]
 FRONT = BearingGeometry(

@@ -15,10 +15,10 @@ import math
 import numpy as np
 import pytest
 
-from spindle_fem.tribology.ball_system import build_ball_rows, join_rows, solve_bordered
-from spindle_fem.tribology.bearing import BearingGeometry
-from spindle_fem.tribology.empirical import static_load_rating
-from spindle_fem.tribology.hertz import (
+from spindle_fem.physics.bearings.ball_system import build_ball_rows, join_rows, solve_bordered
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.catalogue_friction import static_load_rating
+from spindle_fem.physics.bearings.hertz import (
     INNER,
     OUTER,
     bearing_contact_constants,
@@ -26,14 +26,14 @@ from spindle_fem.tribology.hertz import (
     jones_axial_constant,
     mean_load_constant,
 )
-from spindle_fem.tribology.preload import (
+from spindle_fem.physics.bearings.preload import (
     axial_state,
     mounted_contact_angle,
     preload_displacement,
     thrust_angles,
     unloading_thrust,
 )
-from spindle_fem.tribology.race_control import static_evaluation
+from spindle_fem.physics.bearings.race_control import static_evaluation
 
 EXACT = 1e-3  # three to four digits are printed
 BEARING_71928 = BearingGeometry(14.2875e-3, 30, 165e-3, math.radians(15.0), 0.52, 0.52)

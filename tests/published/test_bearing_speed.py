@@ -12,10 +12,10 @@ import math
 
 import pytest
 
-from spindle_fem.tribology.bearing import BearingGeometry
-from spindle_fem.tribology.bearing_set import solve_bearing
-from spindle_fem.tribology.hertz import INNER, OUTER
-from spindle_fem.tribology.state import BearingState
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_set import solve_bearing
+from spindle_fem.physics.bearings.bearing_state import BearingState
+from spindle_fem.physics.bearings.hertz import INNER, OUTER
 
 ANGLE = 0.05
 REL = 3e-3

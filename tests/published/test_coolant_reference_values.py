@@ -13,20 +13,20 @@ from fluids.friction import (
     helical_transition_Re_Schmidt,
 )
 
-from spindle_fem.coolant import nusselt, nusselt_helical
-from spindle_fem.coolant.friction import (
+from spindle_fem.physics.coolant import nusselt, nusselt_helical
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.duct_friction import (
     channel_pressure_drop,
     fanning_reynolds_rectangle,
     friction_factor_curved_laminar,
 )
-from spindle_fem.coolant.properties import OilIsoVg32
-from spindle_fem.coolant.regimes import (
+from spindle_fem.physics.coolant.properties import OilIsoVg32
+from spindle_fem.physics.coolant.regimes import (
     ChannelState,
     critical_reynolds_ito,
     critical_reynolds_schmidt,
     select_film,
 )
-from spindle_fem.coolant.section import ChannelSection
 
 FLOW = 20.0e-3 / 60.0
 OIL = OilIsoVg32()

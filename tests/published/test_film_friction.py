@@ -15,12 +15,16 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from spindle_fem.tribology.ball_system import build_ball_rows, join_rows
-from spindle_fem.tribology.bearing import BearingGeometry
-from spindle_fem.tribology.bearing_set import solve_bearing
-from spindle_fem.tribology.empirical import palmgren_moment, skf_moment
-from spindle_fem.tribology.equilibrium import solve_equilibrium
-from spindle_fem.tribology.film import (
+from spindle_fem.physics.bearings.ball_system import build_ball_rows, join_rows
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_set import solve_bearing
+from spindle_fem.physics.bearings.catalogue_friction import palmgren_moment, skf_moment
+from spindle_fem.physics.bearings.equilibrium import solve_equilibrium
+from spindle_fem.physics.bearings.friction_equilibrium import start_from_race_control
+from spindle_fem.physics.bearings.friction_heat import HeatOptions, rolling_resistance_houpert
+from spindle_fem.physics.bearings.grease import Lubricant, roelands_viscosity
+from spindle_fem.physics.bearings.hertz import INNER, OUTER
+from spindle_fem.physics.bearings.lubricant_film import (
     film_central_hamrock_dowson,
     film_groups,
     film_minimum_hamrock_dowson,
@@ -28,13 +32,9 @@ from spindle_fem.tribology.film import (
     replenishment_factor,
     thermal_reduction,
 )
-from spindle_fem.tribology.friction_equilibrium import start_from_race_control
-from spindle_fem.tribology.grease import Lubricant, roelands_viscosity
-from spindle_fem.tribology.heat import HeatOptions, rolling_resistance_houpert
-from spindle_fem.tribology.hertz import INNER, OUTER
-from spindle_fem.tribology.state_report import lubricant_state
-from spindle_fem.tribology.surface import exceedance_integral
-from spindle_fem.tribology.traction import TractionOptions, ball_drag, build_patch, integrate_traction
+from spindle_fem.physics.bearings.rough_surface import exceedance_integral
+from spindle_fem.physics.bearings.state_records import lubricant_state
+from spindle_fem.physics.bearings.traction import TractionOptions, ball_drag, build_patch, integrate_traction
 
 NBU15 = Lubricant(21e-6, 4.7e-6, density=990.0)
 BEARING = BearingGeometry(

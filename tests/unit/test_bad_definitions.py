@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import pytest
 
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import (
     FaultsError,
     GeometryError,
@@ -18,8 +19,7 @@ from spindle_fem.errors import (
     UnitError,
     UnknownKeyError,
 )
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.spec.load import load_machine
+from spindle_fem.machine.geometry.assembly import build_assembly
 
 VALID = """
 schema = "spindle-fem/machine/1"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import SpecError
-from spindle_fem.meshing.simple import build_box, build_joined_tubes
+from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 
@@ -178,10 +178,10 @@ def test_another_numbering_changes_no_temperature(monkeypatch, compiled):
     import case
     from numbering import numbered
 
-    from spindle_fem.conduction import threads
-    from spindle_fem.conduction.operators import build_operators
-    from spindle_fem.conduction.problem import ConductionProblem, Film
-    from spindle_fem.conduction.steady import solve_steady
+    from spindle_fem.model.mesh import threads
+    from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film
+    from spindle_fem.model.mesh.mesh_operators import build_operators
+    from spindle_fem.model.mesh.steady_conduction import solve_steady
 
     if compiled:
         pytest.importorskip("numba")

@@ -16,7 +16,7 @@ from book.chapters import ENTRIES, bench_motor, concealed, turning_centre  # noq
 from book.page import Chapter, Entry, Pictures, render_chapter  # noqa: E402
 from book.work import Desk  # noqa: E402
 from spindle_fem.errors import BadInputError  # noqa: E402
-from spindle_fem.reporting.document import Section, Text  # noqa: E402
+from spindle_fem.report.block_page import Section, Text  # noqa: E402
 
 
 @pytest.fixture

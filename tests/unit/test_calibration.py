@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.calibration.fit import BOUND_SIGMAS, calibrate, prediction_interval
-from spindle_fem.calibration.noise import SlowError, channel_bins, likely_slow_error, whiten
-from spindle_fem.calibration.predictor import NetworkPredictor, Prior
+from spindle_fem.definition.network_tables import validate_network_machine
 from spindle_fem.errors import RecordingError
-from spindle_fem.network.build import build_network
+from spindle_fem.inference.least_squares import BOUND_SIGMAS, calibrate, prediction_interval
+from spindle_fem.inference.predictor import NetworkPredictor, Prior
+from spindle_fem.inference.reading_noise import SlowError, channel_bins, likely_slow_error, whiten
+from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.spec.network import validate_network_machine
 
 NETWORK = {
     "schema": "spindle-fem/machine/1",

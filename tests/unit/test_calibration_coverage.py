@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.calibration.coverage import coverage_study
-from spindle_fem.calibration.predictor import Prior
+from spindle_fem.inference.coverage import coverage_study
+from spindle_fem.inference.predictor import Prior
 from spindle_fem.recordings.align import read_recording
 
 

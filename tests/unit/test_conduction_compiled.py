@@ -7,19 +7,19 @@ import pytest
 from scipy import sparse
 from skfem import Basis, ElementTetP1, MeshTet
 
-from spindle_fem.conduction import forms, threads
-from spindle_fem.conduction.assemble import assemble_system
-from spindle_fem.conduction.linear_solvers import build_preconditioner, multiply, solve_linear, solve_many
-from spindle_fem.conduction.memory import room
-from spindle_fem.conduction.multigrid import Hierarchy, build_hierarchy
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
-from spindle_fem.conduction.skfem_mesh import ELEMENT_QUADRATURE_DEGREE
-from spindle_fem.conduction.steady import solve_steady
-from spindle_fem.conduction.system import merged
 from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError
-from spindle_fem.meshing.simple import build_box, build_joined_tubes
-from spindle_fem.meshing.tagged_mesh import Joint
+from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes
+from spindle_fem.machine.meshing.tagged_mesh import Joint
+from spindle_fem.model.mesh import forms, threads
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.model.mesh.equations import assemble_system
+from spindle_fem.model.mesh.huge_pages import room
+from spindle_fem.model.mesh.linear_solvers import build_preconditioner, multiply, solve_linear, solve_many
+from spindle_fem.model.mesh.linear_system import merged
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.multigrid import Hierarchy, build_hierarchy
+from spindle_fem.model.mesh.skfem_mesh import ELEMENT_QUADRATURE_DEGREE
+from spindle_fem.model.mesh.steady_conduction import solve_steady
 
 pytest.importorskip("numba")
 ROUND_OFF = 1e-13
@@ -188,8 +188,8 @@ def test_a_cycle_leaves_earlier_answers_alone(loops):
 
 
 def test_smoothing_is_scaled_so_that_no_eigenvalue_is_above_what_it_is_made_for():
-    from spindle_fem.conduction.compiled_solver import invert_diagonal
-    from spindle_fem.conduction.multigrid_compiled import LARGEST
+    from spindle_fem.model.mesh.kernels.solver_loops import invert_diagonal
+    from spindle_fem.model.mesh.multigrid_compiled import LARGEST
 
     rng = np.random.default_rng(7)
     root = sparse.random_array((80, 80), density=0.1, rng=rng)
@@ -207,7 +207,7 @@ def test_smoothing_is_scaled_so_that_no_eigenvalue_is_above_what_it_is_made_for(
 
 def test_a_prolongation_keeps_the_largest_entries_of_each_row_and_its_sum(loops):
     loops(1)
-    from spindle_fem.conduction import compiled_solver
+    from spindle_fem.model.mesh.kernels import solver_loops as compiled_solver
 
     matrix = assemble_system(problem_on(build_operators(TUBES, 2))).matrix
     n = matrix.shape[0]
@@ -278,7 +278,7 @@ def test_iterations_are_few(loops):
 
 def test_space_for_rows_grows_until_they_fit(loops):
     loops(2)
-    from spindle_fem.conduction.compiled_solver import product_rows
+    from spindle_fem.model.mesh.kernels.solver_loops import product_rows
 
     rng = np.random.default_rng(5)
     one = sparse.random_array((600, 500), density=0.05, rng=rng).tocsr()
@@ -354,7 +354,7 @@ def test_work_that_fails_in_another_thread_fails_where_it_was_asked(monkeypatch)
 
 
 def test_a_team_does_every_chunk_once_whoever_comes(loops):
-    from spindle_fem.conduction.compiled_teams import project
+    from spindle_fem.model.mesh.kernels.team_loops import project
 
     rng = np.random.default_rng(12)
     basis = rng.standard_normal((7, 1000)).astype(np.float32)
@@ -388,7 +388,7 @@ def test_chunks_have_as_many_entries_and_do_not_depend_on_threads(loops):
 def test_tied_nodes_have_the_label_of_their_component():
     from scipy.sparse.csgraph import connected_components
 
-    from spindle_fem.conduction.compiled_facets import label_tied
+    from spindle_fem.model.mesh.kernels.facet_loops import label_tied
 
     one, other = np.random.default_rng(5).integers(0, 300, (2, 150))
     graph = sparse.coo_array((np.ones(150), (one, other)), shape=(300, 300))

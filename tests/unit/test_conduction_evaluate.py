@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spindle_fem.conduction.evaluate import (
+from spindle_fem.errors import GeometryError, SpecError
+from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes
+from spindle_fem.model.mesh.evaluate import (
     extreme,
     facet_means,
     heat_flux_at_nodes,
@@ -18,9 +20,7 @@ from spindle_fem.conduction.evaluate import (
     temperature_at_nodes,
     temperature_at_points,
 )
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.errors import GeometryError, SpecError
-from spindle_fem.meshing.simple import build_box, build_joined_tubes
+from spindle_fem.model.mesh.mesh_operators import build_operators
 
 TUBES = build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((2, 2), 24, 3))
 
@@ -36,7 +36,7 @@ def test_points_are_found_on_the_curved_mesh():
     points, parts = _scattered()
     location = locate_points(TUBES, points, parts)
     nodes = TUBES.points[TUBES.tetrahedra[location.element]]
-    from spindle_fem.conduction.evaluate import quadratic_shape
+    from spindle_fem.model.mesh.evaluate import quadratic_shape
 
     values, _ = quadratic_shape(location.place)
     np.testing.assert_allclose(np.einsum("en,enx->ex", values, nodes), points, rtol=0, atol=1e-12)

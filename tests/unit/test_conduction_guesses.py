@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from spindle_fem.conduction.guesses import CORRECTIONS, RecentCorrections, SolvedSpace, mixed
+from spindle_fem.model.mesh.first_guesses import CORRECTIONS, RecentCorrections, SolvedSpace, mixed
 
 RNG = np.random.default_rng(0)
 

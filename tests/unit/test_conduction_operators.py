@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from spindle_fem.conduction import forms, threads
-from spindle_fem.conduction.operators import build_operators, spread
-from spindle_fem.conduction.skfem_mesh import load_into_skfem
 from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError, UnknownSurfaceError
-from spindle_fem.meshing.simple import build_box, build_joined_tubes, build_tube
+from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes, build_tube
+from spindle_fem.model.mesh import forms, threads
+from spindle_fem.model.mesh.mesh_operators import build_operators, spread
+from spindle_fem.model.mesh.skfem_mesh import load_into_skfem
 
 
 @pytest.fixture(autouse=True, params=["numpy", "compiled"])

@@ -8,14 +8,6 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from spindle_fem.conduction.assemble import assemble_capacity, assemble_system
-from spindle_fem.conduction.balance import require_balance
-from spindle_fem.conduction.linear_solvers import build_preconditioner, solve_linear, solve_many
-from spindle_fem.conduction.multigrid import largest_eigenvalue
-from spindle_fem.conduction.nonlinear import film_heat_flux, linearise_films
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film, FilmLaw, LumpedLink, LumpedNode
-from spindle_fem.conduction.steady import solve_steady
 from spindle_fem.errors import (
     ConvergenceError,
     EnergyBalanceError,
@@ -24,7 +16,15 @@ from spindle_fem.errors import (
     SpecError,
     UnknownSurfaceError,
 )
-from spindle_fem.meshing.simple import build_joined_tubes
+from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, FilmLaw, LumpedLink, LumpedNode
+from spindle_fem.model.mesh.equations import assemble_capacity, assemble_system
+from spindle_fem.model.mesh.heat_balance import require_balance
+from spindle_fem.model.mesh.linear_solvers import build_preconditioner, solve_linear, solve_many
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.multigrid import largest_eigenvalue
+from spindle_fem.model.mesh.steady_conduction import solve_steady
+from spindle_fem.model.mesh.temperature_films import film_heat_flux, linearise_films
 
 OPERATORS = build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((1, 1), 12, 2)), 1)
 PROBLEM = ConductionProblem(

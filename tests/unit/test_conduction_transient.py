@@ -7,19 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import PERFECT_CONTACT, ConductionProblem, Film, FilmLaw, LumpedNode
-from spindle_fem.conduction.stage import same_coefficients
-from spindle_fem.conduction.steady import solve_steady
-from spindle_fem.conduction.transient import StepControl, ThermalState, integrate, uniform_state
 from spindle_fem.errors import BadInputError, ConvergenceError, GeometryError, SpecError
-from spindle_fem.meshing.simple import (
+from spindle_fem.machine.meshing.simple_bodies import (
     Block,
     build_box,
     build_joined_tubes,
     build_structured_mesh,
     signed_inverse_condition,
 )
+from spindle_fem.model.mesh.conduction_problem import (
+    PERFECT_CONTACT,
+    ConductionProblem,
+    Film,
+    FilmLaw,
+    LumpedNode,
+)
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.steady_conduction import solve_steady
+from spindle_fem.model.mesh.time_stage import same_coefficients
+from spindle_fem.model.mesh.time_stepper import StepControl, ThermalState, integrate, uniform_state
 
 OPERATORS = build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((1, 1), 12, 2)), 1)
 PROBLEM = ConductionProblem(
@@ -125,7 +131,7 @@ def test_a_stage_that_does_not_settle_takes_a_shorter_step(monkeypatch):
         tolerance=5.0, first_step=500.0, temperature_dependent=True, nonlinear_tolerance=1e-8
     )
     free = integrate(inputs, START, 2000.0, control=replace(control, tolerance=0.02))
-    monkeypatch.setattr("spindle_fem.conduction.stage.MAX_STAGE_ITERATIONS", 4)
+    monkeypatch.setattr("spindle_fem.model.mesh.time_stage.MAX_STAGE_ITERATIONS", 4)
     held = integrate(inputs, START, 2000.0, control=control)
     assert held.rejected > 0
     np.testing.assert_allclose(held.state.temperature, free.state.temperature, rtol=0, atol=0.2)
@@ -224,7 +230,7 @@ def _other_nodes(time, state):
 
 
 def test_hidden_jump_is_an_error_that_asks_for_breakpoints(monkeypatch):
-    monkeypatch.setattr("spindle_fem.conduction.transient.MAX_REJECTIONS", 4)
+    monkeypatch.setattr("spindle_fem.model.mesh.time_stepper.MAX_REJECTIONS", 4)
 
     def inputs(time, state):
         return replace(PROBLEM, surface_heat={"inner.inner": 1e6 * (time > 50.0)})

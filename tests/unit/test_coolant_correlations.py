@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-from spindle_fem.coolant import nusselt, nusselt_helical
-from spindle_fem.coolant.friction import (
+from spindle_fem.errors import OutOfValidityError
+from spindle_fem.physics.coolant import nusselt, nusselt_helical
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.duct_friction import (
     channel_pressure_drop,
     friction_factor_channel,
     friction_factor_curved_laminar,
     friction_factor_helical_turbulent,
     port_loss_coefficient,
 )
-from spindle_fem.coolant.properties import CoolantProperties, OilIsoVg32
-from spindle_fem.coolant.section import ChannelSection
-from spindle_fem.coolant.transition import (
+from spindle_fem.physics.coolant.properties import CoolantProperties, OilIsoVg32
+from spindle_fem.physics.coolant.transition import (
     critical_reynolds_ito,
     critical_reynolds_schmidt,
     nusselt_transition,
 )
-from spindle_fem.errors import OutOfValidityError
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
 CRITICAL = float(critical_reynolds_schmidt(CHANNEL.curvature_ratio))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from spindle_fem.coolant.marching import linearise_march, march_channel, march_enthalpy
-from spindle_fem.coolant.properties import OilIsoVg32, Water
-from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.errors import OutOfValidityError
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.march import linearise_march, march_channel, march_enthalpy
+from spindle_fem.physics.coolant.properties import OilIsoVg32, Water
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
 OIL = OilIsoVg32()

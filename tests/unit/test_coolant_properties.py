@@ -1,8 +1,14 @@
 import numpy as np
 import pytest
 
-from spindle_fem.coolant.properties import COOLANT_NAMES, OilIsoVg32, UserCoolant, Water, coolant_by_name
 from spindle_fem.errors import OutOfValidityError
+from spindle_fem.physics.coolant.properties import (
+    COOLANT_NAMES,
+    OilIsoVg32,
+    UserCoolant,
+    Water,
+    coolant_by_name,
+)
 
 # Temperatures of any shape give properties of that shape.
 SHAPES = [(), (3,), (2, 3)]

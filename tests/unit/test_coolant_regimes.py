@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from spindle_fem.coolant.film_map import film_map
-from spindle_fem.coolant.properties import OilIsoVg32, UserCoolant, Water
-from spindle_fem.coolant.regimes import FILM_MODELS, ChannelState, select_film
-from spindle_fem.coolant.section import ChannelSection
 from spindle_fem.errors import OutOfValidityError
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.film_map import film_map
+from spindle_fem.physics.coolant.properties import OilIsoVg32, UserCoolant, Water
+from spindle_fem.physics.coolant.regimes import FILM_MODELS, ChannelState, select_film
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
 OIL = OilIsoVg32()

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.crosscheck.causes import CHECKS, _narrow_raceways, band_lines, contact_bands
-from spindle_fem.loads.bearing_heat import heat_model_of
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.links import SurfacePatch
-from spindle_fem.network.machine import build_machine_network
-from spindle_fem.network.machine_steady import solve_machine_network
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.model.lumped.links import SurfacePatch
+from spindle_fem.model.lumped.machine_network import build_machine_network
+from spindle_fem.model.lumped.machine_steady import solve_machine_network
+from spindle_fem.operation.bearing_heat import heat_model_of
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.studies.crosscheck.causes import CHECKS, _narrow_raceways, band_lines, contact_bands
 
 
 @pytest.fixture(scope="module")

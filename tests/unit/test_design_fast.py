@@ -7,8 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spindle_fem.design.fast.channel import ChannelBatch, pressure_drops
-from spindle_fem.design.fast.heat import (
+from spindle_fem.definition.load import load_machine
+from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of
+from spindle_fem.operation.channel_cells import ChannelCells
+from spindle_fem.operation.coolant_loop import CoolantLoop
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.studies.sweep.fast.coolant_batch import ChannelBatch, pressure_drops
+from spindle_fem.studies.sweep.fast.fast_outputs import extreme_temperatures
+from spindle_fem.studies.sweep.fast.heat_tables import (
     QUANTITIES,
     BearingTables,
     chebyshev_points,
@@ -17,12 +23,6 @@ from spindle_fem.design.fast.heat import (
     is_constant,
     mechanical_keys,
 )
-from spindle_fem.design.fast.outputs import extreme_temperatures
-from spindle_fem.loads.bearing_heat import BearingTemperatures, heat_model_of
-from spindle_fem.loads.channel_cells import ChannelCells
-from spindle_fem.loads.coolant_loop import CoolantLoop
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.spec.load import load_machine
 
 
 @given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.floats(280.0, 340.0))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from spindle_fem.design.film_study import PAPER_DEPTH, PumpLimits, film_study, pump_limits
-from spindle_fem.reporting.sweep_film import film_maps, film_words
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.report.sweep_film import film_maps, film_words
+from spindle_fem.studies.sweep.film_study import PAPER_DEPTH, PumpLimits, film_study, pump_limits
 
 
 @pytest.fixture(scope="module")

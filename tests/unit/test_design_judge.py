@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from spindle_fem.design.designs import Axis
-from spindle_fem.design.judge import Limit, certainly_beaten, dominated, judged, rank
-from spindle_fem.design.outputs import limit_of, output_fault, output_paths, unit_of, value_of
-from spindle_fem.design.sensitivity import neighbours, sensitivities
-from spindle_fem.design.study import Study
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpecError, UnitError
-from spindle_fem.spec.load import load_machine
+from spindle_fem.studies.sweep.designs import Axis
+from spindle_fem.studies.sweep.judge_designs import Limit, certainly_beaten, dominated, judged, rank
+from spindle_fem.studies.sweep.outputs import limit_of, output_fault, output_paths, unit_of, value_of
+from spindle_fem.studies.sweep.sensitivity import neighbours, sensitivities
+from spindle_fem.studies.sweep.study_file import Study
 
 
 def row(number, **values):

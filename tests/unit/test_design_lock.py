@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
-from spindle_fem.design.lock import folder_lock, lock_path
 from spindle_fem.errors import BadInputError
+from spindle_fem.studies.sweep.study_lock import folder_lock, lock_path
 
 HOLD = """
 import sys
-from spindle_fem.design.lock import folder_lock
+from spindle_fem.studies.sweep.study_lock import folder_lock
 with folder_lock(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.read()

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.design.channel_map import build_map
-from spindle_fem.design.channel_measures import channel_measures
-from spindle_fem.design.morphing import lattice_assembly, lattice_machine
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import GeometryError
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.spec.load import load_machine
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.studies.sweep.channel_map import build_map
+from spindle_fem.studies.sweep.channel_measures import channel_measures
+from spindle_fem.studies.sweep.morphing import lattice_assembly, lattice_machine
 
 MACHINES = ("wu_tan_2016", "recorded_spindle", "small_two_start")
 CHANGES = {

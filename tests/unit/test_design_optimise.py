@@ -2,11 +2,11 @@
 
 import pytest
 
-from spindle_fem.design.designs import Axis, Choice, plan_designs
-from spindle_fem.design.judge import Limit, judged, rank
-from spindle_fem.design.optimise import search_designs
-from spindle_fem.design.study import Study
-from spindle_fem.spec.fields import QuantityRule
+from spindle_fem.definition.field_types import QuantityRule
+from spindle_fem.studies.sweep.designs import Axis, Choice, plan_designs
+from spindle_fem.studies.sweep.judge_designs import Limit, judged, rank
+from spindle_fem.studies.sweep.optimise import search_designs
+from spindle_fem.studies.sweep.study_file import Study
 
 pytest.importorskip("optuna")
 

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spindle_fem.design.table import (
+from spindle_fem.errors import BadInputError
+from spindle_fem.report.sweep_report import answered_by
+from spindle_fem.studies.sweep.results_table import (
     EARLIER,
     PARQUET,
     RESULTS,
@@ -16,8 +18,6 @@ from spindle_fem.design.table import (
     parse_cell,
     read_results,
 )
-from spindle_fem.errors import BadInputError
-from spindle_fem.reporting.sweep_report import answered_by
 
 COLUMNS = ("design", "channel.depth", "temperature.max_degC", "status", "reason", "key")
 

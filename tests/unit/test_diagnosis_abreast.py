@@ -3,8 +3,8 @@
 import threading
 from functools import partial
 
-from spindle_fem.diagnosis import abreast
-from spindle_fem.diagnosis.abreast import Workers
+from spindle_fem.inference import worker_processes as abreast
+from spindle_fem.inference.worker_processes import Workers
 
 
 class Told:

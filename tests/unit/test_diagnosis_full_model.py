@@ -11,9 +11,12 @@ import pandas as pd
 import pytest
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from spindle_fem.diagnosis import full_model
-from spindle_fem.diagnosis.findings import predictions_at_stamps
-from spindle_fem.diagnosis.full_model import (
+from spindle_fem.definition.load import load_machine
+from spindle_fem.effects.registry import candidates_for, effect_of
+from spindle_fem.errors import EnergyBalanceError, MeshQualityError, SpecError
+from spindle_fem.inference import full_model_check as full_model
+from spindle_fem.inference.findings import predictions_at_stamps
+from spindle_fem.inference.full_model_check import (
     expected_steps,
     full_model_errors,
     inputs_of_drive,
@@ -22,16 +25,13 @@ from spindle_fem.diagnosis.full_model import (
     require_choice,
     spec_on,
 )
-from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.diagnosis.view import view_of
-from spindle_fem.effects.catalogue import candidates_for, effect_of
-from spindle_fem.errors import EnergyBalanceError, MeshQualityError, SpecError
+from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.machine.view.build_view import view_of
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reporting.diagnosis_full_model import full_model_sections
-from spindle_fem.spec.load import load_machine
-from spindle_fem.transients.history import OperatingHistory
-from spindle_fem.transients.terms import inputs_of
+from spindle_fem.report.diagnosis_full_model import full_model_sections
+from spindle_fem.solvers.input_history import OperatingHistory
+from spindle_fem.solvers.mesh_terms import inputs_of
 
 MANIFEST = """
 schema = "spindle-fem/recording/1"

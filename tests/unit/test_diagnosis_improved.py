@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 from scipy.linalg import expm
 
-from spindle_fem.diagnosis.findings import predictions_at_stamps, reported_parameters
-from spindle_fem.diagnosis.improved import improved_machine
-from spindle_fem.diagnosis.inference import Problem
-from spindle_fem.diagnosis.machines import open_machine
-from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.diagnosis.prepare import calibrate, expected_slow_error
-from spindle_fem.diagnosis.sufficiency import response_time, says_too_little
-from spindle_fem.effects.catalogue import candidates_for, effect_of, interval_effects
+from spindle_fem.effects.registry import candidates_for, effect_of, interval_effects
+from spindle_fem.inference.findings import predictions_at_stamps, reported_parameters
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.improved_machine import improved_machine
+from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.prepared_problem import calibrate, expected_slow_error
+from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.sufficiency import response_time, says_too_little
 from spindle_fem.recordings.align import read_recording
 
 MACHINE = """

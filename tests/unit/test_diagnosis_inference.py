@@ -10,9 +10,12 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2, multivariate_normal
 
-from spindle_fem.calibration.noise import ChannelBins, SlowError, Whitener, likely_slow_error
-from spindle_fem.diagnosis.drives import even_drive
-from spindle_fem.diagnosis.inference import (
+from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.effects.registry import candidates_for, interval_effects
+from spindle_fem.errors import ConvergenceError
+from spindle_fem.inference.candidate_response import BaseRun, Variant
+from spindle_fem.inference.drive_steps import even_drive
+from spindle_fem.inference.hypothesis_fit import (
     Belief,
     Coordinate,
     Problem,
@@ -20,17 +23,14 @@ from spindle_fem.diagnosis.inference import (
     _huber,
     candidate_coordinates,
 )
-from spindle_fem.diagnosis.linear import LinearProblem
-from spindle_fem.diagnosis.network_view import view_of_network
-from spindle_fem.diagnosis.plant import EFFECT_PREFIX, Plant
-from spindle_fem.diagnosis.prepare import calibrate, machine_coordinates, slow_error_of
-from spindle_fem.diagnosis.screening import BaseRun, Variant
-from spindle_fem.effects.catalogue import candidates_for, interval_effects
-from spindle_fem.errors import ConvergenceError
-from spindle_fem.network.build import build_network
+from spindle_fem.inference.linearised_fit import LinearProblem
+from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates, slow_error_of
+from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener, likely_slow_error
+from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, Plant
+from spindle_fem.machine.view.network_view import view_of_network
+from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.reduced.network_model import NetworkFastModel
-from spindle_fem.spec.network import validate_network_machine
 
 MACHINE = """
 schema = "spindle-fem/machine/1"
@@ -335,7 +335,7 @@ def sensor(candidates, effect):
 def test_a_sensor_offset_has_the_evidence_of_its_exact_gaussian(blank, candidates, tmp_path, monkeypatch):
     """An offset is linear: with the machine fixed, data are exactly Gaussian."""
     # Gaussian tails: nothing is an outlier.
-    monkeypatch.setattr("spindle_fem.diagnosis.inference.OUTLIER_SIGMAS", 1e9)
+    monkeypatch.setattr("spindle_fem.inference.hypothesis_fit.OUTLIER_SIGMAS", 1e9)
     offset = sensor(candidates, "sensor_offset")
     plant = synthetic(blank, tmp_path, 5, {offset.amplitude: 0.06}, (offset,))
     nothing = Belief.prior(())
@@ -515,7 +515,7 @@ def test_the_filter_is_the_cholesky_factor(monkeypatch):
     bins, slow = bins_of(150), SlowError(0.15, 900.0)
     values = np.random.default_rng(1).normal(size=(150, 3))
     dense = Whitener(bins, slow)
-    monkeypatch.setattr("spindle_fem.calibration.noise.MOST_DENSE", 100)
+    monkeypatch.setattr("spindle_fem.inference.reading_noise.MOST_DENSE", 100)
     filtered = Whitener(bins, slow)
     assert filtered.factor is None
     assert filtered(values) == pytest.approx(dense(values), rel=1e-9, abs=1e-9)

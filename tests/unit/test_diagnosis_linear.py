@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from spindle_fem.diagnosis.linear import Box, BoxedColumns
+from spindle_fem.inference.linearised_fit import Box, BoxedColumns
 
 READINGS, COORDINATES, COLUMNS = 60, 4, 5
 

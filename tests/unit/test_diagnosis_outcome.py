@@ -14,40 +14,40 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from spindle_fem.diagnosis.abreast import Workers
-from spindle_fem.diagnosis.core import Diagnosis, _overlapping
-from spindle_fem.diagnosis.engine import OTHER_SPOTS, Hypothesis, Search
-from spindle_fem.diagnosis.findings import findings_of, noise_level, predictions_at_stamps, rmse
-from spindle_fem.diagnosis.inference import Problem
-from spindle_fem.diagnosis.layout import Layout
-from spindle_fem.diagnosis.locate import Pattern, explain, onset_answers
-from spindle_fem.diagnosis.machine_places import centre_of, regions_of
-from spindle_fem.diagnosis.next_measurement import (
+from spindle_fem.definition.load import load_machine, write_machine
+from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
+from spindle_fem.errors import BadInputError
+from spindle_fem.inference.diagnosis import Diagnosis, _overlapping
+from spindle_fem.inference.findings import findings_of, noise_level, predictions_at_stamps, rmse
+from spindle_fem.inference.further_tests import AGAIN, answer, reachable_places, trials_of
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.hypothesis_search import OTHER_SPOTS, Hypothesis, Search
+from spindle_fem.inference.mismatch_place import significant_stretches, smoothed_scores, where_of
+from spindle_fem.inference.missing_heat import Pattern, explain, onset_answers
+from spindle_fem.inference.next_measurement import (
     EXISTING,
     expected_information,
     next_measurement,
     pairwise_distances,
 )
-from spindle_fem.diagnosis.plant import Plant
-from spindle_fem.diagnosis.prepare import (
+from spindle_fem.inference.prepared_problem import (
     COMMON_RADIAL_SIGMA,
     EXPECTED_SLOW,
     PROBE_PLACE_SIGMA,
     calibrate,
     known_before,
 )
-from spindle_fem.diagnosis.trials import AGAIN, answer, reachable_places, trials_of
-from spindle_fem.diagnosis.verdict import Judgement, Ranked
-from spindle_fem.diagnosis.view import view_of
-from spindle_fem.diagnosis.where import significant_stretches, smoothed_scores, where_of
-from spindle_fem.effects.catalogue import candidates_for, catalogue, effect_of, interval_effects
-from spindle_fem.errors import BadInputError
+from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.verdict import Judgement, Ranked
+from spindle_fem.inference.worker_processes import Workers
+from spindle_fem.machine.view.build_view import view_of
+from spindle_fem.machine.view.meridian_places import centre_of, regions_of
+from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reporting.diagnosis_data import diagnosis_dataset
-from spindle_fem.reporting.diagnosis_report import SCHEMA, draw_figures, write_diagnosis_report
-from spindle_fem.reporting.diagnosis_words import verdict_sentence
-from spindle_fem.spec.load import load_machine, write_machine
+from spindle_fem.report.diagnosis_data import diagnosis_dataset
+from spindle_fem.report.diagnosis_report import SCHEMA, draw_figures, write_diagnosis_report
+from spindle_fem.report.diagnosis_words import verdict_sentence
 
 PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
 MANIFEST = """

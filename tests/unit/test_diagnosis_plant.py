@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.diagnosis.drives import coarse_drive
-from spindle_fem.diagnosis.plant import EFFECT_PREFIX, PROBE_PREFIX, Plant
-from spindle_fem.diagnosis.screening import BaseRun, Variant, variants_of
-from spindle_fem.diagnosis.view import view_of
-from spindle_fem.effects.catalogue import candidates_for, effect_of, interval_effects
+from spindle_fem.definition.load import load_machine
+from spindle_fem.effects.registry import candidates_for, effect_of, interval_effects
+from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
+from spindle_fem.inference.drive_steps import coarse_drive
+from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, PROBE_PREFIX, Plant
+from spindle_fem.machine.view.build_view import view_of
+from spindle_fem.model.reduced.drive import drive_of_recording
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.reduced.drive import drive_of_recording
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.spec.load import load_machine
 
 PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
 MANIFEST = """

@@ -5,7 +5,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from spindle_fem.diagnosis.locate import (
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.inference.candidate_response import Variant
+from spindle_fem.inference.missing_heat import (
     Onsets,
     Pattern,
     conditions_of,
@@ -14,10 +17,7 @@ from spindle_fem.diagnosis.locate import (
     shares,
     stretches,
 )
-from spindle_fem.diagnosis.screening import Variant
-from spindle_fem.diagnosis.search import Screened, amplitude_value, log_priors
-from spindle_fem.effects.base import Candidate
-from spindle_fem.effects.term import Term, TermParameter
+from spindle_fem.inference.screening import Screened, amplitude_value, log_priors
 
 STOP, COUNT = 14400.0, 40
 TIMES = np.linspace(0.0, STOP, COUNT + 1)[:-1]

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from spindle_fem.calibration.noise import SlowError
-from spindle_fem.diagnosis.engine import Hypothesis
-from spindle_fem.diagnosis.heldout import heldout_stamps
-from spindle_fem.diagnosis.inference import Coordinate, Fit
-from spindle_fem.diagnosis.reliability import gain_of_more, reliable, share_of_last
-from spindle_fem.diagnosis.verdict import (
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.errors import SpecError
+from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.inference.hypothesis_fit import Coordinate, Fit
+from spindle_fem.inference.hypothesis_search import Hypothesis
+from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
+from spindle_fem.inference.verdict import (
     CANDIDATES_A_TRIAL,
     CHANCE_TEMPERATURE,
     DECIDED,
@@ -38,9 +41,6 @@ from spindle_fem.diagnosis.verdict import (
     rank,
     within_prior,
 )
-from spindle_fem.effects.base import Candidate
-from spindle_fem.effects.term import TermParameter
-from spindle_fem.errors import SpecError
 
 # Where a prior that is even in the logarithm has the density of the normal one.
 AS_NORMAL = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / SMALLEST_SIZE))

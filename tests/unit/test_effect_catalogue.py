@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.diagnosis.view import view_of, view_of_network
-from spindle_fem.effects.catalogue import (
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.effects.framework.term import TermContext
+from spindle_fem.effects.registry import (
     build,
     candidates_for,
     catalogue,
@@ -20,17 +22,15 @@ from spindle_fem.effects.catalogue import (
     fixed,
     interval_effects,
 )
-from spindle_fem.effects.term import TermContext
 from spindle_fem.errors import SpecError, UnitError
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.build import build_network
+from spindle_fem.machine.view.build_view import view_of, view_of_network
+from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.drive import drive_of_recording
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.reduced.drive import drive_of_recording
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.network_model import NetworkFastModel
-from spindle_fem.reduced.transient import simulate_fast
-from spindle_fem.spec.load import load_machine
-from spindle_fem.spec.network import validate_network_machine
 
 SPINDLE_RECORDING = """
 schema = "spindle-fem/recording/1"

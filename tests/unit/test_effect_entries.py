@@ -10,23 +10,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.calibration.predictor import MachinePredictor
-from spindle_fem.effect_entries import (
+from spindle_fem.definition.effect_entries import EffectEntry
+from spindle_fem.definition.load import find_machine, load_machine, read_definition, validate, write_machine
+from spindle_fem.definition.network_tables import validate_network_machine, write_network_machine
+from spindle_fem.effects.framework.effect import Candidate, Reading
+from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.errors import FaultsError
+from spindle_fem.inference.predictor import MachinePredictor
+from spindle_fem.model.reduced.defined_effects import (
     NO_EFFECTS,
     ActiveEffects,
     active_effects,
     effects_on,
     require_known_effects,
 )
-from spindle_fem.effects.base import Candidate, Reading
-from spindle_fem.effects.term import TermParameter
-from spindle_fem.errors import FaultsError
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.simulate import simulate_recordings
-from spindle_fem.spec.effects import EffectEntry
-from spindle_fem.spec.load import find_machine, load_machine, read_definition, validate, write_machine
-from spindle_fem.spec.network import validate_network_machine, write_network_machine
+from spindle_fem.studies.simulate import simulate_recordings
 
 NETWORK = """
 schema = "spindle-fem/machine/1"

@@ -5,28 +5,37 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spindle_fem.effects.ambient_drift import HUMP, RAMP, STEADY, DriftTerm
-from spindle_fem.effects.chiller_cycling import PEAK, SHARPNESS, ChillerCyclingTerm
-from spindle_fem.effects.coolant_film import TransitionTerm, reynolds_number
-from spindle_fem.effects.coolant_heating import CoolantHeatingTerm
-from spindle_fem.effects.gap_closure import GapClosureTerm
-from spindle_fem.effects.grease_churning import GreaseChurningTerm
-from spindle_fem.effects.heat_capacity import ContactCapacityTerm
-from spindle_fem.effects.heat_split import HeatSplitTerm
-from spindle_fem.effects.laws import amplitude, linear, power, relaxed, shape, smooth_step, softplus, switched
-from spindle_fem.effects.mount_sink import MountSinkTerm
-from spindle_fem.effects.natural_convection import NaturalConvectionTerm
-from spindle_fem.effects.radiation import RadiationTerm
-from spindle_fem.effects.speed_heat import SpeedHeatTerm
-from spindle_fem.effects.spread import Spread
-from spindle_fem.effects.starvation import StarvationTerm
-from spindle_fem.effects.term import TermContext
-from spindle_fem.effects.thermal_preload import NAME, ThermalPreloadTerm
-from spindle_fem.effects.unrecorded import Followed, InIntervals, UnrecordedHeatTerm
-from spindle_fem.effects.unrecorded_cooling import CoolingTerm
-from spindle_fem.effects.view import ChannelFlow, FrictionTable, RecordedQuantity
-from spindle_fem.effects.viscosity_heat import ViscosityHeatTerm, Walther
-from spindle_fem.surroundings.air import STEFAN_BOLTZMANN
+from spindle_fem.effects.catalogue.ambient_drift import HUMP, RAMP, STEADY, DriftTerm
+from spindle_fem.effects.catalogue.chiller_cycling import PEAK, SHARPNESS, ChillerCyclingTerm
+from spindle_fem.effects.catalogue.coolant_film import TransitionTerm, reynolds_number
+from spindle_fem.effects.catalogue.coolant_heating import CoolantHeatingTerm
+from spindle_fem.effects.catalogue.gap_closure import GapClosureTerm
+from spindle_fem.effects.catalogue.grease_churning import GreaseChurningTerm
+from spindle_fem.effects.catalogue.heat_capacity import ContactCapacityTerm
+from spindle_fem.effects.catalogue.heat_split import HeatSplitTerm
+from spindle_fem.effects.catalogue.mount_sink import MountSinkTerm
+from spindle_fem.effects.catalogue.natural_convection import NaturalConvectionTerm
+from spindle_fem.effects.catalogue.radiation import RadiationTerm
+from spindle_fem.effects.catalogue.starvation import StarvationTerm
+from spindle_fem.effects.catalogue.thermal_preload import NAME, ThermalPreloadTerm
+from spindle_fem.effects.catalogue.unrecorded_cooling import CoolingTerm
+from spindle_fem.effects.catalogue.viscosity_heat import ViscosityHeatTerm, Walther
+from spindle_fem.effects.framework.laws import (
+    amplitude,
+    linear,
+    power,
+    relaxed,
+    shape,
+    smooth_step,
+    softplus,
+    switched,
+)
+from spindle_fem.effects.framework.machine_view import ChannelFlow, FrictionTable, RecordedQuantity
+from spindle_fem.effects.framework.speed_heat import SpeedHeatTerm
+from spindle_fem.effects.framework.spread import Spread
+from spindle_fem.effects.framework.term import TermContext
+from spindle_fem.effects.framework.unrecorded import Followed, InIntervals, UnrecordedHeatTerm
+from spindle_fem.physics.surroundings.still_air import STEFAN_BOLTZMANN
 
 RPM = np.pi / 30.0
 
@@ -215,7 +224,7 @@ def test_radiation_on_top_is_stefan_and_boltzmann():
 
 
 def _film_parameters(name, **others):
-    from spindle_fem.effects.laws import amplitude, linear
+    from spindle_fem.effects.framework.laws import amplitude, linear
 
     extra = tuple(linear(key, value, 0.1) for key, value in others.items())
     return (amplitude(name, 1.0), *extra, linear("carried_share", 1.0, 0.1))

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from spindle_fem.effects.catalogue import catalogue
-from spindle_fem.effects.coolant_bypass import MixedOutlet
-from spindle_fem.effects.filters import delayed, first_order_lag, scan
-from spindle_fem.effects.sensor_detached import DetachedReading
-from spindle_fem.effects.spectrum import strongest_periods
+from spindle_fem.effects.catalogue.coolant_bypass import MixedOutlet
+from spindle_fem.effects.catalogue.sensor_detached import DetachedReading
+from spindle_fem.effects.framework.filters import delayed, first_order_lag, scan
+from spindle_fem.effects.framework.spectrum import strongest_periods
+from spindle_fem.effects.registry import catalogue
 
 TIMES = np.array([0.0, 3.0, 10.0, 11.0, 40.0, 41.5, 90.0, 200.0, 201.0, 500.0])
 RAMP = 293.15 + 0.05 * TIMES

@@ -6,8 +6,9 @@ import math
 
 import pytest
 
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import FaultsError, GeometryError
-from spindle_fem.geometry.assembly import (
+from spindle_fem.machine.geometry.assembly import (
     AnnularSegment,
     FaceBox,
     PartGeometry,
@@ -15,7 +16,6 @@ from spindle_fem.geometry.assembly import (
     assemble,
     build_assembly,
 )
-from spindle_fem.spec.load import load_machine
 
 
 def ring(z_start, z_end, inner, outer):

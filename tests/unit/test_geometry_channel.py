@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spindle_fem.errors import FaultsError
-from spindle_fem.geometry.assembly import AnnularSegment, PartGeometry, assemble
-from spindle_fem.geometry.channel import ChannelDefinition, ChannelGeometry
-from spindle_fem.geometry.design_space import draw_valid_designs
+from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition, ChannelGeometry
+from spindle_fem.machine.geometry.design_space import draw_valid_designs
 
 
 def ring(z_start, z_end, inner, outer):

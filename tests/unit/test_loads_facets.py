@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spindle_fem.loads.facets import facet_centres
+from spindle_fem.operation.facet_centres import facet_centres
 
 
 def cylinder_patch(radius, height, angle, n):

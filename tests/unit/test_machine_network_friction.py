@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import NoSteadyStateError
-from spindle_fem.loads.bearing_heat import BearingTemperatures, heat_model_of
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.contacts import BallContactLaw
-from spindle_fem.network.friction import film_temperature, tabulate_friction
-from spindle_fem.network.machine import build_machine_network
-from spindle_fem.network.machine_steady import SparseBalance, solve_machine_network
-from spindle_fem.network.machine_transient import simulate_machine_network
-from spindle_fem.network.operating import operate
-from spindle_fem.spec.load import load_machine
+from spindle_fem.model.lumped.ball_contacts import BallContactLaw
+from spindle_fem.model.lumped.friction_table import film_temperature, tabulate_friction
+from spindle_fem.model.lumped.machine_network import build_machine_network
+from spindle_fem.model.lumped.machine_network_transient import simulate_machine_network
+from spindle_fem.model.lumped.machine_steady import SparseBalance, solve_machine_network
+from spindle_fem.model.lumped.operating_state import operate
+from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of
+from spindle_fem.operation.operating_point import OperatingPoint
 
 
 @pytest.fixture(scope="module")

@@ -8,20 +8,20 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from spindle_fem.coolant.nusselt import nusselt_paper_turbulent, nusselt_sieder_tate
 from spindle_fem.errors import OutOfValidityError
-from spindle_fem.geometry.assembly import AnnularSegment, PartGeometry, assemble
-from spindle_fem.network.cells import build_cells
-from spindle_fem.network.links import node_centres, solid_links
-from spindle_fem.network.partition import Partition
-from spindle_fem.network.resistances import (
+from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+from spindle_fem.model.lumped.cells import build_cells
+from spindle_fem.model.lumped.links import node_centres, solid_links
+from spindle_fem.model.lumped.partition import Partition
+from spindle_fem.model.lumped.resistances import (
     air_film_coefficient,
     cylinder_resistance,
     film_resistance,
     plate_film_coefficient,
     ring_housing_resistance,
 )
-from spindle_fem.tribology.contact_heat import ball_resistance, constriction_resistance
+from spindle_fem.physics.bearings.contact_conduction import ball_resistance, constriction_resistance
+from spindle_fem.physics.coolant.nusselt import nusselt_paper_turbulent, nusselt_sieder_tate
 
 K = 42.0
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import FaultsError, NoSteadyStateError, OutOfValidityError, SpecError
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.loads.bearing_heat import heat_model_of
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.network.cells import build_cells, channel_zone, side_wall_area
-from spindle_fem.network.friction import tabulate_friction
-from spindle_fem.network.laws import FrictionLaw
-from spindle_fem.network.machine import build_machine_network
-from spindle_fem.network.machine_steady import SparseBalance, newton, solve_machine_network
-from spindle_fem.network.machine_transient import simulate_machine_network
-from spindle_fem.network.operating import operate
-from spindle_fem.network.steady import solve_steady
-from spindle_fem.spec.load import load_machine
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.model.lumped.cells import build_cells, channel_zone, side_wall_area
+from spindle_fem.model.lumped.friction_table import tabulate_friction
+from spindle_fem.model.lumped.heat_laws import FrictionLaw
+from spindle_fem.model.lumped.machine_network import build_machine_network
+from spindle_fem.model.lumped.machine_network_transient import simulate_machine_network
+from spindle_fem.model.lumped.machine_steady import SparseBalance, newton, solve_machine_network
+from spindle_fem.model.lumped.network_steady import solve_steady
+from spindle_fem.model.lumped.operating_state import operate
+from spindle_fem.operation.bearing_heat import heat_model_of
+from spindle_fem.operation.operating_point import OperatingPoint
 
 MACHINES = ("recorded_spindle", "small_two_start", "uncooled")
 

@@ -7,9 +7,9 @@ import math
 import pytest
 
 from spindle_fem.errors import BadInputError
-from spindle_fem.geometry.assembly import AnnularSegment, PartGeometry, assemble
-from spindle_fem.geometry.channel import ChannelDefinition
-from spindle_fem.meshing.sizes import build_sizes, edge_sizes
+from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
+from spindle_fem.machine.meshing.sizes import build_sizes, edge_sizes
 
 
 @pytest.fixture(scope="module")

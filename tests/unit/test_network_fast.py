@@ -8,16 +8,16 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from spindle_fem.effects.term import Term, TermParameter
+from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import FaultsError, SpecError
-from spindle_fem.network.build import build_network
+from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.adjoint import fast_gradient
+from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.simulate_network import simulate_on_recording
-from spindle_fem.reduced.adjoint import fast_gradient
-from spindle_fem.reduced.network_model import NetworkFastModel
-from spindle_fem.reduced.start import Start
-from spindle_fem.reduced.transient import simulate_fast
-from spindle_fem.spec.network import validate_network_machine
+from spindle_fem.studies.simulate_network import simulate_on_recording
 
 MACHINE = """
 schema = "spindle-fem/machine/1"

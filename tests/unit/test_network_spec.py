@@ -6,16 +6,16 @@ import tomllib
 import numpy as np
 import pytest
 
-from spindle_fem.errors import FaultsError, SpecError, UnknownSurfaceError
-from spindle_fem.network.build import build_network
-from spindle_fem.spec.load import machine_folder
-from spindle_fem.spec.network import (
+from spindle_fem.definition.load import machine_folder
+from spindle_fem.definition.network_tables import (
     is_network_machine,
     load_network_machine,
     validate_network_machine,
     with_parameters,
     write_network_machine,
 )
+from spindle_fem.errors import FaultsError, SpecError, UnknownSurfaceError
+from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.units import Uncertain
 
 TEXT = """

@@ -6,10 +6,10 @@ import scipy.linalg
 from numpy.testing import assert_allclose
 
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, RecordingError, SpecError
-from spindle_fem.network.exact import divided_differences, first_order_recurrence, phi_functions
-from spindle_fem.network.history import InputHistory
-from spindle_fem.network.model import ConductanceLaw, Parameter, ThermalNetwork
-from spindle_fem.network.transient import simulate_transient
+from spindle_fem.model.lumped.exact_steps import divided_differences, first_order_recurrence, phi_functions
+from spindle_fem.model.lumped.network_transient import simulate_transient
+from spindle_fem.model.lumped.thermal_network import ConductanceLaw, Parameter, ThermalNetwork
+from spindle_fem.recordings.input_samples import InputHistory
 
 
 def lump(**changes):

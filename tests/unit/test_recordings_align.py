@@ -5,7 +5,7 @@ import pytest
 
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.checks import (
+from spindle_fem.recordings.channel_checks import (
     Flag,
     resolution,
     slow_error,

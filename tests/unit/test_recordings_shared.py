@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spindle_fem.network.build import build_network
+from spindle_fem.definition.load import machine_folder
+from spindle_fem.definition.network_tables import load_network_machine
+from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare
-from spindle_fem.recordings.simulate_network import simulate_on_recording
-from spindle_fem.spec.load import machine_folder
-from spindle_fem.spec.network import load_network_machine
+from spindle_fem.studies.simulate_network import simulate_on_recording
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 FOLDER = Path(os.environ.get("SPINDLE_FEM_RECORDINGS", BESIDE))

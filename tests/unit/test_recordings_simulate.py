@@ -9,20 +9,20 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
+from spindle_fem.definition.network_tables import validate_network_machine
 from spindle_fem.errors import FaultsError, RecordingError, SpecError
-from spindle_fem.network.build import build_network
-from spindle_fem.network.history import InputHistory
-from spindle_fem.network.transient import simulate_transient
+from spindle_fem.model.lumped.network_transient import simulate_transient
+from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare, simulation_summary, write_simulated
 from spindle_fem.recordings.conditions import operating_conditions
-from spindle_fem.recordings.simulate_network import (
+from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.studies.simulate_network import (
     initial_parameters,
     initial_state,
     magnitude_history,
     simulate_on_recording,
 )
-from spindle_fem.spec.network import validate_network_machine
 
 MACHINE = """
 schema = "spindle-fem/machine/1"

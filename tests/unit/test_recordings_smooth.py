@@ -5,7 +5,7 @@ from dataclasses import make_dataclass
 import numpy as np
 import pytest
 
-from spindle_fem.recordings.smooth import smoothed, walk_and_noise, without_input_noise
+from spindle_fem.recordings.smooth_inputs import smoothed, walk_and_noise, without_input_noise
 
 
 @pytest.fixture

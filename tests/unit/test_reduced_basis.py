@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpecError
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.reduced.affine import build_affine_system
-from spindle_fem.reduced.coefficients import build_coefficient_table
-from spindle_fem.reduced.model import reduced_digest
-from spindle_fem.reduced.snapshots import SnapshotSpace, helix_profiles, orthonormalise
-from spindle_fem.spec.load import load_machine
-from spindle_fem.surroundings.rotating import rotating_film
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.model.reduced.affine_operators import build_affine_system
+from spindle_fem.model.reduced.coefficients import build_coefficient_table
+from spindle_fem.model.reduced.projected_model import reduced_digest
+from spindle_fem.model.reduced.snapshots import SnapshotSpace, helix_profiles, orthonormalise
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.surroundings.rotating_surfaces import rotating_film
 
 RADII = {"air_gap": (0.065, 0.09), "labyrinth": (0.09, 0.091)}
 

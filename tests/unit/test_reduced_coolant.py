@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spindle_fem.coolant.marching import march_enthalpy
-from spindle_fem.reduced.coolant import UniformFilmMaps, coolant_maps, film_derivative
+from spindle_fem.model.reduced.coolant_maps import UniformFilmMaps, coolant_maps, film_derivative
+from spindle_fem.physics.coolant.march import march_enthalpy
 
 
 def walls_as_unknowns(starts, cells, seed=0):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spindle_fem.reduced.directions import FLOW_TOLERANCE, ConductingDirections
+from spindle_fem.model.reduced.coefficient_directions import FLOW_TOLERANCE, ConductingDirections
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,18 @@
 import numpy as np
 import pytest
 
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import RecordingError
-from spindle_fem.loads.bearing_heat import table_heat
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.reduced.drive import STANDARD, WALL_BIN, heat_of_table, inputs_at, make_drive, with_walls
-from spindle_fem.spec.load import load_machine
+from spindle_fem.model.reduced.drive import (
+    STANDARD,
+    WALL_BIN,
+    heat_of_table,
+    inputs_at,
+    make_drive,
+    with_walls,
+)
+from spindle_fem.operation.bearing_heat import table_heat
+from spindle_fem.operation.operating_point import OperatingPoint
 
 HELD = np.array([True, True, False, False, True])
 

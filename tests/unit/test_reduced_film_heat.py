@@ -9,21 +9,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spindle_fem.effects.term import TermContext
+from spindle_fem.definition.load import load_machine
+from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
-from spindle_fem.loads.bearing_heat import BearingMechanics
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.reduced.drive import heat_of_table, with_walls
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.film_heat import (
+from spindle_fem.model.reduced.drive import heat_of_table, with_walls
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.film_heat import (
     FilmHeat,
     operators_machine,
     tabulate_friction,
     tabulated_machine,
     thrusts_between,
 )
-from spindle_fem.reduced.transient import simulate_fast
-from spindle_fem.spec.load import load_machine
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.operation.bearing_heat import BearingMechanics
+from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import Uncertain
 
 RPM = np.pi / 30.0

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spindle_fem.effects.gap_closure import GapClosureTerm
-from spindle_fem.effects.starvation import StarvationTerm
-from spindle_fem.effects.term import Term, TermContext, TermParameter
-from spindle_fem.effects.thermal_preload import ThermalPreloadTerm
-from spindle_fem.reduced.memory import carried, moves_over, remembered
-from spindle_fem.reduced.term_layout import Layout
+from spindle_fem.effects.catalogue.gap_closure import GapClosureTerm
+from spindle_fem.effects.catalogue.starvation import StarvationTerm
+from spindle_fem.effects.catalogue.thermal_preload import ThermalPreloadTerm
+from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
+from spindle_fem.model.reduced.term_layout import Layout
+from spindle_fem.model.reduced.term_memory import carried, moves_over, remembered
 
 STEPS = 80
 GAP = 33

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from spindle_fem.conduction.evaluate import probe_matrix
-from spindle_fem.conduction.operators import build_operators
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.machine_spec import Probe
 from spindle_fem.errors import GeometryError
-from spindle_fem.meshing.simple import build_joined_tubes
-from spindle_fem.reduced.probe_places import (
+from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
+from spindle_fem.model.mesh.evaluate import probe_matrix
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.reduced.probe_places import (
     around_places,
     harmonics,
     near_places,
@@ -15,8 +17,6 @@ from spindle_fem.reduced.probe_places import (
     probe_slopes,
     ringed_probes,
 )
-from spindle_fem.spec.load import load_machine
-from spindle_fem.spec.model import Probe
 
 # Two tubes, radii 100, 150 and 200 mm, 100 mm long.
 MESH = build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((4, 3), 48, 6))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from spindle_fem.reduced.stepping import (
+from spindle_fem.model.reduced.trbdf2_matrices import (
     MatrixChange,
     build_propagator,
     group_steps,

@@ -7,22 +7,23 @@ import numpy as np
 import pytest
 from joblib.externals.loky.backend.reduction import dumps
 
-from spindle_fem.effects.term import Term, TermParameter
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.machine_spec import NaturalFilm
+from spindle_fem.definition.uncertain_parameters import with_parameters
+from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import ConvergenceError, SpecError
-from spindle_fem.geometry.assembly import build_assembly
-from spindle_fem.reduced import nonlinear, term_march
-from spindle_fem.reduced.adjoint import fast_gradient
-from spindle_fem.reduced.coefficients import free_parameters
-from spindle_fem.reduced.drive import STANDARD, make_drive
-from spindle_fem.reduced.fast_model import FastModel
-from spindle_fem.reduced.model import ReducedModel
-from spindle_fem.reduced.term_layout import OneInstant
-from spindle_fem.reduced.term_march import TermMarch
-from spindle_fem.reduced.transient import TransientRun, simulate_fast
-from spindle_fem.spec.load import load_machine
-from spindle_fem.spec.model import NaturalFilm
-from spindle_fem.spec.parameters import with_parameters
-from spindle_fem.surroundings.air import outside_coefficient
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.model.reduced import dynamic_terms as nonlinear
+from spindle_fem.model.reduced import term_march
+from spindle_fem.model.reduced.adjoint import fast_gradient
+from spindle_fem.model.reduced.coefficients import free_parameters
+from spindle_fem.model.reduced.drive import STANDARD, make_drive
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.projected_model import ReducedModel
+from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
+from spindle_fem.model.reduced.term_layout import OneInstant
+from spindle_fem.model.reduced.term_march import TermMarch
+from spindle_fem.physics.surroundings.still_air import outside_coefficient
 
 CELLS = 12
 RPM = np.pi / 30.0

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spindle_fem.meshing.simple import build_joined_tubes
-from spindle_fem.reporting import tables
-from spindle_fem.reporting.figures import TEMPERATURE_MAP, new_figure, rasterise, scale_of, spread
-from spindle_fem.reporting.inputs import customary, input_groups
-from spindle_fem.reporting.machine_drawing import channel_sections, machine_drawing, part_colours
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
+from spindle_fem.report import run_tables as tables
+from spindle_fem.report.definition_tables import customary, input_groups
+from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of, spread
+from spindle_fem.report.machine_drawing import channel_sections, machine_drawing, part_colours
 
 
 @given(st.lists(st.tuples(st.floats(-50, 150), st.floats(1, 9)), min_size=1, max_size=10))
@@ -77,7 +77,7 @@ def test_values_are_shown_in_customary_units(text, expected):
 def test_inputs_carry_the_marks_of_the_file():
     import tomllib
 
-    from spindle_fem.spec.load import write_machine
+    from spindle_fem.definition.load import write_machine
 
     definition = tomllib.loads(write_machine(load_machine("wu_tan_2016")))
     groups = {group["title"]: group for group in input_groups(definition)}
@@ -96,7 +96,7 @@ def test_inputs_carry_the_marks_of_the_file():
 def test_every_input_of_every_shipped_machine_finds_its_row():
     import tomllib
 
-    from spindle_fem.spec.load import write_machine
+    from spindle_fem.definition.load import write_machine
 
     def leaves(value):
         if isinstance(value, dict) and set(value) != {"value", "sigma_rel"}:
@@ -170,8 +170,8 @@ def test_drawings_of_the_shipped_machines_fill_their_page(name):
 
 @pytest.mark.render
 def test_a_closed_shape_looks_the_same_without_what_faces_away():
-    from spindle_fem.reporting.scenes import SceneRenderer, View
-    from spindle_fem.reporting.surfaces import exposed_triangles
+    from spindle_fem.report.drawn_surfaces import exposed_triangles
+    from spindle_fem.report.scenes import SceneRenderer, View
 
     mesh = build_joined_tubes((0.03, 0.07, 0.15), 0.1, ((2, 2), 12, 3), parts=("shaft", "housing"))
     shape = exposed_triangles(mesh, mesh.points[:, 2])

@@ -12,17 +12,19 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from spindle_fem.definition.load import load_machine, validate
 from spindle_fem.errors import BadInputError
-from spindle_fem.meshing.simple import build_joined_tubes
-from spindle_fem.reporting import document, tables
-from spindle_fem.reporting.beside import Helper, start_beside
-from spindle_fem.reporting.figures import new_figure
-from spindle_fem.reporting.interactive import SURFACE_GROUP, display_surface, viewer_payload
-from spindle_fem.reporting.output import MARKER, is_complete, output_folder, require_complete
-from spindle_fem.reporting.report import in_order, rebuild_report, render_run_report
-from spindle_fem.reporting.run_outputs import OutputHelpers, write_outputs
+from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
+from spindle_fem.report import block_page as document
+from spindle_fem.report import run_tables as tables
+from spindle_fem.report.figure_style import new_figure
+from spindle_fem.report.interactive_view import SURFACE_GROUP, display_surface, viewer_payload
+from spindle_fem.report.run_outputs import OutputHelpers, write_outputs
+from spindle_fem.report.run_report import in_order, rebuild_report, render_run_report
+from spindle_fem.report.second_process import Helper, start_beside
 from spindle_fem.results.dataset import build_dataset, default_paths, read_dataset, spec_digest, write_dataset
-from spindle_fem.results.summary import build_summary
+from spindle_fem.results.output_folder import MARKER, is_complete, output_folder, require_complete
+from spindle_fem.results.run_summary import build_summary
 from spindle_fem.results.thermal_result import (
     BearingResult,
     Check,
@@ -30,7 +32,6 @@ from spindle_fem.results.thermal_result import (
     EnergyBalance,
     ThermalResult,
 )
-from spindle_fem.spec.load import load_machine, validate
 from spindle_fem.validity import CodedWarning
 
 PARTS = ("shaft", "F1.inner_ring", "F1.outer_ring", "housing")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spindle_fem.meshing.simple import build_box, build_joined_tubes, build_tube
-from spindle_fem.reporting import sections, surfaces
-from spindle_fem.reporting.profiles import axial_profile, meridian_section, radial_profile
+from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes, build_tube
+from spindle_fem.report import drawn_surfaces as surfaces
+from spindle_fem.report import plane_sections as sections
+from spindle_fem.report.profiles import axial_profile, meridian_section, radial_profile
 
 INNER, OUTER, LENGTH = 0.05, 0.08, 0.1
 

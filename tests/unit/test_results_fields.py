@@ -6,8 +6,8 @@ import meshio
 import numpy as np
 import pytest
 
-from spindle_fem.meshing.simple import build_box, build_joined_tubes, build_tube
-from spindle_fem.results.fields import heat_flux, write_tagged_vtu
+from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes, build_tube
+from spindle_fem.results.field_file import heat_flux, write_tagged_vtu
 
 RADII = (0.04, 0.07)
 

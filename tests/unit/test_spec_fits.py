@@ -4,11 +4,11 @@ import math
 
 import pytest
 
+from spindle_fem.definition.bearing_seats import seat_diameter
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError
-from spindle_fem.loads.bearing_heat import BearingMechanics, BearingTemperatures
-from spindle_fem.loads.operating_point import OperatingPoint
-from spindle_fem.spec.load import load_machine
-from spindle_fem.spec.seats import seat_diameter
+from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
+from spindle_fem.operation.operating_point import OperatingPoint
 
 
 def mechanics(*settings: str) -> tuple[BearingMechanics, OperatingPoint]:

@@ -7,10 +7,9 @@ import tomllib
 
 import pytest
 
-from spindle_fem.errors import FaultsError, SpecError
-from spindle_fem.spec.consistency import find_faults
-from spindle_fem.spec.inherit import apply_overrides, merge, without_none
-from spindle_fem.spec.load import (
+from spindle_fem.definition.consistency import find_faults
+from spindle_fem.definition.inherit import apply_overrides, merge, without_none
+from spindle_fem.definition.load import (
     examine_machine,
     find_machine,
     load_machine,
@@ -21,6 +20,7 @@ from spindle_fem.spec.load import (
     validate,
     write_machine,
 )
+from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.units import Uncertain
 
 WITH_GEOMETRY = tuple(

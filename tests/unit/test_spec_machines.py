@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
 from spindle_fem.units import Uncertain
 
 WU_TAN = load_machine("wu_tan_2016")

@@ -6,9 +6,13 @@ import math
 
 import pytest
 
+from spindle_fem.definition.load import load_machine, validate
+from spindle_fem.definition.uncertain_parameters import (
+    UncertainParameter,
+    uncertain_parameters,
+    with_parameters,
+)
 from spindle_fem.errors import SpecError
-from spindle_fem.spec.load import load_machine, validate
-from spindle_fem.spec.parameters import UncertainParameter, uncertain_parameters, with_parameters
 
 RECORDED = load_machine("recorded_spindle")
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import spindle_fem
-from spindle_fem.spec.model import MachineSpec
-from spindle_fem.spec.reference import reference_page
-from spindle_fem.spec.schema import annotation_of, fields_of, shape_of
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.reference_page import reference_page
+from spindle_fem.definition.schema import annotation_of, fields_of, shape_of
 
 PAGE = Path(spindle_fem.__file__).parents[1] / "docs" / "machine_definition.md"
 
@@ -30,7 +30,7 @@ MODELS = list(dict.fromkeys(models_below(MachineSpec)))
 @pytest.mark.skipif(not PAGE.parent.is_dir(), reason="the page lies in the source tree, not in the wheel")
 def test_the_page_is_up_to_date():
     assert PAGE.read_text(encoding="utf-8") == reference_page(), (
-        "run: python -m spindle_fem.spec.reference > docs/machine_definition.md"
+        "run: python -m spindle_fem.definition.reference_page > docs/machine_definition.md"
     )
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import OutOfValidityError
-from spindle_fem.surroundings.air import (
+from spindle_fem.physics.surroundings.still_air import (
     STEFAN_BOLTZMANN,
     air_properties,
     natural_convection_cylinder,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import OutOfValidityError
-from spindle_fem.surroundings.joints import (
+from spindle_fem.physics.surroundings.joint_conductance_laws import (
     gap_conductance,
     harmonic_conductivity,
     interference_fit,

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import OutOfValidityError
-from spindle_fem.surroundings.gaps import (
+from spindle_fem.physics.surroundings.air_gaps import (
     gap_coefficient_becker_kaye,
     gap_coefficient_power_law,
     nusselt_becker_kaye,
     taylor_number,
 )
-from spindle_fem.surroundings.rotating import (
+from spindle_fem.physics.surroundings.rotating_surfaces import (
     ROTATING_MODELS,
     nusselt_becker,
     nusselt_dropkin_carmi,

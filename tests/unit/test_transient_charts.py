@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spindle_fem.reporting.transient_charts import heat_history, probe_history
-from spindle_fem.transients.study import StudyResult
+from spindle_fem.report.transient_charts import heat_history, probe_history
+from spindle_fem.studies.transient_study import StudyResult
 
 HOUR = 3600.0
 

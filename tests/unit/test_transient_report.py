@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from spindle_fem.console import print_transient
-from spindle_fem.reporting.transient_report import equilibrium_text
+from spindle_fem.commands.console import print_transient
+from spindle_fem.report.transient_report import equilibrium_text
 
 EQUILIBRIUM = {
     "exists": True,

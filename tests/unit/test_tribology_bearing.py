@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 
 from spindle_fem.errors import GeometryError, NoEquilibriumError, OutOfValidityError, SpecError
-from spindle_fem.tribology.bearing import BearingGeometry, select_orientations
-from spindle_fem.tribology.grease import Lubricant
-from spindle_fem.tribology.preload import (
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry, select_orientations
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.preload import (
     axial_force,
     axial_state,
     preload_from_catalogue,

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from spindle_fem.errors import FaultsError, NoEquilibriumError, SpecError, UnitError, UnknownKeyError
-from spindle_fem.tribology.bearing_file import bearing_report, read_bearing_file
+from spindle_fem.physics.bearings.bearing_file import bearing_report, read_bearing_file
 
 BEARING = {
     "ball_diameter": '"22.225 mm"',

@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spindle_fem.errors import GeometryError, SpecError
-from spindle_fem.surroundings.joints import interference_fit
-from spindle_fem.tribology.bearing import BearingGeometry
-from spindle_fem.tribology.bearing_set import (
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_set import (
     BearingSet,
     BearingTemperatures,
     MountedBearing,
@@ -19,11 +18,12 @@ from spindle_fem.tribology.bearing_set import (
     solve_bearing_set,
     uniform_temperatures,
 )
-from spindle_fem.tribology.fits import FitTemperatures, RingFits, mounted_state, seated_rings
-from spindle_fem.tribology.grease import Lubricant
-from spindle_fem.tribology.mounting import rotation_growth
-from spindle_fem.tribology.preload import axial_state
-from spindle_fem.tribology.rings import Annulus, SeatMaterial
+from spindle_fem.physics.bearings.fits import FitTemperatures, RingFits, mounted_state, seated_rings
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.mounting import rotation_growth
+from spindle_fem.physics.bearings.preload import axial_state
+from spindle_fem.physics.bearings.rings import Annulus, SeatMaterial
+from spindle_fem.physics.surroundings.joint_conductance_laws import interference_fit
 
 BEARING = BearingGeometry(
     14.2875e-3, 30, 165e-3, math.radians(15.0), 0.52, 0.52,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError, SpecError
-from spindle_fem.tribology.bearing import BearingGeometry
-from spindle_fem.tribology.bearing_set import (
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_set import (
     BearingSet,
     BearingTemperatures,
     ExternalLoad,
@@ -21,13 +21,17 @@ from spindle_fem.tribology.bearing_set import (
     solve_bearing_set,
     uniform_temperatures,
 )
-from spindle_fem.tribology.contact_heat import ball_conductance, constriction_resistance, contact_resistance
-from spindle_fem.tribology.grease import Lubricant
-from spindle_fem.tribology.heat import CageGuidance, ContactSeal, HeatOptions
-from spindle_fem.tribology.hertz import INNER, OUTER
-from spindle_fem.tribology.mounting import rotation_growth
-from spindle_fem.tribology.preload import unloading_thrust
-from spindle_fem.tribology.traction import TractionOptions
+from spindle_fem.physics.bearings.contact_conduction import (
+    ball_conductance,
+    constriction_resistance,
+    contact_resistance,
+)
+from spindle_fem.physics.bearings.friction_heat import CageGuidance, ContactSeal, HeatOptions
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.hertz import INNER, OUTER
+from spindle_fem.physics.bearings.mounting import rotation_growth
+from spindle_fem.physics.bearings.preload import unloading_thrust
+from spindle_fem.physics.bearings.traction import TractionOptions
 
 BEARING = BearingGeometry(
     14.2875e-3,

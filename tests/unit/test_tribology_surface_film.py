@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import quad
 
 from spindle_fem.errors import OutOfValidityError, SpecError
-from spindle_fem.tribology.film import film_fit_warnings, thermal_reduction
-from spindle_fem.tribology.surface import (
+from spindle_fem.physics.bearings.lubricant_film import film_fit_warnings, thermal_reduction
+from spindle_fem.physics.bearings.rough_surface import (
     SurfaceRoughness,
     contact_area_ratio,
     exceedance_integral,
@@ -20,7 +20,7 @@ from spindle_fem.tribology.surface import (
     weierstrass_mandelbrot_moments,
     weierstrass_mandelbrot_profile,
 )
-from spindle_fem.tribology.traction import ellipse_quadrature
+from spindle_fem.physics.bearings.traction import ellipse_quadrature
 
 FRACTAL = (1e-11, 1.4, 22, 30)
 

@@ -36,7 +36,7 @@ def test_shares_nothing_with_the_program_it_tries_to_fool():
         ours = {name for name in imported if name.startswith("spindle_fem")}
         # What diagnoses the cases calls the program; nothing that makes them does.
         diagnoses = path.name in ("run_study.py", "riddle.py")
-        assert ours <= ({"spindle_fem.diagnosis.run"} if diagnoses else set()), path.name
+        assert ours <= ({"spindle_fem.commands.diagnose_command"} if diagnoses else set()), path.name
 
 
 def test_film_of_the_reference_page():

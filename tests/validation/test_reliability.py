@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from spindle_fem.diagnosis import reliability as stated
+from spindle_fem.inference import reliability as stated
 from validation.reliability import (
     LARGEST_PROBABILITY,
     SMALLEST_SHARE,

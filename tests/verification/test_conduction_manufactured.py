@@ -8,11 +8,11 @@ from scipy.sparse.linalg import spsolve
 from skfem import Functional, LinearForm
 from skfem.helpers import dot, grad
 
-from spindle_fem.conduction.assemble import assemble_system
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film
-from spindle_fem.conduction.skfem_mesh import load_into_skfem
-from spindle_fem.meshing.simple import build_tube
+from spindle_fem.machine.meshing.simple_bodies import build_tube
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film
+from spindle_fem.model.mesh.equations import assemble_system
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.skfem_mesh import load_into_skfem
 
 CONDUCTIVITY, FILM = 3.0, 2.0
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spindle_fem.conduction.evaluate import surface_mean
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
-from spindle_fem.conduction.steady import solve_steady
-from spindle_fem.meshing.simple import Block, build_structured_mesh, build_tube, tube_mapping
+from spindle_fem.machine.meshing.simple_bodies import Block, build_structured_mesh, build_tube, tube_mapping
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.model.mesh.evaluate import surface_mean
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.steady_conduction import solve_steady
 
 LENGTH = 0.1
 

@@ -8,17 +8,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spindle_fem.conduction.evaluate import joint_means, surface_mean, temperature_at_points
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import PERFECT_CONTACT, ConductionProblem, Film
-from spindle_fem.conduction.steady import solve_steady
-from spindle_fem.meshing.simple import (
+from spindle_fem.machine.meshing.simple_bodies import (
     Block,
     build_box,
     build_joined_tubes,
     build_structured_mesh,
     build_tube,
 )
+from spindle_fem.model.mesh.conduction_problem import PERFECT_CONTACT, ConductionProblem, Film
+from spindle_fem.model.mesh.evaluate import joint_means, surface_mean, temperature_at_points
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.steady_conduction import solve_steady
 
 AMBIENT = 293.15
 

@@ -12,12 +12,12 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import j0, j1, y0, y1
 
-from spindle_fem.conduction.evaluate import probe_matrix
-from spindle_fem.conduction.operators import build_operators
-from spindle_fem.conduction.problem import ConductionProblem, Film, LumpedNode
-from spindle_fem.conduction.steady import solve_steady
-from spindle_fem.conduction.transient import StepControl, integrate, uniform_state
-from spindle_fem.meshing.simple import build_box, build_tube
+from spindle_fem.machine.meshing.simple_bodies import build_box, build_tube
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.model.mesh.evaluate import probe_matrix
+from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.steady_conduction import solve_steady
+from spindle_fem.model.mesh.time_stepper import StepControl, integrate, uniform_state
 
 AMBIENT, START = 300.0, 400.0
 K, CAPACITY = 40.0, 3.6e6

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spindle_fem.crosscheck.axisymmetric import solve_axisymmetric
-from spindle_fem.crosscheck.gather import gather_axisymmetric, gather_network
-from spindle_fem.network.machine import build_machine_network
-from spindle_fem.network.machine_steady import solve_machine_network
-from spindle_fem.spec.load import load_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.model.lumped.machine_network import build_machine_network
+from spindle_fem.model.lumped.machine_steady import solve_machine_network
+from spindle_fem.studies.crosscheck.axisymmetric import solve_axisymmetric
+from spindle_fem.studies.crosscheck.gather_fields import gather_axisymmetric, gather_network
 
 
 @pytest.fixture(scope="module")

@@ -1,1 +1,0 @@
-"""Uncertain parameters fitted to recordings, with what the data can and cannot tell."""

@@ -1,0 +1,1 @@
+"""One function a command: a study, its files and its report."""

@@ -1,0 +1,260 @@
+"""Tables on the terminal, through rich."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+
+def _console() -> Console:
+    """The terminal's width, or a wide page where the output goes to a file or a pipe."""
+    console = Console()
+    return console if console.is_terminal else Console(width=120)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(
+        title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
+    table.add_column(columns[0], no_wrap=True)
+    for column in columns[1:]:
+        table.add_column(column, justify="right")
+    return table
+
+
+def _number(value: Any, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+def print_run(summary: dict[str, Any], folder: Path) -> None:
+    """Headline of a run: temperatures, bearings, balance, checks and warnings."""
+    console = _console()
+    table = _table(
+        "Bearings", "", "heat W", "inner °C", "outer °C", "balls °C", "difference K", "preload N", "lambda"
+    )
+    for name, bearing in summary["bearings"].items():
+        table.add_row(
+            name,
+            _number(bearing["heat_W"], 1),
+            _number(bearing["temperature_inner_degC"], 2),
+            _number(bearing["temperature_outer_degC"], 2),
+            _number(bearing["temperature_ball_degC"], 2),
+            _number(bearing["ring_difference_K"], 2),
+            _number(bearing["preload_N"], 0),
+            _number(bearing["lambda"], 1),
+        )
+    console.print(table)
+    probes = _table("Probes", *(["", *summary["probes"]]))
+    probes.add_row("°C", *(_number(value, 2) for value in summary["probes"].values()))
+    console.print(probes)
+    coolant = summary["coolant"]
+    if coolant:
+        film = coolant["film_coefficient_W_m2K"]
+        console.print(
+            f"Coolant {coolant['inlet_degC']:.2f} → {coolant['outlet_degC']:.2f} °C, {coolant['regime']}, "
+            f"Re {coolant['reynolds']:.0f}, "
+            f"film {film['value']:.0f} ({film['low']:.0f}–{film['high']:.0f}) W/(m²·K), "
+            f"pressure drop {coolant['pressure_drop_Pa'] / 1e5:.2f} bar"
+        )
+    temperature, energy, mesh = summary["temperature"], summary["energy"], summary["mesh"]
+    console.print(f"Hottest {temperature['max_degC']:.2f} °C at {temperature['max_at_mm']} mm")
+    console.print(
+        f"Heat in {energy['heat_in_W']:.2f} W, imbalance {energy['imbalance_relative']:.1e}; "
+        f"{mesh['nodes']:,} temperatures, {mesh['elements']:,} elements, "
+        f"worst quality {mesh['min_quality']:.2f}"
+    )
+    split = ", ".join(f"{name} {seconds:.1f}" for name, seconds in summary["timings_s"].items())
+    console.print(f"{summary['wall_time_s']:.1f} s ({split}), peak {summary['peak_rss_MB']:.0f} MB")
+    for check in summary["checks"]:
+        if not check["passed"]:
+            console.print(
+                f"[bold red]FAILED[/] {check['name']}: {check['value']:.4g} {check['unit']}, "
+                f"limit {check['limit']:.4g}. {check['explanation']}"
+            )
+    for warning in summary["warnings"]:
+        console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
+    console.print(f"Report: {folder / 'report.html'}")
+
+
+def print_check(content: dict[str, Any]) -> None:
+    """What a valid machine is made of."""
+    console = _console()
+    console.print(f"[bold]{content['machine']}[/] is valid.")
+    for key in (key for key, rows in content.items() if isinstance(rows, list) and key != "warnings"):
+        if not content[key]:
+            continue
+        table = _table(key, "name", "")
+        for row in content[key]:
+            table.add_row(row["name"], row.get("detail", ""))
+        console.print(table)
+    for warning in content["warnings"]:
+        console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
+
+
+def print_pairs(title: str, content: dict[str, Any]) -> None:
+    """A title and one line for each key."""
+    console = _console()
+    console.print(title)
+    for key, value in content.items():
+        console.print(f"  {key}: {value}")
+
+
+_HEAT_ROWS = (
+    ("axial_load_N", "axial load N", 0),
+    ("preload_N", "preload N", 0),
+    ("contact_angle_inner_deg", "α inner °", 2),
+    ("contact_angle_outer_deg", "α outer °", 2),
+    ("film_um", "film µm", 3),
+    ("lambda", "lambda", 1),
+    ("orbital_speed_rad_s", "orbit rad/s", 1),
+    ("centrifugal_force_N", "centrifugal N", 1),
+)
+
+
+def print_heat(content: dict[str, Any]) -> None:
+    """Heat term by term, one table a bearing, one column a speed."""
+    console = _console()
+    for name, rows in content["bearings"].items():
+        table = _table(
+            f"{name}, model {content['model']}", "rpm", *(f"{row['speed_rpm']:.0f}" for row in rows)
+        )
+        table.add_row("heat W", *(_number(row["heat_W"], 1) for row in rows), style="bold")
+        for term in dict.fromkeys(term for row in rows for term in row["terms_W"]):
+            values = [row["terms_W"].get(term) for row in rows]
+            if any(values):
+                table.add_row(f"· {term.replace('_', ' ')}", *(_number(value, 1) for value in values))
+        for key, label, digits in _HEAT_ROWS:
+            table.add_row(label, *(_number(row[key], digits) for row in rows))
+        for level in content["models"][0]["heat_W"] if content["models"] else ():
+            values = [row["heat_W"][level][name] for row in content["models"]]
+            table.add_row(f"by {level} W", *(_number(value, 1) for value in values), style="dim")
+        console.print(table)
+    for warning in content["warnings"]:
+        console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
+
+
+def print_bearing(content: dict[str, Any]) -> None:
+    """Deflections and a table of balls for one bearing or each of a set."""
+    console = _console()
+    for index, bearing in enumerate(content.get("bearings", [content])):
+        scalars = {key: value for key, value in bearing.items() if not isinstance(value, (list, dict))}
+        console.print(
+            ", ".join(f"{key} {value:.5g}" for key, value in scalars.items() if isinstance(value, float))
+        )
+        balls = bearing["balls"]
+        keys = [key for key in balls[0] if any(ball[key] is not None for ball in balls)]
+        table = _table(f"bearing {index + 1}", *keys)
+        for ball in balls:
+            table.add_row(*("–" if ball[key] is None else f"{ball[key]:.4g}" for key in keys))
+        console.print(table)
+
+
+def print_crosscheck(content: dict[str, Any], folder: Path) -> None:
+    """Largest differences between network and elements."""
+    console = _console()
+    table = _table("Largest differences", "node", "network °C", "FEM °C", "difference K")
+    for node in sorted(content["nodes"], key=lambda item: -abs(item["difference_K"]))[:12]:
+        table.add_row(
+            node["node"],
+            _number(node["network_degC"], 2),
+            _number(node["fem_degC"], 2),
+            _number(node["difference_K"], 2),
+        )
+    console.print(table)
+    console.print(
+        f"{len(content['nodes'])} nodes, {len(content['links'])} links; report: {folder / 'report.html'}"
+    )
+
+
+def print_simulation(content: dict[str, Any], folder: Path) -> None:
+    """Error of every temperature channel."""
+    console = _console()
+    table = _table("Channels", "channel", "rmse K", "noise K")
+    for channel in content["channels"]:
+        table.add_row(channel["channel"], _number(channel["rmse_K"], 3), _number(channel["noise_K"], 3))
+    console.print(table)
+    for line in (*content["defects_text"], *content["notes"]):
+        console.print(line, style="dim", markup=False)
+    console.print(f"Report: {folder / 'report.html'}")
+
+
+def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
+    """Verdict, findings, alternatives and the fit before and after."""
+    console = _console()
+    mismatch, fit = content["mismatch"], content["fit"]
+    console.print(f"[bold]{content['verdict']}[/bold]  (p = {mismatch['p_value']:.2g})")
+    if content["reason"]:
+        console.print(content["reason"])
+    for finding in content["findings"]:
+        console.print(f"{finding['statement']}  (set: {content['set_probability']:.2f})")
+    if content["alternatives"]:
+        table = _table("Not ruled out", "set", "probability")
+        for item in content["alternatives"]:
+            names = " + ".join(f"{f['effect']} at {f['component']}" for f in item["findings"])
+            table.add_row(names or "nothing", _number(item["probability"], 3))
+        console.print(table)
+    if fit["noise_K"] is not None:
+        table = _table("Fit", "", "fitted K", "held out K")
+        for name in ("before", "after"):
+            table.add_row(
+                name, _number(fit[name]["train_rmse_K"], 3), _number(fit[name]["heldout_rmse_K"], 3)
+            )
+        full = fit["full_model"]
+        for name in ("before", "after") if full["reason"] is None else ():
+            errors = (full[name]["train_rmse_K"], full[name]["heldout_rmse_K"])
+            table.add_row(f"{name}, full model", *(_number(error, 3) for error in errors))
+        table.add_row("noise", _number(fit["noise_K"], 3), _number(fit["noise_K"], 3))
+        console.print(table)
+    if fit["full_model"]["mesh"] != "off" and fit["full_model"]["reason"]:
+        console.print(f"Full model: {fit['full_model']['reason']}")
+    following = content["next_measurement"]
+    for note in content.get("notes", ()):
+        console.print(note, style="dim")
+    console.print(f"Next: {following['quantity']} at {following['where']}, {following['condition']}.")
+    console.print(f"Files: {folder}")
+
+
+def print_sweep(content: dict[str, Any], folder: Path) -> None:
+    """How many designs were solved, and where the table is."""
+    console = _console()
+    for key, value in content.items():
+        if isinstance(value, (str, int, float)) and key != "schema":
+            console.print(f"{key.replace('_', ' ')}: {value}")
+    console.print(f"Table: {folder / 'results.csv'}; report: {folder / 'report.html'}")
+
+
+def print_transient(content: dict[str, Any], folder: Path) -> None:
+    """Headline of a transient study: the end of every phase, and the approach to equilibrium."""
+    from spindle_fem.report.transient_report import equilibrium_text
+
+    console = _console()
+    phases, equilibrium = content["phases"], content["equilibrium"]
+    probes = list(phases[0]["probes_degC"])
+    table = _table(
+        f"{content['study']}: {content['machine']}, {content['unknowns']:,} temperatures",
+        "end of",
+        "after h",
+        "heat W",
+        "hottest °C",
+        *probes,
+    )
+    for phase in phases:
+        table.add_row(
+            phase["name"] + (" (not settled)" if phase["settled"] is False else ""),
+            _number(phase["end_s"] / 3600.0, 2),
+            _number(phase["heat_W"], 1),
+            _number(phase["hottest_degC"], 2),
+            *(_number(phase["probes_degC"][name], 2) for name in probes),
+        )
+    console.print(table)
+    console.print(equilibrium_text(equilibrium))
+    worst = max(phase["energy"]["imbalance_relative"] for phase in phases)
+    console.print(
+        f"{sum(phase['steps'] for phase in phases)} steps, heat in less out and stored {worst:.1e}, "
+        f"{sum(phase['cpu_seconds'] for phase in phases):.0f} s of processor"
+    )
+    console.print(f"Report: {folder / 'report.html'}")

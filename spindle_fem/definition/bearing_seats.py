@@ -1,0 +1,45 @@
+"""What the rings of a bearing sit on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from spindle_fem.definition.machine_spec import BearingSet, BearingType, MachineSpec
+from spindle_fem.definition.solid_tables import SetBearing
+from spindle_fem.errors import SpecError, SpindleFemError
+
+
+def seat_diameter(
+    spec: MachineSpec, kind: BearingType, bearing: SetBearing, side: Literal["inner", "outer"]
+) -> tuple[str, float] | None:
+    """What the ring of a bearing sits on: the part's name and the diameter of its far side, m.
+
+    The far side of the shaft is its bore (0: solid), that of the housing its
+    outside. None where no part has a seat there.
+    """
+    middle = 0.5 * (bearing.z[0] + bearing.z[1])
+    for part in spec.part:
+        for segment in part.segment:
+            if part.rotating != (side == "inner") or not segment.z[0] <= middle <= segment.z[1]:
+                continue
+            near, far = segment.inner_diameter, segment.outer_diameter
+            if side == "inner":
+                near, far = far, near
+            seat = kind.bore_diameter if side == "inner" else kind.outer_diameter
+            if abs(near - seat) < 1.0e-6:
+                return part.name, far
+    return None
+
+
+def seat_faults(spec: MachineSpec, group: BearingSet, kind: BearingType) -> Iterator[SpindleFemError]:
+    """Rings of a set with a fit that sit on nothing."""
+    for bearing in group.bearing:
+        for side, diameter in (("inner", kind.bore_diameter), ("outer", kind.outer_diameter)):
+            if seat_diameter(spec, kind, bearing, side) is None:
+                yield SpecError(
+                    f"bearing_set.{group.name}.fit",
+                    f"the {side} ring of {bearing.name} sits on no part: none "
+                    f"has a face of {diameter * 1e3:g} mm there.",
+                    "Allowed: rings on a rotating and a standing part; or leave the fit out.",
+                )

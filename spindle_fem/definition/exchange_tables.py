@@ -1,0 +1,248 @@
+"""Tables of a machine definition: cooling channel, joints, surfaces, films and gaps."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from spindle_fem.definition.field_types import (
+    AmbientOrTemperature,
+    Fault,
+    FilmCoefficient,
+    FilmOrPerfect,
+    Flag,
+    Fraction,
+    Length,
+    Name,
+    Place,
+    PositiveLength,
+    PositiveNumber,
+    SpecModel,
+    Temperature,
+    UncertainFilm,
+    UncertainNumber,
+    VolumeFlow,
+    quantity_field,
+    raise_faults,
+)
+from spindle_fem.units import Uncertain
+
+# Least wall left between neighbouring turns of the channel, for the milling cutter.
+LEAST_LAND = 3.0e-3
+
+ReferenceSpeed = quantity_field("rad/s", above=0.0)
+
+
+class Ports(SpecModel):
+    """Radial drillings from the channel to the outside."""
+
+    diameter: PositiveLength
+    """At most width - 2 mm fits the channel."""
+    wetted: Flag = True
+    """Whether the oil exchanges heat with the walls of the drillings."""
+
+
+class Channel(SpecModel):
+    """Helical rectangular oil channel."""
+
+    part: Name
+    """The standing part that it is milled into."""
+    inner_radius: PositiveLength
+    """Of the wall nearer to the axis."""
+    depth: PositiveLength
+    """Radial height of the section."""
+    width: PositiveLength
+    """Axial width of the section; width + 3 mm must not exceed pitch / starts."""
+    pitch: PositiveLength
+    """Advance in one turn of one start."""
+    turns: PositiveNumber
+    """Of each start; need not be whole."""
+    starts: Annotated[int, Field(ge=1, le=4, strict=True)] = 1
+    """Channels side by side, evenly around the axis."""
+    hand: Literal["right", "left"] = "right"
+    """Right-handed advances to the rear as the angle grows."""
+    z_start: Length
+    """Centre line of the section at angle 0, where the oil enters."""
+    ports: Ports | None = None
+    """None leaves the channel closed in the solid at both ends."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Channel:
+        room = self.pitch / self.starts
+        if self.width + LEAST_LAND > room + 1e-9:
+            raise_faults(
+                [
+                    Fault(
+                        "width",
+                        f"{self.width * 1e3:g} mm leaves less than 3 mm between turns: pitch / starts is "
+                        f"{room * 1e3:g} mm.",
+                        f"Allowed: at most {(room - LEAST_LAND) * 1e3:g} mm."
+                        if room > LEAST_LAND
+                        else "Give a larger pitch or fewer starts.",
+                    )
+                ]
+            )
+        return self
+
+
+class Coolant(SpecModel):
+    """Oil in the channel."""
+
+    fluid: Literal["iso_vg_32", "water"] = "iso_vg_32"
+    """Whose properties are taken."""
+    inlet_temperature: Temperature
+    """Mixed, where the oil enters."""
+    flow: VolumeFlow
+    """Of all starts together."""
+    film_model: Literal["paper", "sieder_tate", "helical"] = "helical"
+    """Equations 29-31, the laminar one on the hydraulic diameter, or a helical duct's."""
+    film_factor: UncertainNumber = Uncertain(1.0)
+    """Factor on the film coefficient of the channel."""
+    properties_at: Literal["inlet", "bulk"] = "bulk"
+    """Temperature of the oil properties: at the inlet, or along the channel."""
+    pumping_heat: Flag = False
+    """Whether the pressure loss heats the oil."""
+
+
+class JointGroup(SpecModel):
+    """Contact faces that share one conductance (one factor when uncertain).
+
+    ``contacts`` are names ``part_a|part_b`` (parts in sorted order) of a
+    cylindrical contact and ``part_a|part_b:face`` of a plane one, as
+    ``spindle-fem check`` lists them; ``*`` stands for any text. ``perfect``
+    means no resistance.
+    """
+
+    name: Name
+    """Shared factors and overrides use it."""
+    conductance: FilmOrPerfect
+    """Heat-transfer coefficient of the joint, or ``"perfect"``."""
+    contacts: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Names, with `*` for any text."""
+
+
+class FaceSelector(SpecModel):
+    """Exposed faces of a part: which way they look, and where they lie.
+
+    Normals: ``outward`` +r, ``inward`` -r, ``front`` -z, ``rear`` +z.
+    """
+
+    facing: Literal["outward", "inward", "front", "rear"]
+    """Where the normal points."""
+    z: Place | None = None
+    """A place or from and to; everywhere when left out."""
+    r: Place | None = None
+    """A radius or from and to; everywhere when left out."""
+
+
+class Surface(SpecModel):
+    """A named exposed surface."""
+
+    name: Name
+    """By convention ``part.surface``."""
+    part: Name
+    """A part or a ring."""
+    where: Annotated[tuple[FaceSelector, ...], Field(min_length=1)]
+    """The union of these faces."""
+
+
+class ConstantFilm(SpecModel):
+    """Fixed heat-transfer coefficient."""
+
+    kind: Literal["constant"]
+    """Tells the films apart."""
+    surface: Annotated[tuple[Name, ...], Field(min_length=1)]
+    """Names of surfaces; each surface takes one film or gap."""
+    coefficient: UncertainFilm
+    """Convection and radiation together."""
+    temperature: AmbientOrTemperature = "ambient"
+    """Of the surroundings."""
+    name: Name | None = None
+    """Needed where a shared factor applies."""
+
+
+class NaturalFilm(SpecModel):
+    """Natural convection and radiation by the surface temperature."""
+
+    kind: Literal["natural_convection_radiation"]
+    """Tells the films apart."""
+    surface: Annotated[tuple[Name, ...], Field(min_length=1)]
+    """Names of surfaces; each surface takes one film or gap."""
+    characteristic_length: PositiveLength
+    """Diameter of the cylinder or height of the plate."""
+    orientation: Literal["horizontal_cylinder", "vertical_plate"] = "horizontal_cylinder"
+    """Which correlation of natural convection."""
+    emissivity: Fraction = 0.9
+    """Of the surface, in large grey surroundings."""
+    factor: UncertainNumber = Uncertain(1.0)
+    """On the coefficient."""
+    temperature: AmbientOrTemperature = "ambient"
+    """Of the surroundings."""
+    name: Name | None = None
+    """Needed where a shared factor applies."""
+
+
+class RotatingFilm(SpecModel):
+    """Film of a rotating surface in air (Becker), with a floor at rest."""
+
+    kind: Literal["rotating"]
+    """Tells the films apart."""
+    surface: Annotated[tuple[Name, ...], Field(min_length=1)]
+    """Names of surfaces; each surface takes one film or gap."""
+    diameter: PositiveLength
+    """Of the Reynolds and Nusselt numbers."""
+    minimum: FilmCoefficient
+    """Floor, the coefficient at rest."""
+    factor: UncertainNumber = Uncertain(1.0)
+    """On the coefficient."""
+    temperature: AmbientOrTemperature = "ambient"
+    """Of the surroundings."""
+    name: Name | None = None
+    """Needed where a shared factor applies."""
+
+
+Film = Annotated[ConstantFilm | NaturalFilm | RotatingFilm, Field(discriminator="kind")]
+
+
+class Gap(SpecModel):
+    """Air between a rotating surface and the standing one around it.
+
+    ``h = at_rest + rise (speed/reference_speed)**exponent`` on the rotating
+    surface, or the annulus correlation of Becker & Kaye.
+    """
+
+    name: Name
+    """Shared factors and overrides use it."""
+    rotating: Name
+    """Name of the rotating surface."""
+    standing: Annotated[tuple[Name, ...], Field(min_length=1)]
+    """Names of the standing surfaces that face it."""
+    kind: Literal["power_law", "becker_kaye"] = "power_law"
+    """How the coefficient follows from the speed."""
+    at_rest: FilmCoefficient | None = None
+    """With ``kind = "power_law"`` only."""
+    rise: FilmCoefficient = 0.0
+    """Added at the reference speed."""
+    reference_speed: ReferenceSpeed = 314.159265359
+    """3000 rpm where none is given."""
+    exponent: PositiveNumber = 0.75
+    """Of the relative speed."""
+    factor: UncertainNumber = Uncertain(1.0)
+    """On the coefficient."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Gap:
+        if self.kind == "power_law" and self.at_rest is None:
+            raise_faults([Fault("at_rest", "is missing.", 'kind = "power_law" needs it, in W/m**2/K.')])
+        if self.kind == "becker_kaye" and self.at_rest is not None:
+            raise_faults(
+                [
+                    Fault(
+                        "at_rest",
+                        'is given, but kind = "becker_kaye" computes it.',
+                        'Set kind = "power_law".',
+                    )
+                ]
+            )
+        return self

@@ -1,0 +1,327 @@
+"""The machine definition as frozen models, one class a table of the file.
+
+Every number is SI and every temperature kelvin once it has been read. What
+concerns one table is checked here and in :mod:`spindle_fem.definition.solid_tables` and
+:mod:`spindle_fem.definition.exchange_tables`; what needs several tables in
+:mod:`spindle_fem.definition.consistency`, what needs the geometry in
+:mod:`spindle_fem.machine.geometry`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from spindle_fem.definition.effect_entries import EffectEntry
+from spindle_fem.definition.exchange_tables import (
+    Channel,
+    ConstantFilm,
+    Coolant,
+    FaceSelector,
+    Film,
+    Gap,
+    JointGroup,
+    NaturalFilm,
+    Ports,
+    RotatingFilm,
+    Surface,
+)
+from spindle_fem.definition.field_types import (
+    Angle,
+    Fault,
+    Flag,
+    Force,
+    Fraction,
+    Length,
+    Name,
+    Number,
+    PositiveForce,
+    PositiveLength,
+    PositiveNumber,
+    Power,
+    Radius,
+    RotationalSpeed,
+    SpecModel,
+    Temperature,
+    UncertainNumber,
+    UncertainShare,
+    quantity_field,
+    raise_faults,
+)
+from spindle_fem.definition.solid_tables import (
+    AnnulusSegment,
+    BallRow,
+    BearingSet,
+    BearingType,
+    Grease,
+    Material,
+    Part,
+    SetBearing,
+)
+from spindle_fem.units import Uncertain
+
+MACHINE_SCHEMA = "spindle-fem/machine/1"
+
+SizeFactor = quantity_field("", at_least=0.2, at_most=5.0)
+SigmaRel = quantity_field("", above=0.0, at_most=3.0)
+
+
+class Operation(SpecModel):
+    """Steady operating point."""
+
+    speed: RotationalSpeed
+    """Of the shaft."""
+    thrust: Force
+    """External axial force on the shaft, positive towards the rear."""
+    ambient_temperature: Temperature
+    """Of the air around the machine."""
+
+
+class HeatTable(SpecModel):
+    """Heat of each bearing against speed, linear between entries."""
+
+    speed: tuple[RotationalSpeed, ...]
+    """At least two entries that grow."""
+    heat: dict[str, tuple[Power, ...]]
+    """One row a bearing, as long as ``speed``."""
+    thrust_coefficient: dict[str, Number] = Field(default_factory=dict)
+    """c of the factor 1 + c (thrust/reference_thrust - 1), by bearing; 0 where none is given."""
+    reference_thrust: PositiveForce = 1750.0
+    """Thrust at which the table holds."""
+
+    @model_validator(mode="after")
+    def _check(self) -> HeatTable:
+        faults = []
+        if len(self.speed) < 2 or any(b <= a for a, b in zip(self.speed, self.speed[1:], strict=False)):
+            faults.append(
+                Fault(
+                    "speed",
+                    f"has {len(self.speed)} entries that do not all grow.",
+                    "Allowed: at least two, growing.",
+                )
+            )
+        faults += [
+            Fault(
+                f"heat.{name}",
+                f"has {len(values)} entries.",
+                f"Allowed: {len(self.speed)}, as many as speed.",
+            )
+            for name, values in self.heat.items()
+            if len(values) != len(self.speed)
+        ]
+        raise_faults(faults)
+        return self
+
+
+class Heat(SpecModel):
+    """Friction heat of the bearings and where it enters.
+
+    ``ball_share`` of it goes to the balls, ``inner_share`` of the rest to the
+    inner ring.
+    """
+
+    model: Literal["table", "palmgren", "skf", "paper", "full"]
+    """`table`, an empirical friction model (palmgren, skf) or an analytical one (paper, full)."""
+    ball_share: Fraction = 0.5
+    """Share of the heat that enters the balls."""
+    inner_share: UncertainShare = Uncertain(0.5)
+    """Share of the rest that enters the inner ring."""
+    palmgren_f0: PositiveNumber = 2.0
+    """Palmgren's lubrication factor: about 2 for grease, up to 4 with a fresh fill."""
+    skf_mu_ehl: PositiveNumber = 0.04
+    """Sliding friction coefficient in full film: 0.04 synthetic, 0.05 mineral oil."""
+    thermal_preload: Flag = False
+    """Whether ring, ball, shaft and housing expansion changes the preload and with it the heat."""
+    table: HeatTable | None = None
+    """Needed with `model = "table"`."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Heat:
+        if self.model == "table" and self.table is None:
+            raise_faults([Fault("table", "is missing.", 'model = "table" needs a [heat.table].')])
+        return self
+
+
+class SharedFactor(SpecModel):
+    """One uncertain factor, 1 when nominal, on several coefficients at once.
+
+    ``applies_to`` names them as ``film.NAME``, ``gap.NAME``, ``joint.NAME``,
+    ``heat.SET`` or ``ball_row.SET``.
+    """
+
+    name: Name
+    """The parameter is called by it."""
+    sigma_rel: SigmaRel
+    """1 sigma of its logarithm."""
+    applies_to: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Coefficients that it multiplies."""
+
+
+class Probe(SpecModel):
+    """A temperature reading: a point on a part, or the mixed coolant outlet."""
+
+    name: Name
+    """Results and recordings use it."""
+    kind: Literal["point", "coolant_outlet"] = "point"
+    """What it reads."""
+    part: Name | None = None
+    """A part, or a ring such as ``F1.outer_ring``; for a point only, like r, z and angle."""
+    r: Radius | None = None
+    """Radius of the point."""
+    z: Length | None = None
+    """Place of the point along the axis."""
+    angle: Angle = 0.0
+    """Around the axis; 0 is up."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Probe:
+        given = {"part": self.part is not None, "r": self.r is not None, "z": self.z is not None}
+        if self.kind == "point":
+            raise_faults(
+                Fault(key, "is missing.", 'A probe of kind "point" needs part, r and z.')
+                for key, present in given.items()
+                if not present
+            )
+        else:
+            raise_faults(
+                Fault(key, "is given.", 'A probe of kind "coolant_outlet" takes no part, r or z.')
+                for key, present in given.items()
+                if present
+            )
+        return self
+
+
+class MeshSettings(SpecModel):
+    """How the machine is meshed and interpolated."""
+
+    preset: Literal["coarse", "normal", "fine"] = "normal"
+    """Fineness."""
+    order: Literal[1, 2] = 2
+    """Of the temperature's polynomials."""
+    size_factor: SizeFactor = 1.0
+    """On every element size of the preset."""
+    size: dict[str, PositiveLength] = Field(default_factory=dict)
+    """Element size by part, ring, or ``channel``."""
+    circumferential_averaging: Flag = True
+    """Rotating parts take the mean temperature around the axis."""
+
+
+class MachineSpec(SpecModel):
+    """A complete machine with geometry."""
+
+    schema_: Annotated[str, Field(alias="schema")]
+    """The version of this format."""
+    name: Name
+    """Short name of the machine."""
+    title: str = ""
+    """One line for reports."""
+    description: str = ""
+    """Longer text for reports."""
+    initial: Literal["ambient", "first_reading"] = "ambient"
+    """Temperatures at the start of a simulation."""
+    remaining_surfaces: Literal["adiabatic", "error"] = "error"
+    """What becomes of exposed faces that no surface names."""
+    heat_capacity_factor: UncertainNumber = Uncertain(1.0)
+    """Factor on every heat capacity."""
+    operation: Operation
+    """Operating point."""
+    materials: dict[str, Material]
+    """Solids by name."""
+    part: Annotated[tuple[Part, ...], Field(min_length=1)]
+    """Solids of revolution."""
+    bearing_types: dict[str, BearingType] = Field(default_factory=dict)
+    """Catalogue data by name."""
+    bearing_set: tuple[BearingSet, ...] = ()
+    """Bearings in their sets."""
+    grease: Grease | None = None
+    """Needed unless ``heat.model = "table"``."""
+    channel: Channel | None = None
+    """Goes with ``[coolant]``."""
+    coolant: Coolant | None = None
+    """Goes with ``[channel]``."""
+    heat: Heat
+    """Friction heat."""
+    joint: tuple[JointGroup, ...] = ()
+    """Conductances of contacts."""
+    surface: tuple[Surface, ...] = ()
+    """Names for exposed faces."""
+    film: tuple[Film, ...] = ()
+    """Heat exchange with the surroundings."""
+    gap: tuple[Gap, ...] = ()
+    """Heat exchange across air gaps."""
+    factor: tuple[SharedFactor, ...] = ()
+    """Uncertain factors that several coefficients share."""
+    probe: tuple[Probe, ...] = ()
+    """Where temperatures are read."""
+    mesh: MeshSettings = MeshSettings()
+    """Fineness of the mesh."""
+    effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
+    """Effects of the catalogue that are switched on."""
+
+    @property
+    def bearings(self) -> tuple[tuple[BearingSet, SetBearing], ...]:
+        """Every bearing with its set, in file order."""
+        return tuple((group, bearing) for group in self.bearing_set for bearing in group.bearing)
+
+    @property
+    def all_surfaces(self) -> tuple[Surface, ...]:
+        """The named surfaces of the file and the raceways of every bearing.
+
+        ``F1.inner_raceway`` is the outer cylinder of ``F1.inner_ring``,
+        ``F1.outer_raceway`` the inner cylinder of ``F1.outer_ring``.
+        """
+        raceways = []
+        for _, bearing in self.bearings:
+            for ring, facing in (("inner", "outward"), ("outer", "inward")):
+                raceways.append(
+                    Surface(
+                        name=f"{bearing.name}.{ring}_raceway",
+                        part=f"{bearing.name}.{ring}_ring",
+                        where=(FaceSelector(facing=facing),),
+                    )
+                )
+        return self.surface + tuple(raceways)
+
+    def part_material(self, part_name: str) -> Material:
+        """Material of a part, the rings of bearings included (``F1.inner_ring``)."""
+        for part in self.part:
+            if part.name == part_name:
+                return self.materials[part.material]
+        bearing_name, _, ring = part_name.rpartition(".")
+        for group, bearing in self.bearings:
+            if bearing.name == bearing_name and ring in ("inner_ring", "outer_ring"):
+                return self.materials[self.bearing_types[group.bearing_type].ring_material]
+        raise KeyError(part_name)
+
+
+__all__ = [
+    "MACHINE_SCHEMA",
+    "AnnulusSegment",
+    "BallRow",
+    "BearingSet",
+    "BearingType",
+    "Channel",
+    "ConstantFilm",
+    "Coolant",
+    "EffectEntry",
+    "FaceSelector",
+    "Film",
+    "Gap",
+    "Grease",
+    "Heat",
+    "HeatTable",
+    "JointGroup",
+    "MachineSpec",
+    "Material",
+    "MeshSettings",
+    "NaturalFilm",
+    "Operation",
+    "Part",
+    "Ports",
+    "Probe",
+    "RotatingFilm",
+    "SetBearing",
+    "SharedFactor",
+    "Surface",
+]

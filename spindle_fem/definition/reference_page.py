@@ -1,0 +1,173 @@
+"""The reference page of machine definitions, written from the models.
+
+``python -m spindle_fem.definition.reference_page > docs/machine_definition.md`` renews it.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from spindle_fem.definition.field_types import MARKS, NAME_RULE
+from spindle_fem.definition.machine_spec import MACHINE_SCHEMA, MachineSpec
+from spindle_fem.definition.schema import Shape, annotation_of, quantity_rule, shape_of, value_text
+from spindle_fem.units import Uncertain
+
+_MARKS = "; ".join(f"{letter} {meaning}" for letter, meaning in MARKS.items())
+_INTRODUCTION = f"""\
+# Machine definitions
+
+<!-- Written by `python -m spindle_fem.definition.reference_page`; edit the models, not this page. -->
+
+A machine is one [TOML](https://toml.io) file. `spindle-fem check FILE` reads it, names every fault at
+once with file, key, value and what is allowed, and exits with 2 if there is any. Unknown keys are
+faults. The machines that ship, in `geometry/`, are the examples to start from.
+
+z runs along the axis from the nose (0) to the drive end, r is the radius, angle 0 points up; the axis
+lies horizontal.
+
+## Values
+
+A **quantity** is a text with one number and its unit: `"19 mm"`, `"3000 rpm"`, `"20 L/min"`,
+`"10 W/m**2/K"` (also `W/(m²·K)` or `W/m²/°C`). Any unit of the right dimension will do; a bare number is
+refused wherever a unit is needed. A temperature takes `degC` or `K`. Rotational speed takes `rpm` or
+`rad/s`, not Hz.
+
+An **uncertain** value takes a quantity, which is then fixed, or a prior: `{{value = "10 W/m**2/K",
+sigma_rel = 0.3}}` (sigma_rel is one standard deviation of the logarithm) or `{{low = "5 W/m**2/K", high =
+"20 W/m**2/K"}}` (between them lie 90 %). `[[factor]]` makes one factor common to several values.
+
+**Marks** say where a value comes from: {_MARKS}.
+`marks = "A"` holds for the whole table, `marks = {{default = "A", bore_diameter = "C"}}` key by key. Every
+table takes them.
+
+**Names** are made of {NAME_RULE}.
+
+## Building on another definition
+
+`base = "wu_tan_2016"`, or a file beside this one, lays this file over that one. Tables merge key by key;
+lists of tables (`[[part]]`, `[[film]]`, segments, bearings) merge by `name`, so an entry gives its name and
+what changes. `key = "none"` leaves a key out, `remove = true` an entry. Any other list replaces the base's.
+A changed value takes the mark that this file gives it, else U.
+
+`--set path=value` on the command line changes one value: `channel.depth=19mm`,
+`bearing_set.front.preload=900N`, `part.shaft.segment.nose.outer_diameter=178mm`,
+`heat.table.heat.F1[7]=160W` (positions count from 1), `channel.ports=none`. Such values carry the mark U.
+
+## Contacts and surfaces
+
+Where two parts touch there is a joint, named `part_a|part_b` (parts in sorted order) on a cylinder and
+`part_a|part_b:face` on a plane. Every joint needs a conductance from exactly one `[[joint]]`; `*` in its
+`contacts` stands for any text. The rings of bearing F1 are the parts `F1.inner_ring` and `F1.outer_ring`,
+their raceways the surfaces `F1.inner_raceway` and `F1.outer_raceway`.
+
+Every other face is exposed. A `[[surface]]` names some of a part's faces, and each named surface takes one
+`[[film]]` or one side of a `[[gap]]`. What no surface names is adiabatic if
+`remaining_surfaces = "adiabatic"` says so, else a fault.
+"""
+
+
+def reference_page() -> str:
+    """Markdown text that lists every table and key of a machine definition."""
+    sections = [_INTRODUCTION, "## Tables\n"]
+    sections += list(_sections("", Shape("table", (MachineSpec,)), in_list=False))
+    return "\n".join(sections).rstrip() + "\n"
+
+
+def _sections(path: str, shape: Shape, *, in_list: bool) -> Iterator[str]:
+    for model in shape.models:
+        kind = (
+            f" with kind {value_text(annotation_of(model.model_fields['kind']))}"
+            if len(shape.models) > 1
+            else ""
+        )
+        header = f"[[{path}]]" if in_list else f"[{path}]"
+        yield f"### {f'`{header}`{kind}' if path else 'Top level'}\n"
+        yield _prose(model) + "\n"
+        yield _key_table(model)
+        for key, field in _fields(model):
+            inner = shape_of(annotation_of(field))
+            nested = f"{path}.{key}".strip(".")
+            if inner.kind == "table":
+                yield from _sections(nested, inner, in_list=False)
+            elif inner.kind in ("list", "mapping"):
+                entries = shape_of(inner.inner)
+                nested += "" if inner.kind == "list" else ".NAME"
+                if entries.kind == "table":
+                    yield from _sections(nested, entries, in_list=inner.kind == "list")
+
+
+def _fields(model: type[BaseModel]) -> list[tuple[str, FieldInfo]]:
+    return [(field.alias or name, field) for name, field in model.model_fields.items() if name != "marks"]
+
+
+def _prose(model: type[BaseModel]) -> str:
+    return inspect.cleandoc(model.__doc__ or "").replace("``", "`")
+
+
+def _key_table(model: type[BaseModel]) -> str:
+    lines = ["| key | meaning | allowed | default |", "|---|---|---|---|"]
+    for key, field in _fields(model):
+        annotation = annotation_of(field)
+        meaning = " ".join((field.description or "").replace("``", "`").split())
+        cells = (f"`{key}`", meaning, _allowed(annotation, key), _default(field, annotation))
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _allowed(annotation: Any, key: str) -> str:
+    shape = shape_of(annotation)
+    if key == "schema":
+        return f'`"{MACHINE_SCHEMA}"`'
+    if shape.kind == "table":
+        return "a table, see below"
+    if shape.kind == "mapping":
+        inner = shape_of(shape.inner)
+        return "tables by name, see below" if inner.kind == "table" else f"by name: {_entries(inner)}"
+    if shape.kind == "list":
+        inner = shape_of(shape.inner)
+        return "a list of tables, see below" if inner.kind == "table" else f"a list: {_entries(inner)}"
+    return _value(annotation)
+
+
+def _entries(shape: Shape) -> str:
+    if shape.kind == "list":
+        return f"a list: {_entries(shape_of(shape.inner))}"
+    if shape.kind == "mapping":
+        return "a table"
+    return _value(shape.annotation)
+
+
+def _value(annotation: Any) -> str:
+    rule = quantity_rule(annotation)
+    text = value_text(annotation)
+    return f"uncertain: {text}" if rule is not None and rule.uncertain else text
+
+
+def _default(field: FieldInfo, annotation: Any) -> str:
+    if field.is_required():
+        return "**required**"
+    value = field.get_default(call_default_factory=True)
+    rule = quantity_rule(annotation)
+    if value is None or value in ((), {}, ""):
+        return "none"
+    if isinstance(value, BaseModel):
+        return "its defaults"
+    if rule is not None and (isinstance(value, (float, int, Uncertain))):
+        return f"`{rule.write(value)}`"
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    return f"`{value}`"
+
+
+def main() -> None:
+    """Print the page."""
+    print(reference_page(), end="")
+
+
+if __name__ == "__main__":
+    main()

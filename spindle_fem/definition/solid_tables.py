@@ -1,0 +1,362 @@
+"""Tables of a machine definition: materials, parts, bearings and their grease."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from spindle_fem.definition.field_types import (
+    Angle,
+    Conductivity,
+    Density,
+    Fault,
+    Flag,
+    Fraction,
+    HeatCapacity,
+    KinematicViscosity,
+    Name,
+    PositiveForce,
+    PositiveLength,
+    Preload,
+    Pressure,
+    PressureViscosity,
+    Radius,
+    Range,
+    SpecificHeat,
+    SpecModel,
+    Temperature,
+    UncertainConductance,
+    UncertainNumber,
+    quantity_field,
+    raise_faults,
+)
+from spindle_fem.units import Uncertain
+
+GrooveCurvature = quantity_field("", at_least=0.505, at_most=0.6)
+PoissonRatio = quantity_field("", at_least=0.0, at_most=0.5)
+PathFill = quantity_field("", at_least=0.0, at_most=0.3)
+FilmStarvation = quantity_field("", at_least=0.1, at_most=1.0)
+ThermalExpansion = quantity_field("1/K", at_least=0.0, at_most=1.0e-4)
+FitDiameter = quantity_field("m", at_least=-1.0e-3, at_most=1.0e-3)
+
+
+class Material(SpecModel):
+    """Isotropic solid with constant properties."""
+
+    thermal_conductivity: Conductivity
+    """Constant over temperature."""
+    density: Density
+    """Constant over temperature."""
+    specific_heat_capacity: SpecificHeat
+    """Constant over temperature."""
+    young_modulus: Pressure = 206.0e9
+    """Where bearings sit with a `fit`; rings take that of their type."""
+    poisson_ratio: PoissonRatio = 0.3
+    """Where bearings sit with a `fit`; rings take that of their type."""
+    thermal_expansion: ThermalExpansion = 12.5e-6
+    """Linear, for rings, balls, shaft and housing with `heat.thermal_preload`."""
+
+    @property
+    def volumetric_heat_capacity(self) -> float:
+        """ρ c_p in J/(m³·K)."""
+        return self.density * self.specific_heat_capacity
+
+
+class AnnulusSegment(SpecModel):
+    """A ring of rectangular meridian section."""
+
+    name: Name
+    """Unique within its part."""
+    z: Range
+    """From and to along the axis; z = 0 is the spindle nose."""
+    inner_diameter: Radius
+    """0 for a solid shaft."""
+    outer_diameter: PositiveLength
+    """Larger than the inner one."""
+
+    @model_validator(mode="after")
+    def _check(self) -> AnnulusSegment:
+        if self.inner_diameter >= self.outer_diameter:
+            raise_faults(
+                [
+                    Fault(
+                        "outer_diameter",
+                        f"{self.outer_diameter * 1e3:g} mm leaves no wall around "
+                        f"inner_diameter {self.inner_diameter * 1e3:g} mm.",
+                        f"Allowed: above {self.inner_diameter * 1e3:g} mm.",
+                    )
+                ]
+            )
+        return self
+
+
+class Part(SpecModel):
+    """One solid of revolution: its segments are fused."""
+
+    name: Name
+    """Joints, surfaces and probes use it."""
+    material: Name
+    """A key of ``[materials]``."""
+    rotating: Flag = False
+    """Whether it turns with the shaft."""
+    segment: Annotated[tuple[AnnulusSegment, ...], Field(min_length=1)]
+    """Rings that are fused to the solid; they share faces or overlap."""
+
+
+class BearingType(SpecModel):
+    """Catalogue dimensions of an angular-contact ball bearing."""
+
+    bore_diameter: PositiveLength
+    """Of the inner ring."""
+    outer_diameter: PositiveLength
+    """Of the outer ring."""
+    width: PositiveLength
+    """Of both rings."""
+    inner_ring_outer_diameter: PositiveLength
+    """Cylinder that stands for the inner ring's outside, where its heat enters."""
+    outer_ring_inner_diameter: PositiveLength
+    """Cylinder that stands for the outer ring's inside, where its heat enters."""
+    ball_diameter: PositiveLength
+    """Between the groove bottoms."""
+    ball_count: Annotated[int, Field(ge=3, le=200, strict=True)]
+    """In one row."""
+    pitch_diameter: PositiveLength | None = None
+    """The middle of bore and outside where none is given."""
+    contact_angle: Angle
+    """Unloaded, above 0 up to 60 degrees."""
+    groove_curvature_inner: GrooveCurvature
+    """Groove radius over ball diameter."""
+    groove_curvature_outer: GrooveCurvature
+    """Groove radius over ball diameter."""
+    basic_static_load: PositiveForce | None = None
+    """C0 of the catalogue, for the empirical friction models."""
+    ring_material: Name
+    """A key of `[materials]`."""
+    ball_material: Name
+    """A key of `[materials]`."""
+    young_modulus: Pressure = 206.0e9
+    """Of rings and balls."""
+    poisson_ratio: PoissonRatio = 0.3
+    """Of rings and balls."""
+    roughness_raceway: PositiveLength = 0.05e-6
+    """Root mean square (Rq)."""
+    roughness_ball: PositiveLength = 0.01e-6
+    """Root mean square (Rq)."""
+
+    @model_validator(mode="after")
+    def _check(self) -> BearingType:
+        raise_faults([*self._ring_faults(), *self._ball_faults()])
+        return self
+
+    def _ring_faults(self) -> list[Fault]:
+        names = ("bore_diameter", "inner_ring_outer_diameter", "outer_ring_inner_diameter", "outer_diameter")
+        diameters = [getattr(self, name) for name in names]
+        return [
+            Fault(
+                names[position],
+                f"{diameters[position] * 1e3:g} mm does not exceed "
+                f"{names[position - 1]} {diameters[position - 1] * 1e3:g} mm.",
+                f"Diameters must grow in the order {', '.join(names)}.",
+            )
+            for position in range(1, 4)
+            if diameters[position] <= diameters[position - 1]
+        ]
+
+    def _ball_faults(self) -> list[Fault]:
+        faults = []
+        ball, pitch = f"{self.ball_diameter * 1e3:g}", f"{self.pitch * 1e3:g}"
+        key = "pitch_diameter" if self.pitch_diameter is not None else "ball_diameter"
+        if (
+            not self.bore_diameter
+            < self.pitch - self.ball_diameter
+            < self.pitch + self.ball_diameter
+            < self.outer_diameter
+        ):
+            faults.append(
+                Fault(
+                    key,
+                    f"balls of {ball} mm on {pitch} mm cut through a ring.",
+                    "pitch_diameter ± ball_diameter must lie between the bore "
+                    f"{self.bore_diameter * 1e3:g} mm and the outside {self.outer_diameter * 1e3:g} mm.",
+                )
+            )
+        most = int(math.pi / math.asin(min(1.0, self.ball_diameter / self.pitch)))
+        if self.ball_count > most:
+            faults.append(
+                Fault(
+                    "ball_count",
+                    f"{self.ball_count} balls of {ball} mm do not fit the pitch diameter {pitch} mm.",
+                    f"Allowed: at most {most}.",
+                )
+            )
+        if not 0.0 < self.contact_angle <= math.radians(60.0) + 1e-9:
+            faults.append(
+                Fault(
+                    "contact_angle",
+                    f"{math.degrees(self.contact_angle):g} deg is no angular contact.",
+                    "Allowed: above 0 up to 60 deg.",
+                )
+            )
+        return faults
+
+    @property
+    def pitch(self) -> float:
+        """Pitch diameter in m; the middle of bore and outside where none is given."""
+        if self.pitch_diameter is not None:
+            return self.pitch_diameter
+        return 0.5 * (self.bore_diameter + self.outer_diameter)
+
+
+class SetBearing(SpecModel):
+    """One bearing of a set."""
+
+    name: Name
+    """Its rings are the parts `NAME.inner_ring` and `NAME.outer_ring`."""
+    z: Range
+    """From and to of its rings; as long as the type is wide."""
+    takes_thrust: Literal["towards_rear", "towards_nose"]
+    """Direction of the force on the shaft that this bearing carries."""
+
+
+class BallRow(SpecModel):
+    """Heat paths between raceways through the balls.
+
+    ``contact`` takes the constriction, ball and lubricant resistances of the
+    paper's Table 1; ``constant`` a conductance to each raceway.
+    """
+
+    kind: Literal["contact", "constant"] = "contact"
+    """How the conductances between balls and raceways come about."""
+    conductance: UncertainConductance | None = None
+    """Balls of one bearing to each raceway, with ``kind = "constant"`` only."""
+    capacity: HeatCapacity | None = None
+    """Heat capacity of the balls of one bearing; from their volume where none is given."""
+
+    @model_validator(mode="after")
+    def _check(self) -> BallRow:
+        if self.kind == "constant" and self.conductance is None:
+            raise_faults([Fault("conductance", "is missing.", 'kind = "constant" needs it, in W/K.')])
+        if self.kind == "contact" and self.conductance is not None:
+            raise_faults(
+                [
+                    Fault(
+                        "conductance", 'is given, but kind = "contact" computes it.', 'Set kind = "constant".'
+                    )
+                ]
+            )
+        return self
+
+
+class Fit(SpecModel):
+    """Seats of a set's rings, cold and at rest.
+
+    With `heat.thermal_preload` they change with temperature and speed, rings
+    and seats give way as thick-walled cylinders do, and `contact_angle` is that
+    of the unmounted bearing. Without it, or without a fit, rings are rigid and
+    `contact_angle` is that of the mounted one.
+    """
+
+    inner_interference: FitDiameter
+    """Of the inner rings on the shaft, on the diameter; negative: clearance."""
+    outer_clearance: FitDiameter
+    """Of the outer rings in the housing, on the diameter; negative: interference."""
+    housing_outer_diameter: PositiveLength | None = None
+    """Of the wall around the outer rings; that of the part they sit in where none is given."""
+
+
+class BearingSet(SpecModel):
+    """Bearings mounted and preloaded against one another."""
+
+    name: Name
+    """Shared factors and overrides use it."""
+    bearing_type: Name
+    """A key of ``[bearing_types]``."""
+    preload: Preload
+    """Force through the set; bearings in tandem share it."""
+    preload_kind: Literal["rigid", "spring"] = "rigid"
+    """Held by a distance (rings, locknut) or by a force (springs)."""
+    fit: Fit | None = None
+    """How its rings sit; rigid rings where none is given."""
+    assembly_temperature: Temperature = 293.15
+    """At which preload and fits are measured."""
+    carries_thrust: Flag = False
+    """Exactly one set of a machine takes the external thrust."""
+    heat_factor: UncertainNumber = Uncertain(1.0)
+    """Factor on the friction heat of every bearing of the set."""
+    ball_row: BallRow = BallRow()
+    """Heat paths through the balls."""
+    bearing: Annotated[tuple[SetBearing, ...], Field(min_length=1)]
+    """From the nose to the rear."""
+
+    @model_validator(mode="after")
+    def _check(self) -> BearingSet:
+        directions = {bearing.takes_thrust for bearing in self.bearing}
+        if self.preload_kind == "rigid" and self.preload > 0.0 and len(directions) == 1:
+            raise_faults(
+                [
+                    Fault(
+                        "preload",
+                        f"{self.preload:g} N is rigid, but every bearing of the set takes_thrust "
+                        f'"{directions.pop()}".',
+                        'Allowed: bearings of both directions, preload_kind = "spring", or no preload.',
+                    )
+                ]
+            )
+        return self
+
+
+class Grease(SpecModel):
+    """Lubricating grease by its base oil."""
+
+    name: str
+    """For reports."""
+    kinematic_viscosity_40: KinematicViscosity
+    """Base oil at 40 °C."""
+    kinematic_viscosity_100: KinematicViscosity
+    """Base oil at 100 °C."""
+    base_oil_density: Density = 890.0
+    """Of the oil, lighter than the grease."""
+    pressure_viscosity: PressureViscosity = 1.8e-8
+    """Coefficient at ambient pressure."""
+    path_fill: PathFill = 0.01
+    """Share of the balls' path that grease fills once channelled; it drags on the balls."""
+    free_volume_fill: Fraction = 0.3
+    """Share of the bearing's free volume that grease fills."""
+    wetted_share: Fraction | None = None
+    """Share of the balls' surface in grease, half of it to each raceway; the fill where none is given."""
+    thermal_conductivity: Conductivity = 0.14
+    """Of the base oil."""
+    temperature_limit: Temperature = 393.15
+    """The grease is checked against it."""
+    film_starvation: FilmStarvation = 1.0
+    """Film over the fully flooded one; 0.5 to 0.7 in aged grease."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Grease:
+        if self.kinematic_viscosity_100 >= self.kinematic_viscosity_40:
+            raise_faults(
+                [
+                    Fault(
+                        "kinematic_viscosity_100",
+                        f"{self.kinematic_viscosity_100 * 1e6:g} mm²/s is not below kinematic_viscosity_40 "
+                        f"{self.kinematic_viscosity_40 * 1e6:g} mm²/s.",
+                        "Oil thins with temperature.",
+                    )
+                ]
+            )
+        return self
+
+
+__all__ = [
+    "AnnulusSegment",
+    "BallRow",
+    "BearingSet",
+    "BearingType",
+    "Fit",
+    "Grease",
+    "Material",
+    "Part",
+    "SetBearing",
+]

@@ -1,0 +1,1 @@
+"""One file an effect; a new file is a new effect."""

@@ -1,0 +1,58 @@
+"""A channel that is displaced in time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
+from spindle_fem.effects.framework.filters import delayed
+from spindle_fem.effects.framework.laws import Complex, linear
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.sensor import Form, SensorEffect
+from spindle_fem.effects.framework.term import TermParameter
+
+
+class ShiftedReading(Reading):
+    """The temperature of some seconds earlier."""
+
+    def __init__(self, channel: str, name: str, parameters: tuple[TermParameter, ...]) -> None:
+        self.channel, self.name, self.parameters = channel, name, parameters
+
+    def read(
+        self,
+        times: Array,
+        values: NDArray[np.complex128],
+        inputs: Mapping[str, Array],
+        parameters: Mapping[str, NDArray[np.complex128]],
+    ) -> Complex:
+        """Reading, (N, k) K."""
+        return delayed(times, values, parameters["shift"])
+
+
+class ClockShift(SensorEffect):
+    """A logger whose clock is off against that of the inputs."""
+
+    name = "clock_shift"
+    title = "the channel's clock is off"
+    check = (
+        "Clocks and time zones of the loggers, buffering and averaging on the way; give both one common mark."
+    )
+
+    def of_forms(self, machine: MachineView) -> dict[str, Form]:
+        """One form."""
+        most = 0.25 * machine.duration
+        shift = linear("shift", 0.0, min(400.0, most), "s", low=-most, high=most)
+        return {"": ((shift,), min(200.0, 0.5 * most), ({},))}
+
+    def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
+        """Of a channel."""
+        return ShiftedReading(channel, name, parameters)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How far."""
+        shift = reported["shift"].value
+        word = "late" if shift >= 0.0 else "early"
+        return f"Channel {candidate.component} is {abs(shift):.0f} s {word}."

@@ -1,0 +1,99 @@
+"""Coolant that misses the channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.effect import Array, Candidate, Effect, Reading, Reported
+from spindle_fem.effects.framework.laws import Complex, amplitude
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.term import FLOW, Operating, Term
+
+FRACTION = amplitude("fraction", 0.3, high=0.95)
+MIXED = "outlet mixed"
+
+
+class BypassTerm(Term):
+    """Less flow through the channel.
+
+    Parameters
+    ----------
+    name : str
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name, self.parameters = name, (FRACTION,)
+
+    def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:
+        """What is left of the flow."""
+        return {FLOW: 1.0 - parameters["fraction"]}
+
+
+class MixedOutlet(Reading):
+    """The outlet sensor reads the channel's flow mixed with what went past it at inlet temperature.
+
+    Parameters
+    ----------
+    channel, name : str
+        The name is the term's: both share one fraction.
+    """
+
+    def __init__(self, channel: str, name: str) -> None:
+        self.channel, self.name, self.parameters = channel, name, (FRACTION,)
+
+    def read(
+        self,
+        times: Array,
+        values: NDArray[np.complex128],
+        inputs: Mapping[str, Array],
+        parameters: Mapping[str, NDArray[np.complex128]],
+    ) -> Complex:
+        """Mixed temperature, (N, k) K."""
+        fraction = parameters["fraction"]
+        return (1.0 - fraction) * values + fraction * np.asarray(inputs["coolant_inlet"])[:, None]
+
+
+class CoolantBypass(Effect):
+    """Part of the measured flow does not pass the channel."""
+
+    name = "coolant_bypass"
+    kind = "missing_physics"
+    title = "part of the coolant misses the channel"
+    check = (
+        "O-rings between sleeve and body, relief valve, crossed hoses; measure the flow at the outlet and "
+        "compare the pressure drop with that of the full flow."
+    )
+    # The share changes with the flow and the oil's viscosity.
+    law_sigma = MappingProxyType({"fraction": 0.05})
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """The outlet sensor sits before the flows join, or behind."""
+        if machine.channel is None:
+            return ()
+        name = self.term_name("channel")
+        found = [self.candidate("channel", BypassTerm(name), amplitude="fraction", reference=0.3)]
+        if machine.outlets:
+            mixed = self.term_name("channel", MIXED)
+            found.append(
+                self.candidate(
+                    "channel",
+                    BypassTerm(mixed),
+                    amplitude="fraction",
+                    reference=0.3,
+                    form=MIXED,
+                    reading=MixedOutlet(machine.outlets[0], mixed),
+                )
+            )
+        return tuple(found)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """Which part, and where the outlet sensor sits."""
+        where = " and joins it before the outlet sensor" if candidate.form == MIXED else ""
+        return (
+            f"Channel: {100.0 * reported['fraction'].value:.0f} % of the coolant flow misses the "
+            f"channel{where}."
+        )

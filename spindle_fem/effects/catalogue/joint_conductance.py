@@ -1,0 +1,89 @@
+"""Contacts that conduct differently from nominal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
+from spindle_fem.effects.framework.laws import factor
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.term import Operating, Term
+
+SIGMA = 0.6
+REFERENCE = 0.6
+
+
+class JointTerm(Term):
+    """One factor on several coefficients.
+
+    Parameters
+    ----------
+    name : str
+    scaled : tuple of str
+        Coefficients.
+    """
+
+    def __init__(self, name: str, scaled: tuple[str, ...]) -> None:
+        self.name, self._scaled = name, scaled
+        self.parameters = (factor("factor", None, SIGMA),)
+
+    def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:
+        """The factor on every one."""
+        return dict.fromkeys(self._scaled, parameters["factor"])
+
+
+class JointConductance(Effect):
+    """A constant factor on a seat, flange, spacer or link.
+
+    Source: contact conductance scatters by a factor of two with flatness, pressure
+    and interstitial medium: Yovanovich (2005), IEEE Trans. Compon. Packag. Technol. 28, 182-206.
+    """
+
+    name = "joint_conductance"
+    kind = "parameter"
+    title = "a contact conducts differently from nominal"
+    check = (
+        "Fit, flatness and cleanliness of the contact, bolt torque, filler or grease in the gap; compare the "
+        "temperatures on both sides at steady state."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Every group of contacts that the view names; by the machine's own parameter where it has one."""
+        found = []
+        for seat in machine.seats:
+            if seat.parameter:
+                own = machine.parameters.get(seat.parameter)
+                found.append(
+                    self.factor_candidate(
+                        seat.component,
+                        (factor(seat.parameter, own, SIGMA),),
+                        seat.form,
+                        REFERENCE,
+                        shift=own is not None,
+                    )
+                )
+            else:
+                term = JointTerm(self.term_name(seat.component, seat.form), seat.coefficients)
+                found.append(
+                    self.candidate(
+                        seat.component,
+                        term,
+                        amplitude="factor",
+                        reference=REFERENCE,
+                        form=seat.form,
+                        null=1.0,
+                    )
+                )
+        return tuple(found)
+
+    def report(self, candidate: Candidate, values: Mapping[str, float]) -> dict[str, Reported]:
+        """The factor."""
+        return {"factor": Reported(values.get(candidate.amplitude, 1.0), "")}
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How much better or worse."""
+        contact = f" ({candidate.form})" if candidate.form else ""
+        return (
+            f"{capital(place_words(candidate.component))}{contact}: the contact conducts "
+            f"{reported['factor'].value:.2f} times its nominal value, at every temperature."
+        )

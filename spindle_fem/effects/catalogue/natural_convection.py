@@ -1,0 +1,67 @@
+"""Natural convection: the outside film grows with the temperature difference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
+from spindle_fem.effects.framework.laws import Complex, amplitude, linear, power
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.outside_film_law import (
+    REFERENCE_DIFFERENCE,
+    OutsideFilmTerm,
+    of_films,
+    outside_films,
+)
+from spindle_fem.effects.framework.term import TermContext
+
+# Rounds the law off where wall and air have one temperature, K.
+ROUNDING = 0.5
+
+
+class NaturalConvectionTerm(OutsideFilmTerm):
+    """Growth ``(|T - T_fluid| / 10 K)^m``."""
+
+    def growth(self, wall: Complex, fluid: Complex, context: TermContext) -> Complex:
+        """Relative to 10 K, (k,)."""
+        square = ((wall - fluid) ** 2 + ROUNDING**2) / REFERENCE_DIFFERENCE**2
+        return power(square, 0.5 * context.parameters["exponent"])
+
+
+class NaturalConvection(Effect):
+    """Nusselt number with the power 1/4 (laminar) to 1/3 (turbulent) of the difference.
+
+    Source: Churchill & Chu (1975), Int. J. Heat Mass Transfer 18, 1049-1053, 1323-1329.
+    """
+
+    name = "natural_convection"
+    kind = "missing_physics"
+    title = "the outside film grows with the temperature difference to the room"
+    check = (
+        "Outside surfaces for covers, draught and dirt; measure wall and air temperature at two steady "
+        "states of different heat."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """The standing outside; boundary links of a network."""
+        found = []
+        for key, films in outside_films(machine).items():
+            parameters = (
+                amplitude("convective_share", 0.7, high=5.0),
+                linear("exponent", 0.3, 0.08, low=0.1, high=1.0),
+                linear("carried_share", 0.5, 0.4, low=0.0, high=1.0),
+            )
+            term = NaturalConvectionTerm(self.term_name(key), *of_films(machine, films), parameters)
+            found.append(
+                self.candidate(machine.component(key), term, amplitude="convective_share", reference=0.7)
+            )
+        return tuple(found)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How strongly the film follows."""
+        return (
+            f"{capital(place_words(candidate.component))}: the film to the air is not constant but "
+            f"grows with the power {reported['exponent'].value:.2f} of the temperature difference (natural "
+            "convection); that "
+            f"part is {reported['convective_share'].value:.2f} of the constant film at 10 K."
+        )

@@ -1,0 +1,72 @@
+"""Radiation: surfaces lose heat faster than in proportion to their temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
+from spindle_fem.effects.framework.laws import Complex, amplitude, linear
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.outside_film_law import (
+    REFERENCE_DIFFERENCE,
+    REFERENCE_TEMPERATURE,
+    OutsideFilmTerm,
+    of_films,
+    outside_films,
+)
+from spindle_fem.effects.framework.term import TermContext
+
+
+def radiative(wall: Complex, fluid: Complex) -> Complex:
+    """``(T⁴ - T_f⁴)/(T - T_f)``, [K³]."""
+    return (wall**2 + fluid**2) * (wall + fluid)
+
+
+NOMINAL = radiative(REFERENCE_TEMPERATURE + REFERENCE_DIFFERENCE, REFERENCE_TEMPERATURE)
+
+
+class RadiationTerm(OutsideFilmTerm):
+    """Growth of the radiative film by Stefan and Boltzmann."""
+
+    def growth(self, wall: Complex, fluid: Complex, context: TermContext) -> Complex:
+        """Relative to a wall of 303 K in a room of 293 K, (k,)."""
+        return radiative(wall, fluid) / NOMINAL
+
+
+class Radiation(Effect):
+    """Exchange with large surroundings by the fourth power.
+
+    Source: Stefan-Boltzmann law; 5.7 W/(m²·K) for a black wall at 293 K, so
+    about half of a usual outside film of 10 W/(m²·K).
+    """
+
+    name = "radiation"
+    kind = "missing_physics"
+    title = "surfaces lose heat by radiation, faster than in proportion to their temperature"
+    check = (
+        "Paint and bare metal of the outside (emissivity), hot or cold bodies in sight (oven, window, "
+        "coolant tank); compare a surface with and without a reflecting foil."
+    )
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """The standing outside; boundary links of a network."""
+        found = []
+        for key, films in outside_films(machine).items():
+            parameters = (
+                amplitude("radiative_share", 0.6, high=5.0),
+                linear("carried_share", 0.5, 0.4, low=0.0, high=1.0),
+            )
+            term = RadiationTerm(self.term_name(key), *of_films(machine, films), parameters)
+            found.append(
+                self.candidate(machine.component(key), term, amplitude="radiative_share", reference=0.6)
+            )
+        return tuple(found)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How large the part is."""
+        return (
+            f"{capital(place_words(candidate.component))}: heat is lost by radiation besides the "
+            "constant film; "
+            f"at 10 K it is {reported['radiative_share'].value:.2f} of that film and grows with the "
+            "fourth power of the absolute temperature."
+        )

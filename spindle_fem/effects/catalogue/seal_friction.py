@@ -1,0 +1,81 @@
+"""Rubbing heat of a lip or labyrinth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
+from spindle_fem.effects.framework.laws import RPM
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.speed_heat import SpeedHeatTerm
+
+NAME = "heat_per_1000rpm"
+# Forms, and how likely they are: most machines have run before.
+LASTING, RUNS_IN = "", "runs in"
+LIKELIHOODS = {LASTING: 0.75, RUNS_IN: 0.25}
+
+
+class SealFriction(Effect):
+    """Constant torque at a seal, so heat in proportion to speed; more of it while a new lip runs in.
+
+    What holds the seal takes a share of it.
+
+    Source: Freudenberg, Simrit catalogue of radial shaft seals: power loss in
+    proportion to speed at given contact force; 20-60 W per 1000 rpm at 100-180 mm.
+    """
+
+    name = "seal_friction"
+    kind = "missing_physics"
+    title = "a seal rubs: heat in proportion to speed"
+    check = (
+        "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the "
+        "spindle by hand with and without the seal."
+    )
+    # Contact force and grease of a lip change with temperature; how much of it the shaft takes is guessed.
+    law_sigma = MappingProxyType({"heat_per_1000rpm": 0.2})
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Lasting or running in, at both shaft ends; every node of a network that has something turning."""
+        ends = machine.spots if machine.kind == "network" else ("nose", "drive_end")
+        found = []
+        for key in ends:
+            speeds = machine.speeds(key)
+            for speed in speeds if key in machine.heat else ():
+                own = speed if len(speeds) > 1 else ""
+                size = (NAME, max(5.0, 0.1 * machine.typical_heat), 1000.0 * RPM)
+                for word, likelihood in LIKELIHOODS.items():
+                    form = f"{own} {word}".strip()
+                    term = SpeedHeatTerm(
+                        self.term_name(key, form),
+                        machine.heat[key],
+                        speed,
+                        size,
+                        exponent=(1.0, 0.1),
+                        beside=machine.heat.get(f"standing_{key}", ()),
+                        runs_in=word == RUNS_IN,
+                    )
+                    found.append(
+                        self.candidate(
+                            machine.component(key),
+                            term,
+                            amplitude=NAME,
+                            reference=size[1],
+                            form=machine.form(key, form),
+                            likelihood=likelihood,
+                        )
+                    )
+        return tuple(found)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How much at which end, and how much more when new."""
+        new = ""
+        if "more_when_new" in reported:
+            new = (
+                f" once it has run in ({100.0 * reported['more_when_new'].value:.0f} % more at first, "
+                f"fading with {reported['run_in_time'].value / 60.0:.0f} min)"
+            )
+        return (
+            f"A seal rubs at {place_words(candidate.component)}: {quantity(reported[NAME])} per 1000 rpm "
+            f"of heat that the model lacks, in proportion to speed{new}."
+        )

@@ -1,0 +1,86 @@
+"""Extra loss at a place that no effect explains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from spindle_fem.effects.framework.effect import Candidate, Reported, place_words, quantity
+from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature
+from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
+from spindle_fem.effects.framework.spread import Spread
+from spindle_fem.effects.framework.term import TermContext, TermParameter
+from spindle_fem.effects.framework.unrecorded import (
+    Share,
+    UnrecordedEffect,
+    UnrecordedHeatTerm,
+    UnrecordedTerm,
+    when_words,
+)
+
+
+class CoolingTerm(UnrecordedTerm):
+    """Conductance from places to the surroundings.
+
+    Parameters
+    ----------
+    name : str
+    size : TermParameter
+    spread : Spread
+    on : Share
+    fluid : str or float
+        Input of the surroundings, or their temperature [K].
+    """
+
+    def __init__(self, name: str, size: TermParameter, spread: Spread, on: Share, fluid: str | float) -> None:
+        super().__init__(name, size, spread, on)
+        self.reads = self.heat_places
+        self._fluid = fluid
+
+    def heat(self, context: TermContext) -> Complex:
+        """Of every place, (n, k) W."""
+        size = context.parameters["conductance"] * self.on.share(context)
+        fluid = fluid_temperature(context, self._fluid)
+        if self.spread.sides:
+            return self.spread.heat(context, -size * (self.spread.temperature(context) - fluid))
+        # Each place by its own temperature.
+        return -size * self.spread.shares(context) * (context.temperatures - fluid)
+
+
+class UnrecordedCooling(UnrecordedEffect):
+    """The way out for a loss that nothing else explains."""
+
+    name = "unrecorded_cooling"
+    kind = "missing_physics"
+    title = "something cools this place that no recorded input explains"
+    check = (
+        "What runs in these intervals: cutting fluid, air blast, an open door or guard, a second coolant "
+        "circuit; compare the intervals with the machine's programme and record the suspect."
+    )
+    check_law = "What blows or flows at this place with the {}; vary it alone and watch this place."
+    interval_forms = ("conductance", "heat")
+
+    def usual(self, machine: MachineView, form: str) -> float:
+        """A fifth of all heat, or what carries it at the usual rise."""
+        heat = 0.2 * machine.typical_heat
+        return heat if form == "heat" else heat / machine.typical_rise
+
+    def followed(self, machine: MachineView) -> Sequence[RecordedQuantity]:
+        """What was recorded beside the inputs: inputs that cool have laws of their own."""
+        return tuple(item for item in machine.quantities if item.beside and not item.changes)
+
+    def term(self, machine: MachineView, name: str, spread: Spread, on: Share, form: str) -> UnrecordedTerm:
+        """Loss over a spot."""
+        usual = self.usual(machine, form)
+        if form == "heat":
+            return UnrecordedHeatTerm(name, amplitude("heat", usual, "W"), spread, on, sign=-1.0)
+        fluid = "ambient" if "ambient" in machine.inputs else machine.reference_temperature
+        return CoolingTerm(name, amplitude("conductance", usual, "W/K"), spread, on, fluid)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How much, and how often."""
+        size = reported.get("conductance") or reported["heat"]
+        way = " to the surroundings" if size.unit == "W/K" else ""
+        return (
+            f"A further {quantity(size)}{way} is lost from "
+            f"{place_words(candidate.component)}{when_words(candidate, reported)}."
+        )

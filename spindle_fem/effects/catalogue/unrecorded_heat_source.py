@@ -1,0 +1,48 @@
+"""Heat at a place that no effect explains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from spindle_fem.effects.framework.effect import Candidate, Reported, capital, place_words, quantity
+from spindle_fem.effects.framework.laws import amplitude
+from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
+from spindle_fem.effects.framework.spread import Spread
+from spindle_fem.effects.framework.unrecorded import Share, UnrecordedEffect, UnrecordedHeatTerm, when_words
+
+
+class UnrecordedHeatSource(UnrecordedEffect):
+    """The way out for heat that nothing else explains."""
+
+    name = "unrecorded_heat_source"
+    kind = "missing_physics"
+    title = "something heats this place that no recorded input explains"
+    check = (
+        "What runs in these intervals: cutting, hydraulic clamping, chip heap, lamp, neighbouring drive; "
+        "compare the intervals with the machine's programme and record the suspect."
+    )
+    check_law = (
+        "What rubs, brakes or is driven at this place with the {}; vary it alone and watch this place."
+    )
+    interval_forms = ("heat",)
+
+    def usual(self, machine: MachineView, form: str) -> float:
+        """A fifth of all heat."""
+        return 0.2 * machine.typical_heat
+
+    def followed(self, machine: MachineView) -> Sequence[RecordedQuantity]:
+        """All of them, speeds only by their changes: what grows with speed has laws of its own."""
+        return machine.quantities
+
+    def term(
+        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str
+    ) -> UnrecordedHeatTerm:
+        """Heat over a spot."""
+        return UnrecordedHeatTerm(name, amplitude("heat", self.usual(machine, form), "W"), spread, on)
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """How much, and how often."""
+        return (
+            f"{capital(quantity(reported['heat']))} of heat enters "
+            f"{place_words(candidate.component)}{when_words(candidate, reported)}."
+        )

@@ -1,0 +1,1 @@
+"""What an effect is, and the building blocks that the catalogue is written with."""

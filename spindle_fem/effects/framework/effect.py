@@ -1,0 +1,376 @@
+"""What an effect of the catalogue is, and what one candidate for it looks like.
+
+An *effect* (``thermal_preload``, ``sensor_lag``, ...) knows where in a machine
+it can act and in which mathematical forms. One form at one place is a
+*candidate*: terms for the thermal model, factors on the machine's own
+parameters, or a transformation of a reading, with free parameters and priors.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.laws import RPM
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.units import ZERO_CELSIUS_K
+
+Array = NDArray[np.float64]
+Kind = Literal["missing_physics", "parameter", "sensor"]
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """One parameter as a finding states it.
+
+    Attributes
+    ----------
+    value : float
+        In ``unit``.
+    unit : str
+        Empty for a pure number.
+    """
+
+    value: float
+    unit: str
+
+
+class Reading(ABC):
+    """A sensor that tells something else than the temperature at its place.
+
+    Attributes
+    ----------
+    channel : str
+        Column of the recording.
+    name : str
+        Outer names of the parameters are ``<name>.<parameter>``.
+    parameters : tuple of TermParameter
+    """
+
+    channel: str = ""
+    name: str = ""
+    parameters: tuple[TermParameter, ...] = ()
+
+    @abstractmethod
+    def read(
+        self,
+        times: Array,
+        values: NDArray[np.complex128],
+        inputs: Mapping[str, Array],
+        parameters: Mapping[str, NDArray[np.complex128]],
+    ) -> NDArray[np.complex128]:
+        """What the sensor tells.
+
+        Affine in ``values``, analytic in the parameters (complex steps).
+
+        Parameters
+        ----------
+        times : (N,) ndarray, [s]
+            Increasing, not uniform.
+        values : (N, k) ndarray, [K]
+            Temperature at the sensor's place.
+        inputs : mapping of str to (N,) ndarray
+            ``ambient`` [K] and the other inputs.
+        parameters : mapping of str to (k,) ndarray
+            By inner name.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One effect at one place in one form.
+
+    Attributes
+    ----------
+    effect, component, form : str
+        Catalogue id; place as :mod:`spindle_fem.effects.framework.machine_view` names it; form,
+        empty where there is one only.
+    kind : str
+    terms : tuple of Term
+        Added to the thermal model.
+    factors : tuple of TermParameter
+        Factors on the machine's own parameters, named as these
+        (``heat.front``, ``joint.flange``); logarithmic, value 1 without effect.
+    reading : Reading or None
+    amplitude : str
+        Outer name of the parameter that switches the effect on; the response
+        is nearly proportional to its distance from ``null``.
+    null : float
+        Value of the amplitude without the effect (0, or 1 for factors).
+    reference : float
+        Typical value of the amplitude, at which responses are screened.
+    starts : tuple of mapping of outer name to float
+        Values of the other parameters to begin searches from (onset speeds,
+        time constants, periods, ...); the nominal ones where a mapping is empty.
+    shift_of_prior : bool
+        Whether the candidate is a wider prior for something that the machine
+        definition itself calls uncertain (kind ``parameter``).
+    recording : int or None
+        The only recording in which it acts, of several; all of them when None.
+    constants : mapping of str to float
+        Numbers of the machine that a report needs.
+    likelihood : float
+        How likely this form is before the data, beside the other forms at its place.
+    """
+
+    effect: str
+    component: str
+    form: str
+    kind: Kind
+    amplitude: str
+    null: float
+    reference: float
+    terms: tuple[Term, ...] = ()
+    factors: tuple[TermParameter, ...] = ()
+    reading: Reading | None = None
+    starts: tuple[Mapping[str, float], ...] = field(default=(MappingProxyType({}),))
+    shift_of_prior: bool = False
+    recording: int | None = None
+    constants: Mapping[str, float] = field(default_factory=dict)
+    likelihood: float = 1.0
+
+    @property
+    def label(self) -> str:
+        """Effect and place, one word each, for tables."""
+        form = f" ({self.form})" if self.form else ""
+        return f"{self.effect} @ {self.component}{form}"
+
+    @property
+    def parameters(self) -> dict[str, TermParameter]:
+        """Every parameter by outer name; fixed ones (``sigma`` 0) included."""
+        found: dict[str, TermParameter] = {}
+        for term in self.terms:
+            found |= term.names()
+        found |= {item.name: item for item in self.factors}
+        if self.reading is not None:
+            found |= {f"{self.reading.name}.{item.name}": item for item in self.reading.parameters}
+        return found
+
+    @property
+    def free(self) -> dict[str, TermParameter]:
+        """Those that are fitted."""
+        return {name: item for name, item in self.parameters.items() if item.sigma > 0.0}
+
+
+class Effect(ABC):
+    """One row of the catalogue.
+
+    Attributes
+    ----------
+    name : str
+        Catalogue id.
+    kind : str
+    title : str
+        In plain words, for reports: "the grease thins as it warms".
+    check : str
+        What a maintenance engineer should look at when it is found.
+    law_sigma : mapping of str to float
+        1 σ of the logarithm of what a finding states, by name, that a fit of so simple a law cannot
+        know of; widens the stated interval.
+    """
+
+    name: str
+    kind: Kind
+    title: str
+    check: str
+    law_sigma: Mapping[str, float] = MappingProxyType({})
+
+    def candidates(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Every form at every place of a machine; none where the definition already has it."""
+        return tuple(
+            item
+            for item in self.forms(machine)
+            if not machine.switched_on(self.name, item.component) and self.can_show(machine, item)
+        )
+
+    def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
+        """Whether a recording of this range and length could show it at all."""
+        return True
+
+    @abstractmethod
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Every form at every place, whatever the definition already has."""
+
+    def candidate(
+        self,
+        component: str,
+        term: Term | None = None,
+        *,
+        amplitude: str,
+        reference: float,
+        form: str = "",
+        null: float = 0.0,
+        starts: Sequence[Mapping[str, float]] = ({},),
+        reading: Reading | None = None,
+        constants: Mapping[str, float] | None = None,
+        likelihood: float = 1.0,
+    ) -> Candidate:
+        """Candidate of one term or reading; ``amplitude`` and ``starts`` by inner names."""
+        owner = term.name if term is not None else reading.name
+        return Candidate(
+            self.name,
+            component,
+            form,
+            self.kind,
+            f"{owner}.{amplitude}",
+            null,
+            reference,
+            terms=() if term is None else (term,),
+            reading=reading,
+            starts=tuple({f"{owner}.{name}": value for name, value in start.items()} for start in starts),
+            constants=constants or {},
+            likelihood=likelihood,
+        )
+
+    def term_name(self, key: str, form: str = "") -> str:
+        """Name of a term, unique over effects, places and forms."""
+        return ".".join(part.replace(" ", "_") for part in (self.name, key, form) if part)
+
+    def factor_candidate(
+        self, component: str, parameters: Sequence[TermParameter], form: str, reference: float, *, shift: bool
+    ) -> Candidate:
+        """Candidate that multiplies a parameter of the machine."""
+        return Candidate(
+            self.name,
+            component,
+            form,
+            self.kind,
+            parameters[0].name,
+            1.0,
+            reference,
+            factors=tuple(parameters),
+            shift_of_prior=shift,
+        )
+
+    def starts_from(
+        self, candidate: Candidate, times: Array, residual: Array
+    ) -> tuple[Mapping[str, float], ...]:
+        """Where to begin searches, given what a model without the effect leaves unexplained.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        times : (N,) ndarray, [s]
+        residual : (N, c) ndarray, [K]
+            Measured less predicted; NaN where nothing was read.
+        """
+        return candidate.starts
+
+    def report(self, candidate: Candidate, values: Mapping[str, float]) -> dict[str, Reported]:
+        """Fitted values under the names and in the units that a finding states, the amplitude first.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        values : mapping of str to float
+            By outer name, SI.
+        """
+        own = candidate.parameters
+        order = [candidate.amplitude, *(name for name in candidate.free if name != candidate.amplitude)]
+        return {own[name].name: stated(own[name], values.get(name, own[name].value)) for name in order}
+
+    def check_of(self, candidate: Candidate) -> str:
+        """What to look at where this candidate is found."""
+        return self.check
+
+    def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+        """One sentence for a report."""
+        numbers = ", ".join(f"{name.replace('_', ' ')} {quantity(item)}" for name, item in reported.items())
+        return f"{capital(place_words(candidate.component))}: {self.title} ({numbers})."
+
+
+def stated(parameter: TermParameter, value: float) -> Reported:
+    """A parameter in the unit in which engineers state it.
+
+    >>> stated(TermParameter("onset_speed", 0.0, unit="rad/s"), 100.0 * np.pi)
+    Reported(value=3000.0, unit='rpm')
+    """
+    if parameter.unit == "rad/s":
+        return Reported(float(round(value / RPM, 6)), "rpm")
+    if parameter.unit == "K/s":
+        return Reported(value * 3600.0, "K/h")
+    if parameter.unit == "K" and parameter.name.endswith("_temperature"):
+        return Reported(value - ZERO_CELSIUS_K, "degC")
+    return Reported(value, parameter.unit)
+
+
+def quantity(item: Reported) -> str:
+    """Value and unit in words.
+
+    >>> quantity(Reported(20.0, "degC"))
+    '20 °C'
+    """
+    value = f"{item.value:.3g}" if abs(item.value) < 1000.0 else f"{item.value:.0f}"
+    return f"{value} {item.unit.replace('degC', '°C')}".strip()
+
+
+def place_words(component: str) -> str:
+    """A component as it stands in a sentence.
+
+    >>> place_words("front_bearings"), place_words("F2"), place_words("drive_end")
+    ('the front bearings', 'F2', 'the drive end')
+    """
+    plain = component.replace("_", " ")
+    return plain if plain.upper() == plain or "|" in plain else f"the {plain}"
+
+
+def capital(text: str) -> str:
+    """With a capital first letter, the rest untouched."""
+    return text[:1].upper() + text[1:]
+
+
+Intervals = Sequence[tuple[float, float]]
+
+
+class IntervalEffect(Effect):
+    """An effect that is on in intervals of time, found in the data rather than searched blindly.
+
+    Its forms besides these follow laws, as those of any other effect.
+
+    Attributes
+    ----------
+    interval_forms : tuple of str
+        Forms that :meth:`over` takes, the usual one first.
+    """
+
+    interval_forms: tuple[str, ...] = ("",)
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Those that follow laws; candidates for intervals come from the data."""
+        return ()
+
+    @abstractmethod
+    def places(self, machine: MachineView) -> tuple[str, ...]:
+        """Where it can act: spots of the view, finer than the components that findings name."""
+
+    @abstractmethod
+    def over(
+        self, machine: MachineView, component: str, intervals: Intervals, form: str | None = None
+    ) -> Candidate:
+        """Candidate that begins from intervals, [s]; their ends are free.
+
+        Parameters
+        ----------
+        machine : MachineView
+        component : str
+            One of :meth:`places`.
+        intervals : sequence of (float, float), [s]
+        form : str, optional
+            One of :attr:`interval_forms`; the first when None.
+        """
+
+    @abstractmethod
+    def intervals(self, candidate: Candidate, values: Mapping[str, float]) -> list[tuple[float, float]]:
+        """Fitted intervals, [s]; none where it follows a law."""
+
+
+def in_intervals(effect: Effect, candidate: Candidate) -> bool:
+    """Whether a candidate of an effect is on in intervals."""
+    return isinstance(effect, IntervalEffect) and bool(effect.intervals(candidate, {}))

@@ -1,0 +1,46 @@
+"""Sensors that tell something else than the temperature at their place: what all of them have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+
+from spindle_fem.effects.framework.effect import Candidate, Effect, Reading
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.term import TermParameter
+
+# What a form needs: parameters with the amplitude first, reference, starts.
+Form = tuple[tuple[TermParameter, ...], float, Sequence[Mapping[str, float]]]
+
+
+class SensorEffect(Effect):
+    """One candidate for every channel and form."""
+
+    kind = "sensor"
+
+    @abstractmethod
+    def of_forms(self, machine: MachineView) -> dict[str, Form]:
+        """Parameters, reference and starts of every form."""
+
+    @abstractmethod
+    def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
+        """The reading of a channel."""
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """Every channel."""
+        found = []
+        for channel in machine.channels:
+            for form, (parameters, reference, starts) in self.of_forms(machine).items():
+                reading = self.reading(channel, self.term_name(channel, form), form, parameters)
+                found.append(
+                    self.candidate(
+                        machine.probes.get(channel, channel),
+                        reading=reading,
+                        amplitude=parameters[0].name,
+                        reference=reference,
+                        form=form,
+                        null=parameters[0].value,
+                        starts=starts,
+                    )
+                )
+        return tuple(found)

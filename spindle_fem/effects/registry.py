@@ -1,0 +1,270 @@
+"""Every effect of the package, found by walking it: a new file is a new effect."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import numpy as np
+
+import spindle_fem.effects.catalogue as package
+from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffect, Intervals, Reading
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.units import to_si
+
+Owner = TypeVar("Owner", Term, Reading)
+# Of a channel without flow: any range does, as film laws leave such a channel alone.
+STANDING_REYNOLDS = (100.0, 1000.0)
+
+
+@cache
+def _found() -> Mapping[str, Effect]:
+    effects: dict[str, Effect] = {}
+    for module in sorted(item.name for item in iter_modules(package.__path__)):
+        loaded = import_module(f"{package.__name__}.{module}")
+        for _, kind in inspect.getmembers(loaded, inspect.isclass):
+            own = kind.__module__ == loaded.__name__
+            if own and issubclass(kind, Effect) and not inspect.isabstract(kind):
+                if kind.name in effects:
+                    raise SpecError("effects", f'two have the name "{kind.name}".', "Give each its own.")
+                effects[kind.name] = kind()
+    return MappingProxyType(effects)
+
+
+def catalogue() -> dict[str, Effect]:
+    """Every effect by its id.
+
+    >>> catalogue()["windage"].kind
+    'missing_physics'
+    """
+    return dict(_found())
+
+
+def effect_of(name: str, where: str = "effect") -> Effect:
+    """An effect by its id.
+
+    Raises
+    ------
+    SpecError
+        The catalogue has no such effect.
+    """
+    if name not in _found():
+        raise SpecError(where, f'"{name}" is not in the catalogue.', did_you_mean(name, _found()))
+    return _found()[name]
+
+
+def candidates_for(view: MachineView) -> tuple[Candidate, ...]:
+    """All effects but those of intervals, in all forms at all places of a machine."""
+    return tuple(candidate for effect in _found().values() for candidate in effect.candidates(view))
+
+
+def interval_effects() -> tuple[IntervalEffect, ...]:
+    """Effects that are on in intervals of time."""
+    return tuple(effect for effect in _found().values() if isinstance(effect, IntervalEffect))
+
+
+def build(
+    effect: str,
+    component: str,
+    form: str,
+    values: Mapping[str, str | float],
+    view: MachineView,
+    intervals: Sequence[tuple[Any, Any]] = (),
+    where: str = "effect",
+) -> Candidate:
+    """Candidate of an entry of a machine definition, its parameters fixed.
+
+    What a definition says holds on every recording: limits that a recording
+    sets to a search (half its length for a lag, the Reynolds numbers that
+    occur) do not apply; those of the physics (signs, shares) do.
+
+    Parameters
+    ----------
+    effect, component, form : str
+        As a candidate and :func:`definition_entry` have them.
+    values : mapping of str to str or float
+        Text with a unit, or SI; by inner name (without ``<term>.``).
+        Parameters that are missing keep their nominal values, but for the
+        amplitude, which must be given.
+    view : MachineView
+    intervals : sequence of pairs, [s]
+        For effects of intervals, text with a unit or SI.
+    where : str
+        For messages.
+
+    Raises
+    ------
+    SpecError
+        The effect, its place, form or a parameter does not exist; the amplitude is missing.
+    UnitError
+        A value without or with a wrong unit.
+    """
+    known = effect_of(effect, f"{where}.effect")
+    candidate = _matching(known, component, form, _of_any_recording(view), _seconds(intervals, where), where)
+    by_inner = {item.name: (outer, item) for outer, item in candidate.parameters.items()}
+    edges = {name for name in by_inner if name.startswith(("start_", "end_"))} if intervals else set()
+    allowed = sorted(set(by_inner) - edges)
+    unknown = [name for name in values if name not in allowed]
+    if unknown:
+        raise SpecError(
+            f"{where}.parameters", f'"{unknown[0]}" is unknown.', did_you_mean(unknown[0], allowed)
+        )
+    amplitude = candidate.parameters[candidate.amplitude].name
+    if amplitude not in values:
+        raise SpecError(
+            f"{where}.parameters", f'"{amplitude}" is missing.', "It says how strong the effect is."
+        )
+    given = {}
+    for name, value in values.items():
+        item = by_inner[name][1]
+        given[name] = _read(item, value, f"{where}.parameters.{name}")
+        _require_possible(item, given[name], name == amplitude, f"{where}.parameters.{name}")
+    return fixed(candidate, given)
+
+
+def _of_any_recording(view: MachineView) -> MachineView:
+    """The view with laws of the Reynolds number, also where no coolant flows and they do nothing."""
+    if view.channel is None or view.reynolds[0] > 0.0:
+        return view
+    return replace(view, reynolds=STANDING_REYNOLDS)
+
+
+def _require_possible(item: TermParameter, value: float, is_amplitude: bool, where: str) -> None:
+    """Refuse a wrong sign, and a pure amplitude beyond its limits; other limits are those of a search."""
+    low = item.low if item.low == 0.0 or (is_amplitude and not item.unit) else -np.inf
+    high = item.high if is_amplitude and not item.unit else np.inf
+    if not low <= value <= high:
+        allowed = f"{low:g} to {high:g}" if np.isfinite(high) else f"{low:g} or more"
+        raise SpecError(
+            where,
+            f"is {value:g} {item.unit}".rstrip() + ".",
+            f"Allowed: {allowed} {item.unit}".rstrip() + ".",
+        )
+
+
+def fixed(candidate: Candidate, values: Mapping[str, float]) -> Candidate:
+    """The candidate with every parameter fixed, at SI values by inner name where given."""
+
+    def frozen(items: tuple[TermParameter, ...]) -> tuple[TermParameter, ...]:
+        return tuple(
+            replace(item, value=float(values.get(item.name, item.value)), sigma=0.0) for item in items
+        )
+
+    return replace(
+        candidate,
+        terms=tuple(_with_parameters(term, frozen(term.parameters)) for term in candidate.terms),
+        factors=frozen(candidate.factors),
+        reading=None
+        if candidate.reading is None
+        else _with_parameters(candidate.reading, frozen(candidate.reading.parameters)),
+        starts=({},),
+        shift_of_prior=False,
+    )
+
+
+def _with_parameters(owner: Owner, parameters: tuple[TermParameter, ...]) -> Owner:
+    copy = object.__new__(type(owner))
+    copy.__dict__.update(owner.__dict__)
+    copy.parameters = parameters
+    return copy
+
+
+def definition_entry(candidate: Candidate, values: Mapping[str, float]) -> dict[str, Any]:
+    """Plain data of a fitted candidate for a machine definition; :func:`build` reads it back.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    values : mapping of str to float
+        By outer name, SI.
+    """
+    effect = effect_of(candidate.effect)
+    entry: dict[str, Any] = {"effect": candidate.effect, "component": candidate.component}
+    if candidate.form:
+        entry["form"] = candidate.form
+    edges: set[str] = set()
+    if isinstance(effect, IntervalEffect):
+        pairs = effect.intervals(candidate, values)
+        if pairs:
+            entry["intervals"] = [[f"{start:.10g} s", f"{end:.10g} s"] for start, end in pairs]
+        edges = {f"{side}_{number}" for number in range(1, len(pairs) + 1) for side in ("start", "end")}
+    entry["parameters"] = {
+        item.name: _text(item, values.get(outer, item.value))
+        for outer, item in candidate.parameters.items()
+        if item.name not in edges
+    }
+    return entry
+
+
+def _is_temperature(item: TermParameter) -> bool:
+    return item.unit == "K" and item.name.endswith("_temperature")
+
+
+def _text(item: TermParameter, value: float) -> str:
+    return f"{value:.10g} {item.unit}".strip()
+
+
+def _read(item: TermParameter, value: str | float, where: str) -> float:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+    return to_si(value, item.unit, where=where, kind="temperature" if _is_temperature(item) else "quantity")
+
+
+def _seconds(intervals: Sequence[tuple[Any, Any]], where: str) -> Intervals:
+    found = []
+    for number, pair in enumerate(intervals, 1):
+        ends = [
+            float(end) if isinstance(end, (int, float)) else to_si(end, "s", where=f"{where}.intervals")
+            for end in pair
+        ]
+        if len(ends) != 2 or ends[1] <= ends[0] or (found and ends[0] <= found[-1][1]):
+            raise SpecError(
+                f"{where}.intervals[{number}]",
+                f"is {list(pair)}.",
+                "Allowed: start and end, one after the other, growing.",
+            )
+        found.append((ends[0], ends[1]))
+    return found
+
+
+def _matching(
+    effect: Effect, component: str, form: str, view: MachineView, intervals: Intervals, where: str
+) -> Candidate:
+    laws = list(effect.forms(view))
+    if isinstance(effect, IntervalEffect) and not intervals:
+        known = dict.fromkeys(item.form for item in laws if item.component == component)
+        if form not in known:
+            own = f'form "{form}" follows nothing that is recorded, and ' if form else ""
+            law = f", or a form that follows a law: {', '.join(map(repr, known))}" if known else ""
+            raise SpecError(f"{where}.intervals", f"{own}{effect.name} has none.", f"Give at least one{law}.")
+        offered = laws
+    elif isinstance(effect, IntervalEffect):
+        offered = [
+            effect.over(view, place, intervals, kind)
+            for place in effect.places(view)
+            for kind in effect.interval_forms
+        ]
+    else:
+        if intervals:
+            raise SpecError(f"{where}.intervals", f"{effect.name} takes none.", "Leave them out.")
+        offered = laws
+    for candidate in offered:
+        if candidate.component == component and candidate.form == form:
+            return candidate
+    components = list(dict.fromkeys(item.component for item in offered))
+    if component not in components:
+        raise SpecError(
+            f"{where}.component",
+            f'"{component}" cannot have {effect.name}.',
+            did_you_mean(component, components),
+        )
+    forms = [item.form for item in offered if item.component == component]
+    raise SpecError(f"{where}.form", f'"{form}" is unknown.', f"Allowed: {', '.join(map(repr, forms))}.")

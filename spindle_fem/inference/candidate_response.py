@@ -1,0 +1,305 @@
+"""First-order answer of every channel to every candidate, about one common run.
+
+A candidate's law is evaluated along the temperatures of that run, at all
+instants at once; the heat that it would add is marched through the linear
+model for hundreds of candidates together. Large effects act back on their own
+cause: the short list is fitted with the full terms afterwards.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.term import COOLANT_INLET, FLUID_PREFIX, Term, TermContext
+from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.model.reduced.reduced_transient import TransientRun
+from spindle_fem.model.reduced.term_layout import Layout
+from spindle_fem.model.reduced.term_memory import Moves, moves_over, remembered
+
+Array = NDArray[np.float64]
+
+CHUNK = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A candidate with starting values of its shape.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    shape : mapping of outer name to float
+        Values of parameters other than the amplitude.
+    """
+
+    candidate: Candidate
+    shape: Mapping[str, float]
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and place."""
+        return self.candidate.effect, self.candidate.component
+
+    def values(self, amplitude: float) -> dict[str, float]:
+        """Every parameter with the amplitude given."""
+        values = {name: item.value for name, item in self.candidate.parameters.items()}
+        return values | dict(self.shape) | {self.candidate.amplitude: amplitude}
+
+
+def variants_of(candidates: Sequence[Candidate]) -> list[Variant]:
+    """Every candidate from each of its starting shapes."""
+    return [Variant(candidate, start) for candidate in candidates for start in candidate.starts]
+
+
+class BaseRun:
+    """One recording simulated with what is known, about which candidates are judged.
+
+    Parameters
+    ----------
+    plant : Plant
+    number : int
+        Recording.
+    values : mapping of str to float
+    candidates : sequence of Candidate
+        Already in the model.
+    """
+
+    def __init__(
+        self, plant: Plant, number: int, values: Mapping[str, float], candidates: Sequence[Candidate] = ()
+    ) -> None:
+        self.plant, self.number, self.values, self.candidates = plant, number, dict(values), tuple(candidates)
+        self.run: TransientRun = plant.transient(number, values, candidates)
+        self.states, self.tracks = self.run.march(plant.start(number, values))
+        drive = self.run.drive
+        self.drive = drive
+        self.start_inputs = {name: drive.start[:, i] for i, name in enumerate(drive.names)}
+        self.end_inputs = {name: drive.end[:, i] for i, name in enumerate(drive.names)}
+        self.columns = plant.columns[number]
+        self._coefficient: dict[str, Array] = {}
+        self._told: Array | None = None
+
+    # ------------------------------------------------------------------ answers
+    def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
+        """Channels' answer (G + 1, c, m) to changes of states (G + 1, r, m) and coolant inlet."""
+        owner = np.append(self.run.step_class, self.run.step_class[-1])
+        column = self.plant.fast.inlet_column if inlet is not None else None
+        found = np.zeros((tangent.shape[0], len(self.columns), tangent.shape[2]))
+        for number in np.unique(owner):
+            operators, rows = self.run.operators[number], np.flatnonzero(owner == number)
+            found[rows] = np.einsum(
+                "or,nrm->nom", operators.outputs[self.columns], tangent[rows], optimize=True
+            )
+            if inlet is not None:
+                direct = operators.output_inputs[self.columns, column]
+                found[rows] += direct[None, :, None] * inlet[rows, None, :]
+        return found
+
+    def march(self, start: Array, end: Array, inlet: Array | None = None) -> Array:
+        """Channels' answer to loads (G, r, m) at both ends of the steps."""
+        forcing = np.empty_like(start)
+        for key, rows in self.run.groups.items():
+            propagator = self.run.propagators[key]
+            forcing[rows] = np.einsum("rs,nsm->nrm", propagator.from_start, start[rows], optimize=True)
+            forcing[rows] += np.einsum("rs,nsm->nrm", propagator.from_end, end[rows], optimize=True)
+        return self.outputs(self.run.tangents(forcing, self.tracks), inlet)
+
+    def place_temperature(self, place: str) -> Array:
+        """Mean temperature of a place at the grid, (G + 1,) K."""
+        return self.states @ self.plant.fast.model.place(place)
+
+    # ------------------------------------------------------------------ candidates
+    def responses(self, variants: Sequence[Variant]) -> Array:
+        """Answer of the channels to every variant at its reference amplitude, (G + 1, c, m)."""
+        size = (self.drive.grid.size, len(self.columns))
+        found = np.zeros((*size, len(variants)))
+        dynamic, steady = [], []
+        for position, variant in enumerate(variants):
+            candidate = variant.candidate
+            if candidate.recording not in (None, self.number):
+                continue
+            if candidate.reading is not None:
+                found[:, :, position] += self._reading(variant)
+            if any(term.is_dynamic for term in candidate.terms):
+                dynamic.append(position)
+            if candidate.factors or any(_is_steady(term) for term in candidate.terms):
+                steady.append(position)
+        for first in range(0, len(dynamic), CHUNK):
+            chosen = dynamic[first : first + CHUNK]
+            found[:, :, chosen] += self._dynamic([variants[i] for i in chosen])
+        if steady:
+            found[:, :, steady] += self._steady([variants[i] for i in steady])
+        return found
+
+    def _dynamic(self, variants: Sequence[Variant]) -> Array:
+        steps, size = len(self.drive.steps), self.plant.fast.model.size
+        start, end = np.zeros((steps, size, len(variants))), np.zeros((steps, size, len(variants)))
+        inlet = np.zeros((steps + 1, len(variants)))
+        for position, variant in enumerate(variants):
+            values = variant.values(variant.candidate.reference)
+            for term in variant.candidate.terms:
+                if term.is_dynamic:
+                    own = term.values(values)
+                    memory = self._memory(term, own)
+                    for loads, before in ((start, True), (end, False)):
+                        added, shift = self._load(term, own, memory, before)
+                        loads[:, :, position] += added
+                        if shift is not None:
+                            rows = slice(0, steps) if before else slice(steps, steps + 1)
+                            inlet[rows, position] += shift if before else shift[-1:]
+        return self.march(start, end, inlet if np.any(inlet) else None)
+
+    def _memory(self, term: Term, values: Mapping[str, float]) -> Array:
+        """State of a term during each step, (n_states, G + 1)."""
+        steps = len(self.drive.steps)
+        if not term.n_states:
+            return np.zeros((0, steps + 1))
+        reads = np.array([self.place_temperature(place) for place in term.reads]).reshape(-1, steps + 1)
+        n_reads = len(reads)
+        layout = Layout.of(term, values, slice(0, n_reads), slice(0, term.n_states), {})
+
+        def seen(layout: Layout, states: Array) -> TermContext:
+            times = self.drive.grid[:-1]
+            return layout.context_over(times, self.start_inputs, reads[:, :-1].T, states, slopes=False)
+
+        def tell(states: Array) -> Moves:
+            shape = (term.n_states, n_reads, 0)
+            return moves_over([(term, layout)], shape, seen, self.drive.steps, states)
+
+        return remembered(tell, term.initial_state(values), steps)[0].T
+
+    def _load(
+        self, term: Term, values: Mapping[str, float], memory: Array, before: bool
+    ) -> tuple[Array, Array | None]:
+        """Load that a term adds at one end of every step, (G, r), and its shift of the inlet."""
+        model, run = self.plant.fast.model, self.run
+        steps = len(self.drive.steps)
+        at = slice(0, steps) if before else slice(1, steps + 1)
+        inputs = self.start_inputs if before else self.end_inputs
+        states = self.states[at]
+        reads = np.array([states @ model.place(place) for place in term.reads]).reshape(-1, steps)
+        context = TermContext(
+            self.drive.grid[at],
+            inputs,
+            reads.astype(complex),
+            memory[:, at].astype(complex),
+            {name: np.full(steps, value, dtype=complex) for name, value in values.items()},
+        )
+        added = np.zeros((steps, model.size))
+        shift = None
+        if term.heat_places:
+            heat = np.asarray(term.heat(context)).real
+            for row, place in enumerate(term.heat_places):
+                if place == COOLANT_INLET:
+                    shift = heat[row] * np.ones(steps)
+                    loads = np.array(
+                        [operators.loads[:, self.plant.fast.inlet_column] for operators in run.operators]
+                    )
+                    added += shift[:, None] * loads[self.drive.step_class]
+                elif place.startswith(FLUID_PREFIX) and place not in model.place_names:
+                    film = self.plant.fast.fluid_places[place]
+                    strength = self._strength(film) * heat[row]
+                    added += strength[:, None] * model.fluid_load[model.fluid_names.index(film)]
+                else:
+                    added += (heat[row] * np.ones(steps))[:, None] * model.place(place)
+        if term.bearings:
+            factor = np.asarray(term.friction(context)).real
+            friction = run.friction_start if before else run.friction_end
+            for row, bearing in enumerate(term.bearings):
+                for position in self.plant.fast.heat_rows(bearing):
+                    heat = (factor[row] - 1.0) * friction[:, position]
+                    added += heat[:, None] * model.place(self.plant.fast.heat_places[position])
+        if term.coefficients:
+            factor = np.asarray(term.factor(context)).real
+            for row, coefficient in enumerate(term.coefficients):
+                excess = (factor[row] - 1.0) * self._strength(coefficient)
+                added -= excess[:, None] * self._flow(coefficient, before)
+        return added, shift
+
+    def _strength(self, coefficient: str) -> Array:
+        """A coefficient in every step, (G,)."""
+        if coefficient not in self._coefficient:
+            by_class = np.array([found[coefficient] for found in self.run.built.coefficients])
+            self._coefficient[coefficient] = by_class[self.drive.step_class]
+        return self._coefficient[coefficient]
+
+    def _flow(self, coefficient: str, before: bool) -> Array:
+        """What a unit coefficient takes out at one end of every step, (G, r)."""
+        model = self.plant.fast.model
+        steps = len(self.drive.steps)
+        states = self.states[:steps] if before else self.states[1:]
+        operator = model.operators[model.coefficient_names.index(coefficient)]
+        flow = states @ operator
+        if coefficient in model.fluid_names:
+            inputs = self.start_inputs if before else self.end_inputs
+            fluid = self.plant.fast.fluid_temperature(coefficient, inputs)
+            flow -= np.outer(
+                np.broadcast_to(fluid, steps), model.fluid_load[model.fluid_names.index(coefficient)]
+            )
+        return flow
+
+    def _reading(self, variant: Variant) -> Array:
+        """Difference of one channel that a sensor effect makes, (G + 1, c)."""
+        if self._told is None:
+            self._told = self.plant.predict(self.number, self.values, self.candidates).temperature
+        values = self.values | variant.values(variant.candidate.reference)
+        return self.plant.read(self.number, [variant.candidate], values, self._told) - self._told
+
+    def _steady(self, variants: Sequence[Variant]) -> Array:
+        """Constant changes of the operators, by their derivatives where they do nothing."""
+        terms: list[Term] = []
+        names: list[list[tuple[str, float]]] = []
+        values = dict(self.values)
+        for number, variant in enumerate(variants):
+            candidate = variant.candidate
+            own: list[tuple[str, float]] = []
+            for factor in candidate.factors:
+                step = float(np.log(candidate.reference)) if factor.logarithmic else candidate.reference - 1.0
+                own.append((factor.name, step))
+            steady = [term for term in candidate.terms if _is_steady(term)]
+            if steady:
+                # Each variant's own copy under a name of its own, at rest.
+                for term in steady:
+                    copy = _renamed(term, f"{term.name}#{number}")
+                    inner = candidate.amplitude.removeprefix(f"{term.name}.")
+                    given = term.values(variant.values(candidate.null))
+                    values |= {f"{copy.name}.{key}": value for key, value in given.items()}
+                    terms.append(copy)
+                    item = next(p for p in term.parameters if p.name == inner)
+                    difference = candidate.reference - candidate.null
+                    own.append(
+                        (
+                            f"{copy.name}.{inner}",
+                            float(np.log(candidate.reference / candidate.null))
+                            if item.logarithmic
+                            else difference,
+                        )
+                    )
+            names.append(own)
+        asked = tuple(dict.fromkeys(name for own in names for name, _ in own))
+        holder = Candidate("", "", "", "parameter", "", 0.0, 0.0, terms=tuple(terms))
+        prediction = self.plant.predict(self.number, values, (*self.candidates, holder), asked)
+        found = np.zeros((*prediction.temperature.shape, len(variants)))
+        for position, own in enumerate(names):
+            for name, step in own:
+                found[:, :, position] += step * prediction.sensitivity[:, :, asked.index(name)]
+        return found
+
+
+def _is_steady(term: Term) -> bool:
+    own = type(term)
+    return any(
+        getattr(own, name) is not getattr(Term, name)
+        for name in ("operating_factor", "place_capacity", "place_conductance")
+    )
+
+
+def _renamed(term: Term, name: str) -> Term:
+    found = copy.copy(term)
+    found.name = name
+    return found

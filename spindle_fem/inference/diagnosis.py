@@ -1,0 +1,288 @@
+"""The diagnosis itself: from a machine and its recordings to a judgement with everything it rests on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.registry import candidates_for, catalogue, interval_effects
+from spindle_fem.inference.candidate_response import variants_of
+from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.inference.hypothesis_fit import Coordinate, Fit, Problem
+from spindle_fem.inference.hypothesis_search import Hypothesis, Search
+from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
+from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.prepared_problem import (
+    Calibrated,
+    all_stamps,
+    calibrate,
+    slow_error_of,
+)
+from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.verdict import NEAR, NEAR_MISFIT, Judgement, judge, may_stand_for, rank, tempered
+from spindle_fem.inference.worker_processes import FitOrder, Workers
+from spindle_fem.model.mesh.threads import thread_count
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+# Hypotheses that are fitted again with the slow error that the best of them leaves, on the whole basis.
+REFITTED = 8
+ALWAYS_REFITTED = 2
+# More could not be kept busy.
+MOST_WORKERS = 4
+# Less likely than the best by so much (natural logarithm): of no account.
+NEGLIGIBLE = 8.0
+# So many rivals of the first set that are near it, or this much farther than what counts as near, are fitted
+# again whatever their probability: on the whole basis they may come nearer.
+NEAREST, LOOKED_AT = 3, 1.3
+#: Prior weight of effects; the ways out for what no other fits count less.
+WEIGHTS = {"unrecorded_heat_source": 0.5, "unrecorded_cooling": 0.5}
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What was found, and what it rests on.
+
+    Attributes
+    ----------
+    plant : Plant
+        Machine on the diagnosed recordings, full basis.
+    view : MachineView
+    calibrated : Calibrated
+    hypotheses : tuple of Hypothesis
+        The most probable first.
+    judgement : Judgement
+    null : Fit
+        Nothing missing, the machine's own parameters fitted.
+    final : Fit
+        The chosen set.
+    explanations : tuple of Explanation
+        Missing heat over time at every spot, if it were the only one.
+    heldout : str
+        How the held-out readings were chosen.
+    candidates_tried : int
+    seconds : mapping of stage to float
+    """
+
+    plant: Plant
+    view: MachineView
+    calibrated: Calibrated
+    hypotheses: tuple[Hypothesis, ...]
+    judgement: Judgement
+    null: Fit
+    final: Fit
+    explanations: tuple[Explanation, ...]
+    heldout: str
+    candidates_tried: int
+    seconds: Mapping[str, float]
+
+    @property
+    def plant_coordinates(self) -> tuple[Coordinate, ...]:
+        """The machine's own coordinates."""
+        return self.calibrated.belief.coordinates
+
+    def stamp(self, seconds: float, recording: int = 0) -> float | str:
+        """A time as the recording has them: seconds from its start, or an ISO 8601 stamp."""
+        start = self.plant.recordings[recording].start
+        if start is None:
+            return float(seconds)
+        moment = datetime.fromisoformat(start) + timedelta(seconds=float(seconds))
+        return moment.isoformat()
+
+
+def diagnose_recordings(
+    machine: DiagnosedMachine,
+    *,
+    heldout: str = "blocks",
+    progress: Progress = lambda stage: None,
+    workers: Workers | None = None,
+) -> Diagnosis:
+    """Diagnose a machine's recordings.
+
+    Parameters
+    ----------
+    machine : DiagnosedMachine
+    heldout : str
+        As :func:`heldout_stamps` takes it.
+    progress : callable
+    workers : Workers, optional
+        Who fit, by default as many as threads are given; the result does not depend on it.
+    """
+    clock = _Clock()
+    fast, view = machine.fast, machine.view
+    workers = Workers(min(thread_count(), MOST_WORKERS)) if workers is None else workers
+    recordings, calibration = machine.recordings, machine.calibration
+    chosen = [heldout_stamps(item, heldout) for item in recordings]
+    plant = Plant(fast, recordings, [~mask for mask, _ in chosen], machine.effects)
+    progress("diagnosis: calibration" if calibration else "diagnosis: what is known")
+    earlier = Plant(fast, calibration, all_stamps(calibration), machine.effects) if calibration else None
+    calibrated = calibrate(earlier, plant)
+    clock.lap("calibration")
+    candidates = candidates_for(view)
+    effects = catalogue()
+    weights = {name: WEIGHTS.get(name, 1.0) for name in effects}
+    places = sorted(
+        {p for named in (view.spots, view.sides) for own in named.values() for p in own}
+        | {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)}
+    )
+    known = [p for p in places if p in fast.model.place_names]
+    small = plant
+    if not machine.is_network:
+        contacts = sorted({name for own in view.joint_coefficients.values() for name in own})
+        small = plant.compressed([name for name, *_ in plant.uncertain()], known, contacts)
+    problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
+    clock.lap("reduction")
+    search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)
+    found = search.run()
+    clock.lap("search")
+    progress("diagnosis: final fits")
+    best = rank(found)[0].best
+    slow = slow_error_of(problem, best.fit)
+    final = Problem(plant, calibrated.belief, slow, plant.observations)
+    overlapping = _overlapping(view)
+    readings = _Readings(plant, slow.sigma)
+    refitted = _refit(final, found, workers, overlapping, readings)
+    clock.lap("final fits")
+    tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
+    judgement = judge(
+        refitted,
+        trials=len({(c.effect, c.component) for c in candidates}),
+        calibrated=bool(calibration),
+        overlapping=overlapping,
+        apart=readings.apart,
+    )
+    null = next(h.fit for h in refitted if not h.fit.candidates)
+    progress("diagnosis: where and when")
+    explanations = []
+    about = problem.fit((), null.values)
+    patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]
+    for number in range(len(recordings)):
+        explanations += [
+            explain(item) for item in onset_answers(problem, about, patterns, number, workers=workers)
+        ]
+    clock.lap("location")
+    return Diagnosis(
+        plant,
+        view,
+        calibrated,
+        tuple(refitted),
+        judgement,
+        null,
+        judgement.chosen.fit,
+        tuple(explanations),
+        chosen[0][1],
+        tried,
+        clock.laps,
+    )
+
+
+def _overlapping(view: MachineView) -> dict[str, frozenset[str]]:
+    """Components that a decision does not tell apart from each.
+
+    A set, its bearings, its other bearings; a probe and what it sits in.
+    """
+    found: dict[str, set[str]] = {}
+    for group in view.groups:
+        members = set(view.sets[group])
+        family = {name for name, own in view.sets.items() if set(own) <= members}
+        for name in family:
+            found.setdefault(name, set()).update(family)
+    for probe, component in view.near.items():
+        whole = found.setdefault(component, {component})
+        found[probe] = {probe, *(whole - set(view.near))}
+        for name in found[probe] - {probe}:
+            found.setdefault(name, {name}).add(probe)
+    return {name: frozenset(family) for name, family in found.items()}
+
+
+class _Readings:
+    """What fits have the channels read, and how far that is apart.
+
+    Parameters
+    ----------
+    plant : Plant
+    slow : float, [K]
+        Slow error of a reading.
+    """
+
+    def __init__(self, plant: Plant, slow: float) -> None:
+        self._plant, self._slow = plant, slow
+        self._known: dict[int, tuple[Fit, list[Array]]] = {}
+
+    def apart(self, one: Fit, other: Fit) -> float:
+        """Root mean square of the difference over the noise, in the channel where it is largest."""
+        largest = 0.0
+        for item, first, second in zip(self._plant.observations, self._of(one), self._of(other), strict=True):
+            noise = np.hypot(self._plant.recordings[item.recording].sigma[item.channel], self._slow)
+            largest = max(largest, float(np.sqrt(np.mean((first - second) ** 2))) / float(noise))
+        return largest
+
+    def _of(self, fit: Fit) -> list[Array]:
+        if id(fit) not in self._known:
+            told = [
+                self._plant.predict(number, fit.values, fit.candidates).temperature
+                for number in range(len(self._plant.recordings))
+            ]
+            own = [item.at(told[item.recording][:, item.channel]) for item in self._plant.observations]
+            # The fit is kept so that no other takes its identity.
+            self._known[id(fit)] = fit, own
+        return self._known[id(fit)][1]
+
+
+def _refit(
+    problem: Problem,
+    found: Sequence[Hypothesis],
+    workers: Workers,
+    overlapping: Mapping[str, frozenset[str]],
+    readings: _Readings,
+) -> list[Hypothesis]:
+    """The most probable hypotheses, what reads nearly as the first, and the empty one, on the whole basis."""
+    score = {id(h): value for h, value in zip(found, tempered(found), strict=True)}
+    ranked = sorted(found, key=lambda h: -score[id(h)])
+    best = score[id(ranked[0])]
+    chosen = [
+        item
+        for position, item in enumerate(ranked[:REFITTED])
+        if position < ALWAYS_REFITTED or score[id(item)] > best - NEGLIGIBLE
+    ]
+    # The slow error is another one by now: what the best set needs each member for is asked again.
+    members = ranked[0].keys
+    smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
+    chosen += [h for h in smaller if h not in chosen]
+    chosen += [h for h in ranked if not h.fit.candidates and h not in chosen]
+    first = ranked[0].fit
+    rivals = [
+        h
+        for h in ranked
+        if h not in chosen
+        and may_stand_for(h.fit, first, overlapping)
+        and h.fit.misfit_with_prior < first.misfit_with_prior + LOOKED_AT * NEAR_MISFIT
+    ]
+    nearest = sorted((readings.apart(first, h.fit), i, h) for i, h in enumerate(rivals))
+    chosen += [h for distance, _, h in nearest[:NEAREST] if distance < LOOKED_AT * NEAR]
+    orders = [FitOrder(h.fit.candidates, h.fit.values, iterations=12) for h in chosen]
+    # What ran before on a part of the basis may run away on the whole of it: it is no hypothesis then.
+    fitted = [
+        Hypothesis(fit, item.log_prior)
+        for fit, item in zip(workers.fits(problem, orders), chosen, strict=True)
+        if fit is not None
+    ]
+    return sorted(fitted, key=lambda h: -h.score)
+
+
+class _Clock:
+    def __init__(self) -> None:
+        self._last = time.perf_counter()
+        self.laps: dict[str, float] = {}
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self.laps[name] = now - self._last
+        self._last = now

@@ -1,0 +1,118 @@
+"""Inputs of recordings on the steps of a diagnosis: minutes from change to change, or even ones."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference.recording_gaps import GAP_STEPS
+from spindle_fem.model.reduced.drive import Drive, classes_of, covariate_columns, drive_of_recording
+from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+# Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
+INLET_BIN = 3.0
+# Of the highest speed: the films that follow it are small beside the oil's.
+SPEED_BIN = 0.01
+# Classes of one oil temperature share what the channel does.
+INLET_STEP = 0.5
+
+
+def _centred(fine: Drive, recording: Recording) -> Drive:
+    """The drive with changes that fell into gaps put amid them instead of at their ends."""
+    usual = float(np.median(np.diff(recording.times)))
+    held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
+    columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
+    start, end = fine.start.copy(), fine.end.copy()
+    for row in 1 + np.flatnonzero(np.diff(recording.times) > GAP_STEPS * usual):
+        first, last = recording.times[row - 1], recording.times[row]
+        begin, stop = np.searchsorted(fine.grid, [first - 1e-6, last - 1e-6])
+        if stop < len(start) and stop - begin > 1:
+            middle = begin + int(np.argmin(np.abs(fine.grid[begin:stop] - 0.5 * (first + last))))
+            start[middle:stop, columns] = end[middle:stop, columns] = fine.start[stop, columns]
+    return replace(fine, start=start, end=end)
+
+
+def coarse_drive(spec, recording: Recording, step: float) -> Drive:
+    """Inputs on steps from change to change, none longer than ``step``; outputs at their ends."""
+    fine = _centred(drive_of_recording(spec, recording), recording)
+    begin, finish = fine.grid[0], fine.grid[-1]
+    beside = covariate_columns(fine.names)
+    inputs = np.setdiff1d(np.arange(len(fine.names)), beside)
+    jumps = fine.grid[1:-1][np.any(fine.start[1:, inputs] != fine.end[:-1, inputs], axis=1)]
+    edges = np.unique(np.concatenate(([begin], jumps, [finish])))
+    # Stamps a second apart that all jump (an input that flickers) would only cost.
+    pieces = [
+        np.linspace(a, b, max(1, int(np.ceil((b - a) / step - 1e-6))) + 1)[:-1]
+        for a, b in itertools.pairwise(edges)
+    ]
+    grid = np.append(np.concatenate(pieces), finish)
+    middle = 0.5 * (grid[:-1] + grid[1:])
+    start, end = np.empty((middle.size, len(fine.names))), np.empty((middle.size, len(fine.names)))
+    first = np.clip(np.searchsorted(fine.grid, grid[:-1], side="right") - 1, 0, fine.steps.size - 1)
+    last = np.clip(np.searchsorted(fine.grid, grid[1:], side="left") - 1, 0, fine.steps.size - 1)
+    for ends, owner, at in ((start, first, grid[:-1]), (end, last, grid[1:])):
+        part = ((at - fine.grid[owner]) / fine.steps[owner])[:, None]
+        ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
+    start[:, beside] = end[:, beside] = _means(fine, grid)[:, beside]
+    step_class, points = classes_of(0.5 * (start + end), INLET_BIN, SPEED_BIN)
+    # Within the range that occurs, so that no property is asked for outside it.
+    inlets = np.array([p.coolant_inlet_temperature for p in points])
+    steps = np.round((inlets - inlets.min()) / INLET_STEP) * INLET_STEP
+    shared = np.minimum(inlets.min() + steps, inlets.max()).tolist()
+    points = tuple(
+        replace(p, coolant_inlet_temperature=inlet) for p, inlet in zip(points, shared, strict=True)
+    )
+    return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
+
+
+def _means(fine: Drive, grid: Array) -> Array:
+    """Means of inputs over the steps of another grid, their integral kept, (G, m)."""
+    total = np.vstack(
+        (
+            np.zeros(fine.start.shape[1]),
+            np.cumsum(0.5 * (fine.start + fine.end) * fine.steps[:, None], axis=0),
+        )
+    )
+    integral = np.column_stack([np.interp(grid, fine.grid, column) for column in total.T])
+    # Beyond the last reading of a segment the last input goes on; the gap that follows counts for nothing.
+    covered = np.diff(np.minimum(grid, fine.grid[-1]))
+    means = np.diff(integral, axis=0) / np.maximum(covered, 1e-9)[:, None]
+    means[covered <= 1e-9] = fine.end[-1]
+    return means
+
+
+def even_drive(fast: NetworkFastModel, recording: Recording) -> Drive:
+    """Inputs of a network on equal steps of the recording's usual spacing, means over each step.
+
+    The means keep the integral of every input; one length of step makes one
+    matrix of the model.
+    """
+    fine = fast.drive(recording, largest_step=np.inf)
+    begins = np.array([0, *fine.restarts])
+    ends = np.array([*(begins[1:] - 1), len(fine.grid) - 1])
+    inside = np.ones(len(fine.steps), dtype=bool)
+    inside[begins[1:] - 1] = False
+    step = float(np.median(fine.steps[inside])) if inside.any() else float(fine.steps[0])
+    pieces, restarts, count = [], [], 0
+    for number, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        first, last = fine.grid[begin], fine.grid[end]
+        whole = max(1, int(np.ceil((last - first) / step - 1e-6)))
+        edges = first + step * np.arange(whole + 1)
+        if number + 1 < len(begins) and edges[-1] >= fine.grid[begins[number + 1]]:
+            edges[-1] = 0.5 * (last + fine.grid[begins[number + 1]])
+        if number:
+            restarts.append(count)
+        pieces.append(edges)
+        count += len(edges)
+    grid = np.concatenate(pieces)
+    means = _means(fine, grid)
+    classes = np.zeros(len(means), dtype=np.int64)
+    return replace(
+        fine, times=grid, grid=grid, start=means, end=means, step_class=classes, restarts=tuple(restarts)
+    )

@@ -1,0 +1,414 @@
+"""Recordings run again through the full finite-element model, with nothing missing and with what was found.
+
+The search works on the reduced model. Here the same physics, sizes and
+parameters drive the mesh itself, so that an improvement is not one of the
+reduction.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.term import COVARIATE
+from spindle_fem.errors import EnergyBalanceError, SpecError, SpindleFemError
+from spindle_fem.inference.diagnosis import Diagnosis
+from spindle_fem.inference.findings import channel_errors, channel_noise, predictions_at_stamps, rmse
+from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX, Plant
+from spindle_fem.model.mesh.threads import one_thread, thread_count
+from spindle_fem.model.reduced.drive import Drive
+from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
+from spindle_fem.solvers.input_history import OperatingHistory
+from spindle_fem.solvers.machine_transient import simulate_full, start_at
+from spindle_fem.solvers.mesh_terms import Physics
+from spindle_fem.solvers.transient_records import MachineTransient, TransientOptions
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+OFF, AUTO, COARSE, OWN = "off", "auto", "coarse", "own"
+CHOICES = (AUTO, OFF, COARSE, OWN)
+COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
+# Tolerances in terms of the noise of the quietest channel. In a duty cycle of the recorded spindle with
+# 75 jumps, readings then stay within a fifth of the noise, a twentieth on average, of what far smaller
+# ones give.
+STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 10.0, 0.1, 2.0
+# A coarse mesh is not as good as the best sensors, and loads must follow the field even for the worst, K.
+QUIETEST, LOUDEST = 0.02, 0.2
+FIRST_STEP = 30.0
+COEFFICIENT_TOLERANCE = 5.0e-3
+# Of the tolerance of a step's fixed point, where a run's balance asks for less.
+FINER = 0.25
+# Unasked, both fits are run where that takes about as long as the search: so many time steps a fit.
+MOST_STEPS = 800
+STEPS_AFTER_JUMP = 3
+
+#: What the reduced model adds to its readings to first order: places of probes, and what gaps hide.
+FIRST_ORDER = (PROBE_PREFIX, JUMP_PREFIX, GAP_PREFIX)
+FIRST_ORDER_NOTE = (
+    "where probes sit within their holes, and what happened within gaps, as the reduced model has them"
+)
+NETWORK_REASON = "The machine is a network: it has no finite-element model."
+
+Keep = Callable[[str, tuple[Array, ...]], None]
+
+
+@dataclass(frozen=True, slots=True)
+class FullFit:
+    """One fit run through the full model.
+
+    Attributes
+    ----------
+    predicted : tuple of (N, c) ndarray, [K]
+        What every channel of every recording should read, at its stamps.
+    steps : int
+        Time steps over all recordings.
+    seconds : float, [s]
+        That it took.
+    """
+
+    predicted: tuple[Array, ...]
+    steps: int
+    seconds: float
+
+
+def require_choice(choice: str) -> str:
+    """Refuse what is none of the choices.
+
+    Raises
+    ------
+    SpecError
+
+    >>> require_choice("coarse")
+    'coarse'
+    """
+    if choice not in CHOICES:
+        raise SpecError("full_model", f"{choice!r}.", f"Allowed: {', '.join(CHOICES)}.")
+    return choice
+
+
+def nothing_run(mesh: str, reason: str) -> dict[str, Any]:
+    """What stands in the place of errors where there are none."""
+    return {"mesh": mesh, "reason": reason}
+
+
+def full_model_errors(
+    diagnosis: Diagnosis,
+    machine: DiagnosedMachine,
+    *,
+    mesh: str = AUTO,
+    options: TransientOptions | None = None,
+    keep: Keep = lambda name, predicted: None,
+    progress: Progress = lambda stage: None,
+) -> dict[str, Any]:
+    """Errors of the full model with nothing missing and with what was found.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    machine : DiagnosedMachine
+        The same.
+    mesh : {"auto", "off", "coarse", "own"}
+        ``coarse``: the coarse preset, linear temperatures; ``own``: the
+        definition's mesh; ``auto``: coarse unless the machine is a network or
+        the recordings need very many time steps.
+    options : TransientOptions, optional
+        How accurately time is followed; :func:`options_for` when absent.
+    keep : callable
+        Gets ``before`` or ``after`` and its predictions.
+    progress : callable
+
+    Returns
+    -------
+    dict
+        ``mesh`` (as asked or chosen), ``reason`` (why nothing was run, else
+        None), and what was run: ``preset``, ``order``, ``unknowns``,
+        ``step_error_K``, ``coupling_tolerance_K``, ``before`` and ``after`` (``train_rmse_K``,
+        ``heldout_rmse_K``, ``channels``, ``steps``, ``seconds``),
+        ``differences`` (largest difference of full and reduced model at each
+        channel: ``before_K``, ``after_K`` and, of what the fits differ by,
+        ``change_K``), ``first_order`` (what the reduced model supplied).
+
+    Raises
+    ------
+    SpecError
+        Another ``mesh``.
+    """
+    require_choice(mesh)
+    if mesh == OFF:
+        return nothing_run(mesh, "It was not asked for.")
+    if machine.is_network:
+        return nothing_run(OFF if mesh == AUTO else mesh, NETWORK_REASON)
+    plant = diagnosis.plant
+    options = options_for(plant) if options is None else options
+    if mesh == AUTO:
+        steps = expected_steps(plant, options)
+        if steps > MOST_STEPS:
+            return nothing_run(
+                mesh, f"It would take some {steps} time steps a fit; --full-model coarse runs them."
+            )
+        mesh = COARSE
+    finer = replace(options, coupling_tolerance=FINER * options.coupling_tolerance)
+    try:
+        try:
+            return _both_fits(diagnosis, machine, mesh, options, keep, progress)
+        except EnergyBalanceError:
+            # How exact a step's fixed point has to be for the balance depends on what heats and cools.
+            return _both_fits(diagnosis, machine, mesh, finer, keep, progress)
+    except SpindleFemError as error:
+        return nothing_run(mesh, f"It could not be run: {error}")
+
+
+def options_for(plant: Plant) -> TransientOptions:
+    """How accurately time is followed: as accurately as the quietest channel can tell."""
+    levels = [
+        channel_noise(plant, recording, channel)
+        for recording in plant.recordings
+        for channel in range(len(recording.temperature_names))
+    ]
+    noise = float(np.clip(min(levels), QUIETEST, LOUDEST))
+    return TransientOptions(
+        error=STEP_ERROR * noise,
+        coupling_tolerance=COUPLING_ERROR * noise,
+        input_resolution=INPUT_RESOLUTION * noise,
+        coefficient_tolerance=COEFFICIENT_TOLERANCE,
+        first_step=FIRST_STEP,
+        trust_contraction=True,
+        method="multigrid",
+    )
+
+
+def expected_steps(plant: Plant, options: TransientOptions) -> int:
+    """Time steps that the inputs ask for at least, over all recordings."""
+    steps = 0
+    for drive in plant.drives:
+        history = OperatingHistory.of(plant.fast.spec, inputs_of_drive(drive))
+        steps += len(history.breakpoints(options.input_resolution))
+        steps += STEPS_AFTER_JUMP * len(history.restarts())
+    return steps
+
+
+def _both_fits(
+    diagnosis: Diagnosis,
+    machine: DiagnosedMachine,
+    mesh: str,
+    options: TransientOptions,
+    keep: Keep,
+    progress: Progress,
+) -> dict[str, Any]:
+    plant = diagnosis.plant
+    progress("full model: mesh")
+    prepared = prepare_machine(spec_on(machine.spec, mesh))
+    fits = {"before": diagnosis.null, "after": diagnosis.final}
+    if _is_same(*fits.values()):
+        progress("full model: before, which is after")
+        runs = dict.fromkeys(fits, run_fit(prepared, plant, diagnosis.null, options))
+    elif mesh == COARSE and thread_count() > 1:
+        runs = _side_by_side(prepared, plant, fits, options, progress)
+    else:
+        runs = _one_by_one(prepared, plant, fits, options, progress)
+    found: dict[str, dict[str, Any]] = {}
+    apart: dict[str, list[Array]] = {}
+    for name, full in runs.items():
+        keep(name, full.predicted)
+        found[name] = {
+            "train_rmse_K": rmse(plant, full.predicted, heldout=False),
+            "heldout_rmse_K": rmse(plant, full.predicted, heldout=True),
+            "channels": channel_errors(plant, full.predicted),
+            "steps": full.steps,
+            "seconds": full.seconds,
+        }
+        reduced = predictions_at_stamps(plant, fits[name])
+        apart[name] = [a - b for a, b in zip(full.predicted, reduced, strict=True)]
+    supplied = any(n.startswith(FIRST_ORDER) for fit in fits.values() for n in fit.values)
+    return {
+        "mesh": mesh,
+        "reason": None,
+        "preset": prepared.spec.mesh.preset,
+        "order": prepared.spec.mesh.order,
+        "unknowns": int(prepared.operators.n_unknowns),
+        "step_error_K": options.error,
+        "coupling_tolerance_K": options.coupling_tolerance,
+        **found,
+        "differences": _differences(plant, apart),
+        "first_order": FIRST_ORDER_NOTE if supplied else None,
+    }
+
+
+def spec_on(spec: MachineSpec, mesh: str) -> MachineSpec:
+    """A machine with its own mesh or the coarse one."""
+    if mesh == OWN:
+        return spec
+    return spec.model_copy(update={"mesh": spec.mesh.model_copy(update=COARSE_MESH)})
+
+
+def run_fit(machine: PreparedMachine, plant: Plant, fit: Fit, options: TransientOptions) -> FullFit:
+    """Run all recordings through the full model with the parameters and candidates of a fit.
+
+    Raises
+    ------
+    NoSteadyStateError, ConvergenceError, EnergyBalanceError
+    """
+    began = time.perf_counter()
+    predicted, steps = [], 0
+    for number, recording in enumerate(plant.recordings):
+        run = _run(machine, plant, number, fit, options)
+        steps += len(run.steps.times)
+        on_grid = _readings(plant, number, fit, run)
+        grid = plant.drives[number].grid
+        predicted.append(np.array([np.interp(recording.times, grid, column) for column in on_grid.T]).T)
+    return FullFit(tuple(predicted), steps, time.perf_counter() - began)
+
+
+def inputs_of_drive(drive: Drive, followed: Collection[str] = ()) -> InputHistory:
+    """The inputs of a drive as the full model takes them, and of its covariates those that are followed.
+
+    Inputs that are constant on every step are held, others joined by straight lines.
+    """
+    columns = [i for i, name in enumerate(drive.names) if not name.startswith(COVARIATE) or name in followed]
+    start, end = drive.start[:, columns], drive.end[:, columns]
+    names = tuple(drive.names[i] for i in columns)
+    return InputHistory(drive.grid, names, np.vstack((start, end[-1:])), np.all(start == end, axis=0))
+
+
+def physics_of_fit(plant: Plant, number: int, fit: Fit) -> Physics:
+    """Terms and factors of a fit, those of the definition included, in one recording.
+
+    Parameters
+    ----------
+    plant : Plant
+    number : int
+        Of the recording.
+    fit : Fit
+    """
+    acting = _acting(fit.candidates, number)
+    values = fit.values
+    terms = [*plant.effects.terms, *(term for item in acting for term in item.terms)]
+    of_terms = {
+        name: values.get(name, item.value)
+        for candidate in acting
+        for term in candidate.terms
+        for name, item in term.names().items()
+    }
+    # What belongs to a candidate is a factor only where it says so.
+    of_candidates = {
+        name for c in fit.candidates for name in c.parameters if name not in {item.name for item in c.factors}
+    }
+    scaled = {EFFECT_PREFIX + item.name: item.name for c in acting for item in c.factors}
+    factors = dict(plant.effects.factors)
+    for name, value in values.items():
+        own = scaled.get(name)
+        if own is None and not (name in of_candidates or name.startswith((*FIRST_ORDER, EFFECT_PREFIX))):
+            own = name
+        if own is not None:
+            factors[own] = factors.get(own, 1.0) * value
+    return Physics(tuple(terms), of_terms, factors)
+
+
+# -------------------------------------------------------------------- details
+def _one_by_one(
+    machine: PreparedMachine,
+    plant: Plant,
+    fits: Mapping[str, Fit],
+    options: TransientOptions,
+    progress: Progress,
+) -> dict[str, FullFit]:
+    found = {}
+    for name, fit in fits.items():
+        progress(f"full model: {name}")
+        found[name] = run_fit(machine, plant, fit, options)
+    return found
+
+
+def _side_by_side(
+    machine: PreparedMachine,
+    plant: Plant,
+    fits: Mapping[str, Fit],
+    options: TransientOptions,
+    progress: Progress,
+) -> dict[str, FullFit]:
+    """Each fit in a process of its own; in this one, and said, where a process ends before its time."""
+    from joblib import Parallel, delayed, parallel_config
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    progress(f"full model: {' and '.join(fits)}")
+    try:
+        with parallel_config(backend="loky", inner_max_num_threads=1):
+            answers = Parallel(n_jobs=len(fits))(
+                delayed(_run_alone)(machine.spec, plant, fit, options) for fit in fits.values()
+            )
+    except TerminatedWorkerError:
+        progress("full model: a process ended before its time")
+        return _one_by_one(machine, plant, fits, options, progress)
+    return dict(zip(fits, answers, strict=True))
+
+
+def _run_alone(spec: MachineSpec, plant: Plant, fit: Fit, options: TransientOptions) -> FullFit:
+    with threadpool_limits(1), one_thread():
+        return run_fit(prepare_machine(spec), plant, fit, options)
+
+
+def _is_same(one: Fit, other: Fit) -> bool:
+    return one.candidates == other.candidates and one.values == other.values
+
+
+def _acting(candidates: Sequence[Candidate], number: int) -> tuple[Candidate, ...]:
+    return tuple(item for item in candidates if item.recording in (None, number))
+
+
+def _run(
+    machine: PreparedMachine, plant: Plant, number: int, fit: Fit, options: TransientOptions
+) -> MachineTransient:
+    physics = physics_of_fit(plant, number, fit)
+    inputs = inputs_of_drive(plant.drives[number], {name for term in physics.terms for name in term.follows})
+    start = start_at(machine, OperatingHistory.of(machine.spec, inputs), plant.start(number, fit.values))
+    return simulate_full(machine, inputs, start=start, options=options, physics=physics)
+
+
+def _readings(plant: Plant, number: int, fit: Fit, run: MachineTransient) -> Array:
+    """What the channels tell of a full run, on the grid of the reduced model, (G + 1, c) K."""
+    told = np.column_stack([run.reading(probe) for probe in plant.recordings[number].probes])
+    told = plant.read(number, plant.effects.candidates, {}, told) + _first_order(plant, number, fit)
+    return plant.read(number, _acting(fit.candidates, number), fit.values, told)
+
+
+def _first_order(plant: Plant, number: int, fit: Fit) -> Array | float:
+    """What the places of the probes and the gaps change, before the fit's own sensor effects, K."""
+    if not any(name.startswith(FIRST_ORDER) for name in fit.values):
+        return 0.0
+    bare = [replace(item, reading=None) for item in fit.candidates]
+    of_bare = {name for item in bare for name in item.parameters}
+    of_readings = {name for item in fit.candidates for name in item.parameters} - of_bare
+    values = {name: value for name, value in fit.values.items() if name not in of_readings}
+    plain = {name: value for name, value in values.items() if not name.startswith(FIRST_ORDER)}
+    moved, still = (plant.predict(number, item, bare).temperature for item in (values, plain))
+    return moved - still
+
+
+def _differences(plant: Plant, apart: Mapping[str, Sequence[Array]]) -> list[Mapping[str, Any]]:
+    """Largest difference of full and reduced model at each channel, and of how much the fits differ."""
+    several = len(plant.recordings) > 1
+    change = [after - before for before, after in zip(apart["before"], apart["after"], strict=True)]
+    return [
+        {
+            "channel": name,
+            **({"recording": recording.name} if several else {}),
+            **{
+                f"{key}_K": float(np.abs(values[number][:, column]).max())
+                for key, values in {**apart, "change": change}.items()
+            },
+        }
+        for number, recording in enumerate(plant.recordings)
+        for column, name in enumerate(recording.temperature_names)
+    ]

@@ -1,0 +1,359 @@
+"""Tests that could be run on a machine, and where on it a further sensor can be put."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.simulated_plant import NO_VALUES, OF_ONE_RECORDING, Plant
+from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.model.reduced.drive import STANDARD, Drive, make_drive
+from spindle_fem.model.reduced.run_start import Start
+
+Array = NDArray[np.float64]
+
+MINUTE = 60.0
+TEST_STEP = 120.0
+HOLD = 60.0 * MINUTE
+REST = 10.0 * MINUTE
+TEMPERATURE_STEP = 5.0
+RPM = np.pi / 30.0
+AGAIN = "the same operation again"
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One way to operate the machine for an hour or a few.
+
+    Attributes
+    ----------
+    name : str
+        In plain words.
+    quantity : str
+        What is varied.
+    drive : Drive
+    effort : int
+        0: as it ran anyway; 1: a test of its own; 2: one that needs more than the control panel.
+    """
+
+    name: str
+    quantity: str
+    drive: Drive
+    effort: int
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Somewhere a sensor can be put.
+
+    Attributes
+    ----------
+    name : str
+        Of the reduced model; of a probe, where ``is_probe``.
+    words : str
+    component : str
+    is_probe : bool
+    """
+
+    name: str
+    words: str
+    component: str
+    is_probe: bool = False
+
+
+class TrialPlant(Plant):
+    """The machine of a diagnosis in another operation, from a uniform temperature at its start."""
+
+    def __init__(self, plant: Plant, drive: Drive) -> None:
+        self.__dict__.update(copy.copy(plant.__dict__))
+        self.drives = (replace(drive, times=drive.grid),)
+        self.recordings, self.columns = plant.recordings[:1], plant.columns[:1]
+        self.observations, self.heldout = (), ()
+
+    def start(
+        self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
+    ) -> float | Start:
+        """Ambient temperature at the start; the recording's first readings where there is none, K.
+
+        An operation with long gaps begins again after each, as it did in the recording.
+        """
+        drive = self.drives[0]
+        if drive.restarts:
+            return super().start(number, values, derivatives)
+        if "ambient" in drive.names:
+            return drive.first("ambient")
+        return float(np.mean(list(self.recordings[0].first_readings().values())))
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a hypothesis predicts for a trial.
+
+    Attributes
+    ----------
+    times : (n,) ndarray, [s]
+    readings : (n, c) ndarray, [K]
+        Channels of the recording, then places.
+    slopes : (n, c, p) ndarray
+        To the coordinates of the fit.
+    """
+
+    times: Array
+    readings: Array
+    slopes: Array
+
+
+def answer(plant: Plant, fit: Fit, trial: Trial, places: Sequence[Place], spacing: float) -> Answer:
+    """Simulate a trial under a hypothesis.
+
+    Parameters
+    ----------
+    plant : Plant
+    fit : Fit
+    trial : Trial
+    places : sequence of Place
+    spacing : float, [s]
+        Of the instants at which readings are told.
+
+    Raises
+    ------
+    ConvergenceError
+        The hypothesis runs away in this operation.
+    """
+    own = TrialPlant(plant, trial.drive)
+    chosen = [(c, i) for i, c in enumerate(fit.coordinates) if not c.name.startswith(OF_ONE_RECORDING)]
+    names = [c.name for c, _ in chosen]
+    values = {name: value for name, value in fit.values.items() if not name.startswith(OF_ONE_RECORDING)}
+    told = own.predict(0, values, fit.candidates, names)
+    readings, slopes = [told.temperature], [told.sensitivity]
+    if places:
+        means = np.array([_weights(plant, place) for place in places])
+        readings.append(told.states @ means.T)
+        slopes.append(told.slopes_at(means))
+    grid = own.drives[0].grid
+    times = np.arange(grid[0] + spacing, grid[-1] + 0.5 * spacing, spacing)
+    times = times[times <= grid[-1]]
+    whole = np.concatenate(readings, axis=1)
+    by = np.concatenate(slopes, axis=1) * np.array([c.sigma for c, _ in chosen])
+    full = np.zeros((len(times), whole.shape[1], len(fit.coordinates)))
+    full[:, :, [i for _, i in chosen]] = _at(times, grid, by)
+    return Answer(times, _at(times, grid, whole), full)
+
+
+def _weights(plant: Plant, place: Place) -> Array:
+    model = plant.fast.model
+    return model.probes[model.probe_names.index(place.name)] if place.is_probe else model.place(place.name)
+
+
+def _at(times: Array, grid: Array, values: Array) -> Array:
+    right = np.clip(np.searchsorted(grid, times, side="left"), 1, len(grid) - 1)
+    part = ((times - grid[right - 1]) / (grid[right] - grid[right - 1])).reshape(
+        -1, *([1] * (values.ndim - 1))
+    )
+    return values[right - 1] + part * (values[right] - values[right - 1])
+
+
+# --------------------------------------------------------------------- places
+def reachable_places(spec: MachineSpec, names: Sequence[str]) -> tuple[Place, ...]:
+    """Places of a reduced model at which a person can put a sensor.
+
+    Standing parts and their segments, outer rings through a bore in the
+    housing, and both ends of the shaft (an infrared sensor on the turning
+    surface). Places that a probe already reads differ from it and stay.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    names : sequence of str
+        Of the model's places.
+    """
+    layout = Layout(spec, set(names))
+    known = set(names)
+    found: list[Place] = []
+    for part in spec.part:
+        if part.rotating or layout.is_spacer(part):
+            continue
+        segments = [s for s in part.segment if f"{part.name}.{s.name}" in known]
+        component = layout.component_of(part.name)
+        if part is layout.housing and len(segments) > 1:
+            for segment in segments:
+                name = f"{part.name}.{segment.name}"
+                own = "flange" if segment.name == layout.flange else component
+                found.append(Place(name, f"{_plain(part.name)}, {_plain(segment.name)}", own))
+        elif part.name in known:
+            found.append(Place(part.name, _plain(part.name), component))
+    for _, bearing in spec.bearings:
+        name = f"{bearing.name}.outer_ring"
+        if name in known:
+            found.append(Place(name, f"outer ring of {bearing.name} (bore in the housing)", bearing.name))
+    for key, words in (("nose", "nose"), ("drive_end", "drive end")):
+        place = next(iter(layout.heat().get(key, ())), "")
+        if place in known:
+            found.append(Place(place, f"shaft, {words} (infrared)", key))
+    return tuple(found)
+
+
+def beside_probes(names: Sequence[str], probes: Sequence[str]) -> tuple[Place, ...]:
+    """A second sensor beside each of some probes, those of ``names`` that a model has as points."""
+    return tuple(
+        Place(name, f"a second sensor beside {name}", name, True) for name in names if name in probes
+    )
+
+
+def network_places(names: Sequence[str], read: Sequence[str]) -> tuple[Place, ...]:
+    """Nodes of a network that are not read yet."""
+    return tuple(Place(name, _plain(name), name) for name in names if name not in read)
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+# --------------------------------------------------------------------- trials
+def trials_of(plant: Plant, view: MachineView) -> tuple[Trial, ...]:
+    """Tests worth considering on a machine, the recorded operation first."""
+    again = Trial(AGAIN, "temperature", plant.drives[0], 0)
+    if view.kind == "network":
+        return (again, *_network_trials(plant))
+    return (again, *_geometry_trials(plant, view))
+
+
+def _geometry_trials(plant: Plant, view: MachineView) -> list[Trial]:
+    names = plant.drives[0].names
+    usual = _usual(plant)
+    high = max(float(np.max(drive.start[:, drive.column("speed")])) for drive in plant.drives)
+    high = high or view.highest_speed
+    levels = [round(share * high / RPM, -2) * RPM or high for share in (1.0 / 3.0, 2.0 / 3.0, 1.0)]
+    middle = levels[1]
+
+    def trial(
+        words: str, quantity: str, effort: int, stages: Sequence[tuple[float, Mapping[str, float]]]
+    ) -> Trial:
+        return Trial(words, quantity, _staged(names, usual, stages), effort)
+
+    rpm = [f"{level / RPM:.0f}" for level in levels]
+    warm = usual["coolant_inlet"] + TEMPERATURE_STEP
+    found = [
+        trial(
+            f"speed holds of {HOLD / MINUTE:.0f} min at {', '.join(rpm)} rpm",
+            "speed",
+            1,
+            [(REST, {"speed": 0.0}), *((HOLD, {"speed": level}) for level in levels)],
+        ),
+        trial(
+            f"{1.5 * HOLD / MINUTE:.0f} min at {rpm[-1]} rpm, then {1.5 * HOLD / MINUTE:.0f} min cool-down "
+            "at standstill",
+            "speed",
+            1,
+            [(1.5 * HOLD, {"speed": levels[-1]}), (1.5 * HOLD, {"speed": 0.0})],
+        ),
+    ]
+    if usual["thrust"] > 0.0:
+        thrusts = [0.5 * usual["thrust"], 1.5 * usual["thrust"]]
+        found.append(
+            trial(
+                f"{rpm[1]} rpm held, thrust {thrusts[0]:.0f} N then {thrusts[1]:.0f} N, "
+                f"{HOLD / MINUTE:.0f} min each",
+                "thrust",
+                1,
+                [(HOLD, {"speed": middle, "thrust": value}) for value in thrusts],
+            )
+        )
+    if plant.fast.spec.channel is not None and usual["coolant_flow"] > 0.0:
+        found += [
+            trial(
+                f"{rpm[1]} rpm held, oil temperature +{TEMPERATURE_STEP:.0f} K after "
+                f"{HOLD / MINUTE:.0f} min, −{TEMPERATURE_STEP:.0f} K after {2 * HOLD / MINUTE:.0f} min",
+                "coolant inlet temperature",
+                1,
+                [
+                    (HOLD, {"speed": middle}),
+                    (HOLD, {"speed": middle, "coolant_inlet": warm}),
+                    (HOLD, {"speed": middle, "coolant_inlet": warm - 2.0 * TEMPERATURE_STEP}),
+                ],
+            ),
+            trial(
+                f"{rpm[1]} rpm held, oil flow reduced to 70 % after {HOLD / MINUTE:.0f} min",
+                "coolant flow",
+                1,
+                [
+                    (HOLD, {"speed": middle}),
+                    (HOLD, {"speed": middle, "coolant_flow": 0.7 * usual["coolant_flow"]}),
+                ],
+            ),
+        ]
+    room = usual["ambient"] + TEMPERATURE_STEP
+    found.append(
+        trial(
+            f"{rpm[1]} rpm held, the room {TEMPERATURE_STEP:.0f} K warmer after {HOLD / MINUTE:.0f} min",
+            "ambient temperature",
+            2,
+            [(HOLD, {"speed": middle}), (2.0 * HOLD, {"speed": middle, "ambient": room})],
+        )
+    )
+    return found
+
+
+def _usual(plant: Plant) -> dict[str, float]:
+    """Mean of every input over all recordings, by name; of what is positive where that is the usual state."""
+    names = plant.drives[0].names
+    found = {}
+    for position, name in enumerate(names):
+        values = np.concatenate(
+            [drive.start[:, drive.column(name)] for drive in plant.drives if name in drive.names]
+        )
+        lengths = np.concatenate([drive.steps for drive in plant.drives if name in drive.names])
+        on = values > 0.0
+        chosen = on if position < len(STANDARD) and on.any() else np.ones(len(values), dtype=bool)
+        found[name] = float(np.average(values[chosen], weights=lengths[chosen]))
+    return found
+
+
+def _staged(
+    names: tuple[str, ...],
+    usual: Mapping[str, float],
+    stages: Sequence[tuple[float, Mapping[str, float]]],
+) -> Drive:
+    """Inputs that hold from stage to stage; what a stage does not name keeps its usual value."""
+    ends = np.cumsum([length for length, _ in stages])
+    times = np.concatenate(([0.0], ends))
+    rows = [[{**usual, **changed}[name] for name in names] for _, changed in stages]
+    values = np.array([*rows, rows[-1]])
+    return make_drive(times, names, values, np.ones(len(names), dtype=bool), largest_step=TEST_STEP)
+
+
+def _network_trials(plant: Plant) -> list[Trial]:
+    """Every input that varied: half its range, the highest, then the lowest; the others as usual."""
+    drive = plant.drives[0]
+    usual = _usual(plant)
+    duration = float(np.clip(0.25 * (drive.grid[-1] - drive.grid[0]), HOLD, 4.0 * HOLD))
+    found = []
+    for position, name in enumerate(drive.names):
+        values = drive.start[:, position]
+        low, high = float(values.min()), float(values.max())
+        if high - low <= 1e-9 * max(abs(high), 1.0):
+            continue
+        stages = (0.5 * (low + high), high, low)
+        grid = np.linspace(0.0, 3.0 * duration, int(np.ceil(3.0 * duration / TEST_STEP / 3.0)) * 3 + 1)
+        owner = np.minimum((3.0 * 0.5 * (grid[:-1] + grid[1:]) / grid[-1]).astype(int), 2)
+        inputs = np.tile([usual[n] for n in drive.names], (len(owner), 1))
+        inputs[:, position] = np.array(stages)[owner]
+        own = replace(
+            drive,
+            times=grid,
+            grid=grid,
+            start=inputs,
+            end=inputs.copy(),
+            step_class=np.zeros(len(owner), dtype=np.int64),
+            restarts=(),
+        )
+        words = f"{_plain(name)} at half its range, highest, lowest, {duration / MINUTE:.0f} min each"
+        found.append(Trial(words, _plain(name), own, 1))
+    return found

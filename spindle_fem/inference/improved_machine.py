@@ -1,0 +1,48 @@
+"""The machine definition with the physics that was found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spindle_fem.definition import network_tables as network_spec
+from spindle_fem.definition.effect_entries import EffectEntry
+from spindle_fem.definition.load import write_machine
+from spindle_fem.definition.uncertain_parameters import with_parameters
+from spindle_fem.effects.registry import definition_entry
+from spindle_fem.inference.diagnosis import Diagnosis
+from spindle_fem.inference.findings import candidate_values
+from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.simulated_plant import OF_ONE_RECORDING, PROBE_PREFIX
+from spindle_fem.model.lumped.written_network import value_in_definition
+from spindle_fem.units import Uncertain
+
+
+def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
+    """Text of the definition with the fitted parameters and an ``[[effect]]`` for each finding.
+
+    Parameters keep what is left of their uncertainty. Where a probe sits
+    within its hole is left as the definition has it.
+    """
+    fit = diagnosis.final
+    values = fit.values
+    entries = tuple(
+        EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))
+        for item in fit.candidates
+    )
+    own = {
+        coordinate.name: (values[coordinate.name], coordinate.sigma)
+        for coordinate in diagnosis.plant_coordinates
+        if not coordinate.name.startswith((PROBE_PREFIX, *OF_ONE_RECORDING))
+    }
+    if not machine.is_network:
+        spec = with_parameters(machine.spec, {name: value for name, (value, _) in own.items()})
+        return write_machine(spec.model_copy(update={"effects": (*machine.spec.effects, *entries)}))
+    moved = {}
+    for name, (factor, _) in own.items():
+        index = next(i for i, c in enumerate(fit.coordinates) if c.name == name)
+        sigma = fit.coordinates[index].sigma * float(np.sqrt(fit.covariance[index, index]))
+        moved[name] = Uncertain(value_in_definition(machine.spec, machine.fast.network, name, factor), sigma)
+    spec = network_spec.with_parameters(machine.spec, moved)
+    return network_spec.write_network_machine(
+        spec.model_copy(update={"effects": (*machine.spec.effects, *entries)})
+    )

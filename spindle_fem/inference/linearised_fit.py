@@ -1,0 +1,196 @@
+"""The inference about one of its fits to first order: what a further effect would explain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import lsq_linear
+
+from spindle_fem.inference.hypothesis_fit import OUTLIER_SIGMAS, Fit, Problem
+
+Array = NDArray[np.float64]
+
+# In standard deviations.
+NEAR = 1e-6
+
+
+def _pressed(fit: Fit, downhill: Array) -> NDArray[np.bool_]:
+    """Coordinates at a bound that the data would have beyond it."""
+    low = np.array([c.low for c in fit.coordinates])
+    high = np.array([c.high for c in fit.coordinates])
+    near = 1e-6 * np.maximum(1.0, np.abs(fit.position))
+    return ((fit.position <= low + near) & (downhill < 0.0)) | (
+        (fit.position >= high - near) & (downhill > 0.0)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Moves of a fit's coordinates, each between its bounds: ``|r - J d|² + |root (d + d0)|²``.
+
+    Attributes
+    ----------
+    jacobian : (n, p) ndarray
+    residual : (n,) ndarray
+    hessian : (p, p) ndarray
+    downhill : (p,) ndarray
+    cost : float
+        Without any move.
+    low, high : (p,) ndarray
+    """
+
+    jacobian: Array
+    residual: Array
+    hessian: Array
+    downhill: Array
+    cost: float
+    low: Array
+    high: Array
+
+    @classmethod
+    def about(cls, fit: Fit, jacobian: Array, residual: Array, root: Array, departure: Array) -> Box:
+        """All coordinates of a fit; ``departure`` is ``root d0``."""
+        return cls(
+            jacobian,
+            residual,
+            jacobian.T @ jacobian + root.T @ root,
+            jacobian.T @ residual - root.T @ departure,
+            float(residual @ residual + departure @ departure),
+            np.array([c.low for c in fit.coordinates]) - fit.position,
+            np.array([c.high for c in fit.coordinates]) - fit.position,
+        )
+
+    @property
+    def matters(self) -> bool:
+        """Whether a bound keeps the coordinates from where the data would have them."""
+        free = np.linalg.solve(self.hessian, self.downhill)
+        return bool(np.any((free < self.low - NEAR) | (free > self.high + NEAR)))
+
+
+@dataclass(frozen=True, slots=True)
+class BoxedColumns:
+    """Inner products of columns with a box's Jacobian, among themselves and with its residual."""
+
+    box: Box
+    with_jacobian: Array
+    with_columns: Array
+    with_residual: Array
+
+    def cost(self, members: Sequence[int], spread: Array, one_sided: Array) -> float:
+        """Least of the quadratic form with the columns of some members, amplitudes included.
+
+        Parameters
+        ----------
+        members : sequence of int
+        spread : (m,) ndarray
+            Prior standard deviation of every amplitude.
+        one_sided : (m,) ndarray of bool
+            Amplitudes that cannot be negative.
+        """
+        own = np.asarray(members, dtype=int)
+        p = len(self.box.low)
+        matrix = np.empty((p + len(own), p + len(own)))
+        matrix[:p, :p] = self.box.hessian
+        matrix[:p, p:] = self.with_jacobian[:, own]
+        matrix[p:, :p] = matrix[:p, p:].T
+        matrix[p:, p:] = self.with_columns[np.ix_(own, own)] + np.diag(spread[own] ** -2.0)
+        right = np.concatenate((self.box.downhill, self.with_residual[own]))
+        low = np.concatenate((self.box.low, np.where(one_sided[own], 0.0, -np.inf)))
+        high = np.concatenate((self.box.high, np.full(len(own), np.inf)))
+        lower = np.linalg.cholesky(matrix)
+        target = solve_triangular(lower, right, lower=True)
+        # No room between bounds: numbers that are fixed.
+        found = lsq_linear(lower.T, target, (low, np.maximum(high, low + NEAR)), method="bvls")
+        return self.box.cost - float(target @ target) + 2.0 * float(found.cost)
+
+
+@dataclass(frozen=True, slots=True)
+class LinearProblem:
+    """A problem about one of its fits: data = J u + sum of columns, u known as the belief says.
+
+    Attributes
+    ----------
+    data : (n,) ndarray
+        Whitened data less what the fit predicts without any departure of its coordinates.
+    jacobian : (n, p) ndarray
+        In coordinates whose prior is a unit normal.
+    weight : (n,) ndarray
+        Root of what each reading counts.
+    box : Box
+    """
+
+    data: Array
+    jacobian: Array
+    weight: Array
+    box: Box
+
+    @classmethod
+    def about(cls, problem: Problem, fit: Fit, trust: Fit | None = None) -> LinearProblem:
+        """Linearised about a fit; coordinates that it presses against a bound stay there.
+
+        Parameters
+        ----------
+        problem : Problem
+        fit : Fit
+        trust : Fit or None
+            Fit whose residuals tell which readings went astray; None for the first one.
+        """
+        predicted = problem.predict(fit.candidates, fit.coordinates, fit.position)
+        jacobian = problem.whitened([p.sensitivity for p in predicted])
+        residual = problem.data - problem.whitened([p.temperature for p in predicted])
+        n_machine = len(problem.belief.coordinates)
+        root = np.eye(len(fit.coordinates))
+        root[:n_machine, :n_machine] = problem.belief.root
+        mean = np.concatenate((problem.belief.mean, np.zeros(len(fit.coordinates) - n_machine)))
+        # The tails that a robust fit discounts are discounted here too.
+        astray = np.abs(residual if trust is None else trust.residual)
+        weight = np.sqrt(np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(astray, 1e-12)))
+        departure = root @ (fit.position - mean)
+        downhill = jacobian.T @ (weight**2 * residual) - root.T @ departure
+        free = ~_pressed(fit, downhill)
+        # What is known of the free coordinates, given those that stay.
+        q, r = np.linalg.qr(root[:, free])
+        unit = np.linalg.solve(r.T, jacobian[:, free].T).T
+        return cls(
+            weight * (residual + unit @ (q.T @ departure)),
+            weight[:, None] * unit,
+            weight,
+            Box.about(fit, weight[:, None] * jacobian, weight * residual, root, departure),
+        )
+
+    def boxed(self, columns: Array) -> BoxedColumns:
+        """Columns (n, m) whose amplitudes are looked for together with coordinates within their bounds."""
+        columns = self.weight[:, None] * columns
+        return BoxedColumns(
+            self.box,
+            self.box.jacobian.T @ columns,
+            columns.T @ columns,
+            columns.T @ self.box.residual,
+        )
+
+    def gram(self, columns: Array) -> tuple[Array, Array, float]:
+        """Inner products in which what the coordinates can absorb does not count.
+
+        Parameters
+        ----------
+        columns : (n, m) ndarray
+            Whitened.
+
+        Returns
+        -------
+        (m, m) ndarray, of the columns; (m,) ndarray, with the data; float, of the data
+        """
+        n = self.jacobian.shape[1]
+        lower = np.linalg.cholesky(np.eye(n) + self.jacobian.T @ self.jacobian)
+        columns = self.weight[:, None] * columns
+        seen = solve_triangular(lower, self.jacobian.T @ columns, lower=True)
+        data = solve_triangular(lower, self.jacobian.T @ self.data, lower=True)
+        return (
+            columns.T @ columns - seen.T @ seen,
+            columns.T @ self.data - seen.T @ data,
+            float(self.data @ self.data - data @ data),
+        )

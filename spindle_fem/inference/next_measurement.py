@@ -1,0 +1,368 @@
+"""Which sensor, place or test would best tell the remaining explanations apart.
+
+Every explanation that is left predicts, with its own uncertain parameters, a
+Gaussian for the readings of every test. What a test is expected to tell is the
+mutual information between explanation and readings; it is bounded from below
+by the pairwise distances of the Gaussians.
+
+Source of the bound: Kolchinsky & Tracey (2017), Estimating mixture entropy
+with pairwise distances, Entropy 19, 361 (Bhattacharyya distance).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from spindle_fem.effects.framework.effect import in_intervals, place_words
+from spindle_fem.effects.registry import effect_of
+from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
+from spindle_fem.inference.further_tests import (
+    AGAIN,
+    Answer,
+    Place,
+    Trial,
+    answer,
+    beside_probes,
+    network_places,
+    reachable_places,
+    trials_of,
+)
+from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.inference.verdict import TEMPERATURE, Ranked, rank
+from spindle_fem.units import ZERO_CELSIUS_K
+
+if TYPE_CHECKING:
+    from spindle_fem.inference.diagnosis import Diagnosis
+
+Array = NDArray[np.float64]
+
+MOST_HYPOTHESES = 3
+SPACING = 300.0
+FEWEST_INSTANTS, MOST_INSTANTS = 12, 48
+# Options that tell nearly as much as the best are worth as much; the simplest of them is proposed.
+AS_GOOD = 0.9
+# Below so many bits a test is not worth calling a decision.
+HARDLY = 0.3
+EXISTING = "the sensors that are there"
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """One test with the sensors that are there, and perhaps one more.
+
+    Attributes
+    ----------
+    trial : Trial
+    place : Place or None
+    information : float
+        Expected, in bits.
+    distance : float
+        Bhattacharyya distance of the readings under the two likeliest explanations.
+    channel : str
+        Where these two differ most clearly.
+    difference : float, [K]
+        There, at the clearest instant.
+    spread : float, [K]
+        1 σ of the difference from noise and unknown parameters.
+    time : float, [s]
+        Of that instant, from the start of the test.
+    levels : (float, float), [K]
+        What the two predict then.
+    """
+
+    trial: Trial
+    place: Place | None
+    information: float
+    distance: float
+    channel: str
+    difference: float
+    spread: float
+    time: float
+    levels: tuple[float, float]
+
+    @property
+    def effort(self) -> int:
+        """What it takes: a test, a sensor more, or both."""
+        return self.trial.effort + (0 if self.place is None else 2)
+
+    @property
+    def sensor(self) -> str:
+        """The place of the further sensor, in words."""
+        return EXISTING if self.place is None else self.place.words
+
+
+def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Measurement that would best separate the explanations that are left.
+
+    Where only one is left, the best is set against the next in rank, both as
+    likely: what would confirm it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+
+    Returns
+    -------
+    dict
+        ``where``, ``quantity``, ``condition``, ``why``, ``expected_information``
+        (bits), ``between`` and ``options``: the proposed one, then the most telling first.
+    """
+    rivals, weights, decided = rivals_of(diagnosis)
+    if len(rivals) < 2:
+        return {
+            "where": EXISTING,
+            "quantity": "temperature",
+            "condition": AGAIN,
+            "why": "No other explanation came near: another recording would test this one.",
+            "expected_information": 0.0,
+            "between": [hypothesis_words(item.fit) for item in rivals],
+            "options": [],
+        }
+    options, failed = evaluate(diagnosis, [item.fit for item in rivals], weights)
+    between = [hypothesis_words(item.fit) for item in rivals]
+    if not options:
+        return {
+            "where": EXISTING,
+            "quantity": "temperature",
+            "condition": AGAIN,
+            "why": "None of the tests could be simulated under every explanation.",
+            "expected_information": 0.0,
+            "between": between,
+            "options": [],
+        }
+    best = choose(options)
+    listed = shortlist(options, best)
+    return {
+        "where": best.sensor if best.place is not None else f"{EXISTING}, above all {best.channel}",
+        "quantity": "temperature",
+        "condition": best.trial.name,
+        "why": why(best, between, decided) + timed_words([item.fit for item in rivals]),
+        "expected_information": best.information,
+        "between": between,
+        "options": [
+            {
+                "where": item.sensor,
+                "condition": item.trial.name,
+                "expected_information": item.information,
+                "channel": item.channel,
+                "difference_K": item.difference,
+                "sigma_K": item.spread,
+                "after_s": item.time,
+                "chosen": item is best,
+            }
+            for item in listed
+        ],
+    } | ({"not_simulated": failed} if failed else {})
+
+
+def rivals_of(diagnosis: Diagnosis) -> tuple[list[Ranked], Array, bool]:
+    """Explanations to tell apart, their probabilities, and whether the data had already decided."""
+    judgement = diagnosis.judgement
+    found = [judgement.chosen, *judgement.alternatives][:MOST_HYPOTHESES]
+    decided = len(found) < 2
+    if decided:
+        others = [item for item in rank(diagnosis.hypotheses) if item.fit.keys != found[0].fit.keys]
+        # The same set with one effect more is no other explanation, and that nothing is missing is out.
+        others.sort(key=lambda item: (item.fit.keys > found[0].fit.keys, not item.fit.candidates))
+        found += others[:1]
+    weights = np.ones(len(found)) if decided else np.array([item.probability for item in found])
+    return found, weights / weights.sum(), decided
+
+
+def hypothesis_words(fit: Fit) -> str:
+    """A set of effects in words.
+
+    >>> from types import SimpleNamespace
+    >>> item = SimpleNamespace(effect="heat_scale", component="front_bearings")
+    >>> hypothesis_words(SimpleNamespace(candidates=(item,)))
+    'heat scale at the front bearings'
+    """
+    if not fit.candidates:
+        return "nothing missing"
+    names = [f"{c.effect.replace('_', ' ')} at {place_words(c.component)}" for c in fit.candidates]
+    return " with ".join(names)
+
+
+def evaluate(
+    diagnosis: Diagnosis, fits: Sequence[Fit], weights: Array
+) -> tuple[list[Option], list[dict[str, str]]]:
+    """Every test with and without a further sensor, and the tests that cannot be simulated."""
+    plant = diagnosis.plant
+    recording = plant.recordings[0]
+    if diagnosis.view.kind == "network":
+        places = network_places(plant.fast.model.place_names, recording.probes)
+    else:
+        doubted = dict.fromkeys(c.component for fit in fits for c in fit.candidates if c.reading is not None)
+        places = (
+            *beside_probes(tuple(doubted), plant.fast.model.probe_names),
+            *reachable_places(plant.fast.spec, plant.fast.model.place_names),
+        )
+    white = np.append(recording.sigma, np.full(len(places), float(np.median(recording.sigma))))
+    step = float(np.median(np.diff(recording.times)))
+    names = (*recording.temperature_names, *(place.words for place in places))
+    count = len(recording.temperature_names)
+    options: list[Option] = []
+    failed = []
+    for trial in trials_of(plant, diagnosis.view):
+        duration = float(trial.drive.grid[-1] - trial.drive.grid[0])
+        spacing = max(min(SPACING, duration / FEWEST_INSTANTS), duration / MOST_INSTANTS)
+        try:
+            answers = [answer(plant, fit, trial, places, spacing) for fit in fits]
+        except (ConvergenceError, OutOfValidityError, SpecError) as error:
+            failed.append({"condition": trial.name, "reason": str(error)})
+            continue
+        noise = [
+            reading_covariance(answers[0].times, sigma, step, spacing, diagnosis.final.slow)
+            for sigma in white
+        ]
+        for position in (None, *range(len(places))):
+            chosen = [*range(count), *([] if position is None else [count + position])]
+            place = None if position is None else places[position]
+            options.append(_option(trial, place, answers, fits, weights, chosen, noise, names))
+    return options, failed
+
+
+def reading_covariance(times: Array, sigma: float, step: float, spacing: float, slow: SlowError) -> Array:
+    """Covariance of means over ``spacing`` of one channel's readings, (n, n) K²."""
+    number = max(1.0, spacing / step)
+    apart = np.abs(times[:, None] - times)
+    return slow.sigma**2 * np.exp(-apart / slow.time) + sigma**2 / number * np.eye(len(times))
+
+
+def _option(
+    trial: Trial,
+    place: Place | None,
+    answers: Sequence[Answer],
+    fits: Sequence[Fit],
+    weights: Array,
+    chosen: Sequence[int],
+    noise: Sequence[Array],
+    names: Sequence[str],
+) -> Option:
+    means, covariances = [], []
+    size = len(answers[0].times)
+    for told, fit in zip(answers, fits, strict=True):
+        means.append(told.readings[:, chosen].T.ravel())
+        slopes = told.slopes[:, chosen].transpose(1, 0, 2).reshape(size * len(chosen), -1)
+        covariance = slopes @ fit.covariance @ slopes.T
+        for position, channel in enumerate(chosen):
+            own = slice(position * size, (position + 1) * size)
+            covariance[own, own] += noise[channel]
+        covariances.append(covariance)
+    distances = pairwise_distances(means, covariances)
+    order = np.argsort(-weights, kind="stable")
+    first, second = int(order[0]), int(order[1])
+    difference = means[second] - means[first]
+    spread = np.sqrt(0.5 * (np.diag(covariances[first]) + np.diag(covariances[second])))
+    # What a further sensor adds is told at that sensor.
+    searched = np.abs(difference / spread)
+    if place is not None:
+        searched[: -size or None] = -1.0
+    at = int(np.argmax(searched))
+    return Option(
+        trial,
+        place,
+        expected_information(weights, distances / TEMPERATURE),
+        float(distances[first, second]),
+        names[chosen[at // size]],
+        float(difference[at]),
+        float(spread[at]),
+        float(answers[0].times[at % size] - trial.drive.grid[0]),
+        (float(means[first][at]), float(means[second][at])),
+    )
+
+
+def pairwise_distances(means: Sequence[Array], covariances: Sequence[Array]) -> Array:
+    """Bhattacharyya distances of Gaussians, (k, k).
+
+    >>> one = np.eye(1)
+    >>> float(pairwise_distances([np.zeros(1), np.full(1, 4.0)], [one, one])[0, 1].round(6))
+    2.0
+    """
+    count = len(means)
+    found = np.zeros((count, count))
+    halves = [_half_log_det(item) for item in covariances]
+    for i in range(count):
+        for j in range(i):
+            lower = np.linalg.cholesky(0.5 * (covariances[i] + covariances[j]))
+            scaled = solve_triangular(lower, means[i] - means[j], lower=True)
+            volume = float(np.log(np.diag(lower)).sum()) - 0.5 * (halves[i] + halves[j])
+            found[i, j] = found[j, i] = 0.125 * float(scaled @ scaled) + volume
+    return found
+
+
+def _half_log_det(covariance: Array) -> float:
+    return float(np.log(np.diag(np.linalg.cholesky(covariance))).sum())
+
+
+def expected_information(weights: Array, distances: Array) -> float:
+    """Lower bound of the mutual information between explanation and readings, bits.
+
+    Parameters
+    ----------
+    weights : (k,) ndarray
+        Probabilities, sum 1.
+    distances : (k, k) ndarray
+
+    >>> even = np.array([0.5, 0.5])
+    >>> expected_information(even, np.zeros((2, 2))), expected_information(even, 50.0 * (1 - np.eye(2)))
+    (0.0, 1.0)
+    """
+    return float(max(0.0, -weights @ np.log2(np.exp(-distances) @ weights)))
+
+
+def choose(options: Sequence[Option]) -> Option:
+    """The simplest of the options that tell nearly as much as the best; of these the clearest."""
+    new = [item for item in options if item.trial.name != AGAIN or item.place is not None]
+    highest = max(item.information for item in new)
+    good = [item for item in new if item.information >= AS_GOOD * highest]
+    effort = min(item.effort for item in good)
+    return max((item for item in good if item.effort == effort), key=lambda item: item.distance)
+
+
+def shortlist(options: Sequence[Option], best: Option) -> list[Option]:
+    """Every test with the sensors that are there, and every further place in its most telling test."""
+    found: dict[str, Option] = {}
+    for item in options:
+        key = item.trial.name if item.place is None else item.place.name
+        if key not in found or _merit(item) > _merit(found[key]):
+            found[key] = item
+    listed = list(found.values())
+    if all(item is not best for item in listed):
+        listed.append(best)
+    return sorted(listed, key=lambda item: (item is not best, *(-value for value in _merit(item))))
+
+
+def _merit(option: Option) -> tuple[float, float]:
+    return round(option.information, 3), option.distance
+
+
+def timed_words(fits: Sequence[Fit]) -> str:
+    """What is taken for granted of effects that come and go; empty where there are none."""
+    timed = any(in_intervals(effect_of(c.effect), c) for fit in fits for c in fit.candidates)
+    return " Unrecorded heat or cooling is taken to come and go as it did in the recording." if timed else ""
+
+
+def why(option: Option, between: Sequence[str], decided: bool) -> str:
+    """The reason in a sentence or two with numbers."""
+    digits = 1 if abs(option.difference) >= 0.2 else 2
+    levels = [f"{value - ZERO_CELSIUS_K:.{digits}f} °C" for value in option.levels]
+    at = option.channel if option.place is None else "the new sensor"
+    text = (
+        f"If it is {between[0]}, {at} reads {levels[0]} after {option.time / 60.0:.0f} min; "
+        f"if it is {between[1]}, {levels[1]}: they differ by {abs(option.difference):.2g} K, "
+        f"{abs(option.difference) / option.spread:.1f} times what noise and unknown parameters leave "
+        f"({option.spread:.2g} K)."
+    )
+    lead = "The data have decided; this would confirm it. " if decided else ""
+    if option.information < HARDLY:
+        lead += "No single test tells these apart well; this one does it best. "
+    tail = f" Expected to tell {option.information:.2f} of {np.log2(len(between)):.2f} bits."
+    return lead + text + tail

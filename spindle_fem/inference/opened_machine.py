@@ -1,0 +1,191 @@
+"""A machine opened for diagnosis: its fast model on its recordings, with or without geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from spindle_fem.definition import network_tables as network_spec
+from spindle_fem.definition.load import find_machine, load_machine, read_definition
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.network_tables import NetworkMachineSpec
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.errors import RecordingError
+from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.machine.view.build_view import view_of, view_of_network
+from spindle_fem.machine.view.usual_sizes import common_quantities
+from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.channel_checks import Flag
+from spindle_fem.recordings.smooth_inputs import without_input_noise
+from spindle_fem.recordings.thin import thinned_recording
+from spindle_fem.studies.simulate import fast_model_for
+
+Progress = Callable[[str], None]
+
+# A network is stepped from stamp to stamp: so many suffice for what its nodes can follow.
+MOST_STAMPS = 3_000
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosedMachine:
+    """What a diagnosis works on.
+
+    Attributes
+    ----------
+    name : str
+    spec : MachineSpec or NetworkMachineSpec
+    fast : FastModel or NetworkFastModel
+    effects : ActiveEffects
+        Of the definition: nominal, not diagnosed.
+    view : MachineView
+        Of the first recording, ranges over all.
+    recordings, calibration : tuple of Recording
+        As they are used: measured inputs smoothed, long ones of networks thinned.
+    notes : tuple of str
+        What was done to them.
+    """
+
+    name: str
+    spec: MachineSpec | NetworkMachineSpec
+    fast: FastModel | NetworkFastModel
+    effects: ActiveEffects
+    view: MachineView
+    recordings: tuple[Recording, ...]
+    calibration: tuple[Recording, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_network(self) -> bool:
+        """Whether the machine has no geometry."""
+        return isinstance(self.fast, NetworkFastModel)
+
+
+def open_machine(
+    machine: str | Path,
+    overrides: Sequence[str],
+    recordings: Sequence[Recording],
+    calibration: Sequence[Recording],
+    *,
+    heldout: str = "blocks",
+    progress: Progress = lambda stage: None,
+) -> DiagnosedMachine:
+    """Read a machine and make or fetch its fast model.
+
+    What is held out (``heldout`` as :func:`heldout_stamps` takes it) does not
+    enter what is usual on the recordings either.
+
+    Raises
+    ------
+    SpindleFemError
+        A broken definition, or a recording that does not fit it.
+    """
+    if not recordings:
+        raise RecordingError("recordings", "there are none.", "Give at least one to be diagnosed.")
+    if network_spec.is_network_machine(read_definition(find_machine(machine))):
+        return _open_network(machine, overrides, recordings, calibration, heldout)
+    spec = load_machine(machine, overrides)
+    recordings, notes = _denoised(recordings)
+    calibration, more = _denoised(calibration)
+    fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
+    for recording in (*recordings, *calibration):
+        fast.require_channels(recording.probes, recording.source)
+    view = _widest([view_of(fast, _seen(recording, heldout)) for recording in recordings])
+    return DiagnosedMachine(
+        spec.name,
+        spec,
+        fast,
+        effects_on(spec.effects, fast, recordings[0]),
+        view,
+        tuple(recordings),
+        tuple(calibration),
+        (*notes, *more),
+    )
+
+
+def _open_network(
+    machine: str | Path,
+    overrides: Sequence[str],
+    recordings: Sequence[Recording],
+    calibration: Sequence[Recording],
+    heldout: str,
+) -> DiagnosedMachine:
+    spec = network_spec.load_network_machine(machine, overrides)
+    network = build_network(spec.network)
+    fast = NetworkFastModel(network, spec)
+    exponents = {
+        name: float(power)
+        for name, power in zip(network.source_input, network.source_exponent, strict=True)
+        if name is not None
+    }
+
+    def thinned(recording: Recording) -> Recording:
+        count = recording.times.size
+        if count <= MOST_STAMPS:
+            return recording
+        # Gaps take no stamps: the step follows from the time that was recorded.
+        covered = sum(recording.times[end - 1] - recording.times[begin] for begin, end in recording.segments)
+        return thinned_recording(recording, float(covered) / MOST_STAMPS, exponents=exponents)
+
+    smooth, notes = _denoised(recordings)
+    smooth_earlier, more = _denoised(calibration)
+    own = tuple(thinned(item) for item in smooth)
+    earlier = tuple(thinned(item) for item in smooth_earlier)
+    averaged = [
+        f"{item.name}: {item.times.size} rows averaged to {short.times.size}"
+        for item, short in zip((*smooth, *smooth_earlier), (*own, *earlier), strict=True)
+        if short.times.size < item.times.size
+    ]
+    has = frozenset(f"{entry.effect} @ {entry.component}" for entry in spec.effects)
+    view = _widest([view_of_network(network, _seen(recording, heldout), has=has) for recording in own])
+    return DiagnosedMachine(
+        spec.name,
+        spec,
+        fast,
+        effects_on(spec.effects, fast, own[0]),
+        view,
+        own,
+        earlier,
+        (*notes, *more, *averaged),
+    )
+
+
+def _denoised(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Recordings without the noise of their measured inputs, and what was done in words."""
+    found, notes = [], []
+    for recording in recordings:
+        smooth, done = without_input_noise(recording)
+        found.append(smooth)
+        notes += [f"{recording.name}: {text}" for text in done]
+    return found, notes
+
+
+def _seen(recording: Recording, heldout: str) -> Recording:
+    """The recording with what is held out marked as not to be used."""
+    held, _ = heldout_stamps(recording, heldout)
+    flags = recording.flags.copy()
+    flags[held] |= int(Flag.MISSING)
+    return replace(recording, flags=flags)
+
+
+def _widest(views: Sequence[MachineView]) -> MachineView:
+    """The first view with ranges over all recordings."""
+    first = views[0]
+    return replace(
+        first,
+        duration=max(view.duration for view in views),
+        highest_speed=max(view.highest_speed for view in views),
+        lowest_speed=min((view.lowest_speed for view in views if view.lowest_speed > 0.0), default=0.0),
+        channels=tuple(dict.fromkeys(name for view in views for name in view.channels)),
+        quantities=common_quantities([view.quantities for view in views]),
+        reynolds=(
+            float(np.min([view.reynolds[0] for view in views])),
+            float(np.max([view.reynolds[1] for view in views])),
+        ),
+    )

@@ -1,0 +1,99 @@
+"""What nobody recorded: pieces of gaps, what may have happened in them, inputs that changed in them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from spindle_fem.model.reduced.drive import Drive
+from spindle_fem.recordings.align import Recording
+
+# Of the usual spacing of a recording: more is a gap.
+GAP_STEPS = 1.5
+# Shorter gaps, s, and smaller changes, K, hide nothing that matters.
+SHORTEST_GAP, LEAST_CHANGE = 120.0, 1.0
+# Length of a piece, s.
+GAP_PIECE, MOST_PIECES = 150.0, 8
+# Input temperatures, by the name of their load.
+WARMTH = ("ambient", "coolant_inlet")
+
+
+def gap_pieces(recording: Recording) -> tuple[tuple[float, float], ...]:
+    """Gaps long enough for something to have happened in them, in pieces of some minutes, [s]."""
+    spacing = np.diff(recording.times)
+    rows = np.flatnonzero((spacing > GAP_STEPS * np.median(spacing)) & (spacing >= SHORTEST_GAP))
+    found = []
+    for row in rows:
+        first, last = recording.times[row : row + 2]
+        edges = np.linspace(first, last, 1 + min(MOST_PIECES, int(np.ceil((last - first) / GAP_PIECE))))
+        found += [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """What may have happened between two times.
+
+    Attributes
+    ----------
+    begin, end : float, [s]
+    what : str
+        Bearing set, or input temperature.
+    size : float
+        1, or change of the input over the gap [K].
+    """
+
+    begin: float
+    end: float
+    what: str
+    size: float
+
+
+def hidden_in(
+    recording: Recording, pieces: Sequence[tuple[float, float]], sets: Sequence[str]
+) -> tuple[Hidden, ...]:
+    """What may have happened in pieces of gaps, beyond what the inputs beside them say.
+
+    Parameters
+    ----------
+    recording : Recording
+    pieces : sequence of (float, float), [s]
+    sets : sequence of str
+        Bearing sets: friction of each, as a share of the highest that it gives. Input temperatures that
+        are others after a gap come on top, as a share of their change.
+    """
+    found = [Hidden(begin, end, name, 1.0) for begin, end in pieces for name in sets]
+    for name in WARMTH:
+        if name not in recording.input_names:
+            continue
+        for begin, end in pieces:
+            row = int(np.searchsorted(recording.times, begin + 1e-6))
+            before, after = recording.input_at(name, recording.times[row - 1 : row + 1])
+            if abs(after - before) >= LEAST_CHANGE:
+                found.append(Hidden(begin, end, name, float(after - before)))
+    return tuple(found)
+
+
+def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, float], ...]:
+    """Changes of held inputs that fell into gaps, which :func:`coarse_drive` puts amid them.
+
+    Returns
+    -------
+    tuple of (int, float, float)
+        Step at whose start each is put; how much earlier [s], least and most,
+        it may have been.
+    """
+    usual = float(np.median(np.diff(recording.times)))
+    found = []
+    for step in 1 + np.flatnonzero(np.any(drive.start[1:] != drive.end[:-1], axis=1)):
+        time = drive.grid[step]
+        row = int(np.searchsorted(recording.times, time - 1e-6))
+        if not 0 < row < recording.times.size:
+            continue
+        first, last = recording.times[row - 1], recording.times[row]
+        if last - first > GAP_STEPS * usual:
+            found.append((int(step), float(time - last), float(time - first)))
+    return tuple(found)

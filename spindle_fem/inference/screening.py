@@ -1,0 +1,304 @@
+"""Which few of many candidates explain what is left, to first order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference.candidate_response import BaseRun, Variant
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.linearised_fit import BoxedColumns, LinearProblem
+from spindle_fem.inference.worker_processes import Workers
+
+Array = NDArray[np.float64]
+
+# An effect more must make the data so much likelier (natural logarithm) to be looked at.
+SMALLEST_GAIN = 3.0
+KEPT_FOR_TRIPLES = 40
+# In which variants are screened.
+PIECES = 2
+# Where bounds matter: sets of several effects that are solved within them, by their gain without bounds, and
+# the single effects whose pairs all are.
+WITHIN_BOUNDS, GOOD_MEMBERS = 120, 24
+# Places of one effect (of one combination of effects) that are looked at together.
+MOST_PLACES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Screened:
+    """Candidates against what one fit leaves.
+
+    Attributes
+    ----------
+    variants : tuple of Variant
+    gram : (m, m) ndarray
+        Inner products of their answers, less what the machine's own coordinates absorb.
+    data : (m,) ndarray
+        With the data.
+    total : float
+        Of the data.
+    spread : (m,) ndarray
+        Prior standard deviation of each amplitude in units of its reference.
+    signs : (m,) ndarray
+        1: the amplitude cannot be negative; 0: it can.
+    log_prior : (m,) ndarray
+    families : mapping of component to str
+        Bearing set of a bearing: one effect is looked for once in each family.
+    boxed : BoxedColumns or None
+        Where bounds of the machine's own coordinates matter: gains of the most promising sets are then
+        found within them.
+    base : float
+        Cost that these gains count from.
+    """
+
+    variants: tuple[Variant, ...]
+    gram: Array
+    data: Array
+    total: float
+    spread: Array
+    signs: Array
+    log_prior: Array
+    families: Mapping[str, str] = field(default_factory=dict)
+    boxed: BoxedColumns | None = None
+    base: float = 0.0
+    # Of sets of one size: what was evaluated and its gains, asked for several times and dear within bounds.
+    _known: dict[int, tuple[NDArray[np.int64], Array]] = field(default_factory=dict, repr=False)
+
+    def singles(self) -> Array:
+        """Logarithm of the evidence of every variant alone over nothing, priors included, (m,)."""
+        return self._evaluated(1)[1]
+
+    def _gain_within(self, sets: NDArray[np.int64]) -> Array:
+        """Gain of sets (k, s) with the machine's coordinates between their bounds."""
+        one_sided = self.signs != 0.0
+        costs = np.array([self.boxed.cost(members, self.spread, one_sided) for members in sets])
+        return 0.5 * (self.base - costs) - self._price(sets, self._scaled(sets))
+
+    def _scaled(self, sets: NDArray[np.int64]) -> Array:
+        """Posterior over prior precision of the amplitudes of sets, (k, s, s)."""
+        spread = self.spread[sets]
+        gram = self.gram[sets[:, :, None], sets[:, None, :]]
+        return spread[:, :, None] * gram * spread[:, None, :] + np.eye(sets.shape[1])
+
+    def _price(self, sets: NDArray[np.int64], scaled: Array) -> Array:
+        """What the amplitudes' room and the priors cost."""
+        _, log_det = np.linalg.slogdet(scaled)
+        return 0.5 * log_det - np.log(2.0) * self.signs[sets].sum(axis=1) - self.log_prior[sets].sum(axis=1)
+
+    def _gain(self, sets: NDArray[np.int64]) -> Array:
+        """Gain of sets (k, s) of equal size, whatever the machine's coordinates have to do for it."""
+        scaled = self._scaled(sets)
+        right = self.spread[sets] * self.data[sets]
+        solution = np.linalg.solve(scaled, right[:, :, None])[:, :, 0]
+        gain = 0.5 * np.sum(right * solution, axis=1) - self._price(sets, scaled)
+        allowed = np.all((self.signs[sets] == 0.0) | (solution >= 0.0), axis=1)
+        return np.where(allowed, gain, -np.inf)
+
+    def amplitudes(self, members: Sequence[int]) -> dict[int, float]:
+        """Most probable amplitudes of a set, in units of the references."""
+        sets = np.asarray(members)
+        matrix = self.gram[np.ix_(sets, sets)] + np.diag(1.0 / self.spread[sets] ** 2)
+        found = np.linalg.solve(matrix, self.data[sets])
+        return dict(zip(members, found.tolist(), strict=True))
+
+    def best(self, size: int, number: int) -> list[tuple[tuple[int, ...], float]]:
+        """Best sets of a size with their gains, each combination of effects and places once.
+
+        Parameters
+        ----------
+        size : int
+            1 to 3; triples extend the best pairs.
+        number : int
+        """
+        sets, gain = self._evaluated(size)
+        found: dict[frozenset[tuple[str, str]], tuple[tuple[int, ...], float]] = {}
+        places: dict[tuple[str, ...], int] = {}
+        for index in np.argsort(-gain):
+            if not np.isfinite(gain[index]):
+                break
+            members = tuple(int(i) for i in sets[index])
+            key = frozenset(self.variants[i].key for i in members)
+            effects = tuple(sorted(self.variants[i].candidate.effect for i in members))
+            # One effect at many places must not crowd out the others.
+            if key not in found and places.get(effects, 0) < MOST_PLACES:
+                found[key] = (members, float(gain[index]))
+                places[effects] = places.get(effects, 0) + 1
+            if len(found) == number:
+                break
+        return list(found.values())
+
+    def _evaluated(self, size: int) -> tuple[NDArray[np.int64], Array]:
+        """Sets of a size (k, s) and their gains (k,); the promising ones where bounds matter."""
+        if size not in self._known:
+            sets = self._sets(size)
+            if self.boxed is None or size > 1:
+                pieces = np.array_split(sets, 1 + len(sets) // 100_000)
+                gain = np.concatenate([self._gain(piece) for piece in pieces])
+            if self.boxed is not None:
+                sets = sets if size == 1 else self._promising(sets, gain)
+                gain = self._gain_within(sets)
+            self._known[size] = sets, gain
+        return self._known[size]
+
+    def _sets(self, size: int) -> NDArray[np.int64]:
+        """Every set of distinct variants, (k, s); triples of the best pairs."""
+        count = len(self.variants)
+        if size == 1:
+            return np.arange(count)[:, None]
+        if size == 2:
+            sets = np.column_stack(np.triu_indices(count, 1))
+        else:
+            pairs = [members for members, _ in self.best(2, KEPT_FOR_TRIPLES)]
+            sets = np.array(
+                [(*pair, third) for pair in pairs for third in range(count) if third not in pair], dtype=int
+            ).reshape(-1, 3)
+        return sets[self._distinct(sets)]
+
+    def _promising(self, sets: NDArray[np.int64], gain: Array) -> NDArray[np.int64]:
+        """Sets worth a bounded solution: the best without bounds, and those of good members."""
+        good = np.zeros(len(self.variants), dtype=bool)
+        good[np.argsort(-self.singles())[:GOOD_MEMBERS]] = True
+        chosen = np.zeros(len(sets), dtype=bool)
+        chosen[np.argsort(-gain, kind="stable")[:WITHIN_BOUNDS]] = True
+        if sets.shape[1] == 2:
+            chosen |= good[sets].all(axis=1)
+        return sets[chosen]
+
+    def best_of(self, allowed: Callable[[Candidate], bool], number: int) -> list[tuple[int, float]]:
+        """Best variant of each effect and form at each place, among those allowed, with its amplitude."""
+        gain = self.singles()
+        found: dict[tuple[str, str, str], int] = {}
+        for index in np.argsort(-gain):
+            candidate = self.variants[index].candidate
+            if not np.isfinite(gain[index]) or len(found) == number:
+                break
+            if allowed(candidate):
+                found.setdefault((candidate.effect, candidate.component, candidate.form), int(index))
+        return [(index, self.amplitudes([index])[index]) for index in found.values()]
+
+    def _distinct(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Sets of different candidates, no two of one effect at one place or in one family."""
+        keys = [
+            (effect, self.families.get(component, component))
+            for effect, component in (v.key for v in self.variants)
+        ]
+        names = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+        label = np.array([names[key] for key in keys])[sets]
+        keep = np.ones(len(sets), dtype=bool)
+        for i in range(sets.shape[1]):
+            for j in range(i):
+                keep &= label[:, i] != label[:, j]
+        return keep
+
+
+def log_priors(variants: Sequence[Variant], weights: Mapping[str, float]) -> Array:
+    """Logarithm of the prior of each variant given that one effect more is there.
+
+    Every effect has a weight, shared evenly by its places, their forms and
+    starting shapes.
+    """
+    total = sum(weights.values())
+    places: dict[str, set[str]] = {}
+    shapes: dict[tuple[str, str], int] = {}
+    for variant in variants:
+        places.setdefault(variant.candidate.effect, set()).add(variant.candidate.component)
+        shapes[variant.key] = shapes.get(variant.key, 0) + 1
+    return np.array(
+        [
+            np.log(weights[v.candidate.effect] / total)
+            - np.log(len(places[v.candidate.effect]))
+            - np.log(shapes[v.key])
+            for v in variants
+        ]
+    )
+
+
+def screen(
+    problem: Problem,
+    fit: Fit,
+    variants: Sequence[Variant],
+    weights: Mapping[str, float],
+    families: Mapping[str, str],
+    trust: Fit | None = None,
+    workers: Workers | None = None,
+) -> Screened:
+    """Answers of all variants about a fit, and their inner products.
+
+    Parameters
+    ----------
+    problem : Problem
+    fit : Fit
+        What the model already holds.
+    variants : sequence of Variant
+    weights : mapping of effect to float
+    families : mapping of component to str
+        As :class:`Screened` has them.
+    trust : Fit or None
+        Fit without the variants that gains count from, and whose residuals tell which readings went
+        astray; None for the first one.
+    workers : Workers or None
+        Who work out the answers; the result does not depend on it.
+    """
+    # As many pieces whether or not there are workers for them, so that the result is the same.
+    pieces = [tuple(variants[first::PIECES]) for first in range(PIECES)]
+    *answers, linear = (workers or Workers()).done(
+        problem,
+        [
+            *(partial(_answers, fit=fit, variants=piece) for piece in pieces),
+            partial(LinearProblem.about, fit=fit, trust=trust),
+        ],
+    )
+    columns = np.empty((len(problem.data), len(variants)))
+    for first, found in enumerate(answers):
+        columns[:, first::PIECES] = found
+    gram, data, total = linear.gram(columns)
+    spread = np.array([_spread(v) for v in variants])
+    signs = np.array([_one_sided(v) for v in variants])
+    priors = log_priors(variants, weights)
+    boxed = linear.boxed(columns) if linear.box.matters or trust is not None else None
+    base = linear.box.cost
+    if trust is not None:
+        base = float(np.sum((linear.weight * trust.residual) ** 2)) + trust.misfit_with_prior - trust.misfit
+    return Screened(tuple(variants), gram, data, total, spread, signs, priors, families, boxed, base)
+
+
+def _answers(problem: Problem, fit: Fit, variants: Sequence[Variant]) -> Array:
+    """Whitened answers of all recordings to variants, (n, m)."""
+    return problem.whitened(
+        [
+            BaseRun(problem.plant, number, fit.values, fit.candidates).responses(variants)
+            for number in range(len(problem.plant.recordings))
+        ]
+    )
+
+
+def _spread(variant: Variant) -> float:
+    candidate = variant.candidate
+    item = candidate.parameters[candidate.amplitude]
+    if item.logarithmic:
+        return item.sigma / abs(float(np.log(candidate.reference / candidate.null)))
+    return item.sigma / abs(candidate.reference - candidate.null)
+
+
+def _one_sided(variant: Variant) -> float:
+    candidate = variant.candidate
+    item = candidate.parameters[candidate.amplitude]
+    upwards = candidate.reference > candidate.null
+    bound = item.low if upwards else item.high
+    return 1.0 if bound == candidate.null else 0.0
+
+
+def amplitude_value(variant: Variant, scaled: float) -> float:
+    """Amplitude from one in units of the reference."""
+    candidate = variant.candidate
+    item = candidate.parameters[candidate.amplitude]
+    if item.logarithmic:
+        value = candidate.null * float(np.exp(scaled * np.log(candidate.reference / candidate.null)))
+    else:
+        value = candidate.null + scaled * (candidate.reference - candidate.null)
+    return float(np.clip(value, item.low, item.high))

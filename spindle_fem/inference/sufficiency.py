@@ -1,0 +1,99 @@
+"""Whether a recording says enough to be diagnosed at all."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import eigh
+
+from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.prepared_problem import all_stamps
+from spindle_fem.inference.simulated_plant import Plant
+
+# Readings must move by so many times their noise, by measurement or by the model's word.
+EXCITED_SIGMAS = 6.0
+FEWEST_READINGS = 30
+ONE_SIDED_SIGMAS = 1.645
+# Share of the quickest time constant that heat from the bearings follows to a probe.
+REACHED = 0.632
+
+
+def says_too_little(machine: DiagnosedMachine) -> str:
+    """Why the recordings cannot be diagnosed; empty where they can.
+
+    A recording must hold readings, last longer than the machine needs to
+    answer, and move either the readings or the model by more than the noise.
+    """
+    reasons = []
+    for recording in machine.recordings:
+        if not recording.temperature_names:
+            return f'"{recording.name}" has no channel of role "temperature": there is nothing to explain.'
+        usable = int(recording.usable.sum(axis=0).max(initial=0))
+        if usable < FEWEST_READINGS:
+            reasons.append(
+                f'"{recording.name}" has {usable} usable readings in its best channel; '
+                f"at least {FEWEST_READINGS} are needed."
+            )
+            continue
+        plant = Plant(machine.fast, [recording], all_stamps([recording]), machine.effects)
+        duration = float(recording.times[-1] - recording.times[0])
+        # A network whose values are guesses may be that much quicker than its nominal values say.
+        needed = response_time(plant) / prior_factor(plant)
+        if duration < needed:
+            reasons.append(
+                f'"{recording.name}" lasts {duration / 60.0:.3g} min, but the machine needs '
+                f"{needed / 60.0:.3g} min to answer a change at the probes by 63 %: "
+                "causes that act at different speeds cannot be told apart."
+            )
+            continue
+        predicted = plant.predict(0, {}).temperature
+        moved = float((np.ptp(predicted, axis=0) / recording.sigma).max())
+        spread = [
+            np.ptp(np.quantile(recording.temperature[recording.usable[:, k], k], [0.02, 0.98]))
+            / recording.sigma[k]
+            for k in range(len(recording.temperature_names))
+            if recording.usable[:, k].any()
+        ]
+        if moved < EXCITED_SIGMAS and max(spread, default=0.0) < EXCITED_SIGMAS:
+            reasons.append(
+                f'"{recording.name}" holds no excitation: no reading moves by more than '
+                f"{EXCITED_SIGMAS:g} times its noise, nor should it by the model."
+            )
+    return " ".join(reasons) if len(reasons) == len(machine.recordings) else ""
+
+
+def prior_factor(plant: Plant) -> float:
+    """How much quicker than nominal the priors allow a machine to be (95 % bound), 1 for what is known."""
+    sigmas: dict[str, list[float]] = {"capacity": [], "conductance": []}
+    if plant.is_network:
+        for name, sigma, _ in plant.uncertain():
+            kind = name.partition(".")[0]
+            if kind in sigmas:
+                sigmas[kind].append(sigma)
+    # A time constant is a capacity over a conductance.
+    variance = sum(float(np.median(values)) ** 2 for values in sigmas.values() if values)
+    return float(np.exp(ONE_SIDED_SIGMAS * np.sqrt(variance)))
+
+
+def response_time(plant: Plant) -> float:
+    """Time in which the probes answer a step of all heat by 63 %, the median over the probes [s].
+
+    From the modes of the machine at its mean operating point.
+    """
+    run = plant.transient(0, {})
+    counts = np.bincount(plant.drives[0].step_class, weights=plant.drives[0].steps)
+    operators = run.operators[int(np.argmax(counts))]
+    rates, modes = eigh(operators.conduction, run.built.storage)
+    heat = operators.loads[:, : len(plant.fast.heat_places)].sum(axis=1)
+    gains = (operators.outputs[plant.columns[0]] @ modes) * (modes.T @ heat)
+    found = []
+    for gain in gains:
+        final = float(np.sum(gain / rates))
+        if abs(final) < 1e-12:
+            continue
+        low, high = 0.0, 20.0 / float(rates[0])
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            answer = float(np.sum(gain / rates * -np.expm1(-rates * middle))) / final
+            low, high = (low, middle) if answer > REACHED else (middle, high)
+        found.append(high)
+    return float(np.median(found)) if found else 0.0

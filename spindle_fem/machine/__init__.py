@@ -1,0 +1,1 @@
+"""The machine as geometry, mesh and named places; no temperatures yet."""

@@ -1,0 +1,280 @@
+"""The machine as geometry: parts of revolution, their faces and contacts, the channel.
+
+Everything of a spindle but the channel and its ports is a solid of revolution,
+so parts are unions of rectangles in the meridian plane (z, r), and contacts,
+named surfaces and faults are found there, in whole nanometres, before any CAD
+kernel runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+from spindle_fem.errors import FaultsError, GeometryError
+from spindle_fem.machine.geometry.channel_geometry import (
+    ChannelDefinition,
+    ChannelGeometry,
+    build_channel,
+)
+from spindle_fem.machine.geometry.faces import Facing, MeridianEdge
+from spindle_fem.machine.geometry.meridian import MeridianMap
+
+if TYPE_CHECKING:
+    from spindle_fem.definition.machine_spec import MachineSpec
+
+REMAINING = "adiabatic"
+
+
+@dataclass(frozen=True, slots=True)
+class AnnularSegment:
+    """A ring of rectangular meridian section, lengths in m."""
+
+    z_start: float
+    z_end: float
+    inner_radius: float
+    outer_radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class PartGeometry:
+    """A solid of revolution: its segments fused into one."""
+
+    name: str
+    segments: tuple[AnnularSegment, ...]
+    rotating: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FaceBox:
+    """Exposed faces that look one way and lie between bounds, lengths in m.
+
+    Attributes
+    ----------
+    facing : {"outward", "inward", "front", "rear"}
+        Direction of the normal: +r, -r, -z, +z.
+    z, r : (low, high) or None
+        A face that lies in the range only in part is split there; None takes
+        every face. A plane face is asked for with equal bounds or a range.
+    """
+
+    facing: Facing
+    z: tuple[float, float] | None = None
+    r: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceDefinition:
+    """A named exposed surface of one part, the union of its boxes."""
+
+    name: str
+    part: str
+    where: tuple[FaceBox, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BallRowGeometry:
+    """Balls of a bearing: drawn in the solid model, one temperature in the mesh."""
+
+    name: str
+    z: float
+    pitch_radius: float
+    ball_diameter: float
+    ball_count: int
+
+
+@dataclass(frozen=True, slots=True)
+class AssemblyGeometry:
+    """A checked machine, ready for solids and meshes.
+
+    Attributes
+    ----------
+    parts : tuple of PartGeometry
+    edges : tuple of MeridianEdge
+        Every face of revolution as its line in the meridian plane, with the
+        name of its surface or joint.
+    channel : ChannelGeometry or None
+    balls : tuple of BallRowGeometry
+    notes : tuple of str
+        What was decided for the user, for example a port drilled narrower.
+    """
+
+    parts: tuple[PartGeometry, ...]
+    edges: tuple[MeridianEdge, ...]
+    channel: ChannelGeometry | None = None
+    balls: tuple[BallRowGeometry, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """Names in definition order."""
+        return tuple(part.name for part in self.parts)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """``part_a|part_b`` of cylindrical and ``part_a|part_b:face`` of plane contacts, sorted."""
+        return tuple(sorted({edge.name for edge in self.edges if edge.is_contact}))
+
+    @property
+    def joint_parts(self) -> Mapping[str, tuple[str, str]]:
+        """The two parts of each joint, in the order of its name."""
+        return MappingProxyType({edge.name: edge.parts for edge in self.edges if edge.is_contact})
+
+    @property
+    def surface_names(self) -> tuple[str, ...]:
+        """Every exposed surface, sorted; the walls of the channel included."""
+        names = {edge.name for edge in self.edges if not edge.is_contact and not edge.is_axis}
+        if self.channel is not None:
+            names.update(self.channel.surface_names)
+        return tuple(sorted(names))
+
+    @property
+    def rotating(self) -> Mapping[str, bool]:
+        """Whether each part turns with the shaft."""
+        return MappingProxyType({part.name: part.rotating for part in self.parts})
+
+
+def build_assembly(spec: MachineSpec, *, where: str | None = None) -> AssemblyGeometry:
+    """Geometry of a machine definition: its parts, the rings of its bearings, its channel.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    where : str, optional
+        The file, for messages; the machine's name where none is given.
+
+    Returns
+    -------
+    AssemblyGeometry
+
+    Raises
+    ------
+    FaultsError
+        Every geometric fault at once.
+    """
+    parts = [
+        PartGeometry(
+            part.name,
+            tuple(
+                AnnularSegment(*segment.z, 0.5 * segment.inner_diameter, 0.5 * segment.outer_diameter)
+                for segment in part.segment
+            ),
+            part.rotating,
+        )
+        for part in spec.part
+    ]
+    balls = []
+    for group, bearing in spec.bearings:
+        kind = spec.bearing_types[group.bearing_type]
+        for ring, inner, outer in (
+            ("inner", kind.bore_diameter, kind.inner_ring_outer_diameter),
+            ("outer", kind.outer_ring_inner_diameter, kind.outer_diameter),
+        ):
+            segment = AnnularSegment(*bearing.z, 0.5 * inner, 0.5 * outer)
+            parts.append(PartGeometry(f"{bearing.name}.{ring}_ring", (segment,), ring == "inner"))
+        balls.append(
+            BallRowGeometry(
+                bearing.name, 0.5 * sum(bearing.z), 0.5 * kind.pitch, kind.ball_diameter, kind.ball_count
+            )
+        )
+    surfaces = [
+        SurfaceDefinition(
+            surface.name, surface.part, tuple(FaceBox(box.facing, box.z, box.r) for box in surface.where)
+        )
+        for surface in spec.all_surfaces
+    ]
+    channel = None
+    if spec.channel is not None:
+        values = {
+            name: getattr(spec.channel, name)
+            for name in (
+                "part", "inner_radius", "depth", "width", "pitch", "turns", "starts", "hand", "z_start"
+            )
+        }  # fmt: skip
+        ports = spec.channel.ports
+        channel = ChannelDefinition(**values, port_diameter=None if ports is None else ports.diameter)
+    return assemble(
+        parts, surfaces, channel, balls, remaining=spec.remaining_surfaces, where=where or spec.name
+    )
+
+
+def assemble(
+    parts: Iterable[PartGeometry],
+    surfaces: Iterable[SurfaceDefinition] = (),
+    channel: ChannelDefinition | None = None,
+    balls: Iterable[BallRowGeometry] = (),
+    *,
+    remaining: Literal["adiabatic", "error"] = REMAINING,
+    where: str = "machine",
+) -> AssemblyGeometry:
+    """Check parts, surfaces and channel against one another and name every face.
+
+    Parameters
+    ----------
+    parts : iterable of PartGeometry
+    surfaces : iterable of SurfaceDefinition
+    channel : ChannelDefinition, optional
+    balls : iterable of BallRowGeometry, optional
+    remaining : {"adiabatic", "error"}
+        Exposed faces without a name go to ``<part>.adiabatic``, or are faults.
+    where : str
+        The file, for messages.
+
+    Returns
+    -------
+    AssemblyGeometry
+
+    Raises
+    ------
+    FaultsError
+        Every fault at once, each a GeometryError.
+
+    >>> ring = PartGeometry("ring", (AnnularSegment(0.0, 0.02, 0.05, 0.06),))
+    >>> assemble([ring]).surface_names
+    ('ring.adiabatic',)
+    """
+    parts, surfaces = tuple(parts), tuple(surfaces)
+    faults: list[GeometryError] = []
+    _check_names(parts, surfaces, faults)
+    if faults:
+        raise FaultsError(where, faults)
+    meridian = MeridianMap.of_parts(parts, surfaces, faults)
+    edges = meridian.named_edges(surfaces, remaining, faults)
+    channel_geometry, notes = None, ()
+    if channel is not None:
+        channel_geometry, notes = build_channel(channel, meridian, faults)
+    if faults:
+        raise FaultsError(where, faults)
+    return AssemblyGeometry(parts, edges, channel_geometry, tuple(balls), notes)
+
+
+def _check_names(
+    parts: tuple[PartGeometry, ...],
+    surfaces: tuple[SurfaceDefinition, ...],
+    faults: list[GeometryError],
+) -> None:
+    if not parts:
+        faults.append(GeometryError("part", "no part is defined.", "Allowed: at least one part."))
+    for kind, names in (("part", [p.name for p in parts]), ("surface", [s.name for s in surfaces])):
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            faults.append(GeometryError(f'{kind} "{name}"', "is defined twice.", "Allowed: names used once."))
+    part_names = {part.name for part in parts}
+    for surface in surfaces:
+        reserved = {f"{surface.part}.{suffix}" for suffix in (REMAINING, *ChannelGeometry.SUFFIXES)}
+        if surface.name in reserved:
+            faults.append(
+                GeometryError(
+                    f'surface "{surface.name}"',
+                    "takes a name that the geometry gives itself.",
+                    f"Allowed: any other than {', '.join(sorted(reserved))}.",
+                )
+            )
+    for name in sorted(part_names):
+        if "|" in name or ":" in name:
+            faults.append(
+                GeometryError(
+                    f'part "{name}"', 'contains "|" or ":".', "Allowed: letters, digits, dot, underscore."
+                )
+            )

@@ -1,0 +1,271 @@
+"""Faces, contacts and faults of solids of revolution, found in the meridian plane.
+
+Coordinates are whole nanometres, so that touching is equality.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import GeometryError, did_you_mean
+from spindle_fem.machine.geometry.faces import (
+    VOID,
+    MeridianEdge,
+    Piece,
+    describe_box,
+    in_millimetres,
+    list_faces,
+    merge_pieces,
+    to_nanometres,
+)
+
+if TYPE_CHECKING:
+    from spindle_fem.machine.geometry.assembly import PartGeometry, SurfaceDefinition
+
+
+@dataclass(frozen=True, slots=True)
+class MeridianMap:
+    """Which part owns each cell of the grid spanned by all coordinates.
+
+    Attributes
+    ----------
+    part_names : tuple of str
+    z_lines, r_lines : (n,), (m,) int64 ndarray, [nm]
+    owner : (n + 1, m + 1) int32 ndarray
+        Part of the cell below each pair of lines, VOID outside; the rim of
+        cells around the grid is VOID.
+    """
+
+    part_names: tuple[str, ...]
+    z_lines: NDArray[np.int64]
+    r_lines: NDArray[np.int64]
+    owner: NDArray[np.int32]
+
+    @classmethod
+    def of_parts(
+        cls,
+        parts: Sequence[PartGeometry],
+        surfaces: Sequence[SurfaceDefinition],
+        faults: list[GeometryError],
+    ) -> MeridianMap:
+        """Build the map; degenerate segments and overlapping parts go to ``faults``."""
+        names = tuple(part.name for part in parts)
+        boxes = []
+        for index, part in enumerate(parts):
+            for segment in part.segments:
+                bounds = [
+                    to_nanometres(value)
+                    for value in (segment.z_start, segment.z_end, segment.inner_radius, segment.outer_radius)
+                ]
+                if _check_segment(part.name, bounds, faults):
+                    boxes.append((index, *bounds))
+        z_values = {value for box in boxes for value in box[1:3]}
+        r_values = {value for box in boxes for value in box[3:5]} | {0}
+        for surface in surfaces:
+            for box in surface.where:
+                z_values.update(to_nanometres(value) for value in box.z or ())
+                r_values.update(max(0, to_nanometres(value)) for value in box.r or ())
+        z_lines = np.array(sorted(z_values), dtype=np.int64)
+        r_lines = np.array(sorted(r_values), dtype=np.int64)
+        owner = np.full((len(z_lines) + 1, len(r_lines) + 1), VOID, dtype=np.int32)
+        overlaps: dict[tuple[int, int], list[int]] = {}
+        for index, z_start, z_end, inner, outer in boxes:
+            cells = (
+                slice(*(np.searchsorted(z_lines, (z_start, z_end)) + 1)),
+                slice(*(np.searchsorted(r_lines, (inner, outer)) + 1)),
+            )
+            block = owner[cells]
+            for other in np.unique(block[(block != VOID) & (block != index)]).tolist():
+                overlaps.setdefault((other, index), [z_start, z_end, inner, outer])
+            block[block == VOID] = index
+        for (first, second), (z_start, z_end, inner, outer) in overlaps.items():
+            faults.append(
+                GeometryError(
+                    f'part "{names[second]}"',
+                    f"z {in_millimetres(z_start)} to {in_millimetres(z_end)}, r {in_millimetres(inner)} to "
+                    f'{in_millimetres(outer)} overlaps part "{names[first]}".',
+                    "Allowed: parts that touch or keep apart.",
+                )
+            )
+        return cls(names, z_lines, r_lines, owner)
+
+    def named_edges(
+        self,
+        surfaces: Sequence[SurfaceDefinition],
+        remaining: Literal["adiabatic", "error"],
+        faults: list[GeometryError],
+    ) -> tuple[MeridianEdge, ...]:
+        """Name every face and join neighbours of one name into edges.
+
+        Parts that float, come apart or pinch, selectors that match nothing and
+        faces claimed twice go to ``faults``.
+        """
+        pieces = self._boundary_pieces()
+        self._check_connection(pieces, faults)
+        labels = self._label(pieces, surfaces, remaining, faults)
+        return merge_pieces(pieces, labels, self.part_names)
+
+    def cell_boxes(self) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+        """Bounds (z low, z high, r low, r high) in nm and owner of every cell.
+
+        The rim reaches ten metres out.
+        """
+        far = 10_000_000_000
+        z_edges = np.concatenate(([self.z_lines[0] - far], self.z_lines, [self.z_lines[-1] + far]))
+        r_edges = np.concatenate(([-far], self.r_lines, [self.r_lines[-1] + far]))
+        z_index, r_index = np.indices(self.owner.shape)
+        boxes = np.stack(
+            [z_edges[z_index], z_edges[z_index + 1], r_edges[r_index], r_edges[r_index + 1]], axis=-1
+        )
+        # Below the axis there is nothing to break into.
+        inside = (r_index > 0).ravel()
+        return boxes.reshape(-1, 4)[inside], self.owner.ravel()[inside]
+
+    def _boundary_pieces(self) -> list[Piece]:
+        pieces = []
+        owner = self.owner
+        for low, high in zip(*np.nonzero(owner[:, 1:] != owner[:, :-1]), strict=True):
+            pieces.append(
+                Piece(
+                    "cylinder",
+                    (self.z_lines[low - 1].item(), self.z_lines[low].item()),
+                    (self.r_lines[high].item(),) * 2,
+                    owner[low, high].item(),
+                    owner[low, high + 1].item(),
+                )
+            )
+        for low, high in zip(*np.nonzero(owner[1:] != owner[:-1]), strict=True):
+            pieces.append(
+                Piece(
+                    "plane",
+                    (self.z_lines[low].item(),) * 2,
+                    (self.r_lines[high - 1].item(), self.r_lines[high].item()),
+                    owner[low, high].item(),
+                    owner[low + 1, high].item(),
+                )
+            )
+        return pieces
+
+    def _check_connection(self, pieces: list[Piece], faults: list[GeometryError]) -> None:
+        from scipy.ndimage import label
+
+        touching = {part for piece in pieces if piece.is_contact for part in (piece.below, piece.above)}
+        for index, name in enumerate(self.part_names):
+            cells = self.owner == index
+            if not cells.any():
+                continue
+            if len(self.part_names) > 1 and index not in touching:
+                faults.append(
+                    GeometryError(
+                        f'part "{name}"', "touches no other part.", "Allowed: parts with a face in contact."
+                    )
+                )
+            _, number = label(cells)
+            if number > 1:
+                faults.append(
+                    GeometryError(
+                        f'part "{name}"',
+                        f"comes apart into {number} bodies.",
+                        "Allowed: segments that share a face.",
+                    )
+                )
+            diagonal = (cells[1:, 1:] & cells[:-1, :-1] & ~cells[1:, :-1] & ~cells[:-1, 1:]) | (
+                cells[1:, :-1] & cells[:-1, 1:] & ~cells[1:, 1:] & ~cells[:-1, :-1]
+            )
+            for z_index, r_index in zip(*np.nonzero(diagonal), strict=True):
+                faults.append(
+                    GeometryError(
+                        f'part "{name}"',
+                        f"has zero thickness at z {in_millimetres(self.z_lines[z_index])}, "
+                        f"r {in_millimetres(self.r_lines[r_index])}, where segments meet in an edge only.",
+                        "Allowed: segments that share a face.",
+                    )
+                )
+
+    def _label(
+        self,
+        pieces: list[Piece],
+        surfaces: Sequence[SurfaceDefinition],
+        remaining: Literal["adiabatic", "error"],
+        faults: list[GeometryError],
+    ) -> list[str]:
+        names = self.part_names
+        labels = [piece.joint_name(names) if piece.is_contact else "" for piece in pieces]
+        claimed_twice: set[tuple[str, str]] = set()
+        for surface in surfaces:
+            if surface.part not in names:
+                faults.append(
+                    GeometryError(
+                        f'surface "{surface.name}"',
+                        f'part "{surface.part}" does not exist.',
+                        did_you_mean(surface.part, names),
+                    )
+                )
+                continue
+            part = names.index(surface.part)
+            for number, box in enumerate(surface.where):
+                hits = [
+                    index
+                    for index, piece in enumerate(pieces)
+                    if piece.is_exposed_of(part) and piece.lies_in(box)
+                ]
+                if not hits:
+                    faults.append(
+                        GeometryError(
+                            f'surface "{surface.name}", where[{number}]',
+                            f'{describe_box(box)} matches no exposed face of part "{surface.part}".',
+                            f"Faces that look {box.facing}: {list_faces(pieces, part, box.facing)}.",
+                        )
+                    )
+                for index in hits:
+                    if labels[index] not in ("", surface.name):
+                        claimed_twice.add((labels[index], surface.name))
+                    else:
+                        labels[index] = surface.name
+        for first, second in sorted(claimed_twice):
+            faults.append(
+                GeometryError(
+                    f'surface "{second}"',
+                    f'claims a face that surface "{first}" has already.',
+                    "Allowed: each face in one surface.",
+                )
+            )
+        for index, piece in enumerate(pieces):
+            if labels[index] == "" and not piece.is_axis:
+                part = names[max(piece.below, piece.above)]
+                labels[index] = f"{part}.adiabatic"
+                if remaining == "error":
+                    faults.append(
+                        GeometryError(
+                            f'part "{part}"',
+                            f"{piece.describe()} belongs to no surface.",
+                            'Name it in a [[surface]], or set remaining_surfaces = "adiabatic".',
+                        )
+                    )
+        return labels
+
+
+def _check_segment(part: str, bounds: list[int], faults: list[GeometryError]) -> bool:
+    z_start, z_end, inner, outer = bounds
+    where = f'part "{part}"'
+    if z_end <= z_start or outer <= inner:
+        faults.append(
+            GeometryError(
+                where,
+                f"a segment z {in_millimetres(z_start)} to {in_millimetres(z_end)}, "
+                f"r {in_millimetres(inner)} to {in_millimetres(outer)} has no thickness.",
+                "Allowed: z and r that grow.",
+            )
+        )
+        return False
+    if inner < 0:
+        faults.append(
+            GeometryError(where, f"inner radius is {in_millimetres(inner)}.", "Allowed: 0 mm or more.")
+        )
+        return False
+    return True

@@ -1,0 +1,84 @@
+"""The solid model as a STEP file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from spindle_fem.errors import GeometryError
+from spindle_fem.machine.geometry.assembly import AssemblyGeometry
+from spindle_fem.machine.geometry.cad_solids import build_solids, gmsh_session
+
+
+def export_step(assembly: AssemblyGeometry, path: str | Path) -> Path:
+    """Write the solid model in mm, balls as spheres included, as STEP.
+
+    Parameters
+    ----------
+    assembly : AssemblyGeometry
+    path : str or Path
+        Ends in .step or .stp.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    GeometryError
+        Another suffix.
+    """
+    import gmsh
+
+    path = Path(path)
+    if path.suffix.lower() not in (".step", ".stp"):
+        raise GeometryError(str(path), f'suffix "{path.suffix}".', "Allowed: .step, .stp.")
+    scaled = _in_millimetres(assembly)
+    with gmsh_session() as geometry:
+        solids = build_solids(scaled, geometry)
+        names = {tag: name for name, tag in solids.volume_of_part.items()}
+        for row in scaled.balls:
+            for index in range(row.ball_count):
+                angle = 2.0 * math.pi * index / row.ball_count
+                ball = geometry.add_ball(
+                    [-row.pitch_radius * math.sin(angle), row.pitch_radius * math.cos(angle), row.z],
+                    0.5 * row.ball_diameter,
+                )
+                names[ball.dim_tag[1]] = f"{row.name}.ball_{index + 1}"
+        geometry.synchronize()
+        for tag, name in names.items():
+            gmsh.model.setEntityName(3, tag, name)
+        gmsh.write(str(path))
+    return path
+
+
+def _in_millimetres(assembly: AssemblyGeometry) -> AssemblyGeometry:
+    """Lengths times 1000: scaling solids afterwards would turn them into splines."""
+
+    def scaled(item: object, *names: str) -> object:
+        changes = {name: getattr(item, name) for name in names}
+        return replace(
+            item,
+            **{
+                name: tuple(1.0e3 * part for part in value) if isinstance(value, tuple) else 1.0e3 * value
+                for name, value in changes.items()
+            },
+        )
+
+    channel = assembly.channel
+    if channel is not None:
+        channel = replace(
+            channel,
+            definition=scaled(channel.definition, "inner_radius", "depth", "width", "pitch", "z_start"),
+            ports=tuple(
+                scaled(port, "z", "radius", "start_radius", "seam_radius", "end_radius")
+                for port in channel.ports
+            ),
+        )
+    return replace(
+        assembly,
+        edges=tuple(scaled(edge, "z", "r") for edge in assembly.edges),
+        channel=channel,
+        balls=tuple(scaled(row, "z", "pitch_radius", "ball_diameter") for row in assembly.balls),
+    )

@@ -1,0 +1,1 @@
+"""What commands and effects ask about a machine: its places, parts and usual sizes."""

@@ -1,0 +1,1 @@
+"""Thermal models of a machine: finite elements, their projection, lumped networks."""

@@ -1,0 +1,293 @@
+"""Temperatures where they are asked for: points, surfaces, maxima, heat flux."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.spatial import KDTree
+from skfem import ElementTetP1, ElementTetP2
+
+from spindle_fem.errors import ConvergenceError, GeometryError, SpecError
+from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.model.mesh.element_integrals import evaluate_shape
+from spindle_fem.model.mesh.mesh_operators import ThermalOperators, prolongation_from_corners
+
+CANDIDATES = 48
+NEWTON_STEPS = 30
+NEWTON_TOLERANCE = 1e-12
+# A point may lie this far outside its element, in reference coordinates,
+# because a curved wall and its quadratic mesh differ.
+OUTSIDE_TOLERANCE = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """Elements and reference places of points.
+
+    Attributes
+    ----------
+    element : (n,) int64 ndarray
+    place : (n, 3) ndarray
+        Reference coordinates.
+    distance : (n,) ndarray, [m]
+        From the asked point to the nearest point of its element; 0 inside.
+    """
+
+    element: NDArray[np.int64]
+    place: NDArray[np.float64]
+    distance: NDArray[np.float64]
+
+
+def locate_points(mesh: TaggedMesh, points: ArrayLike, parts: Sequence[str]) -> Location:
+    """Curved elements that hold points, searched in one part each.
+
+    Parameters
+    ----------
+    mesh : TaggedMesh
+    points : (n, 3) array_like, [m]
+    parts : sequence of str
+        Part of each point: at a joint, both sides have a temperature.
+
+    Raises
+    ------
+    GeometryError
+        A point outside its part, with its distance.
+    SpecError
+        Unknown part or wrong shape.
+    """
+    asked = np.atleast_2d(np.asarray(points, dtype=float))
+    if asked.shape != (len(parts), 3):
+        raise SpecError(
+            "points", f"shape {asked.shape} for {len(parts)} parts.", "Allowed: (n, 3), one part each."
+        )
+    element = np.empty(len(asked), dtype=np.int64)
+    place = np.empty((len(asked), 3))
+    distance = np.empty(len(asked))
+    part_of_point = np.asarray(parts, dtype=object)
+    for part in dict.fromkeys(parts):
+        if part not in mesh.part_names:
+            raise SpecError("points", f'part "{part}" is not in this mesh.', f"Allowed: {mesh.part_names}.")
+        chosen = np.flatnonzero(part_of_point == part)
+        own = np.flatnonzero(mesh.part_of_element == mesh.part_names.index(part))
+        element[chosen], place[chosen], distance[chosen] = _locate_in(mesh, own, asked[chosen], part)
+    return Location(element, place, distance)
+
+
+def _locate_in(
+    mesh: TaggedMesh, own: NDArray[np.int64], asked: NDArray[np.float64], part: str
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    corners = mesh.points[mesh.tetrahedra[own, :4]]
+    n_candidates = min(CANDIDATES, len(own))
+    _, near = KDTree(corners.mean(axis=1)).query(asked, k=n_candidates)
+    candidates = own[np.reshape(near, (len(asked), n_candidates))]
+    nodes = mesh.points[mesh.tetrahedra[candidates.ravel()]]
+    targets = np.repeat(asked, n_candidates, axis=0)
+    places = _invert_mapping(nodes, targets)
+    outside = _outside(places).reshape(candidates.shape)
+    best = np.argmin(outside, axis=1)
+    row = np.arange(len(asked))
+    chosen_places = places.reshape(*candidates.shape, 3)[row, best]
+    excess = outside[row, best]
+    chosen = candidates[row, best]
+    extent = np.ptp(mesh.points[mesh.tetrahedra[chosen, :4]], axis=1).max(axis=1)
+    far = np.flatnonzero(excess > OUTSIDE_TOLERANCE)
+    if far.size:
+        first = far[0]
+        millimetres = np.round(1e3 * asked[first], 3).tolist()
+        raise GeometryError(
+            f"point {millimetres} mm",
+            f'it lies about {1e3 * excess[first] * extent[first]:.3g} mm outside part "{part}".',
+            "Move the point into the part or name another part.",
+        )
+    return chosen, chosen_places, np.maximum(excess, 0.0) * extent
+
+
+def _outside(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest negative barycentric coordinate; infinite where Newton failed."""
+    lowest = np.minimum(places.min(axis=1), 1.0 - places.sum(axis=1))
+    return np.where(np.isfinite(lowest), np.maximum(-lowest, 0.0), np.inf)
+
+
+def _invert_mapping(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Reference places of targets (n, 3) in quadratic tetrahedra (n, 10, 3)."""
+    edges = (nodes[:, 1:4] - nodes[:, :1]).transpose(0, 2, 1)
+    places = np.linalg.solve(edges, (targets - nodes[:, 0])[:, :, None])[:, :, 0]
+    straight = places.copy()
+    active = np.flatnonzero(np.abs(places).max(axis=1) < 4.0)
+    rejected = np.ones(len(places), dtype=bool)
+    rejected[active] = False
+    for _ in range(NEWTON_STEPS):
+        if not active.size:
+            break
+        values, gradients = quadratic_shape(places[active])
+        residual = targets[active] - np.einsum("en,enx->ex", values, nodes[active])
+        jacobian = np.einsum("enx,enk->exk", nodes[active], gradients)
+        determinant = np.linalg.det(jacobian)
+        sound = np.abs(determinant) > 1e-14 * np.abs(np.linalg.det(edges[active]))
+        step = np.zeros_like(residual)
+        step[sound] = np.linalg.solve(jacobian[sound], residual[sound][:, :, None])[:, :, 0]
+        places[active] += step
+        rejected[active[~sound]] = True
+        moving = np.abs(step).max(axis=1) > NEWTON_TOLERANCE
+        inside_range = np.abs(places[active]).max(axis=1) < 10.0
+        rejected[active[~inside_range]] = True
+        active = active[moving & sound & inside_range]
+    rejected[active] = True
+    return np.where(rejected[:, None], np.where(np.abs(straight) < 4.0, np.nan, straight), places)
+
+
+def quadratic_shape(places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values (n, 10) and gradients (n, 10, 3) of the quadratic tetrahedron at places (n, 3)."""
+    return evaluate_shape(ElementTetP2(), places.T)
+
+
+def probe_matrix(operators: ThermalOperators, points: ArrayLike, parts: Sequence[str]) -> sparse.csr_array:
+    """Rows that give the temperature at points, (n_points, n_unknowns).
+
+    Parameters
+    ----------
+    operators : ThermalOperators
+    points : (n, 3) array_like, [m]
+    parts : sequence of str
+        Part of each point.
+
+    Raises
+    ------
+    GeometryError
+        A point outside its part.
+    """
+    location = locate_points(operators.mesh, points, parts)
+    element = ElementTetP1() if operators.order == 1 else ElementTetP2()
+    values, _ = evaluate_shape(element, location.place.T)
+    columns = operators.mesh.tetrahedra[location.element, : values.shape[1]]
+    rows = np.repeat(np.arange(len(values)), values.shape[1])
+    return sparse.csr_array(
+        (values.ravel(), (rows, columns.ravel())), shape=(len(values), operators.n_unknowns)
+    )
+
+
+def temperature_at_points(
+    operators: ThermalOperators, temperature: NDArray[np.float64], points: ArrayLike, parts: Sequence[str]
+) -> NDArray[np.float64]:
+    """Temperature at points of given parts, (n,) [K]."""
+    return probe_matrix(operators, points, parts) @ temperature
+
+
+def mean_matrix(operators: ThermalOperators, surfaces: Sequence[str]) -> sparse.csr_array:
+    """Rows that give area-mean temperatures of surfaces, (n_surfaces, n_unknowns)."""
+    rows = []
+    for surface in surfaces:
+        facets = operators.rows_of(surface, "mean temperature")
+        weights = operators.facet_vector(np.ones(facets.stop - facets.start), facets)
+        rows.append(sparse.csr_array(weights[None, :] / operators.facet_area[facets].sum()))
+    return sparse.vstack(rows, format="csr")
+
+
+def surface_mean(operators: ThermalOperators, temperature: NDArray[np.float64], surface: str) -> float:
+    """Area-mean temperature of a surface, [K]."""
+    rows = operators.rows_of(surface, "mean temperature")
+    return float(operators.facet_integral(temperature, rows).sum() / operators.facet_area[rows].sum())
+
+
+def facet_means(
+    operators: ThermalOperators, temperature: NDArray[np.float64], surface: str
+) -> NDArray[np.float64]:
+    """Mean temperature of each facet of a surface, (n_facets,) [K]."""
+    rows = operators.rows_of(surface, "facet temperatures")
+    return operators.facet_integral(temperature, rows) / operators.facet_area[rows]
+
+
+def joint_means(
+    operators: ThermalOperators, temperature: NDArray[np.float64], joint: str
+) -> tuple[float, float]:
+    """Mean temperatures of side a and side b of a joint, [K]."""
+    sides = operators.joint_sides(joint, "joint temperatures")
+    means = [
+        float(operators.facet_integral(temperature, rows).sum() / operators.facet_area[rows].sum())
+        for rows in sides
+    ]
+    return means[0], means[1]
+
+
+def part_mean(operators: ThermalOperators, temperature: NDArray[np.float64], part: str) -> float:
+    """Volume-mean temperature of a part, [K]."""
+    own = operators.part_of_unknown == operators.part_index(part, "part mean")
+    return float(operators.part_load[own] @ temperature[own] / operators.part_volume[part])
+
+
+def extreme(
+    operators: ThermalOperators, temperature: NDArray[np.float64], *, hottest: bool = True
+) -> tuple[float, NDArray[np.float64], str]:
+    """Hottest (or coldest) node: temperature [K], place (3,) [m], part."""
+    node = int(np.argmax(temperature) if hottest else np.argmin(temperature))
+    part = operators.mesh.part_names[operators.part_of_unknown[node]]
+    return float(temperature[node]), operators.mesh.points[node], part
+
+
+def temperature_at_nodes(
+    operators: ThermalOperators, temperature: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Temperature at every node of the mesh, edge middles included, (n_nodes,) [K].
+
+    Linear temperatures are interpolated: the mean of an edge's two ends.
+    """
+    if operators.order == 2:
+        return temperature
+    return prolongation_from_corners(operators.mesh) @ temperature
+
+
+def heat_flux_at_nodes(
+    operators: ThermalOperators,
+    temperature: NDArray[np.float64],
+    conductivity: NDArray[np.float64],
+    circumferential_factor: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Heat flux vector at every node of the mesh, averaged over its elements, (n_nodes, 3) [W/m²].
+
+    Parameters
+    ----------
+    operators : ThermalOperators
+    temperature : (n_unknowns,) ndarray, [K]
+    conductivity : (n_parts,) ndarray, [W/(m·K)]
+    circumferential_factor : (n_parts,) ndarray, optional, [-]
+    """
+    mesh = operators.mesh
+    places = ElementTetP2().doflocs
+    _, geometry = quadratic_shape(places)
+    element = ElementTetP1() if operators.order == 1 else ElementTetP2()
+    _, gradients = evaluate_shape(element, places.T)
+    n_local = gradients.shape[1]
+    flux = np.zeros((len(mesh.points), 3))
+    weight = np.zeros(len(mesh.points))
+    k_element = np.asarray(conductivity, dtype=float)[mesh.part_of_element]
+    for local in range(len(places)):
+        nodes = mesh.tetrahedra[:, local]
+        jacobian = np.einsum("enx,nk->exk", mesh.points[mesh.tetrahedra], geometry[local])
+        slope = temperature[mesh.tetrahedra[:, :n_local]] @ gradients[local]
+        gradient = np.linalg.solve(jacobian.transpose(0, 2, 1), slope[:, :, None])[:, :, 0]
+        if circumferential_factor is not None:
+            gradient = _turned(gradient, mesh.points[nodes], circumferential_factor[mesh.part_of_element])
+        volume = np.linalg.det(jacobian)
+        for axis in range(3):
+            flux[:, axis] += np.bincount(
+                nodes, weights=-k_element * gradient[:, axis] * volume, minlength=len(flux)
+            )
+        weight += np.bincount(nodes, weights=volume, minlength=len(flux))
+    if np.any(weight <= 0.0):
+        raise ConvergenceError("heat flux", "an element is inverted at a node.", "Optimise the mesh.")
+    return flux / weight[:, None]
+
+
+def _turned(
+    gradient: NDArray[np.float64], points: NDArray[np.float64], factor: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    radius = np.maximum(np.hypot(points[:, 0], points[:, 1]), np.finfo(float).tiny)
+    along = np.stack((-points[:, 1] / radius, points[:, 0] / radius), axis=1)
+    extra = (factor - 1.0) * np.einsum("ex,ex->e", gradient[:, :2], along)
+    turned = gradient.copy()
+    turned[:, :2] += extra[:, None] * along
+    return turned

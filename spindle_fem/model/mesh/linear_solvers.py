@@ -1,0 +1,433 @@
+"""Linear solvers: a factor for small systems, multigrid conjugate gradients for large ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse.linalg import splu
+
+from spindle_fem.errors import ConvergenceError, SpecError
+from spindle_fem.model.mesh.linear_system import ThermalSystem
+from spindle_fem.model.mesh.multigrid import build_hierarchy
+from spindle_fem.model.mesh.threads import (
+    chunk_bounds,
+    row_blocks,
+    run_blocks,
+    run_team,
+    unsigned,
+    use_compiled,
+)
+
+DIRECT_BELOW = 20_000
+RELATIVE_TOLERANCE = 1e-11
+MAX_ITERATIONS = 400
+# Right-hand sides iterated together: a product with so many reads the matrix once for all.
+COLUMNS_AT_ONCE = 24
+# A residual this small against the matrix times the solution is round-off: no solver gets below.
+ROUND_OFF = 16.0 * np.finfo(float).eps
+
+Method = Literal["direct", "multigrid"]
+Operator = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, slots=True)
+class Preconditioner:
+    """An approximate inverse of a system, to be passed on to similar ones.
+
+    Attributes
+    ----------
+    method : {"direct", "multigrid"}
+    size : int
+        Unknowns, lumped nodes included.
+    apply : callable
+        Approximate solution of ``A x = r``, (n,) or several columns (n, m);
+        symmetric positive definite.
+    """
+
+    method: Method
+    size: int
+    apply: Operator
+
+
+@dataclass(frozen=True, slots=True)
+class LinearSolution:
+    """Solution of a linear system.
+
+    Attributes
+    ----------
+    unknowns : (n,) ndarray
+    iterations : int
+    residual : float, [-]
+        2-norm of the true residual relative to the load's; not a number where
+        an error tolerance ended the iteration.
+    digits : float
+        Decades by which the estimated error fell; only where an error
+        tolerance ended the iteration.
+    """
+
+    unknowns: NDArray[np.float64]
+    iterations: int
+    residual: float
+    digits: float = 0.0
+
+
+def build_preconditioner(system: ThermalSystem, method: Method | None = None) -> Preconditioner:
+    """Factor or multigrid hierarchy of a system without tied nodes.
+
+    Parameters
+    ----------
+    system : ThermalSystem
+        As ``tied()`` returns it.
+    method : {"direct", "multigrid"}, optional
+        Direct below 20,000 unknowns when not given.
+    """
+    size = len(system.load) + system.n_lumped
+    chosen: Method = method or ("direct" if size < DIRECT_BELOW else "multigrid")
+    if chosen == "direct":
+        factor = splu(
+            sparse.csc_matrix(system.full_matrix()),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        return Preconditioner("direct", size, factor.solve)
+    if chosen != "multigrid":
+        raise SpecError("solver", f"{method!r}.", "Allowed: direct, multigrid.")
+    hierarchy = build_hierarchy(system.matrix, system.prolongation)
+    return Preconditioner("multigrid", size, with_lumped_nodes(system, hierarchy.cycle))
+
+
+def with_lumped_nodes(system: ThermalSystem, cycle: Operator) -> Operator:
+    """Extend a cycle on the mesh's unknowns by exact elimination of the lumped nodes."""
+    if not system.n_lumped:
+        return cycle
+    n = len(system.load)
+    exchange, factor = system.exchange, cho_factor(system.lumped_matrix)
+
+    def apply(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+        condensed = residual[:n] + exchange @ cho_solve(factor, residual[n:])
+        unknowns = cycle(condensed)
+        return np.concatenate((unknowns, cho_solve(factor, residual[n:] + exchange.T @ unknowns)))
+
+    return apply
+
+
+def multiply(matrix: sparse.csr_array, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``A x``; by threads in compiled loops where they are worth it.
+
+    Parameters
+    ----------
+    matrix : (n, n) csr_array
+    vector : (n,) ndarray
+    """
+    if not use_compiled(len(vector)) or matrix.data.dtype != np.float64:
+        return matrix @ vector
+    from spindle_fem.model.mesh.kernels import solver_loops as compiled_solver
+
+    answer = np.empty(matrix.shape[0])
+    rows = (*unsigned(matrix.indptr, matrix.indices), matrix.data)
+    run_blocks(
+        compiled_solver.multiply, row_blocks(len(answer)), *rows, np.asarray(vector, dtype=float), answer
+    )
+    return answer
+
+
+def solve_linear(
+    matrix: sparse.csr_array,
+    load: NDArray[np.float64],
+    preconditioner: Preconditioner,
+    guess: NDArray[np.float64] | None = None,
+    *,
+    relative_tolerance: float = RELATIVE_TOLERANCE,
+    error_tolerance: float | None = None,
+    reduction: float = 0.0,
+    max_iterations: int = MAX_ITERATIONS,
+) -> LinearSolution:
+    """Preconditioned conjugate gradients, checked on the true residual.
+
+    Ends at the tolerance, or where the residual is round-off of the product
+    itself (stiff coefficients).
+
+    Parameters
+    ----------
+    matrix : (n, n) csr_array
+        Symmetric positive definite.
+    load : (n,) ndarray
+    preconditioner : Preconditioner
+        Of this matrix or of a similar one.
+    guess : (n,) ndarray, optional
+    relative_tolerance : float, [-]
+        Of the residual's 2-norm against the load's.
+    error_tolerance : float, optional, [K]
+        Ends instead where the preconditioned residual, which estimates the
+        error, is nowhere larger. The norm of the residual itself would let
+        small elements go wrong in short time steps.
+    reduction : float, [-]
+        With an error tolerance: this share of the guess's own error is enough
+        even where it is larger, for use inside an outer iteration.
+    max_iterations : int
+
+    Raises
+    ------
+    ConvergenceError
+        The tolerance was not reached.
+    SpecError
+        The preconditioner has another size.
+    """
+    if preconditioner.size != len(load):
+        raise SpecError(
+            "preconditioner",
+            f"it has {preconditioner.size} unknowns, the system {len(load)}.",
+            "Build it for this mesh and these lumped nodes.",
+        )
+    unknowns = np.zeros_like(load) if guess is None else np.array(guess, dtype=float)
+    residual = load.copy() if guess is None else load - multiply(matrix, unknowns)
+    scale = float(np.linalg.norm(load))
+    if scale == 0.0:
+        scale = float(np.linalg.norm(residual))
+    target = relative_tolerance * scale
+    if error_tolerance is not None:
+        floor = ROUND_OFF * largest(unknowns)
+        first = preconditioner.apply(residual).astype(float, copy=False)
+        estimate = largest(first)
+        wanted = max(error_tolerance, floor, reduction * estimate)
+        if estimate <= wanted:
+            unknowns += first
+            return LinearSolution(unknowns, 0, np.nan)
+        correction, iterations, reached = _to_error(
+            matrix, residual, preconditioner.apply, first, wanted, max_iterations
+        )
+        if iterations >= max_iterations:
+            raise ConvergenceError(
+                "linear solver",
+                f"error above {wanted:.1e} after {iterations} iterations.",
+                "Rebuild the preconditioner or allow more iterations.",
+            )
+        digits = float(np.log10(estimate / max(reached, np.finfo(float).tiny)))
+        unknowns += correction
+        return LinearSolution(unknowns, iterations, np.nan, digits)
+    iterations = 0
+    restarts = 0
+    while (norm := float(np.linalg.norm(residual))) > target:
+        if restarts and norm <= ROUND_OFF * float(np.linalg.norm(matrix.diagonal() * unknowns)):
+            break
+        if iterations >= max_iterations or restarts > 4:
+            raise ConvergenceError(
+                "linear solver",
+                f"residual {norm / scale:.2e} after {iterations} iterations.",
+                f"Asked: {target / scale:.1e}. Rebuild the preconditioner or allow more iterations.",
+            )
+        correction, steps = _conjugate_gradients(
+            matrix, residual, preconditioner.apply, target, max_iterations - iterations
+        )
+        unknowns += correction
+        iterations += steps
+        restarts += 1
+        residual = load - multiply(matrix, unknowns)
+    return LinearSolution(unknowns, iterations, norm / scale if scale else 0.0)
+
+
+def solve_many(
+    matrix: sparse.csr_array,
+    loads: NDArray[np.float64],
+    preconditioner: Preconditioner,
+    guesses: NDArray[np.float64] | None = None,
+    *,
+    relative_tolerance: float,
+    max_iterations: int = MAX_ITERATIONS,
+) -> NDArray[np.float64]:
+    """Several right-hand sides at once by conjugate gradients, each on its own.
+
+    The iterations share only the products: sparse ones with 24 columns take
+    some six times as long as with one. A column ends when its error in the
+    energy norm, estimated as ``√(rᵀ B r)`` with the preconditioner B, is a
+    given share of the norm of its solution.
+
+    Parameters
+    ----------
+    matrix : (n, n) csr_array
+        Symmetric positive definite.
+    loads : (n, m) ndarray
+    preconditioner : Preconditioner
+        Of this matrix or of a similar one.
+    guesses : (n, m) ndarray, optional
+        Galerkin solutions in some space (their energy is taken for their
+        share of the solution's).
+    relative_tolerance : float, [-]
+    max_iterations : int
+
+    Returns
+    -------
+    (n, m) ndarray
+
+    Raises
+    ------
+    ConvergenceError
+        The tolerance was not reached.
+    """
+    solved = np.zeros_like(loads) if guesses is None else np.array(guesses, dtype=float)
+    for first in range(0, loads.shape[1], COLUMNS_AT_ONCE):
+        own = slice(first, first + COLUMNS_AT_ONCE)
+        block = np.ascontiguousarray(solved[:, own])
+        residual = loads[:, own] - matrix @ block
+        known = np.abs(_dots(loads[:, own], block))
+        solved[:, own] = block + _columnwise_gradients(
+            matrix, residual, preconditioner.apply, known, relative_tolerance, max_iterations
+        )
+    return solved
+
+
+def _dots(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.einsum("nm,nm->m", first, second)
+
+
+def _columnwise_gradients(
+    matrix: sparse.csr_array,
+    residual: NDArray[np.float64],
+    precondition: Operator,
+    known: NDArray[np.float64],
+    tolerance: float,
+    limit: int,
+) -> NDArray[np.float64]:
+    """Corrections of all columns; those that have converged leave the iteration."""
+    corrections = np.zeros_like(residual)
+    active = np.arange(residual.shape[1])
+    unknowns = np.zeros_like(residual)
+    direction = precondition(residual)
+    energy = _dots(residual, direction)
+    target = tolerance**2 * (known + energy)
+    for _ in range(limit + 1):
+        going = energy > target
+        if not going.all():
+            corrections[:, active] = unknowns
+            if not going.any():
+                return corrections
+            active, energy, target = active[going], energy[going], target[going]
+            residual, direction, unknowns = (
+                np.ascontiguousarray(item[:, going]) for item in (residual, direction, unknowns)
+            )
+        image = matrix @ direction
+        curvature = _dots(direction, image)
+        if not np.all(curvature > 0.0):
+            raise ConvergenceError(
+                "linear solver", f"the matrix is not positive definite ({curvature.min():.3g})."
+            )
+        step = energy / curvature
+        unknowns += step * direction
+        residual -= step * image
+        preconditioned = precondition(residual)
+        direction *= -step * _dots(preconditioned, image) / energy
+        direction += preconditioned
+        energy = _dots(residual, preconditioned)
+    raise ConvergenceError(
+        "linear solver",
+        f"error {tolerance * np.sqrt((energy / target).max()):.1e} of the solution after {limit} iterations.",
+        f"Asked: {tolerance:.1e}. Allow more iterations.",
+    )
+
+
+def _to_error(
+    matrix: sparse.csr_array,
+    residual: NDArray[np.float64],
+    precondition: Operator,
+    first: NDArray[np.float64],
+    wanted: float,
+    limit: int,
+) -> tuple[NDArray[np.float64], int, float]:
+    """Correction whose estimated error is nowhere above what is wanted, iterations, and that error."""
+    state = _iterate(matrix, residual)
+    preconditioned = first
+    for iteration in range(1, limit + 1):
+        state.advance(preconditioned)
+        preconditioned = precondition(state.residual)
+        reached = largest(preconditioned)
+        if reached <= wanted:
+            state.unknowns += preconditioned
+            return state.unknowns, iteration, reached
+    return state.unknowns, limit, reached
+
+
+class _Iteration:
+    """Conjugate gradients between two applications of the preconditioner."""
+
+    __slots__ = ("_energy", "_image", "_matrix", "_step", "direction", "residual", "unknowns")
+
+    def __init__(self, matrix: sparse.csr_array, residual: NDArray[np.float64]) -> None:
+        self._matrix = matrix
+        self.unknowns = np.zeros_like(residual)
+        self.residual = residual
+        self.direction = np.zeros_like(residual)
+        self._image = np.zeros_like(residual)
+        self._energy = self._step = 0.0
+
+    def advance(self, preconditioned: NDArray[np.float64]) -> float:
+        """Turn, go as far along the new direction as helps; returns the residual's norm."""
+        if self._energy > 0.0:
+            # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
+            self.direction *= -self._step * float(preconditioned @ self._image) / self._energy
+        self.direction += preconditioned
+        self._energy = float(self.residual @ preconditioned)
+        self._image = self._matrix @ self.direction
+        self._step = self._length(float(self.direction @ self._image))
+        self.unknowns += self._step * self.direction
+        self.residual -= self._step * self._image
+        return float(np.linalg.norm(self.residual))
+
+    def _length(self, curvature: float) -> float:
+        if not curvature > 0.0 or not np.isfinite(self._energy):
+            raise ConvergenceError("linear solver", f"the matrix is not positive definite ({curvature:.3g}).")
+        return self._energy / curvature
+
+
+class _CompiledIteration(_Iteration):
+    """The same in one compiled call that threads share."""
+
+    __slots__ = ("_bounds", "_rows", "_run", "_shares")
+
+    def __init__(self, matrix: sparse.csr_array, residual: NDArray[np.float64]) -> None:
+        from spindle_fem.model.mesh.kernels.team_loops import conjugate_step
+
+        super().__init__(matrix, residual)
+        self._run = conjugate_step
+        self._rows = (*unsigned(matrix.indptr, matrix.indices), matrix.data)
+        self._bounds = chunk_bounds(matrix.indptr)
+        self._shares = np.empty((4, len(self._bounds) - 1))
+
+    def advance(self, preconditioned: NDArray[np.float64]) -> float:
+        run_team(
+            self._run, len(self._bounds) - 1, self._bounds, *self._rows, preconditioned, self.residual,
+            self._image, self.direction, self.unknowns, self._step, self._energy, self._shares,
+        )  # fmt: skip
+        _, self._energy, curvature, square = self._shares.sum(axis=1).tolist()
+        self._step = self._length(curvature)
+        return float(np.sqrt(square))
+
+
+def _iterate(matrix: sparse.csr_array, residual: NDArray[np.float64]) -> _Iteration:
+    kind = _CompiledIteration if use_compiled(len(residual)) else _Iteration
+    return kind(matrix, residual)
+
+
+def _conjugate_gradients(
+    matrix: sparse.csr_array,
+    load: NDArray[np.float64],
+    precondition: Operator,
+    target: float,
+    limit: int,
+) -> tuple[NDArray[np.float64], int]:
+    state = _iterate(matrix, load.copy())
+    for iteration in range(1, limit + 1):
+        if state.advance(precondition(state.residual).astype(float, copy=False)) <= target:
+            return state.unknowns, iteration
+    return state.unknowns, limit
+
+
+def largest(vector: NDArray[np.float64]) -> float:
+    """Largest size of a vector's entries, without a vector of sizes."""
+    return max(float(vector.max(initial=0.0)), -float(vector.min(initial=0.0)))

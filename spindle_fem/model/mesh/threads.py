@@ -1,0 +1,208 @@
+"""Whether compiled loops are there, and the threads that share their rows."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
+from functools import cache, partial
+from importlib.util import find_spec
+from queue import SimpleQueue
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.model.mesh.huge_pages import room
+
+# Loading compiled code takes as long as it saves on so many unknowns.
+COMPILED_ABOVE = 40_000
+# A block of fewer rows costs more to hand over than it saves.
+LEAST_ROWS = 15_000
+# A chunk of work for a team: few hand-overs against some 20 µs of work, and all threads end together.
+ENTRIES_A_CHUNK = 30_000
+MOST_CHUNKS = 32
+# Room for the two counters of a team, on cache lines of their own.
+N_COUNTERS = 32
+_ONE: ContextVar[bool] = ContextVar("one_thread", default=False)
+
+
+@cache
+def has_compiled() -> bool:
+    """Whether numba is installed and ``SPINDLE_FEM_COMPILED`` does not forbid it (``0``)."""
+    return os.environ.get("SPINDLE_FEM_COMPILED", "1") != "0" and find_spec("numba") is not None
+
+
+def use_compiled(n_unknowns: int) -> bool:
+    """Whether a problem of this size is worth compiled loops, and they are there."""
+    return n_unknowns >= COMPILED_ABOVE and has_compiled()
+
+
+def thread_count() -> int:
+    """Threads of compiled loops: one within :func:`one_thread`, else what the machine gives."""
+    return 1 if _ONE.get() else _given_threads()
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Compiled loops with one thread: the order of sums, and so the last digits, depend on their number."""
+    token = _ONE.set(True)
+    try:
+        yield
+    finally:
+        _ONE.reset(token)
+
+
+@cache
+def _given_threads() -> int:
+    """``SPINDLE_FEM_THREADS``, else ``OMP_NUM_THREADS``, else the cores given."""
+    for name in ("SPINDLE_FEM_THREADS", "OMP_NUM_THREADS"):
+        given = os.environ.get(name, "")
+        if given.isdigit() and int(given) > 0:
+            return int(given)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _jobs(count: int, process: int) -> SimpleQueue:
+    """Where so many threads of a process wait for work; handing over to a pool takes five times as long."""
+    jobs: SimpleQueue = SimpleQueue()
+    for index in range(count):
+        threading.Thread(target=_serve, args=(jobs,), name=f"spindle-fem-{index}", daemon=True).start()
+    return jobs
+
+
+def _serve(jobs: SimpleQueue) -> None:
+    while True:
+        jobs.get()()
+
+
+def _hand_over(count: int, job: Callable[[], object]) -> None:
+    """Have a job called by so many other threads, once each."""
+    jobs = _jobs(count, os.getpid())
+    for _ in range(count):
+        jobs.put(job)
+
+
+def row_blocks(n_rows: int) -> NDArray[np.int64]:
+    """Bounds of the ranges that threads work on, (n_blocks + 1,)."""
+    count = max(1, min(thread_count(), n_rows // LEAST_ROWS))
+    return np.linspace(0, n_rows, count + 1).astype(np.int64)
+
+
+def chunk_bounds(starts: NDArray) -> NDArray[np.int64]:
+    """Bounds of ranges of compressed rows with about as many entries each, (n_chunks + 1,).
+
+    They do not depend on the number of threads, so that neither do sums over them.
+    """
+    total = int(starts[-1])
+    count = max(1, min(total // ENTRIES_A_CHUNK, MOST_CHUNKS, len(starts) - 1))
+    bounds = np.searchsorted(starts, np.linspace(0, total, count + 1)).astype(np.int64)
+    bounds[0], bounds[-1] = 0, len(starts) - 1
+    return bounds
+
+
+def run_team(function: Callable, n_chunks: int, *arguments: object) -> None:
+    """Call ``function(is_first, counters, *arguments)`` in as many threads as are worth it.
+
+    For loops whose members claim chunks from the counters (``compiled_teams``): the
+    calling thread is the first and returns when all is done, whoever did it. Others
+    join when they come; one that finds nothing left to claim leaves again.
+    """
+    counters = np.zeros(N_COUNTERS, dtype=np.int64)
+    count = min(thread_count(), n_chunks)
+    if count > 1:
+        _hand_over(count - 1, partial(function, False, counters, *arguments))
+    function(True, counters, *arguments)
+
+
+def run_jobs(jobs: Sequence[Callable[[], object]]) -> list:
+    """Call functions, each in whatever thread is free, and return what they return in their order.
+
+    The calling thread takes part; idle threads sleep.
+    """
+    answers: list = [None] * len(jobs)
+    places, done = iter(range(len(jobs))), SimpleQueue()
+
+    def work() -> None:
+        # taking the next of a range is one step of the interpreter
+        for place in places:
+            try:
+                answers[place] = jobs[place]()
+                done.put(None)
+            except Exception as error:  # noqa: BLE001 - the caller raises it
+                done.put(error)
+
+    count = min(thread_count(), len(jobs))
+    if count > 1:
+        _hand_over(count - 1, work)
+    work()
+    errors = [done.get() for _ in jobs]
+    for error in errors:
+        if error is not None:
+            raise error
+    return answers
+
+
+def run_blocks(function: Callable, bounds: NDArray[np.int64], *arguments: object) -> list:
+    """Call ``function(low, high, *arguments)`` for every range, and return what the calls return."""
+    return run_jobs([partial(function, low, high, *arguments) for low, high in itertools.pairwise(bounds)])
+
+
+def fill_rows(
+    function: Callable,
+    n_rows: int,
+    given: tuple,
+    entries_a_row: float,
+    kinds: tuple[type, ...] = (np.int32, np.float64),
+) -> tuple[NDArray, ...]:
+    """Compressed rows whose lengths are not known before: starts, columns and what goes with them.
+
+    ``function(low, high, *given, counts, columns, ...)`` fills a range of rows, writes
+    row i's length to ``counts[i + 1]`` and returns how many entries it made, or -1 when
+    these did not fit. ``kinds`` are the types of the columns and of the others.
+    """
+    counts = np.zeros(n_rows + 1, dtype=np.int32)
+    blocks = row_blocks(n_rows)
+    spaces = [int(entries_a_row * rows) + 1024 for rows in np.diff(blocks)]
+    while True:
+        begins = np.concatenate(([0], np.cumsum(spaces)))
+        parts = [room(int(begins[-1]), kind) for kind in kinds]
+
+        def fill(low: int, high: int, begins: NDArray = begins, parts: list[NDArray] = parts) -> int:
+            k = int(np.searchsorted(blocks, low, side="right")) - 1
+            return function(low, high, *given, counts, *(part[begins[k] : begins[k + 1]] for part in parts))
+
+        made = run_blocks(fill, blocks)
+        if min(made) >= 0:
+            break
+        spaces = [
+            space + (space // 2 if entries < 0 else 0) for space, entries in zip(spaces, made, strict=True)
+        ]
+    # in 32 bits: numpy would sum in 64 and, in place, through a buffer
+    starts = np.cumsum(counts, dtype=np.int32)
+    for part in parts:
+        end = made[0]
+        for begin, entries in zip(begins[1:-1], made[1:], strict=True):
+            _move(part, begin, end, entries)
+            end += entries
+    # the rest was never touched and takes no memory
+    return starts, *(part[: starts[-1]] for part in parts)
+
+
+def _move(array: NDArray, begin: int, to: int, count: int) -> None:
+    """Move a slice towards the front, in pieces that do not overlap themselves."""
+    gap = begin - to
+    for done in range(0, count if gap else 0, max(gap, 1)):
+        size = min(gap, count - done)
+        array[to + done : to + done + size] = array[begin + done : begin + done + size]
+
+
+def unsigned(*arrays: NDArray) -> tuple[NDArray[np.uint32], ...]:
+    """Indices as unsigned 32-bit integers; no copy where they are 32 bits wide.
+
+    Compiled loops test signed indices for "from the end" at every access.
+    """
+    return tuple(array.astype(np.int32, copy=False).view(np.uint32) for array in arrays)

@@ -1,0 +1,415 @@
+"""Make a reduced model: snapshots, basis, check against the full model, enrichment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.errors import ConvergenceError
+from spindle_fem.model.reduced.affine_operators import AffineSystem, build_affine_system
+from spindle_fem.model.reduced.coefficients import (
+    CHANNEL_FILM,
+    CoefficientTable,
+    build_coefficient_table,
+    free_parameters,
+    gap_radii_of,
+)
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.probe_places import ACROSS, AROUND, NEAR, UP
+from spindle_fem.model.reduced.projected_model import (
+    ReducedModel,
+    family_of,
+    project,
+    reduced_digest,
+    reduced_path,
+)
+from spindle_fem.model.reduced.snapshots import (
+    Sample,
+    SnapshotSpace,
+    helix_profiles,
+    load_columns,
+    shifted_systems,
+)
+from spindle_fem.operation.coolant_loop import CoolantLoop
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class ReductionOptions:
+    """How a reduced model is made.
+
+    Attributes
+    ----------
+    samples : int
+        Sets of coefficients beside the nominal one; where too few, the checks add some.
+    checks : int
+        Sets that the basis is not made from.
+    sigmas : float
+        Half width of the sampled range in standard deviations.
+    tolerance : float, [-]
+        Of the proper orthogonal decomposition.
+    error : float, [K]
+        Largest error at any probe in the checks, for loads as large as they occur.
+    largest : int
+        Basis vectors at most; 30 more each time that a check fails.
+    highest_speed : float or None, [rad/s]
+        Of the sampled range; the heat table's last, or the definition's speed
+        where that is higher, when None.
+    """
+
+    samples: int = 5
+    checks: int = 3
+    sigmas: float = 3.0
+    tolerance: float = 3.0e-6
+    error: float = 5.0e-3
+    largest: int = 170
+    highest_speed: float | None = None
+
+    def key(self, spec: MachineSpec) -> dict[str, float]:
+        """What of it a model's identity depends on."""
+        return {**asdict(self), "highest_speed": self.highest_speed_of(spec)}
+
+    def highest_speed_of(self, spec: MachineSpec) -> float:
+        """Highest speed that the range holds, rad/s."""
+        if self.highest_speed is not None:
+            return self.highest_speed
+        table = spec.heat.table
+        return max(spec.operation.speed, table.speed[-1] if table is not None else 0.0)
+
+
+# Laplace frequencies, 1/s: steady state, hours, minutes, half a minute.
+SHIFTS = (0.0, 3.0e-4, 3.0e-3)
+FAST_SHIFT = 3.0e-2
+FRICTION_HEAT = 80.0
+PLACE_HEAT = 50.0
+GUESS_SIZE = 80
+# Of an error itself.
+CHECK_TOLERANCE = 0.05
+FLUID_RISE = 10.0
+# Steps of the series in the change of one contact that the basis holds, and the share of its conductance
+# that is left where all contacts of a group have opened.
+CONTACT_ORDERS, OPENED = 2, 0.05
+# Of the highest speed; the second is the nominal one.
+SPEED_SHARES = (0.0, 2.0 / 3.0, 0.25, 1.0, 0.45)
+
+
+@dataclass(frozen=True, slots=True)
+class _Workshop:
+    """What building the snapshots needs beside the operators."""
+
+    machine: PreparedMachine
+    affine: AffineSystem
+    table: CoefficientTable
+    sigma: Mapping[str, float]
+    options: ReductionOptions
+
+    @property
+    def usual_speed(self) -> float:
+        """Of the nominal coefficients, rad/s."""
+        return SPEED_SHARES[1] * self.options.highest_speed_of(self.machine.spec)
+
+    def sample(self, factors: Mapping[str, float], speed: float) -> Sample:
+        """Coefficients with factors at a speed."""
+        spec = self.machine.spec
+        point = replace(OperatingPoint.of(spec), speed=speed)
+        chosen = self.table.factors(factors)
+        chosen.pop("heat.inner_share", None)
+        base = self.table.base(point)
+        coefficients = {
+            name: base[name] * self.table.scale(name, chosen) for name in self.affine.coefficient_names
+        }
+        capacities = {
+            name: value * self.table.scale(name, chosen) for name, value in self.table.capacities().items()
+        }
+        film = nominal_channel_film(self.machine, point) * self.table.scale(CHANNEL_FILM, chosen)
+        return Sample(coefficients, film, capacities)
+
+    def random_samples(self, number: int, seed: int, sigmas: float) -> list[Sample]:
+        """Latin hypercube over all parameters; the speeds take turns."""
+        names = tuple(self.sigma)
+        highest = self.options.highest_speed_of(self.machine.spec)
+        unit = qmc.LatinHypercube(max(1, len(names)), rng=seed).random(number)
+        found = []
+        for row, values in enumerate(unit):
+            factors = {
+                name: float(np.exp(sigmas * self.sigma[name] * (2.0 * value - 1.0)))
+                for name, value in zip(names, values, strict=False)
+            }
+            found.append(self.sample(factors, SPEED_SHARES[row % len(SPEED_SHARES)] * highest))
+        return found
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest coefficient that the samples may have."""
+        ends = []
+        highest = self.options.highest_speed_of(self.machine.spec)
+        for share in SPEED_SHARES:
+            for sign in (-1.0, 1.0):
+                factors = {
+                    name: float(np.exp(sign * self.options.sigmas * s)) for name, s in self.sigma.items()
+                }
+                sample = self.sample(factors, share * highest)
+                ends.append(
+                    sample.coefficients
+                    | sample.capacities
+                    | ({CHANNEL_FILM: float(sample.channel_film.mean())} if sample.channel_film.size else {})
+                )
+        return {name: (min(e[name] for e in ends), max(e[name] for e in ends)) for name in ends[0]}
+
+
+def nominal_channel_film(machine: PreparedMachine, point: OperatingPoint) -> Array:
+    """Film of every coolant cell with the wall at inlet temperature, (n_cells,) W/(m²·K)."""
+    cells = machine.builder.cells
+    if cells is None:
+        return np.zeros(0)
+    wall = np.full(cells.cell_area.shape, point.coolant_inlet_temperature)
+    return CoolantLoop(machine.spec, cells).at(point, wall).film_coefficient.ravel()
+
+
+def reduced_model_of(
+    spec: MachineSpec,
+    *,
+    options: ReductionOptions | None = None,
+    as_given: bool = False,
+    progress: Progress = lambda stage: None,
+) -> ReducedModel:
+    """Reduced model of a machine, from the cache where it was made before.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    options : ReductionOptions, optional
+    as_given : bool
+        Whether the coefficients stay as the definition gives them; a model of
+        a machine that differs in coefficients only will then do, where its
+        range holds these.
+    progress : callable
+        Told each stage by name as it begins.
+    """
+    chosen = options or ReductionOptions()
+    digest = reduced_digest(spec, chosen.key(spec))
+    found = ReducedModel.load(reduced_path(digest))
+    if found is not None and found.digest == digest:
+        return found
+    for path in family_of(digest) if as_given else []:
+        found = ReducedModel.load(path)
+        if found is not None and _holds(found, spec, chosen.highest_speed_of(spec)):
+            return found
+    machine = prepare_machine(spec, progress=progress)
+    model = build_reduced_model(machine, chosen, progress=progress)
+    model.save(reduced_path(digest))
+    return model
+
+
+def _holds(model: ReducedModel, spec: MachineSpec, highest_speed: float) -> bool:
+    """Whether every coefficient of a machine is in the range of a model, from rest to a speed (rad/s)."""
+    fast = FastModel(model, spec)
+    values = [fast.table.capacities()]
+    for share in SPEED_SHARES:
+        point = replace(OperatingPoint.of(spec), speed=share * highest_speed)
+        values.append(fast.coefficients(point, {}))
+    return not any(model.outside_range(item) for item in values)
+
+
+def build_reduced_model(
+    machine: PreparedMachine,
+    options: ReductionOptions | None = None,
+    *,
+    progress: Progress = lambda stage: None,
+) -> ReducedModel:
+    """Project a prepared machine and check the projection against the full model.
+
+    Snapshots are full solutions at several Laplace frequencies (moment
+    matching, rational Krylov) for every source and fluid at the nominal
+    coefficients, and for the physical loads at coefficients drawn over the
+    range, each begun from the projection on those before; their proper
+    orthogonal decomposition in the energy of the nominal operator is the
+    basis. The check corrects projected solutions at other coefficients by the
+    full model; where they err by more than ``options.error``, the full
+    solutions join the snapshots.
+
+    Raises
+    ------
+    ConvergenceError
+        The checks still err after three rounds.
+    """
+    chosen = options or ReductionOptions()
+    spec = machine.spec
+    progress("reduced model: operators")
+    affine = build_affine_system(machine)
+    radii = gap_radii_of(machine)
+    table = build_coefficient_table(spec, machine.mesh.joints, radii)
+    workshop = _Workshop(machine, affine, table, free_parameters(spec), chosen)
+    nominal = workshop.sample({}, workshop.usual_speed)
+    progress("reduced model: snapshots")
+    energy = (
+        affine.conduction(nominal.coefficients, nominal.channel_film)
+        + 1e-4 * affine.capacity(nominal.capacities)
+    ).tocsr()
+    space = SnapshotSpace(energy, np.ones((affine.size, 1)), chosen.tolerance)
+    _add_nominal(space, affine, nominal, spec)
+    opened = [workshop.sample({f"joint.{group.name}": OPENED}, workshop.usual_speed) for group in spec.joint]
+    for sample in (*opened, *workshop.random_samples(chosen.samples, 1, chosen.sigmas)):
+        # Fields at other coefficients begin as the best combination of those known.
+        known = space.basis(GUESS_SIZE)
+        loads = physical_loads(affine, sample, spec)
+        systems = shifted_systems(affine, sample, SHIFTS, known)
+        space.add(np.hstack([system.solve(loads) for system in systems]))
+    seed = 2
+    for attempt in range(3):
+        progress("reduced model: basis")
+        basis = space.basis(chosen.largest + 30 * attempt)
+        model = project(
+            affine,
+            basis,
+            basis.T @ (energy @ np.ones(affine.size)),
+            cells=machine.builder.cells,
+            contacts=tuple(machine.mesh.joints),
+            gap_radii=radii,
+            ranges=workshop.ranges(),
+            digest=reduced_digest(spec, chosen.key(spec)),
+        )
+        progress("reduced model: check")
+        worst: dict[str, float] = {}
+        # Solutions that have joined can no longer judge: every round draws others.
+        for sample in workshop.random_samples(chosen.checks, seed, 0.9 * chosen.sigmas):
+            found = _check(affine, basis, sample, spec)
+            worst = {key: max(value, worst.get(key, 0.0)) for key, value in found.errors.items()}
+            if found.errors["probes"] > chosen.error:
+                for solution in found.solutions:
+                    space.add(solution)
+        seed += 100
+        model = replace(model, errors=worst)
+        if worst["probes"] <= chosen.error:
+            return model
+    raise ConvergenceError(
+        "reduced model",
+        f"its probes still err by {worst['probes']:.3g} K with {model.size} basis vectors.",
+        f"Asked: {chosen.error:g} K. Allow more basis vectors or a larger error.",
+    )
+
+
+def _source_places(affine: AffineSystem, spec: MachineSpec) -> tuple[list[str], list[str]]:
+    """Places where friction heat enters, and those where a diagnosis may need a source."""
+    friction = [
+        f"{bearing.name}.{side}"
+        for _, bearing in spec.bearings
+        for side in ("inner_raceway", "outer_raceway", "balls")
+    ]
+    rings = {
+        f"{bearing.name}.{side}" for _, bearing in spec.bearings for side in ("inner_ring", "outer_ring")
+    }
+    segments = {f"{part.name}.{segment.name}" for part in spec.part for segment in part.segment}
+    single = {f"{part.name}.{part.segment[0].name}" for part in spec.part if len(part.segment) == 1}
+    other = [name for name in affine.place_names if name in segments - single or name in rings]
+    other += [part.name for part in spec.part if len(part.segment) == 1]
+    other += [name for name in affine.place_names if name.startswith((NEAR, AROUND, UP, ACROSS))]
+    return friction, other
+
+
+def _add_nominal(space: SnapshotSpace, affine: AffineSystem, nominal: Sample, spec: MachineSpec) -> None:
+    """Every source and fluid by itself at the nominal coefficients."""
+    friction, other = _source_places(affine, spec)
+    heat = FRICTION_HEAT * load_columns(affine, friction)
+    fluids = [nominal.coefficients[name] * FLUID_RISE * load for name, load in affine.fluid_load.items()]
+    columns = [heat, PLACE_HEAT * load_columns(affine, other), np.array(fluids).reshape(-1, affine.size).T]
+    columns.append(_coolant_loads(affine, nominal, 5))
+    loads = np.hstack(columns)
+    known = None
+    for shift in (*SHIFTS, FAST_SHIFT):
+        [system] = shifted_systems(affine, nominal, [shift], known)
+        space.add(system.solve(heat if shift == FAST_SHIFT else loads))
+        known = space.basis(GUESS_SIZE)
+    _add_contacts(space, affine, nominal, spec)
+
+
+def _add_contacts(space: SnapshotSpace, affine: AffineSystem, nominal: Sample, spec: MachineSpec) -> None:
+    """What each contact by itself changes, at the nominal coefficients.
+
+    The uncertain parameters move the contacts of a set together: the field beside one seat that is worse
+    than the others is in no other solution. ``K⁻¹ g J u``, and the same of that, are the first terms of
+    the series in a share of one conductance g with the operator J.
+    """
+    contacts = [
+        nominal.coefficients[name] * operator
+        for name, operator in zip(affine.coefficient_names, affine.operators, strict=True)
+        if name.startswith("joint.")
+    ]
+    loads = physical_loads(affine, nominal, spec)
+    for system in shifted_systems(affine, nominal, SHIFTS, space.basis(GUESS_SIZE)):
+        fields = system.solve(loads)
+        # All loads press heat through a contact much alike: the largest combination stands for them.
+        columns = [_largest_combination(contact @ fields) for contact in contacts]
+        for _ in range(CONTACT_ORDERS):
+            changes = system.solve(np.column_stack(columns))
+            space.add(changes)
+            columns = [contact @ change for contact, change in zip(contacts, changes.T, strict=True)]
+
+
+def _largest_combination(columns: Array) -> Array:
+    """The combination of columns (n, m) of the largest norm that unit weights can have, (n,)."""
+    _, vectors = np.linalg.eigh(columns.T @ columns)
+    return columns @ vectors[:, -1]
+
+
+def _coolant_loads(affine: AffineSystem, sample: Sample, degree: int) -> Array:
+    if not affine.cell_film:
+        return np.zeros((affine.size, 0))
+    profiles = helix_profiles(*affine.cell_area.shape, degree) * FLUID_RISE
+    return np.asarray(affine.cell_load.T @ (sample.channel_film[:, None] * profiles))
+
+
+def physical_loads(affine: AffineSystem, sample: Sample, spec: MachineSpec) -> Array:
+    """Loads that occur: heat of each set on inner and on outer raceways, air, coolant."""
+    columns = []
+    for group in spec.bearing_set:
+        for side in ("inner_raceway", "outer_raceway"):
+            names = [f"{bearing.name}.{side}" for bearing in group.bearing]
+            columns.append(FRICTION_HEAT * load_columns(affine, names).sum(axis=1))
+    if affine.fluid_load:
+        films = sum(sample.coefficients[name] * load for name, load in affine.fluid_load.items())
+        columns.append(FLUID_RISE * films)
+    coolant = _coolant_loads(affine, sample, 1)
+    return np.column_stack([*columns, *coolant.T])
+
+
+@dataclass(frozen=True, slots=True)
+class _Check:
+    """A basis against the full model at one sample.
+
+    Attributes
+    ----------
+    errors : mapping of str to float, [K]
+        Largest over loads and frequencies, by what was compared.
+    solutions : tuple of (n, m) ndarray
+        Of the full model.
+    """
+
+    errors: dict[str, float]
+    solutions: tuple[Array, ...]
+
+
+def _check(affine: AffineSystem, basis: Array, sample: Sample, spec: MachineSpec) -> _Check:
+    """Correct the projected solutions by the full model; the corrections are the errors."""
+    loads = physical_loads(affine, sample, spec)
+    worst = {"probes": 0.0, "places": 0.0}
+    solutions = []
+    for system in shifted_systems(affine, sample, SHIFTS, basis):
+        projected = basis @ np.linalg.solve(system.projected, basis.T @ loads)
+        missing = system.correct(loads, projected, CHECK_TOLERANCE)
+        worst["probes"] = max(worst["probes"], _largest(affine.probes @ missing))
+        worst["places"] = max(worst["places"], _largest(affine.places @ missing))
+        solutions.append(projected + missing)
+    return _Check(worst, tuple(solutions))
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max()) if values.size else 0.0

@@ -1,0 +1,332 @@
+"""Inputs of a machine over time, and the classes of operating points that share their operators."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.term import COVARIATE
+from spindle_fem.errors import RecordingError
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+# Of the channel's film at constant Nusselt number: 0.02 % a kelvin and 0.3 % a per cent. Where it follows
+# viscosity, about 1 % a kelvin.
+INLET_BIN = 1.0
+FLOW_BIN = 0.01
+SPEED_BIN = 2.0e-3
+MOST_CLASSES = 60
+# Walls of the channel whose mean differs by less share a film where films follow the wall, K; that many
+# classes more at most.
+WALL_BIN, MOST_WALLS = 0.5, 200
+LARGEST_STEP = 60.0
+MOST_STEP_SIZES = 200
+
+STANDARD = ("speed", "thrust", "ambient", "coolant_inlet", "coolant_flow")
+
+
+@dataclass(frozen=True, slots=True)
+class WarmedPoint(OperatingPoint):
+    """Operating point with the temperature of the channel's wall.
+
+    Attributes
+    ----------
+    channel_wall : (n_cells,) ndarray, [K]
+        Mean of each cell over the steps of a class.
+    """
+
+    channel_wall: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Inputs on a grid of steps.
+
+    Attributes
+    ----------
+    times : (N,) ndarray, [s]
+        Where outputs are wanted.
+    grid : (G + 1,) ndarray, [s]
+        Ends of the steps.
+    names : tuple of str
+        ``speed`` [rad/s], ``thrust`` [N], ``ambient``, ``coolant_inlet`` [K],
+        ``coolant_flow`` [m³/s], then ``heat.<source>`` [W] and
+        ``covariate.<column>``, which only terms may follow: means over each step.
+    start, end : (G, m) ndarray
+        Inputs just after the start and just before the end of each step.
+    step_class : (G,) int ndarray
+        Class of each step.
+    points : tuple of OperatingPoint
+        Mean operating point of each class.
+    notes : tuple of str
+    restarts : tuple of int
+        Points of the grid at which a network starts again, after a long gap.
+    """
+
+    times: Array
+    grid: Array
+    names: tuple[str, ...]
+    start: Array
+    end: Array
+    step_class: NDArray[np.int64]
+    points: tuple[OperatingPoint, ...]
+    notes: tuple[str, ...]
+    restarts: tuple[int, ...] = ()
+
+    @property
+    def steps(self) -> Array:
+        """Length of each step, (G,) [s]."""
+        return np.diff(self.grid)
+
+    def column(self, name: str) -> int:
+        """Column of an input."""
+        return self.names.index(name)
+
+    def first(self, name: str) -> float:
+        """Value of an input at the start."""
+        return float(self.start[0, self.column(name)])
+
+
+def standard_inputs(spec: MachineSpec) -> dict[str, float]:
+    """Inputs as the definition has them, for those that a recording does not give."""
+    point = OperatingPoint.of(spec)
+    return {
+        "speed": point.speed,
+        "thrust": point.thrust,
+        "ambient": point.ambient_temperature,
+        "coolant_inlet": point.coolant_inlet_temperature,
+        "coolant_flow": point.coolant_flow,
+    }
+
+
+def drive_of_recording(
+    spec: MachineSpec, recording: Recording, *, largest_step: float = LARGEST_STEP
+) -> Drive:
+    """Inputs of a recording on the steps of its own grid.
+
+    Raises
+    ------
+    RecordingError
+        An input that the machine does not know, or a speed that is not given.
+    """
+    known = standard_inputs(spec)
+    unknown = [n for n in recording.input_names if n not in known and not n.startswith("heat.")]
+    if unknown:
+        raise RecordingError(
+            recording.source,
+            f'drives "{unknown[0]}", which a machine with geometry does not have.',
+            f"Allowed: {', '.join(known)}, heat.<source>.",
+        )
+    if "speed" not in recording.input_names:
+        raise RecordingError(
+            recording.source, "no channel drives the speed.", 'Add an input channel with drives = "speed".'
+        )
+    notes = [
+        f'"{name}" is not recorded: the definition\'s value is used'
+        for name in known
+        if name not in recording.input_names
+    ]
+    names = (*known, *(n for n in recording.input_names if n.startswith("heat.")))
+    history = recording.input_history()
+    columns, held = [], []
+    for name in names:
+        if name in history.names:
+            position = history.names.index(name)
+            values = history.values[:, position]
+            # Friction does not know which way a spindle turns.
+            columns.append(np.abs(values) if name == "speed" else values)
+            held.append(bool(history.held[position]))
+        else:
+            columns.append(np.full(recording.times.size, known[name]))
+            held.append(True)
+    beside = recording.covariate_history()
+    names = (*names, *(COVARIATE + name for name in beside))
+    columns += beside.values()
+    held += [False] * len(beside)
+    return make_drive(
+        recording.times,
+        names,
+        np.column_stack(columns),
+        np.array(held),
+        notes=tuple(notes),
+        largest_step=largest_step,
+    )
+
+
+def make_drive(
+    times: Array,
+    names: tuple[str, ...],
+    values: Array,
+    held: NDArray[np.bool_],
+    *,
+    notes: tuple[str, ...] = (),
+    largest_step: float = LARGEST_STEP,
+) -> Drive:
+    """Inputs on steps no longer than allowed, sorted into classes.
+
+    Parameters
+    ----------
+    times : (N,) ndarray, [s]
+        Strictly increasing.
+    names : tuple of str
+        The standard ones first, as in :class:`Drive`.
+    values : (N, m) ndarray, SI
+    held : (m,) bool ndarray
+    largest_step : float, [s]
+    """
+    if names[: len(STANDARD)] != STANDARD:
+        raise RecordingError("inputs", f"named {names}.", f"Allowed: {STANDARD} first.")
+    grid, start, end = inputs_on_steps(np.asarray(times, dtype=float), values, held, largest_step)
+    level_covariates(names, start, end)
+    step_class, points = classes_of(0.5 * (start + end))
+    return Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
+
+
+def inputs_on_steps(
+    times: Array, values: Array, held: NDArray[np.bool_], largest_step: float, breaks: Sequence[float] = ()
+) -> tuple[Array, Array, Array]:
+    """Ends of the steps (G + 1,), and the inputs at the start and end of each (G, m).
+
+    Parameters
+    ----------
+    times : (N,) ndarray, [s]
+    values : (N, m) ndarray
+    held : (m,) bool ndarray
+    largest_step : float, [s]
+    breaks : sequence of float, [s]
+        Stamps that begin a new segment: one step, of any length, leads to each.
+    """
+    grid = _grid(times, values[:, held], largest_step, np.asarray(breaks, dtype=float))
+    start, end = np.empty((grid.size - 1, len(held))), np.empty((grid.size - 1, len(held)))
+    owner = np.searchsorted(times, 0.5 * (grid[:-1] + grid[1:]), side="right") - 1
+    for column in range(len(held)):
+        if held[column]:
+            start[:, column] = end[:, column] = values[owner, column]
+        else:
+            on_grid = np.interp(grid, times, values[:, column])
+            start[:, column], end[:, column] = on_grid[:-1], on_grid[1:]
+    return grid, start, end
+
+
+def level_covariates(names: Sequence[str], start: Array, end: Array) -> None:
+    """Let covariates keep their mean over each step, in place: what follows them sees one value."""
+    for column in covariate_columns(names):
+        start[:, column] = end[:, column] = 0.5 * (start[:, column] + end[:, column])
+
+
+def covariate_columns(names: Sequence[str]) -> list[int]:
+    """Columns that were recorded beside the inputs."""
+    return [column for column, name in enumerate(names) if name.startswith(COVARIATE)]
+
+
+def _grid(times: Array, held: Array, largest: float, breaks: Array) -> Array:
+    """Ends of the steps: every stamp, long gaps divided; few sizes only where stamps jitter."""
+    gaps = np.diff(times)
+    bridges = np.isin(times[1:], breaks)
+    pieces = np.where(bridges, 1, np.maximum(1, np.ceil(gaps / largest - 1e-9).astype(int)))
+    if np.unique(np.round((gaps / pieces)[~bridges], 6)).size <= MOST_STEP_SIZES:
+        within = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        return np.append(np.repeat(times[:-1], pieces) + within * np.repeat(gaps / pieces, pieces), times[-1])
+    # Equal steps between the changes of held inputs; outputs are interpolated between them.
+    changes = times[1:][np.any(np.diff(held, axis=0) != 0.0, axis=1)]
+    step = min(largest, float(np.median(gaps)))
+    edges = np.unique(np.concatenate(([times[0]], changes, times[:-1][bridges], breaks, [times[-1]])))
+    parts = []
+    for begin, stop in itertools.pairwise(edges):
+        if stop in breaks:
+            parts.append(np.array([begin]))
+            continue
+        whole = int(np.floor((stop - begin) / step * (1.0 + 1e-9)))
+        parts.append(
+            begin + step * np.arange(whole + 1 if begin + whole * step < stop - 1e-6 * step else whole)
+        )
+    return np.append(np.concatenate(parts), times[-1])
+
+
+def classes_of(
+    inputs: Array, inlet_bin: float = INLET_BIN, speed_bin: float = SPEED_BIN
+) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
+    """Steps whose films differ too little to matter share one operator."""
+    speed, thrust, ambient, inlet, flow = inputs[:, : len(STANDARD)].T
+    width = speed_bin * max(float(speed.max()), 1.0)
+    flow_width = FLOW_BIN * max(float(flow.max()), 1e-9)
+    inlet_width = inlet_bin
+    while True:
+        keys = np.column_stack(
+            (np.round(speed / width), np.round(inlet / inlet_width), np.round(flow / flow_width))
+        )
+        # Standstill is a class of its own: films at rest are not those of slow turning.
+        keys[speed == 0.0, 0] = -1.0
+        _, label = np.unique(keys, axis=0, return_inverse=True)
+        label = label.reshape(-1)
+        if label.max() < MOST_CLASSES:
+            break
+        width, inlet_width, flow_width = 1.5 * width, 1.5 * inlet_width, 1.5 * flow_width
+    means = [
+        np.bincount(label, weights=column) / np.bincount(label)
+        for column in (speed, thrust, ambient, inlet, flow)
+    ]
+    return label, tuple(OperatingPoint(*(float(v) for v in values)) for values in zip(*means, strict=True))
+
+
+def with_walls(drive: Drive, walls: Array) -> Drive:
+    """The same drive, its classes divided by the temperature of the channel's wall.
+
+    Parameters
+    ----------
+    drive : Drive
+    walls : (G + 1, n_cells) ndarray, [K]
+        At the ends of the steps.
+    """
+    middle = 0.5 * (walls[:-1] + walls[1:])
+    mean, width = middle.mean(axis=1), WALL_BIN
+    while True:
+        keys = np.column_stack((drive.step_class, np.round(mean / width)))
+        first, label = np.unique(keys, axis=0, return_inverse=True)
+        if len(first) <= len(drive.points) + MOST_WALLS:
+            break
+        width *= 1.5
+    label = label.reshape(-1)
+    points = []
+    for number, (owner, _) in enumerate(first):
+        point = drive.points[int(owner)]
+        own = {name: getattr(point, name) for name in OperatingPoint.__slots__}
+        points.append(WarmedPoint(**own, channel_wall=middle[label == number].mean(axis=0)))
+    return replace(drive, step_class=label, points=tuple(points))
+
+
+def heat_of_table(spec: MachineSpec, speed: Array, thrust: Array) -> Array:
+    """Heat of every bearing by the table over time, (n, n_bearings) W, in the order of ``spec.bearings``.
+
+    Parameters
+    ----------
+    speed : (n,) ndarray, [rad/s]
+    thrust : (n,) ndarray, [N]
+    """
+    table = spec.heat.table
+    grid = np.asarray(table.speed)
+    segment = np.clip(np.searchsorted(grid, speed, side="right") - 1, 0, len(grid) - 2)
+    fraction = (speed - grid[segment]) / (grid[segment + 1] - grid[segment])
+    found = np.empty((len(speed), len(spec.bearings)))
+    for column, (group, bearing) in enumerate(spec.bearings):
+        values = np.asarray(table.heat[bearing.name])
+        nominal = values[segment] + fraction * (values[segment + 1] - values[segment])
+        slope = table.thrust_coefficient.get(bearing.name, 0.0)
+        factor = 1.0 + slope * (thrust / table.reference_thrust - 1.0)
+        found[:, column] = np.maximum(0.0, nominal * factor) * group.heat_factor.value
+    return found
+
+
+def inputs_at(drive: Drive, times: Array) -> Mapping[str, Array]:
+    """Inputs at any times, as they are just after them."""
+    step = np.clip(np.searchsorted(drive.grid, times, side="right") - 1, 0, drive.grid.size - 2)
+    part = ((times - drive.grid[step]) / drive.steps[step])[:, None]
+    values = drive.start[step] + part * (drive.end[step] - drive.start[step])
+    return {name: values[:, column] for column, name in enumerate(drive.names)}

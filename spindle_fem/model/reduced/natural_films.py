@@ -1,0 +1,58 @@
+"""Natural convection and radiation of a machine's own films as terms of the fast model."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.effects.framework.term import Term, TermContext
+from spindle_fem.model.reduced.coefficients import natural_reference
+from spindle_fem.model.reduced.term_layout import OneInstant
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.outside_films import film_coefficient
+
+DIFFERENCE = 1e-3
+
+
+class NaturalFilmTerm(OneInstant, Term):
+    """A film that follows the temperature of its surface.
+
+    The full model takes the coefficient of each facet, this one that of the
+    surface's mean temperature.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    film : NaturalFilm
+    surface : str
+    """
+
+    def __init__(self, spec: MachineSpec, film: NaturalFilm, surface: str) -> None:
+        self.film = film
+        self.reference = natural_reference(spec, film)
+        self.name = f"natural film of {surface}"
+        self.coefficients = (f"film.{surface}",)
+        self.reads = (surface,)
+
+    def factor(self, context: TermContext) -> NDArray[np.complex128]:
+        """Coefficient at the wall's temperature over that which the operators hold, (1, k)."""
+        ambient = context.inputs["ambient"]
+        fluid = ambient if self.film.temperature == "ambient" else self.film.temperature
+        wall = float(context.temperatures[0, 0].real)
+        # The correlation takes no complex numbers: its slope by a central difference.
+        walls = np.array([wall, wall + DIFFERENCE, wall - DIFFERENCE])
+        point = OperatingPoint(context.inputs["speed"], context.inputs["thrust"], ambient, ambient, 0.0)
+        value, _ = film_coefficient(self.film, point, walls, fluid)
+        slope = (value[1] - value[2]) / (2.0 * DIFFERENCE)
+        return ((value[0] + slope * (context.temperatures - wall)) / self.reference).astype(complex)
+
+
+def natural_film_terms(spec: MachineSpec) -> tuple[NaturalFilmTerm, ...]:
+    """A term for each surface with a natural film."""
+    return tuple(
+        NaturalFilmTerm(spec, film, surface)
+        for film in spec.film
+        if isinstance(film, NaturalFilm)
+        for surface in film.surface
+    )

@@ -1,0 +1,455 @@
+"""A thermal network that the user wrote, in the clothes of a fast model.
+
+Its nodes are the unknowns, its links the coefficients, its boundaries the
+fluids and its sources the bearings, so that terms, drives, sensitivities and
+everything built on them work on it as on a machine with geometry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.network_tables import NetworkMachineSpec
+from spindle_fem.effects.framework.term import COVARIATE, FLUID_PREFIX, RecordedHeat, Term
+from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
+from spindle_fem.model.reduced.coefficient_directions import ConductingDirections
+from spindle_fem.model.reduced.drive import (
+    LARGEST_STEP,
+    STANDARD,
+    Drive,
+    inputs_on_steps,
+    level_covariates,
+)
+from spindle_fem.model.reduced.exponential_step import build_exact_propagator
+from spindle_fem.model.reduced.fast_model import NO_CHANGES, ClassOperators
+from spindle_fem.model.reduced.network_operators import (
+    LINK,
+    NetworkTable,
+    boundary_of_links,
+    network_as_reduced,
+    source_power,
+)
+from spindle_fem.model.reduced.run_start import Start
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.recordings.align import Recording
+from spindle_fem.studies.simulate_network import (
+    initial_parameters,
+    initial_state,
+    magnitude_history,
+    require_compatible,
+)
+
+Array = NDArray[np.float64]
+
+
+class NetworkFastModel:
+    """A network as a fast model: see :class:`spindle_fem.model.reduced.fast_model.FastModel`.
+
+    Parameters are factors named ``conductance.<link>``, ``capacity.<node>``,
+    ``gain.<source>``, ``temperature.<boundary>`` (of the absolute temperature
+    of a boundary that no input drives) and ``initial.<node>``.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        Constants only: no laws, no streams.
+    spec : NetworkMachineSpec or None
+        What it was written as.
+
+    Raises
+    ------
+    SpecError
+        Laws or streams.
+
+    Attributes
+    ----------
+    model : ReducedModel
+        Unknowns are the nodes; places are the nodes, coefficients
+        ``link.<link>``, fluids those of them that end at a boundary.
+    bearings : tuple of str
+        Sources.
+    heat_places : tuple of str
+        Node of each source.
+    channels : tuple of str
+        Nodes.
+    load_names : tuple of str
+        ``source.<source>``, then ``boundary.<boundary>``.
+    ambient_boundary : str or None
+        Boundary that stands for the surroundings: that named ``ambient``, or the only one.
+    """
+
+    def __init__(self, network: ThermalNetwork, spec: NetworkMachineSpec | None = None) -> None:
+        if not network.is_linear or not network.is_symmetric:
+            raise SpecError(
+                "network", "has laws or streams.", "The fast model takes constant links, sources, boundaries."
+            )
+        self.network, self.spec = network, spec
+        self.table = NetworkTable.of(network)
+        self.bearings = network.source_names
+        self.heat_places = tuple(network.node_names[node] for node in network.source_node)
+        self.channels = network.node_names
+        self.load_names = (
+            *(f"source.{name}" for name in network.source_names),
+            *(f"boundary.{name}" for name in network.boundary_names),
+        )
+        names = network.boundary_names
+        self.ambient_boundary = "ambient" if "ambient" in names else names[0] if len(names) == 1 else None
+        self._boundary_of = boundary_of_links(network)
+        self.model = network_as_reduced(network, tuple(self._boundary_of))
+        self.directions = ConductingDirections(self.model)
+        self._conductance = {
+            f"{LINK}{name}": float(value)
+            for name, value in zip(network.link_names, network.link_conductance, strict=True)
+        }
+
+    # ------------------------------------------------------------- operators
+    def storage(self, factors: Mapping[str, float], added: Mapping[str, float] = NO_CHANGES) -> Array:
+        """Capacity matrix, (n, n) J/K; ``added`` is further capacity of nodes, J/K."""
+        names = self.network.node_names
+        scales = np.array([self.table.scale(f"capacity.{name}", factors) for name in names])
+        extra = np.array([added.get(name, 0.0) for name in names])
+        return np.diag(self.network.capacity * scales + extra)
+
+    def storage_by(self, factors: Mapping[str, float], parameters: Sequence[str]) -> dict[str, Array]:
+        """Derivatives of the capacity matrix to logarithms of parameters; absent where zero."""
+        found = {}
+        for parameter in parameters:
+            for i, node in enumerate(self.network.node_names):
+                if self.table.targets(parameter) == self.table.groups[f"capacity.{node}"]:
+                    found[parameter] = np.zeros((self.model.size, self.model.size))
+                    found[parameter][i, i] = self.network.capacity[i] * factors.get(parameter, 1.0)
+        return found
+
+    def coefficients(
+        self, point: OperatingPoint, factors: Mapping[str, float], changes: Mapping[str, float] = NO_CHANGES
+    ) -> dict[str, float]:
+        """Conductance of every link, W/K.
+
+        Raises
+        ------
+        SpecError
+            A change of something else, or one that asks for an input that the
+            recording does not give.
+        """
+        for name, factor in changes.items():
+            if name not in self._conductance:
+                raise SpecError(
+                    "changes", f'"{name}" is no link.', did_you_mean(name, tuple(self._conductance))
+                )
+            if not np.isfinite(factor):
+                raise SpecError(
+                    "changes",
+                    f'the factor of "{name}" is {factor}.',
+                    "It may follow only inputs that the recording gives.",
+                )
+        return {
+            name: value * self.table.scale(name, factors) * changes.get(name, 1.0)
+            for name, value in self._conductance.items()
+        }
+
+    def operators(
+        self,
+        point: OperatingPoint,
+        factors: Mapping[str, float],
+        parameters: Sequence[str] = (),
+        *,
+        changes: Mapping[str, float] = NO_CHANGES,
+        conductances: Mapping[str, float] = NO_CHANGES,
+    ) -> ClassOperators:
+        """Operators with factors, and derivatives to some parameters.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        factors : mapping of str to float
+        parameters : sequence of str
+        changes : mapping of str to float
+            Further factors on single links.
+        conductances : mapping of str to float, [W/K]
+            From nodes to the surroundings, beside the network's own links.
+        """
+        model = self.model
+        found = self.coefficients(point, factors, changes)
+        values = np.array([found[name] for name in model.coefficient_names])
+        conduction = np.tensordot(values, model.operators, axes=1)
+        n_sources = len(self.bearings)
+        loads = np.zeros((model.size, len(self.load_names)))
+        loads[self.network.source_node, np.arange(n_sources)] = 1.0
+        for row, name in enumerate(model.fluid_names):
+            loads[:, self._boundary_column(name)] += found[name] * model.fluid_load[row]
+        for place, conductance in conductances.items():
+            mean = model.place(place)
+            conduction = conduction + conductance * np.outer(mean, mean)
+            loads[:, self._ambient_column(place)] += conductance * mean
+        conduction_by, loads_by = {}, {}
+        for parameter in parameters:
+            targets = self.table.targets(parameter)
+            for row, name in enumerate(model.coefficient_names):
+                if self.table.groups[name] != targets:
+                    continue
+                conduction_by[parameter] = values[row] * model.operators[row]
+                if name in self._boundary_of:
+                    loads_by[parameter] = np.zeros_like(loads)
+                    load = model.fluid_load[model.fluid_names.index(name)]
+                    loads_by[parameter][:, self._boundary_column(name)] = values[row] * load
+        outputs = np.eye(model.size)
+        nothing = np.zeros((model.size, len(self.load_names)))
+        return ClassOperators(conduction, loads, outputs, nothing, conduction_by, loads_by, {}, {})
+
+    def change(
+        self,
+        point: OperatingPoint,
+        factors: Mapping[str, float],
+        changes: tuple[Mapping[str, float], Mapping[str, float]],
+        conductances: tuple[Mapping[str, float], Mapping[str, float]],
+    ) -> ClassOperators:
+        """Operators with the first of two sets of changes less those with the second, no derivatives."""
+        first, second = (
+            self.operators(point, factors, changes=one, conductances=other)
+            for one, other in zip(changes, conductances, strict=True)
+        )
+        names = ("conduction", "loads", "outputs", "output_inputs")
+        return ClassOperators(*(getattr(first, n) - getattr(second, n) for n in names), {}, {}, {}, {})
+
+    @property
+    def film_follows_wall(self) -> bool:
+        """Never: links conduct as they are written."""
+        return False
+
+    def _boundary_column(self, coefficient: str) -> int:
+        return self.load_names.index(f"boundary.{self._boundary_of[coefficient]}")
+
+    def _ambient_column(self, where: str) -> int:
+        if self.ambient_boundary is None:
+            raise SpecError(
+                where,
+                "is joined to the surroundings, but no boundary stands for them.",
+                'Name one of the boundaries "ambient".',
+            )
+        return self.load_names.index(f"boundary.{self.ambient_boundary}")
+
+    # ----------------------------------------------------------------- inputs
+    propagator = staticmethod(build_exact_propagator)
+
+    @property
+    def inlet_column(self) -> None:
+        """A network has no coolant."""
+        return None
+
+    @property
+    def fluid_places(self) -> dict[str, str]:
+        """Link of every boundary temperature that a term may shift, by ``fluid.<link>``."""
+        return {FLUID_PREFIX + name.removeprefix(LINK): name for name in self.model.fluid_names}
+
+    def fluid_temperature(self, coefficient: str, inputs: Mapping[str, float]) -> float:
+        """Nominal temperature of the boundary that a link ends at, K; 0 between nodes."""
+        if coefficient not in self._boundary_of:
+            return 0.0
+        return self._boundary_value(self._boundary_of[coefficient], inputs)
+
+    def _boundary_value(self, boundary: str, inputs: Mapping[str, float]) -> float:
+        position = self.network.boundary_names.index(boundary)
+        driven = self.network.boundary_input[position]
+        return float(self.network.boundary_temperature[position]) if driven is None else inputs[driven]
+
+    def fluid_parameters(self, coefficient: str) -> tuple[str, ...]:
+        """Names whose factors multiply :meth:`fluid_temperature`."""
+        name = f"temperature.{self._boundary_of.get(coefficient, '')}"
+        return (name,) if name in self.table.names else ()
+
+    def own_terms(self, drive: Drive) -> tuple[Term, ...]:
+        """Heat of nodes that a recording gives and no source takes already."""
+        return tuple(
+            RecordedHeat(name)
+            for name in drive.names
+            if name.startswith("heat.") and name not in self.network.input_names
+        )
+
+    def load_inputs(
+        self,
+        names: Sequence[str],
+        inputs: Array,
+        factors: Mapping[str, float],
+        parameters: Sequence[str] = (),
+    ) -> tuple[Array, dict[str, Array]]:
+        """Heat of every source [W] and temperature of every boundary [K], and derivatives.
+
+        Parameters and returns as :meth:`FastModel.load_inputs`.
+        """
+        network = self.network
+        column = {name: inputs[:, position] for position, name in enumerate(names)}
+        heat = np.tile(network.source_gain, (len(inputs), 1))
+        for position, name in enumerate(network.source_input):
+            if name is not None:
+                heat[:, position] *= source_power(
+                    network.source_names[position], column[name], float(network.source_exponent[position])
+                )
+        friction, friction_by = self.friction_loads(heat, factors, parameters)
+        found = np.zeros((len(inputs), len(self.load_names)))
+        found[:, : friction.shape[1]] = friction
+        by = {name: np.zeros_like(found) for name in friction_by}
+        for name, part in friction_by.items():
+            by[name][:, : part.shape[1]] = part
+        for position, boundary in enumerate(network.boundary_names):
+            name, driven = f"temperature.{boundary}", network.boundary_input[position]
+            own = network.boundary_temperature[position] if driven is None else column[driven]
+            place = len(self.bearings) + position
+            found[:, place] = own * factors.get(name, 1.0)
+            if name in parameters:
+                by[name] = np.zeros_like(found)
+                by[name][:, place] = found[:, place]
+        return found, by
+
+    def heat_rows(self, bearing: str) -> tuple[int, ...]:
+        """Position among :attr:`heat_places` of a source."""
+        return (self.bearings.index(bearing),)
+
+    def friction_loads(
+        self, heat: Array, factors: Mapping[str, float], parameters: Sequence[str] = ()
+    ) -> tuple[Array, dict[str, Array]]:
+        """Heat of every source with factors, (n, n_sources) W, and derivatives."""
+        scales = np.array([factors.get(f"gain.{name}", 1.0) for name in self.bearings])
+        loads, by = heat * scales, {}
+        for position, name in enumerate(self.bearings):
+            if f"gain.{name}" in parameters:
+                by[f"gain.{name}"] = np.zeros_like(loads)
+                by[f"gain.{name}"][:, position] = loads[:, position]
+        return loads, by
+
+    def require_channels(self, probes: Sequence[str], where: str) -> NDArray[np.int64]:
+        """Rows of the outputs for the probes of a recording.
+
+        Raises
+        ------
+        SpecError
+            A probe that is no node.
+        """
+        for probe in probes:
+            if probe not in self.channels:
+                raise SpecError(
+                    where, f'reads "{probe}", no node of this network.', did_you_mean(probe, self.channels)
+                )
+        return np.array([self.channels.index(probe) for probe in probes], dtype=np.int64)
+
+    # ------------------------------------------------------------- recordings
+    def drive(self, recording: Recording, *, largest_step: float = LARGEST_STEP) -> Drive:
+        """Inputs of a recording on the steps of its own grid; long gaps begin anew.
+
+        Every input of the recording is there, by the name of what it drives,
+        also those that the network does not use; and ``ambient``, the nominal
+        temperature of the surroundings where none is recorded.
+
+        Raises
+        ------
+        FaultsError
+            The recording does not fit the network.
+        """
+        notes = require_compatible(self.network, recording)
+        history = magnitude_history(self.network, recording, recording.input_names)
+        names, values, held = history.names, history.values, history.held
+        if "ambient" not in names and self.ambient_boundary is not None:
+            first = self._boundary_value(self.ambient_boundary, dict.fromkeys(names, 0.0))
+            position = self.network.boundary_names.index(self.ambient_boundary)
+            driven = self.network.boundary_input[position]
+            room = np.full(len(values), first) if driven is None else values[:, names.index(driven)]
+            names, values = (*names, "ambient"), np.column_stack((values, room))
+            held = np.append(held, driven is None or held[names.index(driven)])
+        for name, column in recording.covariate_history().items():
+            names, values = (*names, COVARIATE + name), np.column_stack((values, column))
+            held = np.append(held, False)
+        breaks = recording.times[recording.segments[1:, 0]]
+        grid, start, end = inputs_on_steps(recording.times, values, held, largest_step, breaks)
+        level_covariates(names, start, end)
+        restarts = tuple(int(i) for i in np.searchsorted(grid, breaks - 1e-9))
+        means = dict(zip(names, (0.5 * (start + end)).mean(axis=0).tolist(), strict=True))
+        point = OperatingPoint(*(means.get(name, np.nan) for name in STANDARD))
+        classes = np.zeros(len(start), dtype=np.int64)
+        return Drive(recording.times, grid, names, start, end, classes, (point,), notes, restarts)
+
+    def initial_parameters(self, recording: Recording) -> tuple[Parameter, ...]:
+        """Temperatures at the start of a recording with their priors, named ``initial.<node>``."""
+        return initial_parameters(self.network, recording)
+
+    def start(
+        self,
+        recording: Recording,
+        drive: Drive,
+        parameters: Mapping[str, float] = NO_CHANGES,
+        derivatives: Sequence[str] = (),
+        *,
+        kind: str = "first_reading",
+        initial: Sequence[Parameter] = (),
+    ) -> Start:
+        """Temperatures at the start of a recording and after its long gaps.
+
+        Parameters
+        ----------
+        recording : Recording
+        drive : Drive
+            Of the same recording, by :meth:`drive`.
+        parameters : mapping of str to float
+            Factors; those of terms and unknown ones are left aside.
+        derivatives : sequence of str
+        kind : {"first_reading", "ambient", "steady"}
+            As :func:`initial_state` has it; terms do not enter.
+        initial : sequence of Parameter
+            Of :meth:`initial_parameters`; the factors ``initial.<node>`` multiply them.
+
+        Returns
+        -------
+        Start
+        """
+        factors = {name: value for name, value in parameters.items() if name in self.table.names}
+        network = self.moved(factors)
+        history = magnitude_history(network, recording)
+        begun = tuple(replace(p, value=p.value * factors.get(p.name, 1.0)) for p in initial)
+        asked = tuple(
+            self._parameter(network, name)
+            for name in derivatives
+            if name in self.table.names and not name.startswith("initial.")
+        )
+        states = np.empty((len(recording.segments), network.n_nodes))
+        by: dict[str, Array] = {}
+        for segment, (begin, end) in enumerate(recording.segments):
+            # Free starting temperatures belong to the first segment; later ones start from their readings.
+            chosen = (*asked, *begun) if segment == 0 else asked
+            readings = recording.first_readings(segment)
+            state, slope = initial_state(network, history.cut(begin, end), readings, chosen, kind=kind)
+            states[segment] = state
+            for column, item in enumerate(chosen):
+                by.setdefault(item.name, np.zeros_like(states))[segment] = slope[:, column]
+        points = np.array([0, *drive.restarts], dtype=np.int64)
+        return Start(points, states, {name: part for name, part in by.items() if name in derivatives})
+
+    def moved(self, factors: Mapping[str, float]) -> ThermalNetwork:
+        """The network with factors on its numbers."""
+        network = self.network
+
+        def scaled(kind: str, names: Sequence[str], values: Array) -> Array:
+            return values * np.array([factors.get(f"{kind}.{name}", 1.0) for name in names])
+
+        return replace(
+            network,
+            capacity=scaled("capacity", network.node_names, network.capacity),
+            link_conductance=scaled("conductance", network.link_names, network.link_conductance),
+            source_gain=scaled("gain", network.source_names, network.source_gain),
+            boundary_temperature=scaled("temperature", network.boundary_names, network.boundary_temperature),
+        )
+
+    @staticmethod
+    def _parameter(network: ThermalNetwork, name: str) -> Parameter:
+        kind, _, label = name.partition(".")
+        of_kind = {
+            "capacity": (network.node_names, network.capacity, "J/K"),
+            "conductance": (network.link_names, network.link_conductance, "W/K"),
+            "gain": (network.source_names, network.source_gain, ""),
+            "temperature": (network.boundary_names, network.boundary_temperature, "K"),
+        }
+        labels, values, unit = of_kind[kind]
+        index = labels.index(label)
+        return Parameter(name, kind, index, float(values[index]), 1.0, unit)

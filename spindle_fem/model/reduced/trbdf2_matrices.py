@@ -1,0 +1,192 @@
+"""TR-BDF2 steps of a reduced model as precomputed matrices, with their exact derivatives.
+
+The two stages of a step of length h, with γ = 2 − √2 and d = γ/2, are
+
+    (M + d h K) u_γ = (M − d h K) u_0 + d h ((2 − γ) f_0 + γ f_1)
+    (M + d h K) u_1 = M (a u_γ − b u_0) + d h f_1
+
+for loads that are linear in time over the step: second order, L-stable, one
+matrix for both stages.
+
+Source: Bank et al. (1985), IEEE Trans. CAD 4, 436-451.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.model.reduced.exponential_step import ExactPropagator
+
+Array = NDArray[np.float64]
+
+GAMMA = 2.0 - np.sqrt(2.0)
+SHARE = 0.5 * GAMMA
+STAGE_WEIGHT = 1.0 / (GAMMA * (2.0 - GAMMA))
+START_WEIGHT = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
+
+
+@dataclass(frozen=True, slots=True)
+class Propagator:
+    """One step of given length as matrices.
+
+    Attributes
+    ----------
+    step : float, [s]
+    advance : (r, r) ndarray
+        ``u_1`` from ``u_0`` without loads.
+    stage : (r, r) ndarray
+        ``u_γ`` from ``u_0`` without loads.
+    inverse : (r, r) ndarray
+        ``(M + d h K)⁻¹``.
+    carried : (r, r) ndarray
+        What a right-hand side of the first stage adds to ``u_1``.
+    """
+
+    step: float
+    advance: Array
+    stage: Array
+    inverse: Array
+    carried: Array
+
+    @property
+    def from_start(self) -> Array:
+        """``u_1`` from a load at the start of the step, (r, r) K/W."""
+        return SHARE * self.step * (2.0 - GAMMA) * self.carried
+
+    @property
+    def from_end(self) -> Array:
+        """``u_1`` from a load at the end of the step, (r, r) K/W."""
+        return SHARE * self.step * (GAMMA * self.carried + self.inverse)
+
+
+def build_propagator(storage: Array, conduction: Array, step: float) -> Propagator:
+    """Matrices of one step.
+
+    Parameters
+    ----------
+    storage, conduction : (r, r) ndarray, [J/K], [W/K]
+    step : float, [s]
+    """
+    inverse = np.linalg.inv(storage + SHARE * step * conduction)
+    stage = inverse @ (storage - SHARE * step * conduction)
+    held = inverse @ storage
+    return Propagator(
+        step,
+        held @ (STAGE_WEIGHT * stage - START_WEIGHT * np.eye(len(storage))),
+        stage,
+        inverse,
+        STAGE_WEIGHT * held @ inverse,
+    )
+
+
+def load_response(propagator: Propagator | ExactPropagator, start: Array, end: Array, loads: Array) -> Array:
+    """What linear loads add to ``u_1`` in many equal steps.
+
+    Parameters
+    ----------
+    start, end : (n, n_w) ndarray
+        Load inputs at both ends of each step.
+    loads : (r, n_w) ndarray
+
+    Returns
+    -------
+    (n, r) ndarray, [K]
+    """
+    return start @ (propagator.from_start @ loads).T + end @ (propagator.from_end @ loads).T
+
+
+def stage_values(
+    propagator: Propagator | ExactPropagator, before: Array, start: Array, end: Array, loads: Array
+) -> Array:
+    """What :func:`sensitivity_forcing` needs of equal steps: ``u_γ`` (n, r); of exact ones, the loads."""
+    if isinstance(propagator, ExactPropagator):
+        return propagator.load_values(start, end, loads)
+    weight = SHARE * propagator.step
+    matrix = propagator.inverse @ loads
+    return before @ propagator.stage.T + weight * ((2.0 - GAMMA) * start + GAMMA * end) @ matrix.T
+
+
+@dataclass(frozen=True, slots=True)
+class MatrixChange:
+    """Derivatives of a system to one parameter; None where it does not enter.
+
+    Attributes
+    ----------
+    conduction, storage : (r, r) ndarray or None
+    load_start, load_end : (n, r) ndarray or None
+        Loads at both ends of each step.
+    """
+
+    conduction: Array | None = None
+    storage: Array | None = None
+    load_start: Array | None = None
+    load_end: Array | None = None
+
+    @property
+    def enters(self) -> bool:
+        """Whether the parameter changes anything."""
+        return any(item is not None for item in (self.conduction, self.storage, self.load_start))
+
+
+def sensitivity_forcing(
+    propagator: Propagator | ExactPropagator,
+    before: Array,
+    stage: Array,
+    after: Array,
+    changes: Sequence[MatrixChange],
+) -> Array:
+    """What parameters add to the derivative of ``u_1`` in many equal steps.
+
+    Parameters
+    ----------
+    before, stage, after : (n, r) ndarray
+        ``u_0``, :func:`stage_values` and ``u_1`` of each step.
+    changes : sequence of MatrixChange
+        One a parameter.
+
+    Returns
+    -------
+    (n, r, p) ndarray
+    """
+    if isinstance(propagator, ExactPropagator):
+        columns = [
+            propagator.forcing(before, stage, c.conduction, c.storage, c.load_start, c.load_end)
+            for c in changes
+        ]
+        return np.stack(columns, axis=2) if columns else np.zeros((*before.shape, 0))
+    weight = SHARE * propagator.step
+    # Defects of both halves of the step; all parameters that enter share the products with the inverses.
+    entering = [i for i, change in enumerate(changes) if change.enters]
+    entered = [changes[i] for i in entering]
+    first = np.zeros((len(entered), *before.shape))
+    second = np.zeros_like(first)
+    by_conduction = [i for i, change in enumerate(entered) if change.conduction is not None]
+    if by_conduction:
+        matrices = np.stack([entered[i].conduction.T for i in by_conduction])
+        first[by_conduction] -= weight * ((before + stage) @ matrices)
+        second[by_conduction] -= weight * (after @ matrices)
+    for own_first, own_second, change in zip(first, second, entered, strict=True):
+        if change.storage is not None:
+            own_first += (before - stage) @ change.storage.T
+            own_second += (STAGE_WEIGHT * stage - START_WEIGHT * before - after) @ change.storage.T
+        if change.load_start is not None:
+            own_first += weight * ((2.0 - GAMMA) * change.load_start + GAMMA * change.load_end)
+            own_second += weight * change.load_end
+    size = before.shape[1]
+    moved = first.reshape(-1, size) @ propagator.carried.T
+    moved += second.reshape(-1, size) @ propagator.inverse.T
+    found = np.zeros((*before.shape, len(changes)))
+    found[:, :, entering] = moved.reshape(first.shape).transpose(1, 2, 0)
+    return found
+
+
+def group_steps(step_class: NDArray[np.int64], steps: Array) -> Mapping[tuple[int, float], NDArray[np.int64]]:
+    """Steps by operating class and length, to a microsecond."""
+    lengths = np.round(steps, 6)
+    keys, label = np.unique(np.column_stack((step_class, lengths)), axis=0, return_inverse=True)
+    label = label.reshape(-1)
+    return {(int(key[0]), float(key[1])): np.flatnonzero(label == i) for i, key in enumerate(keys)}

@@ -1,0 +1,398 @@
+"""Bearing heat behind one interface, whatever model makes it.
+
+A heat model is called with the operating point and the temperatures of every
+bearing and answers with :class:`BearingHeat` for each. A new model is a
+function of that form, entered in :func:`heat_model_of`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spindle_fem.definition.bearing_seats import seat_diameter
+from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
+from spindle_fem.definition.solid_tables import Material, SetBearing
+from spindle_fem.errors import OutOfValidityError
+from spindle_fem.operation.loads import BearingHeat
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.bearings import mounting
+from spindle_fem.physics.bearings.bearing_geometry import STEEL_EXPANSION, BearingGeometry
+from spindle_fem.physics.bearings.bearing_set import solve_bearing_set, solve_states
+from spindle_fem.physics.bearings.bearing_state import BearingState
+from spindle_fem.physics.bearings.contact_conduction import BallConductance, ball_conductance
+from spindle_fem.physics.bearings.fits import RingFits
+from spindle_fem.physics.bearings.friction_heat import HeatOptions
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.rings import SeatMaterial
+from spindle_fem.validity import CodedWarning
+
+# A preload this many times that of assembly ends a bearing, whatever the loop then does.
+LARGEST_PRELOAD_RATIO = 5.0
+_ORIENTATION = {"towards_rear": 1, "towards_nose": -1}
+
+
+@dataclass(frozen=True, slots=True)
+class BearingTemperatures:
+    """Mean temperatures around one bearing, K.
+
+    ``shaft`` and ``housing`` are those of the seats on the other side of the
+    joints.
+    """
+
+    inner: float
+    outer: float
+    ball: float
+    shaft: float
+    housing: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FilmCurves:
+    """What one bearing does over the temperature of its film while nothing expands.
+
+    Attributes
+    ----------
+    temperature : (n,) ndarray, [K]
+    heat : (n,) ndarray, [W]
+    conductance_inner, conductance_outer : (n,) ndarray, [W/K]
+        Between raceway and balls.
+    """
+
+    temperature: NDArray[np.float64]
+    heat: NDArray[np.float64]
+    conductance_inner: NDArray[np.float64]
+    conductance_outer: NDArray[np.float64]
+
+
+HeatModel = Callable[
+    [OperatingPoint, Mapping[str, BearingTemperatures]],
+    tuple[Mapping[str, BearingHeat], tuple[CodedWarning, ...]],
+]
+
+
+def heat_model_of(spec: MachineSpec) -> HeatModel:
+    """The heat model that a definition asks for."""
+    if not spec.bearing_set:
+        return lambda point, temperatures: ({}, ())
+    if spec.heat.model != "table":
+        return BearingMechanics(spec)
+    needs_contacts = any(group.ball_row.kind == "contact" for group in spec.bearing_set)
+    mechanics = BearingMechanics(spec) if needs_contacts else None
+
+    def by_table(
+        point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+    ) -> tuple[Mapping[str, BearingHeat], tuple[CodedWarning, ...]]:
+        values, warnings = table_heat(spec, point)
+        if mechanics is None:
+            return {name: BearingHeat(value, {"table": value}) for name, value in values.items()}, warnings
+        states, said = mechanics(point, temperatures)
+        heat = {
+            name: replace(states[name], total=value, terms={"table": value}) for name, value in values.items()
+        }
+        return heat, warnings + said
+
+    return by_table
+
+
+def table_heat(spec: MachineSpec, point: OperatingPoint) -> tuple[dict[str, float], tuple[CodedWarning, ...]]:
+    """Heat of every bearing by the table, W: linear in speed, first order in thrust.
+
+    Beyond the last speed the last segment is continued and a warning says so.
+    """
+    table = spec.heat.table
+    speeds = np.asarray(table.speed)
+    warnings: tuple[CodedWarning, ...] = ()
+    if point.speed > speeds[-1] * (1.0 + 1e-9):
+        text = (
+            f"Speed {point.speed * 30 / np.pi:.0f} rpm lies beyond the heat table, which ends at "
+            f"{speeds[-1] * 30 / np.pi:.0f} rpm; its last segment was continued."
+        )
+        warnings = (CodedWarning("heat_table_extrapolated", text),)
+    segment = int(np.clip(np.searchsorted(speeds, point.speed, side="right") - 1, 0, len(speeds) - 2))
+    fraction = (point.speed - speeds[segment]) / (speeds[segment + 1] - speeds[segment])
+    heat = {}
+    for group, bearing in spec.bearings:
+        values = table.heat[bearing.name]
+        nominal = values[segment] + fraction * (values[segment + 1] - values[segment])
+        slope = table.thrust_coefficient.get(bearing.name, 0.0)
+        factor = 1.0 + slope * (point.thrust / table.reference_thrust - 1.0)
+        heat[bearing.name] = max(0.0, nominal * factor) * group.heat_factor.value
+    return heat, warnings
+
+
+class BearingMechanics:
+    """Equilibrium, films and friction of every bearing set of a machine.
+
+    The heat level is the definition's; with ``heat.model = "table"`` only the
+    mechanics are used.
+    """
+
+    def __init__(self, spec: MachineSpec) -> None:
+        self.spec = spec
+        grease = spec.grease
+        self.lubricant = Lubricant(
+            kinematic_viscosity_40=grease.kinematic_viscosity_40,
+            kinematic_viscosity_100=grease.kinematic_viscosity_100,
+            density=grease.base_oil_density,
+            pressure_viscosity=grease.pressure_viscosity,
+            thermal_conductivity=grease.thermal_conductivity,
+            film_starvation=grease.film_starvation,
+            path_fill=grease.path_fill,
+            temperature_limit=grease.temperature_limit,
+        )
+        level = spec.heat.model
+        self.options = HeatOptions(
+            level="palmgren" if level == "table" else level,
+            palmgren_f0=spec.heat.palmgren_f0,
+            skf_friction_ehl=spec.heat.skf_mu_ehl,
+        )
+        self.sets = {group.name: _bearing_set(spec, group) for group in spec.bearing_set}
+
+    def states(
+        self,
+        point: OperatingPoint,
+        temperatures: Mapping[str, BearingTemperatures],
+        *,
+        expand: bool,
+        options: HeatOptions | None = None,
+    ) -> dict[str, BearingState]:
+        """Mechanical state of every bearing.
+
+        Parameters
+        ----------
+        expand : bool
+            Whether the parts grow with their temperature, or keep the size they
+            were assembled with; the film has its temperature either way.
+        options : HeatOptions, optional
+            Another heat model than the definition's.
+
+        Raises
+        ------
+        NoEquilibriumError, OutOfValidityError
+        """
+        found: dict[str, BearingState] = {}
+        for group in self.spec.bearing_set:
+            around = [temperatures[bearing.name] for bearing in group.bearing]
+            mounted = self.sets[group.name]
+            if expand:
+                set_temperatures = self._expanded(around, group.assembly_temperature)
+            else:
+                set_temperatures, mounted = self._as_assembled(around), mounted.with_rigid_rings()
+            states = solve_bearing_set(
+                mounted,
+                point.speed,
+                point.thrust if group.carries_thrust else 0.0,
+                set_temperatures,
+                lubricant=self.lubricant,
+                control=_control(options or self.options),
+                heat=options or self.options,
+            )
+            found |= {state.name: state for state in states}
+        return found
+
+    def knows(self, temperature: float) -> bool:
+        """Whether the grease's viscosity is known at a temperature (K)."""
+        try:
+            self.lubricant.kinematic_viscosity(temperature)
+        except OutOfValidityError:
+            return False
+        return True
+
+    def over_film_temperature(self, point: OperatingPoint, temperatures: ArrayLike) -> dict[str, FilmCurves]:
+        """Heat and contacts of every bearing over its film temperature, at the size of assembly.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        temperatures : (n,) array_like, [K]
+
+        Raises
+        ------
+        NoEquilibriumError, OutOfValidityError
+        """
+        kelvin = np.asarray(temperatures, dtype=float)
+        factors = {bearing.name: group.heat_factor.value for group, bearing in self.spec.bearings}
+        curves: dict[str, FilmCurves] = {}
+        for group in self.spec.bearing_set:
+            around = [
+                self._as_assembled([BearingTemperatures(*(value,) * 5)] * len(group.bearing))
+                for value in kelvin.tolist()
+            ]
+            found = solve_states(
+                self.sets[group.name].with_rigid_rings(),
+                point.speed,
+                mounting.ExternalLoad(point.thrust if group.carries_thrust else 0.0),
+                around,
+                lubricant=self.lubricant,
+                control=_control(self.options),
+                heat=self.options,
+            )
+            for states in zip(*found, strict=True):
+                paths = [self._ball_path(group, state) for state in states]
+                name = states[0].name
+                curves[name] = FilmCurves(
+                    kelvin,
+                    factors[name] * np.array([state.heat.total for state in states]),
+                    np.array([path.inner for path in paths]),
+                    np.array([path.outer for path in paths]),
+                )
+        return curves
+
+    def _ball_path(self, group: BearingSet, state: BearingState) -> BallConductance:
+        kind, grease = self.spec.bearing_types[group.bearing_type], self.spec.grease
+        return ball_conductance(
+            state,
+            self.lubricant,
+            ring_conductivity=self.spec.materials[kind.ring_material].thermal_conductivity,
+            ball_conductivity=self.spec.materials[kind.ball_material].thermal_conductivity,
+            wetted_share=grease.free_volume_fill if grease.wetted_share is None else grease.wetted_share,
+        )
+
+    @staticmethod
+    def _expanded(around: list[BearingTemperatures], assembly: float) -> mounting.SetTemperatures:
+        return mounting.SetTemperatures(
+            bearings=tuple(
+                mounting.BearingTemperatures(
+                    item.inner, item.outer, item.ball, shaft_seat=item.shaft, housing_seat=item.housing
+                )
+                for item in around
+            ),
+            shaft=float(np.mean([item.shaft for item in around])),
+            housing=float(np.mean([item.housing for item in around])),
+            assembly=assembly,
+        )
+
+    @staticmethod
+    def _as_assembled(around: list[BearingTemperatures]) -> mounting.SetTemperatures:
+        cold = mounting.ROOM_TEMPERATURE
+        return mounting.SetTemperatures(
+            bearings=tuple(
+                mounting.BearingTemperatures(
+                    cold, cold, cold, mounting.BearingTemperatures(item.inner, item.outer, item.ball).film
+                )
+                for item in around
+            ),
+            shaft=cold,
+            housing=cold,
+        )
+
+    def __call__(
+        self, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+    ) -> tuple[dict[str, BearingHeat], tuple[CodedWarning, ...]]:
+        """Heat, contacts and films of every bearing; the heat model's interface."""
+        states = self.states(point, temperatures, expand=self.spec.heat.thermal_preload)
+        factors = {bearing.name: group.heat_factor.value for group, bearing in self.spec.bearings}
+        groups = {bearing.name: group for group, bearing in self.spec.bearings}
+        heat, warnings = {}, []
+        for name, state in states.items():
+            path = self._ball_path(groups[name], state)
+            balls = state.balls
+            terms = {term: factors[name] * value for term, value in state.heat.terms.items()}
+            heat[name] = BearingHeat(
+                total=factors[name] * state.heat.total,
+                terms=terms,
+                contact_angle_inner=state.contact_angle_inner,
+                contact_angle_outer=state.contact_angle_outer,
+                preload=state.preload,
+                axial_load=state.axial_force,
+                film_thickness=float(np.min(balls.film_central)),
+                film_thickness_ratio=float(np.min(balls.film_thickness_ratio)),
+                conductance_inner=path.inner,
+                conductance_outer=path.outer,
+            )
+            warnings += state.warnings
+        return heat, tuple(warnings)
+
+
+def preload_runs_away(preload: Mapping[str, float], assembled: Mapping[str, float]) -> bool:
+    """Whether a preload has grown beyond what a bearing survives."""
+    return any(preload[name] > LARGEST_PRELOAD_RATIO * assembled[name] for name in preload)
+
+
+def _control(options: HeatOptions) -> str:
+    """Only the paper's terms need friction to decide the attitude of the balls."""
+    return "equilibrium" if options.level in ("paper", "full") else "outer"
+
+
+def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
+    kind = spec.bearing_types[group.bearing_type]
+    geometry = BearingGeometry(
+        ball_diameter=kind.ball_diameter,
+        ball_count=kind.ball_count,
+        pitch_diameter=kind.pitch,
+        contact_angle=kind.contact_angle,
+        groove_curvature_inner=kind.groove_curvature_inner,
+        groove_curvature_outer=kind.groove_curvature_outer,
+        young_modulus=kind.young_modulus,
+        poisson_ratio=kind.poisson_ratio,
+        density=spec.materials[kind.ball_material].density,
+        thermal_expansion=spec.materials[kind.ring_material].thermal_expansion,
+        ball_thermal_expansion=spec.materials[kind.ball_material].thermal_expansion,
+        bore_diameter=kind.bore_diameter,
+        outer_diameter=kind.outer_diameter,
+        width=kind.width,
+        static_load_rating=kind.basic_static_load,
+    )
+    return mounting.BearingSet(
+        bearings=tuple(
+            mounting.MountedBearing(
+                bearing.name,
+                geometry,
+                _ORIENTATION[bearing.takes_thrust],
+                0.5 * (bearing.z[0] + bearing.z[1]),
+                _ring_fits(spec, group, bearing),
+            )
+            for bearing in group.bearing
+        ),
+        preload=group.preload,
+        preload_kind=group.preload_kind,
+        shaft_expansion=_seat_expansion(spec, group, "inner"),
+        housing_expansion=_seat_expansion(spec, group, "outer"),
+        shaft_bore_diameter=_shaft_bore(spec, group),
+        raceway_roughness=kind.roughness_raceway,
+        ball_roughness=kind.roughness_ball,
+    )
+
+
+def _ring_fits(spec: MachineSpec, group: BearingSet, bearing: SetBearing) -> RingFits | None:
+    """Seats of one bearing's rings; None where the set has no fit."""
+    if group.fit is None:
+        return None
+    kind = spec.bearing_types[group.bearing_type]
+    shaft, shaft_bore = seat_diameter(spec, kind, bearing, "inner")
+    housing, wall = seat_diameter(spec, kind, bearing, "outer")
+    own = group.fit.housing_outer_diameter
+    return RingFits(
+        inner_interference=group.fit.inner_interference,
+        outer_clearance=group.fit.outer_clearance,
+        housing_outer_diameter=wall if own is None else own,
+        shaft_bore_diameter=shaft_bore,
+        inner_ring_outer_diameter=kind.inner_ring_outer_diameter,
+        outer_ring_inner_diameter=kind.outer_ring_inner_diameter,
+        ring_density=spec.materials[kind.ring_material].density,
+        shaft=_seat_material(spec.part_material(shaft)),
+        housing=_seat_material(spec.part_material(housing)),
+    )
+
+
+def _seat_material(material: Material) -> SeatMaterial:
+    return SeatMaterial(
+        material.young_modulus, material.poisson_ratio, material.density, material.thermal_expansion
+    )
+
+
+def _seat_expansion(spec: MachineSpec, group: BearingSet, side: Literal["inner", "outer"]) -> float:
+    """Thermal expansion of what carries the set, 1/K; steel's where its rings sit on no part."""
+    seat = seat_diameter(spec, spec.bearing_types[group.bearing_type], group.bearing[0], side)
+    return STEEL_EXPANSION if seat is None else spec.part_material(seat[0]).thermal_expansion
+
+
+def _shaft_bore(spec: MachineSpec, group: BearingSet) -> float | None:
+    """Bore of the rotating part that carries the set; None under a solid shaft."""
+    seat = seat_diameter(spec, spec.bearing_types[group.bearing_type], group.bearing[0], "inner")
+    return None if seat is None else seat[1] or None

@@ -1,0 +1,122 @@
+"""The coolant along the helix, between the correlations and the wetted facets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.operation.channel_cells import ChannelCells
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.duct_friction import PressureDrop, channel_pressure_drop
+from spindle_fem.physics.coolant.march import ChannelMarch, march_channel
+from spindle_fem.physics.coolant.nusselt import nusselt_sieder_tate
+from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
+
+
+@dataclass(frozen=True, slots=True)
+class CoolantState:
+    """March along every start with the film it used.
+
+    Attributes
+    ----------
+    film_coefficient, film_low, film_high : (n_starts, n) ndarray, [W/(m²·K)]
+        Port cells and the film factor included.
+    """
+
+    march: ChannelMarch
+    film_coefficient: NDArray[np.float64]
+    film_low: NDArray[np.float64]
+    film_high: NDArray[np.float64]
+    pressure: PressureDrop
+
+
+class CoolantLoop:
+    """Marches the coolant of one machine over given wall temperatures."""
+
+    def __init__(self, spec: MachineSpec, cells: ChannelCells) -> None:
+        channel = spec.channel
+        self.spec = spec
+        self.cells = cells
+        self.coolant = coolant_by_name(spec.coolant.fluid)
+        self.section = ChannelSection(
+            inner_radius=channel.inner_radius,
+            depth=channel.depth,
+            width=channel.width,
+            pitch=channel.pitch,
+            turns=channel.turns,
+            starts=channel.starts,
+        )
+        self.port_diameter = channel.ports.diameter if cells.is_port.any() else None
+        port_area = cells.cell_area[:, cells.is_port].sum() / max(
+            1, cells.n_starts * int(cells.is_port.sum())
+        )
+        self.port_length = port_area / (np.pi * self.port_diameter) if self.port_diameter else 0.0
+
+    def at(
+        self, point: OperatingPoint, wall_temperature: NDArray[np.float64], *, film_factor: float = 1.0
+    ) -> CoolantState:
+        """March at an operating point.
+
+        Parameters
+        ----------
+        wall_temperature : (n_starts, n) ndarray, [K]
+            Area mean of each cell.
+        film_factor : float
+            Beside that of the definition.
+        """
+        settings = self.spec.coolant
+        inlet = point.coolant_inlet_temperature
+        pressure = channel_pressure_drop(
+            self.section,
+            point.coolant_flow,
+            self.coolant.properties(inlet),
+            float(critical_reynolds_schmidt(self.section.curvature_ratio)),
+            port_diameter=self.port_diameter,
+            port_length=self.port_length,
+        )
+        factor = film_factor * settings.film_factor.value * self._port_factor(point, inlet)
+        local = settings.properties_at == "bulk"
+        march = march_channel(
+            self.section,
+            self.coolant,
+            point.coolant_flow,
+            inlet,
+            wall_temperature,
+            self.cells.cell_area,
+            model=settings.film_model,
+            properties_at="local" if local else "inlet",
+            wall_correction=local,
+            film_factor=factor,
+            pumping_power=pressure.pumping_power if settings.pumping_heat else 0.0,
+        )
+        shape = self.cells.cell_area.shape
+        value, low, high = (
+            np.broadcast_to(factor * np.asarray(item), shape)
+            for item in (march.film.value, march.film.low, march.film.high)
+        )
+        return CoolantState(march, value, low, high, pressure)
+
+    def _port_factor(self, point: OperatingPoint, inlet: float) -> NDArray[np.float64]:
+        """Film of the drillings over that of the channel: short tubes, thermally developing."""
+        factor = np.ones(self.cells.is_port.shape)
+        if self.port_diameter is None:
+            return factor
+        properties = self.coolant.properties(inlet)
+        velocity = point.coolant_flow / self.section.starts / (0.25 * np.pi * self.port_diameter**2)
+        reynolds = velocity * self.port_diameter / properties.kinematic_viscosity
+        graetz = reynolds * properties.prandtl * self.port_diameter / self.port_length
+        port = (
+            nusselt_sieder_tate(graetz, extrapolate=True)
+            * properties.thermal_conductivity
+            / self.port_diameter
+        )
+        state = ChannelState(self.coolant, point.coolant_flow, inlet)
+        factor[self.cells.is_port] = (
+            float(port) / select_film(self.spec.coolant.film_model, self.section, state).value
+        )
+        return factor

@@ -1,0 +1,278 @@
+"""Loads of a machine at an operating point and a temperature field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
+from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
+from spindle_fem.operation.channel_cells import ChannelCells, build_channel_cells
+from spindle_fem.operation.coolant_loop import CoolantLoop, CoolantState
+from spindle_fem.operation.facet_centres import facet_centres
+from spindle_fem.operation.gap_bands import GapBands, angle_of, build_gap_bands
+from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads, LumpedLoad
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
+from spindle_fem.validity import CodedWarning, fold_warnings
+
+GAP_BAND_WIDTH = 0.02
+SECTORS_WITHOUT_AVERAGING = 24
+
+
+@dataclass(frozen=True, slots=True)
+class FieldState:
+    """Temperatures that the loads depend on.
+
+    Attributes
+    ----------
+    facets : mapping of surface to (n_facets,) ndarray, [K]
+        Mean over each facet.
+    lumped : mapping of lumped-node name to float, [K]
+    joints : mapping of joint to (float, float), [K]
+        Mean of the first and of the second part's side.
+    """
+
+    facets: Mapping[str, NDArray[np.float64]]
+    joints: Mapping[str, tuple[float, float]]
+    lumped: Mapping[str, float]
+
+
+class LoadsBuilder:
+    """Evaluates the loads of one machine on one mesh, again and again.
+
+    Everything that only depends on geometry is sorted once at construction.
+    """
+
+    def __init__(
+        self,
+        spec: MachineSpec,
+        mesh: TaggedMesh,
+        facet_area: Mapping[str, NDArray[np.float64]],
+        heat_model: HeatModel,
+    ) -> None:
+        self.spec = spec
+        self.mesh = mesh
+        self.heat_model = heat_model
+        self.n_sectors = 1 if spec.mesh.circumferential_averaging else SECTORS_WITHOUT_AVERAGING
+        self.facet_area = facet_area
+        self._centres = {name: facet_centres(mesh.points, facets) for name, facets in mesh.surfaces.items()}
+        self.cells: ChannelCells | None = None
+        self.coolant_loop: CoolantLoop | None = None
+        if spec.channel is not None:
+            self.cells = build_channel_cells(mesh, facet_area, spec.channel)
+            self.coolant_loop = CoolantLoop(spec, self.cells)
+        self.gaps: dict[str, GapBands] = {
+            gap.name: build_gap_bands(
+                mesh, facet_area, gap.rotating, gap.standing, GAP_BAND_WIDTH, self.n_sectors
+            )
+            for gap in spec.gap
+        }
+
+    # ------------------------------------------------------------------ means
+    def surface_mean(self, surface: str, state: FieldState) -> float:
+        """Area mean of the temperature over a surface, K."""
+        areas = self.facet_area[surface]
+        return float(areas @ state.facets[surface] / areas.sum())
+
+    def wall_temperature(self, state: FieldState) -> NDArray[np.float64]:
+        """Area mean of the wetted wall in each coolant cell, (n_starts, n) in K."""
+        cells = self.cells
+        total = np.zeros(cells.cell_area.size)
+        for surface in cells.surfaces:
+            weighted = cells.areas[surface] * state.facets[surface]
+            total += np.bincount(cells.facet_cell[surface], weighted, total.size)
+        return total.reshape(cells.cell_area.shape) / cells.cell_area
+
+    def bearing_temperatures(self, state: FieldState) -> dict[str, BearingTemperatures]:
+        """Mean raceway and ball temperatures of every bearing, K."""
+        found = {}
+        for _, bearing in self.spec.bearings:
+            inner = self.surface_mean(f"{bearing.name}.inner_raceway", state)
+            outer = self.surface_mean(f"{bearing.name}.outer_raceway", state)
+            balls = [state.lumped[name] for name in self.ball_nodes(bearing.name) if name in state.lumped]
+            ball = float(np.mean(balls)) if balls else 0.5 * (inner + outer)
+            shaft = self._seat(f"{bearing.name}.inner_ring", state, default=inner)
+            housing = self._seat(f"{bearing.name}.outer_ring", state, default=outer)
+            found[bearing.name] = BearingTemperatures(inner, outer, ball, shaft, housing)
+        return found
+
+    def _seat(self, ring: str, state: FieldState, default: float) -> float:
+        """Temperature of what a ring sits on; a ring that is fused has its own."""
+        for name, (first, second) in state.joints.items():
+            parts = name.split("|")
+            if ring in parts:
+                return second if parts[0] == ring else first
+        return default
+
+    def ball_nodes(self, bearing: str) -> tuple[str, ...]:
+        """Names of the lumped nodes of a ball row (one, or one a sector)."""
+        if self.n_sectors == 1:
+            return (f"{bearing}.balls",)
+        return tuple(f"{bearing}.balls[{sector}]" for sector in range(self.n_sectors))
+
+    # ------------------------------------------------------------------ loads
+    def at(
+        self, point: OperatingPoint, state: FieldState, change: LoadChange = NO_CHANGE
+    ) -> tuple[Loads, CoolantState | None]:
+        """Loads at an operating point, with every coefficient at the given field.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        state : FieldState
+        change : LoadChange
+            Physics beyond the machine's own.
+        """
+        warnings: list[CodedWarning] = []
+        heats, heat_warnings = self.heat_model(point, self.bearing_temperatures(state))
+        heats = {name: _scaled(heat, change.friction.get(name, 1.0)) for name, heat in heats.items()}
+        warnings += heat_warnings
+        surface_heat: dict[str, float] = {}
+        heat_to: dict[str, dict[str, float]] = {}
+        lumped: list[LumpedLoad] = []
+        for group, bearing in self.spec.bearings:
+            heat = heats[bearing.name]
+            shares = self.shares(heat.total)
+            heat_to[bearing.name] = shares
+            surface_heat[f"{bearing.name}.inner_raceway"] = shares["inner"]
+            surface_heat[f"{bearing.name}.outer_raceway"] = shares["outer"]
+            lumped += self._ball_row(group, bearing.name, heat, shares["balls"], change)
+        films = self._air_films(point, state, warnings, change)
+        lumped += self._gap_nodes(point, warnings, change)
+        coolant = None
+        if self.coolant_loop is not None:
+            flowing = replace(
+                point,
+                coolant_inlet_temperature=point.coolant_inlet_temperature + change.inlet,
+                coolant_flow=point.coolant_flow * change.flow,
+            )
+            coolant = self.coolant_loop.at(
+                flowing, self.wall_temperature(state), film_factor=change.factor("channel.film")
+            )
+            films |= self._channel_films(coolant)
+            warnings += [*coolant.march.film.warnings, *coolant.pressure.warnings]
+        loads = Loads(
+            surface_heat,
+            films,
+            tuple(lumped),
+            heats,
+            heat_to,
+            fold_warnings(warnings, tuple(heats)),
+            change,
+        )
+        return loads, coolant
+
+    def shares(self, total: float) -> dict[str, float]:
+        """Where a bearing's heat enters: both rings and the balls, W."""
+        heat = self.spec.heat
+        rings = (1.0 - heat.ball_share) * total
+        inner = heat.inner_share.value
+        return {"inner": inner * rings, "outer": (1.0 - inner) * rings, "balls": heat.ball_share * total}
+
+    def _ball_row(
+        self, group: BearingSet, name: str, heat: BearingHeat, ball_heat: float, change: LoadChange
+    ) -> list[LumpedLoad]:
+        spec = self.spec
+        kind = spec.bearing_types[group.bearing_type]
+        row = group.ball_row
+        if row.kind == "constant":
+            conductances = (row.conductance.value,) * 2
+        else:
+            conductances = (heat.conductance_inner, heat.conductance_outer)
+        conductances = [
+            value * change.factor(f"balls.{name}.{side}")
+            for value, side in zip(conductances, ("inner", "outer"), strict=True)
+        ]
+        material = spec.materials[kind.ball_material]
+        volume = kind.ball_count * np.pi / 6.0 * kind.ball_diameter**3
+        capacity = row.capacity if row.capacity is not None else volume * material.volumetric_heat_capacity
+        capacity *= spec.heat_capacity_factor.value
+        raceways = (f"{name}.inner_raceway", f"{name}.outer_raceway")
+        sectors = {
+            surface: np.minimum(
+                (angle_of(self._centres[surface]) / (2.0 * np.pi) * self.n_sectors).astype(int),
+                self.n_sectors - 1,
+            )
+            for surface in raceways
+        }
+        nodes = []
+        for sector, node in enumerate(self.ball_nodes(name)):
+            connections = {}
+            for surface, conductance in zip(raceways, conductances, strict=True):
+                inside = sectors[surface] == sector
+                area = self.facet_area[surface][inside].sum()
+                connections[surface] = np.where(inside, conductance / self.n_sectors / area, 0.0)
+            own_capacity = capacity / self.n_sectors + change.lumped_capacity.get(node, 0.0)
+            own_heat = ball_heat / self.n_sectors + change.lumped_heat.get(node, 0.0)
+            nodes.append(LumpedLoad(node, own_capacity, own_heat, connections))
+        return nodes
+
+    def _air_films(
+        self, point: OperatingPoint, state: FieldState, warnings: list[CodedWarning], change: LoadChange
+    ) -> dict[str, FilmLoad]:
+        films = {}
+        for film in self.spec.film:
+            fluid = point.ambient_temperature if film.temperature == "ambient" else film.temperature
+            for surface in film.surface:
+                wall = state.facets[surface]
+                coefficient, said = film_coefficient(film, point, wall, fluid)
+                warnings += said
+                films[surface] = FilmLoad(
+                    surface,
+                    coefficient * change.factor(f"film.{surface}"),
+                    np.full(wall.shape, fluid + change.fluids.get(surface, 0.0)),
+                )
+        return films
+
+    def _gap_nodes(
+        self, point: OperatingPoint, warnings: list[CodedWarning], change: LoadChange
+    ) -> list[LumpedLoad]:
+        nodes = []
+        for gap in self.spec.gap:
+            bands = self.gaps[gap.name]
+            coefficient, said = gap_coefficient(gap, point, *self._gap_radii(gap.rotating, gap.standing))
+            warnings += said
+            # Half the resistance on either side of the mixed air.
+            conductance = 2.0 * coefficient * change.factor(f"gap.{gap.name}") * bands.conductance_share
+            on_rotating = (conductance / bands.rotating_area)[bands.rotating_cell]
+            on_standing = {
+                name: (conductance / bands.standing_area)[cells]
+                for name, cells in bands.standing_cells.items()
+            }
+            for cell in range(bands.n_cells):
+                connections = {gap.rotating: np.where(bands.rotating_cell == cell, on_rotating, 0.0)}
+                for name, cells in bands.standing_cells.items():
+                    connections[name] = np.where(cells == cell, on_standing[name], 0.0)
+                nodes.append(LumpedLoad(f"{gap.name}[{cell}]", 0.0, 0.0, connections))
+        return nodes
+
+    def _gap_radii(self, rotating: str, standing: tuple[str, ...]) -> tuple[float, float]:
+        """Mean radius of the turning side and of what faces it, m."""
+        radii = []
+        for names in ((rotating,), standing):
+            centres = np.concatenate([self._centres[name] for name in names])
+            areas = np.concatenate([self.facet_area[name] for name in names])
+            radii.append(float(areas @ np.hypot(centres[:, 0], centres[:, 1]) / areas.sum()))
+        return radii[0], radii[1]
+
+    def _channel_films(self, coolant: CoolantState) -> dict[str, FilmLoad]:
+        cells = self.cells
+        coefficient = coolant.film_coefficient.ravel()
+        bulk = np.broadcast_to(coolant.march.march.bulk_temperature, cells.cell_area.shape).ravel()
+        return {
+            surface: FilmLoad(surface, coefficient[index], bulk[index])
+            for surface, index in cells.facet_cell.items()
+        }
+
+
+def _scaled(heat: BearingHeat, factor: float) -> BearingHeat:
+    """Friction heat and its terms times a factor."""
+    if factor == 1.0:
+        return heat
+    terms = {name: value * factor for name, value in heat.terms.items()}
+    return replace(heat, total=heat.total * factor, terms=terms)

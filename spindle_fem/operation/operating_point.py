@@ -1,0 +1,49 @@
+"""The instantaneous inputs of a machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from spindle_fem.definition.machine_spec import MachineSpec
+
+
+@dataclass(frozen=True, slots=True)
+class OperatingPoint:
+    """What drives the machine at one instant, SI.
+
+    Attributes
+    ----------
+    speed : float, [rad/s]
+    thrust : float, [N]
+    ambient_temperature, coolant_inlet_temperature : float, [K]
+    coolant_flow : float, [m³/s]
+    extra_heat : mapping of source name to float, [W]
+    beside : mapping of str to float
+        What was recorded beside the inputs and only terms may follow, ``covariate.<column>``.
+    """
+
+    speed: float
+    thrust: float
+    ambient_temperature: float
+    coolant_inlet_temperature: float
+    coolant_flow: float
+    extra_heat: Mapping[str, float] = field(default_factory=dict)
+    beside: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, spec: MachineSpec) -> OperatingPoint:
+        """The steady operating point that the definition asks for."""
+        operation, coolant = spec.operation, spec.coolant
+        return cls(
+            speed=operation.speed,
+            thrust=operation.thrust,
+            ambient_temperature=operation.ambient_temperature,
+            coolant_inlet_temperature=coolant.inlet_temperature if coolant else operation.ambient_temperature,
+            coolant_flow=coolant.flow if coolant else 0.0,
+        )
+
+    @property
+    def coldest(self) -> float:
+        """Lowest temperature that anything outside the solids has, K."""
+        return min(self.ambient_temperature, self.coolant_inlet_temperature)

@@ -1,0 +1,1 @@
+"""Laws of bearings, coolant and surroundings; none of them knows a mesh."""

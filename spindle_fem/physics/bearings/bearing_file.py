@@ -1,0 +1,327 @@
+"""One bearing or preloaded set from a TOML file: read, check, solve, report as plain numbers."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.errors import (
+    BadInputError,
+    FaultsError,
+    OutOfValidityError,
+    SpecError,
+    SpindleFemError,
+    UnknownKeyError,
+    did_you_mean,
+)
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry, bearing_faults
+from spindle_fem.physics.bearings.bearing_keys import (
+    FIT,
+    GEOMETRY,
+    HEAT_FIELDS,
+    HOUSING_FIELDS,
+    REQUIRED,
+    TABLES,
+)
+from spindle_fem.physics.bearings.bearing_report import report_of_states
+from spindle_fem.physics.bearings.bearing_set import solve_bearing_set
+from spindle_fem.physics.bearings.fits import RingFits, fit_faults
+from spindle_fem.physics.bearings.friction_heat import HeatOptions
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.mounting import (
+    BearingSet,
+    BearingTemperatures,
+    ExternalLoad,
+    MountedBearing,
+    SetTemperatures,
+    uniform_temperatures,
+)
+from spindle_fem.physics.bearings.rings import STEEL
+from spindle_fem.validity import CodedWarning
+
+SCHEMA = "spindle-fem/bearing/1"
+_SPACING_OVER_BALL = 1.7
+
+
+@dataclass(frozen=True, slots=True)
+class BearingCase:
+    """What a bearing file says, in SI.
+
+    Attributes
+    ----------
+    bearing_set : BearingSet
+    speed : float, [rad/s]
+    load : ExternalLoad
+        Thrust turned so that a positive axial load of the file loads the
+        first bearing of the row.
+    temperatures : SetTemperatures
+        All at the operation's temperature, which is also that of assembly,
+        unless ``[temperatures]`` says otherwise.
+    raceway_control : str
+    lubricant : Lubricant or None
+    heat : HeatOptions
+    warnings : tuple of CodedWarning
+    """
+
+    bearing_set: BearingSet
+    speed: float
+    load: ExternalLoad
+    temperatures: SetTemperatures
+    raceway_control: str
+    lubricant: Lubricant | None
+    heat: HeatOptions
+    warnings: tuple[CodedWarning, ...]
+
+
+def bearing_report(path: str | Path) -> dict[str, Any]:
+    """Solve the bearing or set of a TOML file and report it for JSON.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    dict
+        Keys and units as ``spindle-fem bearing FILE --json`` prints them;
+        None where there is no film (no lubricant, at rest, no contact).
+
+    Raises
+    ------
+    BadInputError
+        Every fault of the file with file, key, value and what is allowed.
+    NoEquilibriumError
+        The state does not exist.
+    """
+    case = read_bearing_file(path)
+    try:
+        states = solve_bearing_set(
+            case.bearing_set,
+            case.speed,
+            case.load,
+            case.temperatures,
+            lubricant=case.lubricant,
+            control=case.raceway_control,
+            heat=case.heat,
+        )
+    except OutOfValidityError as error:
+        raise SpecError(f"{path}: operation.temperature", error.what, error.how_to_fix) from error
+    return report_of_states(states, case.warnings)
+
+
+def read_bearing_file(path: str | Path) -> BearingCase:
+    """Read and check a bearing file; all faults at once.
+
+    Raises
+    ------
+    BadInputError
+    """
+    file = Path(path)
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpecError(str(file), f"cannot be read ({error}).", "Give a TOML file.") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(str(file), f"is not TOML ({error}).", "Correct the syntax.") from error
+    faults: list[SpindleFemError] = []
+    tables = _read_tables(document, str(file), faults)
+    case = None
+    if not faults:
+        case = _build_case(tables, str(file), faults)
+    if len(faults) == 1:
+        raise faults[0]
+    if faults or case is None:
+        raise FaultsError(str(file), faults)
+    return case
+
+
+def _read_tables(
+    document: Mapping[str, Any], file: str, faults: list[SpindleFemError]
+) -> dict[str, dict[str, Any]]:
+    schema = document.get("schema", SCHEMA)
+    if schema != SCHEMA:
+        faults.append(SpecError(f"{file}: schema", f"{schema!r} is unknown.", f'Allowed: "{SCHEMA}".'))
+    tables: dict[str, dict[str, Any]] = {}
+    for name in document:
+        if name != "schema" and name not in TABLES:
+            faults.append(UnknownKeyError(f"{file}: {name}", "unknown table.", did_you_mean(name, TABLES)))
+    for name, readers in TABLES.items():
+        table = document.get(name)
+        if table is None:
+            if name in ("bearing", "operation"):
+                faults.append(SpecError(f"{file}: {name}", "the table is missing.", f"Write [{name}]."))
+            continue
+        if not isinstance(table, dict):
+            faults.append(SpecError(f"{file}: {name}", f"{table!r} is no table.", f"Write [{name}]."))
+            continue
+        values: dict[str, Any] = {}
+        for key, value in table.items():
+            where = f"{file}: {name}.{key}"
+            if key not in readers:
+                faults.append(UnknownKeyError(where, "unknown key.", did_you_mean(key, readers)))
+                continue
+            try:
+                values[key] = readers[key](value, where)
+            except BadInputError as error:
+                faults.append(error)
+        for key in REQUIRED[name]:
+            if key not in table:
+                faults.append(SpecError(f"{file}: {name}.{key}", "the key is missing.", "It is required."))
+        tables[name] = values
+    return tables
+
+
+def _build_case(
+    tables: dict[str, dict[str, Any]], file: str, faults: list[SpindleFemError]
+) -> BearingCase | None:
+    bearing, operation = tables["bearing"], tables["operation"]
+    orientations = bearing.get("arrangement", (1,))
+    geometry_values = {key: value for key, value in bearing.items() if key in GEOMETRY}
+    probe = _Unchecked(**geometry_values)
+    for key, what, how_to_fix in bearing_faults(probe):
+        faults.append(SpecError(f"{file}: bearing.{key}", what, how_to_fix))
+    _check_operation(operation, orientations, file, faults)
+    preload = bearing.get("preload", 0.0)
+    if preload < 0.0:
+        faults.append(
+            SpecError(f"{file}: bearing.preload", f"preload is {preload:g} N.", "It must not be negative.")
+        )
+    lubricant = _lubricant(tables.get("lubricant"), file, faults)
+    control = operation.get("raceway_control", "outer")
+    if control == "equilibrium" and lubricant is None and "lubricant" not in tables:
+        faults.append(
+            SpecError(
+                f"{file}: operation.raceway_control",
+                '"equilibrium" lets friction decide, but there is no [lubricant].',
+                'Write [lubricant], or "outer" or "inner".',
+            )
+        )
+    heat_values = tables.get("heat", {})
+    heat = HeatOptions()
+    try:
+        heat = HeatOptions(**{HEAT_FIELDS.get(key, key): value for key, value in heat_values.items()})
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: {error.where}", error.what, error.how_to_fix))
+    if faults:
+        return None
+    geometry = BearingGeometry(**geometry_values)
+    warnings: list[CodedWarning] = []
+    radial, moment = operation.get("radial_load", 0.0), operation.get("moment", 0.0)
+    spacing = bearing.get("spacing", bearing.get("width"))
+    if spacing is None:
+        spacing = _SPACING_OVER_BALL * geometry.ball_diameter
+        if len(orientations) > 1 and (radial or moment):
+            warnings.append(
+                CodedWarning(
+                    "spacing_assumed",
+                    f"bearings stand {spacing * 1e3:.2f} mm apart (1.7 ball diameters); give bearing.spacing "
+                    "or bearing.width.",
+                )
+            )
+    fits = _fits(tables.get("fit"), geometry, file, faults)
+    if faults:
+        return None
+    mounted = tuple(
+        MountedBearing(
+            f"B{index + 1}" if len(orientations) > 1 else "bearing", geometry, side, index * spacing, fits
+        )
+        for index, side in enumerate(orientations)
+    )
+    roughness = {
+        target: bearing[key]
+        for key, target in (("roughness_raceway", "raceway_roughness"), ("roughness_ball", "ball_roughness"))
+        if key in bearing
+    }
+    try:
+        bearing_set = BearingSet(mounted, preload, bearing.get("preload_kind", "rigid"), **roughness)
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: bearing.{error.where}", error.what, error.how_to_fix))
+        return None
+    return BearingCase(
+        bearing_set,
+        operation["speed"],
+        ExternalLoad(operation["axial_load"] * orientations[0], radial, moment),
+        _temperatures(tables, len(mounted)),
+        control,
+        lubricant,
+        heat,
+        tuple(warnings),
+    )
+
+
+def _fits(
+    values: dict[str, Any] | None, geometry: BearingGeometry, file: str, faults: list[SpindleFemError]
+) -> RingFits | None:
+    """Seats of the rings; the housing is of steel where nothing else is said."""
+    if values is None:
+        return None
+    housing = {name: values[key] for key, name in HOUSING_FIELDS.items() if key in values}
+    own = {key: value for key, value in values.items() if key not in HOUSING_FIELDS}
+    fits = RingFits(**own, housing=replace(STEEL, **housing))
+    for key, what, how_to_fix in fit_faults(geometry, fits):
+        table = "fit" if key in FIT else "bearing"
+        faults.append(SpecError(f"{file}: {table}.{key}", what, how_to_fix))
+    return fits
+
+
+def _temperatures(tables: Mapping[str, dict[str, Any]], number: int) -> SetTemperatures:
+    common = tables["operation"].get("temperature", 313.15)
+    given = tables.get("temperatures")
+    if given is None:
+        return uniform_temperatures(number, common)
+    rings = BearingTemperatures(*(given.get(key, common) for key in ("inner_ring", "outer_ring", "ball")))
+    return SetTemperatures(
+        (rings,) * number, given.get("shaft", common), given.get("housing", common), given["assembly"]
+    )
+
+
+class _Unchecked:
+    """Geometry values before the checks of ``BearingGeometry``."""
+
+    def __init__(self, **values: Any) -> None:
+        for name, spec in BearingGeometry.__dataclass_fields__.items():
+            setattr(self, name, values.get(name, spec.default))
+
+
+def _check_operation(
+    operation: dict[str, Any], orientations: tuple[int, ...], file: str, faults: list[SpindleFemError]
+) -> None:
+    if operation["speed"] < 0.0:
+        rpm = operation["speed"] * 30.0 / math.pi
+        faults.append(
+            SpecError(f"{file}: operation.speed", f"speed is {rpm:g} rpm.", "It must not be negative.")
+        )
+    axial = operation["axial_load"]
+    if axial < 0.0 and len(set(orientations)) == 1:
+        faults.append(
+            SpecError(
+                f"{file}: operation.axial_load",
+                f"{axial:g} N unloads bearings that all face the other way.",
+                "It must not be negative without a counter bearing.",
+            )
+        )
+    if operation.get("radial_load", 0.0) < 0.0:
+        faults.append(
+            SpecError(
+                f"{file}: operation.radial_load",
+                f"{operation['radial_load']:g} N.",
+                "It must not be negative: azimuth 0 lies under the radial load.",
+            )
+        )
+
+
+def _lubricant(values: dict[str, Any] | None, file: str, faults: list[SpindleFemError]) -> Lubricant | None:
+    if values is None:
+        return None
+    fields = {
+        ("density" if key == "base_oil_density" else key): v for key, v in values.items() if key != "name"
+    }
+    try:
+        return Lubricant(**fields)
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: lubricant.{error.where}", error.what, error.how_to_fix))
+        return None

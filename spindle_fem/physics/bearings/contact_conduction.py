@@ -1,0 +1,182 @@
+"""Conduction between raceway, ball and lubricant (the paper's Table 1, section on resistances)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ellipkm1
+
+from spindle_fem.errors import SpecError
+from spindle_fem.physics.bearings.bearing_state import BearingState
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.hertz import INNER, OUTER
+
+FloatArray = NDArray[np.float64]
+STEEL_CONDUCTIVITY = 46.0
+OIL_HEAT_CAPACITY = 1900.0
+
+
+@dataclass(frozen=True, slots=True)
+class BallConductance:
+    """Conductance of all balls of a bearing together, W/K.
+
+    Attributes
+    ----------
+    inner, outer : float, [W/K]
+        Raceway to the balls' middle: constriction on both sides of the
+        contact, half the ball, and the lubricant around it beside them.
+    inner_contact, outer_contact : float, [W/K]
+        The solid path alone.
+    lubricant : float, [W/K]
+        Film of the lubricant in the balls' path, to each raceway.
+    """
+
+    inner: float
+    outer: float
+    inner_contact: float
+    outer_contact: float
+    lubricant: float
+
+
+def constriction_resistance(
+    semi_major: ArrayLike, semi_minor: ArrayLike, thermal_conductivity: ArrayLike
+) -> FloatArray:
+    """Constriction resistance of an elliptic contact in *one* half-space, ψ/(4 k a).
+
+    Parameters
+    ----------
+    semi_major, semi_minor : array_like, [m]
+    thermal_conductivity : array_like, [W/(m K)]
+
+    Returns
+    -------
+    ndarray, [K/W]
+        Infinite without contact. Add both bodies.
+
+    Source: Table 1, with ψ = (2/π) K(m = 1 - b²/a²).
+
+    Circle of 1 mm radius: 1/(4 k a).
+
+    >>> float(constriction_resistance(1e-3, 1e-3, 50.0))
+    5.0
+    """
+    major, minor = np.asarray(semi_major, float), np.asarray(semi_minor, float)
+    if np.any(minor > major * (1.0 + 1e-12)):
+        raise SpecError("semi_minor", "it exceeds the semi-major axis.", "Give a >= b.")
+    touching = major > 0.0
+    ratio = np.divide(minor, major, out=np.ones_like(major), where=touching)
+    shape = 2.0 / np.pi * ellipkm1(ratio**2)
+    with np.errstate(divide="ignore"):
+        return np.where(touching, shape / (4.0 * np.asarray(thermal_conductivity) * major), np.inf)
+
+
+def ball_resistance(ball_diameter: float, thermal_conductivity: float) -> float:
+    """Resistance of one ball from contact to contact, 2/(π k D), K/W: a crude one-dimensional figure.
+
+    >>> round(ball_resistance(14.2875e-3, 46.0), 3)
+    0.969
+    """
+    return 2.0 / (np.pi * thermal_conductivity * ball_diameter)
+
+
+def ball_film_coefficient(
+    ball_diameter: float, flow_speed: ArrayLike, kinematic_viscosity: float, lubricant: Lubricant, *,
+    density: float, heat_capacity: float = OIL_HEAT_CAPACITY,
+) -> FloatArray:  # fmt: skip
+    """Film coefficient of lubricant around a ball, 0.33 (k/D) Re_D^½ Pr^0.4, W/(m² K).
+
+    Parameters
+    ----------
+    flow_speed : array_like, [m/s]
+        A third to all of the cage's surface speed (Harris).
+    kinematic_viscosity : float, [m²/s]
+    density, heat_capacity : float, [kg/m³], [J/(kg K)]
+    """
+    conductivity = lubricant.thermal_conductivity
+    reynolds = np.abs(np.asarray(flow_speed, float)) * ball_diameter / kinematic_viscosity
+    prandtl = heat_capacity * density * kinematic_viscosity / conductivity
+    return 0.33 * conductivity / ball_diameter * np.sqrt(reynolds) * prandtl**0.4
+
+
+def contact_resistance(
+    state: BearingState,
+    *,
+    ring_conductivity: float = STEEL_CONDUCTIVITY,
+    ball_conductivity: float = STEEL_CONDUCTIVITY,
+) -> tuple[float, float]:
+    """Resistance from each raceway to the balls' middle, all balls in parallel, K/W.
+
+    Per ball: constriction in the ring and in the ball, and half the ball.
+
+    Returns
+    -------
+    (inner, outer) : float, [K/W]
+        Infinite where no ball touches.
+    """
+    balls = state.balls
+    half_ball = 0.5 * ball_resistance(state.geometry.ball_diameter, ball_conductivity)
+    resistance = half_ball + sum(
+        constriction_resistance(balls.semi_major, balls.semi_minor, conductivity)
+        for conductivity in (ring_conductivity, ball_conductivity)
+    )
+    conductance = balls.weight @ (1.0 / resistance)
+    with np.errstate(divide="ignore"):
+        inner, outer = 1.0 / conductance
+    return float(inner), float(outer)
+
+
+def ball_conductance(
+    state: BearingState,
+    lubricant: Lubricant | None = None,
+    *,
+    ring_conductivity: float = STEEL_CONDUCTIVITY,
+    ball_conductivity: float = STEEL_CONDUCTIVITY,
+    flow_share: float = 1.0 / 3.0,
+    wetted_share: float | None = None,
+) -> BallConductance:
+    """Conductance between each raceway and the balls of a bearing.
+
+    Parameters
+    ----------
+    state : BearingState
+        Gives the ellipses and the orbital speed.
+    lubricant : Lubricant, optional
+        Adds the film around the balls in parallel.
+    flow_share : float
+        Flow speed over the cage's surface speed, a third to 1.
+    wetted_share : float, optional
+        Share of the ball's surface in lubricant; None: the path fill, which
+        is small once the grease has channelled. Half of it faces each raceway.
+    """
+    inner, outer = contact_resistance(
+        state, ring_conductivity=ring_conductivity, ball_conductivity=ball_conductivity
+    )
+    film = 0.0
+    if lubricant is not None and state.speed > 0.0:
+        geometry = state.geometry
+        temperature = state.lubricant_temperature
+        coefficient = ball_film_coefficient(
+            geometry.ball_diameter,
+            flow_share * 0.5 * geometry.pitch_diameter * state.mean("orbital_speed"),
+            float(lubricant.kinematic_viscosity(temperature)),
+            lubricant,
+            density=float(lubricant.oil_density(temperature)),
+        )
+        share = lubricant.path_fill if wetted_share is None else wetted_share
+        area = 0.5 * np.pi * geometry.ball_diameter**2 * geometry.ball_count
+        film = float(coefficient * share * area)
+    return BallConductance(1.0 / inner + film, 1.0 / outer + film, 1.0 / inner, 1.0 / outer, film)
+
+
+__all__ = [
+    "INNER",
+    "OUTER",
+    "BallConductance",
+    "ball_conductance",
+    "ball_film_coefficient",
+    "ball_resistance",
+    "constriction_resistance",
+    "contact_resistance",
+]

@@ -1,0 +1,335 @@
+"""Friction, pressure drop and pumping power of a helical rectangular channel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.properties import CoolantProperties
+from spindle_fem.physics.coolant.transition import TURBULENT_FROM_REYNOLDS, transition_weight
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, CodedWarning, range_fault, require_range
+
+_HOW_TO_FIX = "Let coolant.friction.channel_pressure_drop choose the correlation."
+_WHITE_DEAN_RANGE = (0.0, 2000.0)
+_HELICAL_TURBULENT_RANGE = (4500.0, 1.0e5)
+_INCH_M = 0.0254
+
+
+def fanning_reynolds_rectangle(aspect_ratio: ArrayLike) -> NDArray[np.float64]:
+    """Fanning friction factor times Reynolds number, laminar, straight rectangular duct.
+
+    Parameters
+    ----------
+    aspect_ratio : (n,) array_like, [-]
+        Short over long side.
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+        On the hydraulic diameter.
+
+    Raises
+    ------
+    OutOfValidityError
+        Aspect ratio outside 0–1.
+
+    Range: 0 (slit) to 1 (square), developed laminar flow.
+
+    Source: Shah & London (1978), Laminar Flow Forced Convection in Ducts, eq. 341.
+
+    >>> float(fanning_reynolds_rectangle(10.0 / 12.0).round(2))
+    14.33
+    """
+    a = np.asarray(aspect_ratio, float)
+    require_range(
+        "fanning_reynolds_rectangle",
+        aspect_ratio=(a, 0.0, 1.0),
+        how_to_fix="Give the short over the long side.",
+    )
+    return 24.0 * (1.0 + a * (-1.3553 + a * (1.9467 + a * (-1.7012 + a * (0.9564 - 0.2537 * a)))))
+
+
+def friction_factor_curved_laminar(dean: ArrayLike, *, extrapolate: bool = False) -> NDArray[np.float64]:
+    """Laminar friction factor of a curved duct over that of the straight one.
+
+    Parameters
+    ----------
+    dean : (n,) array_like, [-]
+        Re √(D_h/D_c).
+    extrapolate : bool
+        Compute above Range too.
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+        1 up to De = 11.6.
+
+    Raises
+    ------
+    OutOfValidityError
+        Outside Range, unless ``extrapolate``.
+
+    Range: De <= 2000. Mishra & Gupta (1979) give the same within 2 % up to 3000.
+
+    Source: White (1929), Proc. R. Soc. A 123, 645–663.
+
+    >>> friction_factor_curved_laminar([10.0, 64.0, 1000.0]).round(3).tolist()
+    [1.0, 1.334, 3.64]
+    """
+    de = np.asarray(dean, float)
+    if not extrapolate:
+        require_range("friction_factor_curved_laminar", dean=(de, *_WHITE_DEAN_RANGE), how_to_fix=_HOW_TO_FIX)
+    reduced = (11.6 / np.maximum(de, 11.6)) ** 0.45
+    return 1.0 / (1.0 - (1.0 - reduced) ** (1.0 / 0.45))
+
+
+def friction_factor_helical_turbulent(
+    reynolds: ArrayLike, curvature_ratio: ArrayLike, *, extrapolate: bool = False
+) -> NDArray[np.float64]:
+    """Darcy friction factor of turbulent flow in a smooth helical coil.
+
+    Parameters
+    ----------
+    reynolds : (n,) array_like, [-]
+    curvature_ratio : (n,) array_like, [-]
+        Hydraulic over coil diameter; 0 is a straight duct (Blasius).
+    extrapolate : bool
+        Compute outside Range too.
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+
+    Raises
+    ------
+    OutOfValidityError
+        Outside Range, unless ``extrapolate``.
+
+    Range: 4500 <= Re <= 1e5, D_h/D_c <= 0.2, isothermal.
+
+    Source: Mishra & Gupta (1979), Ind. Eng. Chem. Process Des. Dev. 18,
+    130–137; as used by Gnielinski (1986).
+
+    >>> float(friction_factor_helical_turbulent(2.2e4, 0.05).round(5))
+    0.03269
+    """
+    re, delta = np.broadcast_arrays(np.asarray(reynolds, float), np.asarray(curvature_ratio, float))
+    if not extrapolate:
+        require_range(
+            "friction_factor_helical_turbulent",
+            reynolds=(re, *_HELICAL_TURBULENT_RANGE),
+            curvature_ratio=(delta, 0.0, 0.2),
+            how_to_fix=_HOW_TO_FIX,
+        )
+    return 0.3164 * re**-0.25 + 0.03 * np.sqrt(delta)
+
+
+def friction_factor_channel(
+    reynolds: ArrayLike, section: ChannelSection, critical_reynolds: float
+) -> NDArray[np.float64]:
+    """Darcy friction factor of the channel in every regime, without a jump.
+
+    Laminar rectangle with White's curvature factor up to the critical Reynolds
+    number, the turbulent coil from 2.2e4, linear in Re between.
+
+    Parameters
+    ----------
+    reynolds : (n,) array_like, [-]
+        On the hydraulic diameter.
+    section : ChannelSection
+    critical_reynolds : float, [-]
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+
+    Raises
+    ------
+    OutOfValidityError
+        Reynolds number not positive.
+    """
+    re = np.asarray(reynolds, float)
+    require_range(
+        "friction_factor_channel",
+        reynolds=(re, *POSITIVE),
+        how_to_fix="The coolant must flow.",
+    )
+
+    def laminar(value: NDArray[np.float64]) -> NDArray[np.float64]:
+        curved = friction_factor_curved_laminar(value * np.sqrt(section.curvature_ratio), extrapolate=True)
+        return 4.0 * fanning_reynolds_rectangle(section.aspect_ratio) / value * curved
+
+    def turbulent(value: NDArray[np.float64]) -> NDArray[np.float64]:
+        return friction_factor_helical_turbulent(value, section.curvature_ratio, extrapolate=True)
+
+    weight = transition_weight(re, critical_reynolds)
+    return weight * laminar(np.minimum(re, critical_reynolds)) + (1.0 - weight) * turbulent(
+        np.maximum(re, TURBULENT_FROM_REYNOLDS)
+    )
+
+
+def port_loss_coefficient(
+    reynolds: ArrayLike, diameter: float, length_to_diameter: float, *, outlet: bool
+) -> NDArray[np.float64]:
+    """Loss of a drilled radial port and its turn into the channel.
+
+    Sharp-edged entry or exit, friction along the drilling and one square
+    turn, in velocity heads of the port.
+
+    Parameters
+    ----------
+    reynolds : (n,) array_like, [-]
+        On the port diameter.
+    diameter : float, [m]
+    length_to_diameter : float, [-]
+    outlet : bool
+        Whether the coolant leaves through it.
+
+    Returns
+    -------
+    (n,) ndarray, [-]
+
+    Raises
+    ------
+    OutOfValidityError
+        Reynolds number or diameter not positive.
+
+    Range: a few tens of per cent at Re of some hundred. Friction along the
+    drilling is Hagen–Poiseuille below Re 2300, Blasius above 4000, linear between.
+
+    Source: two-constant method, Hooper (1981), Chem. Eng. 24 August, 96–100:
+    square turn 1000/Re + 1.15 (1 + 1 inch/D), entry 160/Re + 0.5, exit 1.
+
+    >>> float(port_loss_coefficient(409.0, 0.010, 9.1, outlet=False).round(2))
+    8.83
+    """
+    re = np.asarray(reynolds, float)
+    require_range(
+        "port_loss_coefficient",
+        reynolds=(re, *POSITIVE),
+        diameter=(diameter, *POSITIVE),
+        length_to_diameter=(length_to_diameter, *NOT_NEGATIVE),
+        how_to_fix="Give SI values; the coolant must flow.",
+    )
+    weight = np.clip((4000.0 - re) / (4000.0 - 2300.0), 0.0, 1.0)
+    pipe = weight * 64.0 / np.minimum(re, 2300.0) + (1.0 - weight) * 0.3164 * np.maximum(re, 4000.0) ** -0.25
+    turn = 1000.0 / re + 1.15 * (1.0 + _INCH_M / diameter)
+    end = np.ones_like(re) if outlet else 160.0 / re + 0.5
+    return turn + end + pipe * length_to_diameter
+
+
+@dataclass(frozen=True, slots=True)
+class PressureDrop:
+    """Pressure drop of the coolant and the heat it makes.
+
+    Attributes
+    ----------
+    channel : float, [Pa]
+    ports : float, [Pa]
+    total : float, [Pa]
+    pumping_power : float, [W]
+        Total drop times volume flow, all starts; ends as heat in the coolant.
+    channel_power : float, [W]
+        The part that is dissipated along the channel.
+    friction_factor : float, [-]
+        Darcy, of the channel.
+    reynolds : float, [-]
+        On the hydraulic diameter.
+    warnings : tuple of CodedWarning
+    """
+
+    channel: float
+    ports: float
+    total: float
+    pumping_power: float
+    channel_power: float
+    friction_factor: float
+    reynolds: float
+    warnings: tuple[CodedWarning, ...]
+
+
+def channel_pressure_drop(
+    section: ChannelSection,
+    volume_flow: float,
+    properties: CoolantProperties,
+    critical_reynolds: float,
+    *,
+    port_diameter: float | None = None,
+    port_length: float = 0.0,
+) -> PressureDrop:
+    """Pressure drop from inlet to outlet port and the pumping power.
+
+    Parameters
+    ----------
+    section : ChannelSection
+    volume_flow : float, [m³/s]
+        Total, all starts.
+    properties : CoolantProperties
+        Scalar, at the mean bulk temperature.
+    critical_reynolds : float, [-]
+        For example ``critical_reynolds_schmidt(section.curvature_ratio)``.
+    port_diameter : float or None, [m]
+        None leaves the ports out.
+    port_length : float, [m]
+        Length of each drilling.
+
+    Returns
+    -------
+    PressureDrop
+
+    Raises
+    ------
+    OutOfValidityError
+        No flow.
+    """
+    require_range(
+        "channel_pressure_drop",
+        volume_flow=(volume_flow, *POSITIVE),
+        how_to_fix="Set coolant.flow above 0.",
+    )
+    velocity = section.velocity(volume_flow)
+    density = float(properties.density)
+    viscosity = float(properties.kinematic_viscosity)
+    reynolds = velocity * section.hydraulic_diameter / viscosity
+    factor = float(friction_factor_channel(reynolds, section, critical_reynolds))
+    dynamic_pressure = 0.5 * density * velocity**2
+    channel = factor * section.length / section.hydraulic_diameter * dynamic_pressure
+
+    ports = 0.0
+    if port_diameter is not None:
+        port_velocity = volume_flow / section.starts / (0.25 * np.pi * port_diameter**2)
+        port_reynolds = port_velocity * port_diameter / viscosity
+        slenderness = port_length / port_diameter
+        coefficient = sum(
+            float(port_loss_coefficient(port_reynolds, port_diameter, slenderness, outlet=outlet))
+            for outlet in (False, True)
+        )
+        ports = coefficient * 0.5 * density * port_velocity**2
+
+    total = channel + ports
+    return PressureDrop(
+        channel=channel,
+        ports=ports,
+        total=total,
+        pumping_power=total * volume_flow,
+        channel_power=channel * volume_flow,
+        friction_factor=factor,
+        reynolds=reynolds,
+        warnings=_friction_warnings(reynolds, section, critical_reynolds),
+    )
+
+
+def _friction_warnings(
+    reynolds: float, section: ChannelSection, critical_reynolds: float
+) -> tuple[CodedWarning, ...]:
+    if reynolds <= critical_reynolds:
+        dean = reynolds * np.sqrt(section.curvature_ratio)
+        fault = range_fault("Dean number", dean, *_WHITE_DEAN_RANGE)
+    else:
+        fault = range_fault("Reynolds number", reynolds, 0.0, _HELICAL_TURBULENT_RANGE[1])
+    if not fault:
+        return ()
+    return (CodedWarning("coolant_friction_extrapolated", f"Friction of the channel: {fault}."),)

@@ -1,0 +1,413 @@
+"""One-dimensional enthalpy march of the coolant along its channel.
+
+Within a cell the wall temperature is uniform and the bulk temperature follows
+the exact exponential, so a march over few cells is as good as over many. The
+heat is counted as rise of enthalpy: what the cells take up and what leaves
+with the coolant agree to rounding, for either direction of the heat.
+
+Arrays carry cells along their last axis, from inlet to outlet; axes before
+it are channels in parallel (starts) with the same inlet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spindle_fem.errors import ConvergenceError, OutOfValidityError, did_you_mean
+from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.properties import Coolant
+from spindle_fem.physics.coolant.regimes import ChannelState, FilmCoefficient, select_film
+from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
+
+_ITERATIONS = 50
+_TEMPERATURE_TOLERANCE_K = 1.0e-10
+
+
+@dataclass(frozen=True, slots=True)
+class MarchResult:
+    """Bulk temperature and heat along the channel.
+
+    Attributes
+    ----------
+    edge_temperature : (..., n + 1) ndarray, [K]
+        Bulk temperature at the cell ends, the inlet first.
+    edge_rise : (..., n + 1) ndarray, [K]
+        The same above the inlet, without the rounding of absolute temperatures.
+    bulk_temperature : (..., n) ndarray, [K]
+        Mean of the exact profile in each cell: heat = h A (T_wall − T_bulk).
+    heat : (..., n) ndarray, [W]
+        From the wall into the coolant.
+    pumping_heat : (..., n) ndarray, [W]
+        Made by friction in the coolant.
+    outlet_temperature : (...) ndarray, [K]
+        Of each channel in parallel.
+    mixed_outlet_temperature : float, [K]
+        After all channels have joined.
+    enthalpy_rise : float, [W]
+        What leaves with the coolant less what came with it, all channels.
+    specific_heat_capacity : (..., n) ndarray, [J/(kg·K)]
+        The mean one of each cell, as used.
+    """
+
+    edge_temperature: NDArray[np.float64]
+    edge_rise: NDArray[np.float64]
+    bulk_temperature: NDArray[np.float64]
+    heat: NDArray[np.float64]
+    pumping_heat: NDArray[np.float64]
+    outlet_temperature: NDArray[np.float64]
+    mixed_outlet_temperature: float
+    enthalpy_rise: float
+    specific_heat_capacity: NDArray[np.float64]
+
+    @property
+    def imbalance_relative(self) -> float:
+        """Heat taken up less enthalpy rise, over the sum of all heat moved."""
+        taken = float(np.sum(self.heat) + np.sum(self.pumping_heat))
+        moved = float(np.sum(np.abs(self.heat)) + np.sum(np.abs(self.pumping_heat)))
+        return abs(taken - self.enthalpy_rise) / moved if moved > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class MarchLinearisation:
+    """Heat of the cells as a linear function of all wall temperatures.
+
+    ``heat = constant + matrix @ wall_temperature`` for each channel, exact at
+    fixed film coefficients and heat capacities; a coupled solver that takes
+    it in needs no iteration between wall and coolant.
+
+    Attributes
+    ----------
+    matrix : (..., n, n) ndarray, [W/K]
+        Lower triangular: a cell feels its own wall and those upstream.
+    constant : (..., n) ndarray, [W]
+    """
+
+    matrix: NDArray[np.float64]
+    constant: NDArray[np.float64]
+
+
+def march_enthalpy(
+    inlet_temperature: float,
+    mass_flow: float,
+    specific_heat_capacity: ArrayLike,
+    wall_temperature: ArrayLike,
+    wetted_area: ArrayLike,
+    film_coefficient: ArrayLike,
+    pumping_heat: ArrayLike = 0.0,
+) -> MarchResult:
+    """Bulk temperature and heat along a channel at given film coefficients.
+
+    Parameters
+    ----------
+    inlet_temperature : float, [K]
+    mass_flow : float, [kg/s]
+        Of each channel in parallel.
+    specific_heat_capacity : (..., n) array_like or float, [J/(kg·K)]
+    wall_temperature : (..., n) array_like, [K]
+        Area mean in each cell.
+    wetted_area : (..., n) array_like, [m²]
+    film_coefficient : (..., n) array_like or float, [W/(m²·K)]
+    pumping_heat : (..., n) array_like or float, [W]
+        Friction heat in each cell.
+
+    Returns
+    -------
+    MarchResult
+
+    Raises
+    ------
+    OutOfValidityError
+        No flow, a negative area, film coefficient or heat capacity.
+
+    Source: steady energy balance of plug flow, dT/dx = h P (T_wall − T)/(ṁ c).
+
+    >>> march = march_enthalpy(288.15, 0.3, 1900.0, [300.0] * 4, [0.04] * 4, 250.0)
+    >>> exact = 300.0 + (288.15 - 300.0) * np.exp(-250.0 * 0.16 / (0.3 * 1900.0))
+    >>> bool(np.isclose(march.outlet_temperature, exact, rtol=0.0, atol=1e-12))
+    True
+    """
+    wall, area, film, capacity, pumping = np.broadcast_arrays(
+        np.atleast_1d(np.asarray(wall_temperature, dtype=np.float64)),
+        np.asarray(wetted_area, dtype=np.float64),
+        np.asarray(film_coefficient, dtype=np.float64),
+        np.asarray(specific_heat_capacity, dtype=np.float64),
+        np.asarray(pumping_heat, dtype=np.float64),
+    )
+    require_range(
+        "coolant march",
+        inlet_temperature=(inlet_temperature, *POSITIVE),
+        mass_flow=(mass_flow, *POSITIVE),
+        specific_heat_capacity=(capacity, *POSITIVE),
+        wall_temperature=(wall, *POSITIVE),
+        wetted_area=(area, *NOT_NEGATIVE),
+        film_coefficient=(film, *NOT_NEGATIVE),
+        pumping_heat=(pumping, -POSITIVE[1], POSITIVE[1]),
+        how_to_fix="Give SI values; without flow there is nothing to march.",
+    )
+    capacity_rate = mass_flow * capacity
+    units = film * area / capacity_rate
+    reached, mean_share, second_share = _exponential_shares(units)
+    friction_rise = pumping / capacity_rate
+    # Everything is counted from the inlet temperature: rounding then scales with
+    # the temperature differences, not with 300 K.
+    wall_difference = wall - inlet_temperature
+    gain = reached * wall_difference + mean_share * friction_rise
+    edges = np.zeros((*wall.shape[:-1], wall.shape[-1] + 1))
+    for cell in range(wall.shape[-1]):
+        edges[..., cell + 1] = gain[..., cell] + (1.0 - reached[..., cell]) * edges[..., cell]
+    start = edges[..., :-1]
+    heat = capacity_rate * (gain - reached * start) - pumping
+    bulk = start + (1.0 - mean_share) * (wall_difference - start) + second_share * friction_rise
+    outlet = inlet_temperature + edges[..., -1]
+    return MarchResult(
+        edge_temperature=_frozen(inlet_temperature + edges),
+        edge_rise=_frozen(edges),
+        bulk_temperature=_frozen(inlet_temperature + bulk),
+        heat=_frozen(heat),
+        pumping_heat=_frozen(pumping),
+        outlet_temperature=_frozen(outlet),
+        mixed_outlet_temperature=float(np.mean(outlet)),
+        enthalpy_rise=float(np.sum(capacity_rate * np.diff(edges, axis=-1))),
+        specific_heat_capacity=_frozen(capacity),
+    )
+
+
+def linearise_march(
+    inlet_temperature: float,
+    mass_flow: float,
+    specific_heat_capacity: ArrayLike,
+    wetted_area: ArrayLike,
+    film_coefficient: ArrayLike,
+    pumping_heat: ArrayLike = 0.0,
+) -> MarchLinearisation:
+    """Heat of every cell as a linear function of all wall temperatures.
+
+    Parameters
+    ----------
+    inlet_temperature : float, [K]
+    mass_flow : float, [kg/s]
+        Of each channel in parallel.
+    specific_heat_capacity : (..., n) array_like or float, [J/(kg·K)]
+    wetted_area : (..., n) array_like, [m²]
+    film_coefficient : (..., n) array_like or float, [W/(m²·K)]
+    pumping_heat : (..., n) array_like or float, [W]
+
+    Returns
+    -------
+    MarchLinearisation
+
+    Raises
+    ------
+    OutOfValidityError
+        As ``march_enthalpy``.
+
+    >>> line = linearise_march(288.15, 0.3, 1900.0, [0.04] * 4, 250.0)
+    >>> march = march_enthalpy(288.15, 0.3, 1900.0, [300.0, 310.0, 305.0, 290.0], [0.04] * 4, 250.0)
+    >>> bool(np.allclose(line.constant + line.matrix @ [300.0, 310.0, 305.0, 290.0], march.heat))
+    True
+    """
+    area = np.atleast_1d(np.asarray(wetted_area, dtype=np.float64))
+    # With the wall at inlet temperature the march gives the part that friction makes,
+    # and checks the input.
+    at_inlet = march_enthalpy(
+        inlet_temperature,
+        mass_flow,
+        specific_heat_capacity,
+        inlet_temperature,
+        area,
+        film_coefficient,
+        pumping_heat,
+    )
+    capacity_rate = mass_flow * at_inlet.specific_heat_capacity
+    units = np.asarray(film_coefficient, dtype=np.float64) * area / capacity_rate
+    reached, _, _ = _exponential_shares(units)
+    passed = np.cumsum(units, axis=-1)
+    before = passed - units
+    # Share of cell j's rise that is left at the inlet of cell i, for j < i.
+    decay = np.exp(np.minimum(passed[..., None, :] - before[..., :, None], 0.0))
+    strictly_lower = np.tril(np.ones((area.shape[-1],) * 2), k=-1)
+    from_upstream = strictly_lower * decay * reached[..., None, :]
+    own = np.eye(area.shape[-1])
+    matrix = (capacity_rate * reached)[..., :, None] * (own - from_upstream)
+    constant = at_inlet.heat - matrix.sum(axis=-1) * inlet_temperature
+    return MarchLinearisation(matrix=_frozen(matrix), constant=_frozen(constant))
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelMarch:
+    """A march with the film coefficient that its own temperatures give.
+
+    Attributes
+    ----------
+    march : MarchResult
+    film : FilmCoefficient
+        Before ``film_factor``; values of shape (..., n), or floats when
+        nothing varies along the channel.
+    linearisation : MarchLinearisation
+        At the final film coefficients and heat capacities.
+    mass_flow : float, [kg/s]
+        Of each start.
+    """
+
+    march: MarchResult
+    film: FilmCoefficient
+    linearisation: MarchLinearisation
+    mass_flow: float
+
+
+def march_channel(
+    section: ChannelSection,
+    coolant: Coolant,
+    volume_flow: float,
+    inlet_temperature: float,
+    wall_temperature: ArrayLike,
+    wetted_area: ArrayLike,
+    *,
+    model: str = "helical",
+    properties_at: str = "local",
+    wall_correction: bool = True,
+    film_factor: ArrayLike = 1.0,
+    pumping_power: float = 0.0,
+) -> ChannelMarch:
+    """March with film coefficients by a named model, at given wall temperatures.
+
+    Parameters
+    ----------
+    section : ChannelSection
+    coolant : Coolant
+    volume_flow : float, [m³/s]
+        Total, all starts, at inlet temperature; every start takes its share.
+    inlet_temperature : float, [K]
+    wall_temperature : (..., n) array_like, [K]
+        Area mean in each cell, from inlet to outlet; an axis before the last
+        one counts the starts. Without it the result is that of one start.
+    wetted_area : (..., n) array_like, [m²]
+        Of each cell.
+    model : str
+        One of ``coolant.regimes.FILM_MODELS``.
+    properties_at : {"local", "inlet"}
+        Bulk temperature of each cell, or the inlet's everywhere.
+    wall_correction : bool
+        Whether the viscosity at the wall corrects the film coefficient.
+    film_factor : (..., n) array_like or float, [-]
+        Multiplies the film coefficient (fouling, calibration, ports).
+    pumping_power : float, [W]
+        Friction heat of all starts, spread over the wetted area.
+
+    Returns
+    -------
+    ChannelMarch
+
+    Raises
+    ------
+    OutOfValidityError
+        No flow, a temperature outside the coolant's range, an unknown option.
+    ConvergenceError
+        The properties do not settle (they do within ten iterations).
+
+    >>> from spindle_fem.physics.coolant.properties import OilIsoVg32
+    >>> channel = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
+    >>> result = march_channel(
+    ...     channel, OilIsoVg32(), 20e-3 / 60, 288.15, [295.0] * 20, [0.1562 / 20] * 20, model="sieder_tate"
+    ... )
+    >>> result.march.imbalance_relative < 1e-12
+    True
+    """
+    if properties_at not in ("local", "inlet"):
+        raise OutOfValidityError(
+            "coolant march",
+            f'properties_at is "{properties_at}".',
+            did_you_mean(properties_at, ("local", "inlet")),
+        )
+    wall, area = np.broadcast_arrays(
+        np.atleast_1d(np.asarray(wall_temperature, dtype=np.float64)),
+        np.asarray(wetted_area, dtype=np.float64),
+    )
+    at_inlet = coolant.properties(inlet_temperature)
+    mass_flow = float(at_inlet.density) * volume_flow / section.starts
+    given = wall[..., 0].size
+    if given not in (1, section.starts):
+        raise OutOfValidityError(
+            "coolant march",
+            f"walls of {given} starts are given, the channel has {section.starts}.",
+            "Give every start, or one that stands for all.",
+        )
+    # Friction makes the same heat in every start.
+    pumping = pumping_power / section.starts * area / area.sum(axis=-1, keepdims=True)
+
+    def film_at(bulk: ArrayLike) -> FilmCoefficient:
+        state = ChannelState(coolant, volume_flow, bulk, wall if wall_correction else None)
+        return select_film(model, section, state)
+
+    bulk: ArrayLike = inlet_temperature
+    capacity: ArrayLike = at_inlet.specific_heat_capacity
+    for _ in range(_ITERATIONS):
+        film = film_at(bulk)
+        coefficient = np.asarray(film_factor, dtype=np.float64) * np.asarray(film.value)
+        march = march_enthalpy(inlet_temperature, mass_flow, capacity, wall, area, coefficient, pumping)
+        if properties_at == "inlet":
+            break
+        change = float(np.max(np.abs(march.bulk_temperature - bulk)))
+        if change <= _TEMPERATURE_TOLERANCE_K:
+            march = _with_true_enthalpy(march, coolant, mass_flow)
+            break
+        bulk = march.bulk_temperature
+        edges = march.edge_rise
+        capacity = _mean_heat_capacity(coolant, inlet_temperature, edges[..., :-1], edges[..., 1:])
+    else:
+        raise ConvergenceError(
+            "coolant march",
+            f"bulk temperature still changes by {change:.3g} K after {_ITERATIONS} iterations.",
+            'Use properties_at = "inlet", or more cells.',
+        )
+    line = linearise_march(
+        inlet_temperature, mass_flow, march.specific_heat_capacity, area, coefficient, pumping
+    )
+    return ChannelMarch(march=march, film=film, linearisation=line, mass_flow=mass_flow)
+
+
+def _with_true_enthalpy(march: MarchResult, coolant: Coolant, mass_flow: float) -> MarchResult:
+    """Replace the enthalpy rise by that of the coolant itself, and mix by enthalpy."""
+    inlet, outlet_rise = float(march.edge_temperature.flat[0]), march.edge_rise[..., -1:]
+    capacity = _mean_heat_capacity(coolant, inlet, np.zeros_like(outlet_rise), outlet_rise)
+    rise = mass_flow * float(np.sum(capacity * outlet_rise))
+    mixed_enthalpy = float(np.mean(coolant.specific_enthalpy(march.outlet_temperature)))
+    mixed = march.mixed_outlet_temperature
+    for _ in range(3):
+        error = float(coolant.specific_enthalpy(mixed)) - mixed_enthalpy
+        mixed -= error / float(coolant.properties(mixed).specific_heat_capacity)
+    return replace(march, enthalpy_rise=rise, mixed_outlet_temperature=mixed)
+
+
+def _mean_heat_capacity(
+    coolant: Coolant, inlet: float, start: NDArray[np.float64], end: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean between two rises above the inlet, by Gauss points: no division by a small rise."""
+    points, weights = np.polynomial.legendre.leggauss(5)
+    rise = 0.5 * (start + end)[..., None] + 0.5 * (end - start)[..., None] * points
+    return coolant.properties(inlet + rise).specific_heat_capacity @ (0.5 * weights)
+
+
+def _exponential_shares(
+    units: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """1 − e^−N, (1 − e^−N)/N and (1 − (1 − e^−N)/N)/N, exact for small N too."""
+    reached = -np.expm1(-units)
+    small = units < 1.0e-2
+    divisor = np.where(small, 1.0, units)
+    series_mean = 1.0 - units / 2.0 * (1.0 - units / 3.0 * (1.0 - units / 4.0 * (1.0 - units / 5.0)))
+    mean_share = np.where(small, series_mean, reached / divisor)
+    series_second = 0.5 * (
+        1.0 - units / 3.0 * (1.0 - units / 4.0 * (1.0 - units / 5.0 * (1.0 - units / 6.0)))
+    )
+    second_share = np.where(small, series_second, (1.0 - mean_share) / divisor)
+    return reached, mean_share, second_share
+
+
+def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    array = np.array(array)
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,104 @@
+"""Recordings that nobody made: a day about what a machine's definition says.
+
+Where an effect can act follows from the machine, its usual size from a
+recording. Without one, these stand in for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.model.lumped.thermal_network import ThermalNetwork
+from spindle_fem.model.reduced.drive import standard_inputs
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.channel_checks import ChannelNoise
+from spindle_fem.recordings.defects import DefectReport
+from spindle_fem.units import ZERO_CELSIUS_K
+
+DAY = 86400.0
+ROOM = ZERO_CELSIUS_K + 20.0
+ANGULAR = "radian / second"
+# Flow and speed range over this share of what the definition has, as laws of the Reynolds number ask for it.
+RANGE = 0.5
+
+
+def at_the_defined_point(spec: MachineSpec) -> Recording:
+    """A day about the operating point of a definition, all of it at the ambient temperature."""
+    inputs = standard_inputs(spec)
+    spread = {name: RANGE if name in ("speed", "coolant_flow") else 0.0 for name in inputs}
+    ends = {
+        name: ((1.0 - spread[name]) * value, (1.0 + spread[name]) * value) for name, value in inputs.items()
+    }
+    probes = tuple(probe.name for probe in spec.probe)
+    return _recording(spec.name, probes, inputs["ambient"], ends, {})
+
+
+def of_a_network(network: ThermalNetwork, speeds: Sequence[str] = ()) -> Recording:
+    """A day in which every input of a written network is 1 in SI, temperatures 20 °C, and every node is read.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    speeds : sequence of str
+        Inputs in rad/s, beside those of the network or among them.
+    """
+    temperatures = {name for name in network.boundary_input if name is not None}
+    names = dict.fromkeys((*network.input_names, *speeds))
+    values = {name: ROOM if name in temperatures else 1.0 for name in names}
+    ends = {name: (value, value) for name, value in values.items()}
+    return _recording("network", network.node_names, ROOM, ends, dict.fromkeys(speeds, ANGULAR))
+
+
+def _recording(
+    source: str,
+    probes: tuple[str, ...],
+    temperature: float,
+    inputs: Mapping[str, tuple[float, float]],
+    units: Mapping[str, str],
+) -> Recording:
+    times = np.array([0.0, DAY])
+    noise = ChannelNoise(0.0, 0.0, 0.0, 0.0)
+    return Recording(
+        name="as defined",
+        source=source,
+        start=None,
+        times=times,
+        temperature_names=probes,
+        probes=probes,
+        temperature=np.full((2, len(probes)), temperature),
+        flags=np.zeros((2, len(probes)), dtype=np.uint8),
+        sigma=np.ones(len(probes)),
+        noise=(noise,) * len(probes),
+        input_names=tuple(inputs),
+        input_columns=tuple(inputs),
+        inputs=np.array(list(inputs.values())).reshape(-1, 2).T,
+        held=np.ones(len(inputs), dtype=bool),
+        input_units=tuple(units.get(name, "") for name in inputs),
+        covariate_names=(),
+        covariates=np.empty((2, 0)),
+        covariate_units=(),
+        segments=np.array([[0, 2]]),
+        defects=DefectReport(
+            name=source,
+            rows=2,
+            stamps=2,
+            duration_s=DAY,
+            rows_without_time=0,
+            blank_rows=0,
+            short_rows=0,
+            truncated_last_row=False,
+            unordered_rows=0,
+            repeated_rows=0,
+            conflicting_stamps=0,
+            median_step_s=DAY,
+            non_uniform_steps=0,
+            gaps=(),
+            long_gap_s=DAY,
+            segments=1,
+            unused_columns=(),
+            channels=(),
+        ),
+    )

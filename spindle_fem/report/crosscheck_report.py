@@ -1,0 +1,241 @@
+"""Report of a cross-check, from its files alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.errors import BadInputError
+from spindle_fem.report.block_page import (
+    Bullets,
+    Cards,
+    Section,
+    Table,
+    Text,
+    illustration_of,
+    render_document,
+)
+from spindle_fem.report.crosscheck_charts import CAPTIONS
+from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.results.output_folder import replace_text
+from spindle_fem.studies.crosscheck.causes import CAUSES, CHECKS
+
+_SHOWN_LINKS = 20
+
+
+def write_report(folder: str | Path) -> Path:
+    """``report.html`` of a folder that holds ``crosscheck.json`` and ``figures``.
+
+    Raises
+    ------
+    BadInputError
+        The file is missing or of a version that this program does not know.
+    """
+    folder = Path(folder)
+    path = folder / "crosscheck.json"
+    if not path.is_file():
+        raise BadInputError(str(path), "there is no such file.", "Run spindle-fem crosscheck.")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    if content.get("schema") != "spindle-fem/crosscheck/1":
+        raise BadInputError(
+            str(path), f"schema {content.get('schema')!r} is not known.", "Run the command again."
+        )
+    return replace_text(folder / "report.html", render(content, folder / "figures"))
+
+
+def render(content: Mapping[str, Any], figures: Path) -> str:
+    """HTML of a cross-check."""
+
+    def picture(name: str) -> list[Any]:
+        path = figures / f"{name}.png"
+        return [illustration_of(path, CAPTIONS[name])] if path.is_file() else []
+
+    summary, network = content["summary"], content["network"]
+    at_match = min(content["matched"]["speeds"], key=lambda row: row["matched_max_K"])
+    worst = max(content["matched"]["speeds"], key=lambda row: row["matched_max_K"])
+    finest = content["convergence"]["rows"][-1]
+    headline = Cards(
+        [
+            {"name": "largest difference, network − elements",
+             "value": f"{number(summary['max_difference_K'], 2)} K"},
+            {"name": "root mean square over the nodes",
+             "value": f"{number(summary['rms_difference_K'], 2)} K"},
+            {"name": f"refined {finest['refinement']}×, to axisymmetric elements",
+             "value": f"{number(finest['max_difference_K'], 3)} K"},
+            {"name": "after flux matching, matched state",
+             "value": f"{significant(at_match['matched_max_K'], 2)} K"},
+            {"name": "after flux matching, other speeds", "value": f"{number(worst['matched_max_K'], 2)} K"},
+            {"name": "network’s energy balance", "value": significant(network["imbalance_relative"], 2)},
+        ]
+    )  # fmt: skip
+    sections = [
+        Section("headline", "Headline numbers", [headline, Text(_sentence(content)), *picture("difference")]),
+        Section("nodes", "Node by node", [*picture("temperatures"), _node_table(content)]),
+        Section("links", "Heat along the links", [Text(_LINKS), *_link_tables(content)]),
+        Section("causes", "Why they differ", [Text(_CAUSES), *picture("causes"), _cause_table(content)]),
+        Section("convergence", "Refinement", [*picture("convergence"), _convergence_table(content)]),
+        Section("matched", "Reduced network by flux matching",
+                [Text(_MATCHED), *picture("speeds"), _speed_table(content)]),
+    ]  # fmt: skip
+    if content["claim"]:
+        sections.append(Section("claim", "The paper’s optimum", _claim_blocks(content["claim"])))
+    subtitle = (
+        f"{network['nodes']} nodes in {len(network['columns'])} columns beside {content['fem']['unknowns']} "
+        f"temperature unknowns, {content['operating_point']['speed_rpm']:.0f} rpm."
+    )
+    return render_document("Cross-check", f"{content['machine']}: network and elements", sections, subtitle)
+
+
+_LINKS = (
+    "Heat from the first to the second end of each link. Where two bodies touch or a film ends a "
+    "link, the elements’ "
+    "heat is that of the same surface, as their balance has it. Where a link is cut through one body "
+    "there is no "
+    "surface of the mesh: there the gradient of the field is integrated over the cut. Links through "
+    "the channel’s "
+    "depth along the axis exist in the elements only (the turns are joined by their lands)."
+)
+_CAUSES = (
+    "Between both models stand others, each different from its neighbour in one assumption: nodes "
+    "refined along z, "
+    "then along r too (axisymmetric elements), then closed rings instead of the smeared helix, then "
+    "the helix itself "
+    "without ports, then the machine as defined. The differences of neighbours add up to the whole."
+)
+_MATCHED = (
+    "Every conductance is multiplied by a constant so that the elements’ node temperatures balance "
+    "exactly at the "
+    "matched state. Other speeds were not fitted: they test it. The state-space has matrices for "
+    "every speed; the TOML "
+    "network holds the conductances of the matched one."
+)
+
+
+def _sentence(content: Mapping[str, Any]) -> str:
+    summary = content["summary"]
+    title = CAUSES[summary["worst_node_cause"]]
+    return (
+        f"The node that differs most is {summary['worst_node']}; "
+        f"{number(summary['worst_node_cause_K'], 2)} K of it come "
+        f"from this: {title}."
+    )
+
+
+def _node_table(content: Mapping[str, Any]) -> Table:
+    rows = [
+        (
+            item["node"],
+            number(item["network_degC"], 2),
+            number(item["fem_degC"], 2),
+            number(item["difference_K"], 2),
+            CAUSES[item["largest_cause"]].split(":")[0],
+            number(item["largest_cause_K"], 2),
+        )
+        for item in content["nodes"]
+    ]
+    columns = (
+        column("node"), column("network °C", number=True), column("elements °C", number=True),
+        column("difference K", number=True), column("largest cause"), column("of it K", number=True),
+    )  # fmt: skip
+    return Table(columns, rows_of(rows), "Elements are averaged over each node’s region.")
+
+
+def _link_tables(content: Mapping[str, Any]) -> list[Table]:
+    columns = (
+        column("link"), column("network W", number=True), column("elements W", number=True),
+        column("difference W", number=True), column("over"),
+    )  # fmt: skip
+
+    def rows(items: list[Mapping[str, Any]]) -> Any:
+        return rows_of(
+            (
+                item["link"].replace("|", " → "),
+                number(item["network_W"], 2),
+                number(item["fem_W"], 2),
+                number(item["network_W"] - item["fem_W"], 2),
+                item["surface"],
+            )
+            for item in items
+        )
+
+    ranked = sorted(content["links"], key=lambda item: -abs(item["network_W"] - item["fem_W"]))
+    return [
+        Table(columns, rows(ranked[:_SHOWN_LINKS]), f"The {_SHOWN_LINKS} links that differ most."),
+        Table(columns, rows(content["links"]), "Every link.", folded=f"All {len(ranked)} links"),
+    ]
+
+
+def _cause_table(content: Mapping[str, Any]) -> Table:
+    titles = {**CAUSES, **CHECKS}
+    rows = [
+        (titles[item["cause"]], "step" if item["kind"] == "step" else "by itself",
+         number(item["max_K"], 3), number(item["rms_K"], 3))
+        for item in content["causes"]
+    ]  # fmt: skip
+    columns = (
+        column("assumption exchanged"),
+        column("kind"),
+        column("at most K", number=True),
+        column("rms K", number=True),
+    )
+    return Table(
+        columns, rows_of(rows), "Steps add up to the difference; the others change one assumption by itself."
+    )
+
+
+def _convergence_table(content: Mapping[str, Any]) -> Table:
+    rows = [
+        (f"{item['refinement']}×", item["nodes"], number(item["max_difference_K"], 3))
+        for item in content["convergence"]["rows"]
+    ]
+    columns = (
+        column("refinement"),
+        column("nodes", number=True),
+        column("largest difference K", number=True),
+    )
+    caption = (
+        f"Against axisymmetric elements with {content['convergence']['axisymmetric_unknowns']} unknowns."
+    )
+    return Table(columns, rows_of(rows), caption)
+
+
+def _speed_table(content: Mapping[str, Any]) -> Table:
+    rows = [
+        (
+            number(item["speed_rpm"], 0),
+            significant(item["matched_max_K"], 2),
+            number(item["fixed_max_K"], 2),
+            number(item["unmatched_max_K"], 2),
+        )
+        for item in content["matched"]["speeds"]
+    ]
+    columns = (
+        column("rpm", number=True), column("matched K", number=True),
+        column("matched, conductances fixed K", number=True), column("not matched K", number=True),
+    )  # fmt: skip
+    return Table(columns, rows_of(rows), "Largest difference of any node to the elements.")
+
+
+def _claim_blocks(claim: Mapping[str, Any]) -> list[Any]:
+    if "not_possible" in claim:
+        return [Text(claim["not_possible"])]
+    rows = [
+        (
+            item["model"],
+            item["design"],
+            number(item["max_degC"], 1),
+            ", ".join(f"{name} {number(value, 1)}" for name, value in item["ring_difference_K"].items()),
+            number(item["film_coefficient_W_m2K"], 0),
+            number(item["coolant_heat_W"], 0),
+            number(item["friction_heat_W"], 0),
+        )
+        for item in claim["cases"]
+    ]
+    columns = (
+        column("model"), column("design"), column("maximum °C", number=True), column("inner − outer K"),
+        column("film W/(m²·K)", number=True), column("to the oil W", number=True),
+        column("friction W", number=True),
+    )  # fmt: skip
+    return [Table(columns, rows_of(rows), claim["source"]), Bullets(claim["explanation"])]

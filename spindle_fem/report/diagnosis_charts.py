@@ -1,0 +1,357 @@
+"""Charts of a diagnosis over time and condition: before and after, residual map, missing heat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from spindle_fem.report.figure_style import (
+    CYCLE,
+    FILM_MAP,
+    INK,
+    MUTED,
+    ColourBar,
+    draw_colour_bar,
+    new_figure,
+    pixel_axes,
+    set_title,
+    styled,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+READ, BEFORE, AFTER, HELD = "#8a8f94", CYCLE[1], CYCLE[0], "#eceff2"
+MOST_CHANNELS = 12
+MOST_POINTS = 1500
+BINS = 240
+NORMAL_90 = 1.645
+# As recordings are divided: a longer pause than so many usual steps.
+LONG_GAP_STEPS = 60.0
+LONG_SECONDS = 3.0 * 86400.0
+
+
+def time_scale(seconds: float) -> tuple[float, str]:
+    """Divisor and unit in which a span of time reads well.
+
+    >>> time_scale(5400.0), time_scale(1e7)[1]
+    ((3600.0, 'h'), 'd')
+    """
+    if seconds >= LONG_SECONDS:
+        return 86400.0, "d"
+    return (3600.0, "h") if seconds >= 3600.0 else (60.0, "min")
+
+
+def of_recording(data: xr.Dataset, number: int) -> xr.Dataset:
+    """Stamps of one recording."""
+    return data.isel(stamp=np.flatnonzero(data["recording_index"].values == number))
+
+
+def channel_order(data: xr.Dataset) -> list[str]:
+    """Channels that were read, those with the largest error before first."""
+    error = (data["before"] - data["measured"]).where(data["usable"] == 1)
+    size = np.sqrt((error**2).mean("stamp", skipna=True)).values
+    names = [str(name) for name in data["channel"].values]
+    return [names[i] for i in np.argsort(-np.nan_to_num(size, nan=-1.0)) if np.isfinite(size[i])]
+
+
+@styled
+def before_after(data: xr.Dataset, number: int) -> Figure:
+    """Every channel of a recording over time, predictions before and after, residuals beneath.
+
+    Parameters
+    ----------
+    data : Dataset
+        As ``diagnosis.nc`` has it.
+    number : int
+        Recording.
+    """
+    own = of_recording(data, number)
+    names = [str(n) for n in own["channel"].values if n in channel_order(own)]
+    if len(names) > MOST_CHANNELS:
+        names = channel_order(own)[:MOST_CHANNELS]
+    scale, unit = time_scale(float(own["time"].values[-1] - own["time"].values[0]))
+    rows = math.ceil(len(names) / 2)
+    top, cell, foot = 178.0, 470.0, 50.0
+    figure = new_figure(top + rows * cell + foot)
+    for position, name in enumerate(names):
+        row, column = divmod(position, 2)
+        left = 115.0 + 795.0 * column
+        upper = pixel_axes(figure, left, top + row * cell, 655.0, 235.0)
+        lower = pixel_axes(figure, left, top + row * cell + 260.0, 655.0, 130.0, sharex=upper)
+        _draw_channel(upper, lower, own, number, name, scale)
+        upper.set_ylabel("°C")
+        lower.set_ylabel("residual / K")
+        for axes in (upper, lower):
+            # Beyond the widest tick label, in every row alike.
+            axes.yaxis.set_label_coords(-0.128, 0.5)
+        if row == rows - 1 or position + 2 >= len(names):
+            lower.set_xlabel(f"time / {unit}")
+    width, height = figure.get_size_inches() * figure.dpi
+    handles = [
+        Line2D([], [], color=READ, linestyle="none", marker=".", markersize=6),
+        Line2D([], [], color=BEFORE, linestyle="--"),
+        Line2D([], [], color=AFTER),
+        Rectangle((0, 0), 1, 1, color=HELD),
+        Rectangle((0, 0), 1, 1, color="#c9d3dc"),
+    ]
+    texts = ["read", "model before", "model after", "held out: not fitted", "noise, ± 2 σ of a reading"]
+    figure.legend(
+        handles, texts, ncols=5, loc="upper left", bbox_to_anchor=(15.0 / width, 1.0 - 82.0 / height)
+    )
+    set_title(
+        figure,
+        f"{data['recording'].values[number]}: before and after",
+        "Temperature above, residual (read − model, means over short times) beneath.",
+    )
+    return figure
+
+
+def _draw_channel(upper: Axes, lower: Axes, own: xr.Dataset, number: int, name: str, scale: float) -> None:
+    item = own.sel(channel=name)
+    times = item["time"].values / scale
+    good = item["usable"].values == 1
+    for start, end in runs(item["held_out"].values == 1):
+        for axes in (upper, lower):
+            axes.axvspan(times[start], times[end], color=HELD, linewidth=0.0, zorder=0)
+    chosen = np.flatnonzero(good)
+    chosen = chosen[:: max(1, len(chosen) // MOST_POINTS)]
+    upper.plot(times[chosen], item["measured"].values[chosen], ".", color=READ, markersize=2.6, zorder=2)
+    sigma = float(item["noise"].values[number])
+    lower.axhspan(-2.0 * sigma, 2.0 * sigma, color="#c9d3dc", alpha=0.8, linewidth=0.0, zorder=1)
+    lower.axhline(0.0, color=MUTED, linewidth=0.8, zorder=1)
+    for key, colour, style in (("before", BEFORE, "--"), ("after", AFTER, "-")):
+        thin = slice(None, None, max(1, len(times) // (3 * MOST_POINTS)))
+        upper.plot(
+            times[thin],
+            _broken(times, item[key].values)[thin],
+            color=colour,
+            linestyle=style,
+            linewidth=1.5,
+            zorder=3,
+        )
+        at, mean = _bin_means(times[good], (item["measured"] - item[key]).values[good])
+        lower.plot(at, mean, color=colour, linewidth=1.3, linestyle=style, zorder=3)
+    upper.set_title(name)
+    upper.tick_params(labelbottom=False)
+    upper.margins(x=0.01)
+
+
+def _broken(times: Array, values: Array) -> Array:
+    """Values with NaN where a long gap follows, so that no line crosses it."""
+    gaps = np.diff(times, append=times[-1])
+    return np.where(gaps > max(LONG_GAP_STEPS * float(np.median(gaps)), 1e-9), np.nan, values)
+
+
+def _bin_means(times: Array, values: Array) -> tuple[Array, Array]:
+    """Means over equal stretches of time; NaN between two where nothing was read for long."""
+    if times.size <= BINS:
+        return times, values
+    owner = np.minimum((BINS * (times - times[0]) / (times[-1] - times[0])).astype(int), BINS - 1)
+    count = np.bincount(owner, minlength=BINS)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (
+            times[0] + (np.arange(BINS) + 0.5) * (times[-1] - times[0]) / BINS,
+            np.bincount(owner, weights=values, minlength=BINS) / count,
+        )
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of every run of true entries.
+
+    >>> runs(np.array([True, False, True, True]))
+    [(0, 0), (2, 3)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def residual_table(data: xr.Dataset, key: str) -> tuple[list[str], list[str], Array]:
+    """Root mean square residual by channel and condition, (channels, conditions) K."""
+    names = [str(n) for n in data["channel"].values if n in channel_order(data)][: 2 * MOST_CHANNELS]
+    conditions = [str(n) for n in data["condition"].values]
+    error = (data[key] - data["measured"]).where(data["usable"] == 1).sel(channel=names).values.T
+    found = np.full((len(names), len(conditions) + 2), np.nan)
+    held = data["held_out"].values == 1
+    masks = [*(data["condition_holds"].values.T == 1), held, np.ones(len(held), dtype=bool)]
+    for column, mask in enumerate(masks):
+        for row in range(len(names)):
+            values = error[row, mask]
+            values = values[np.isfinite(values)]
+            if values.size:
+                found[row, column] = float(np.sqrt(np.mean(values**2)))
+    return names, [*conditions, "held out", "all"], found
+
+
+@styled
+def residual_map(data: xr.Dataset) -> Figure:
+    """Root mean square residual, channel by condition, before beside after on one scale."""
+    names, conditions, before = residual_table(data, "before")
+    after = residual_table(data, "after")[2]
+    noise = float(np.sqrt(np.nanmean(data["noise"].values ** 2)))
+    bar = ColourBar(
+        FILM_MAP.reversed(), 0.0, max(float(np.nanmax(before)), 2.0 * noise), "root mean square residual / K"
+    )
+    row_height, top, foot = 46.0, 150.0, 285.0
+    figure = new_figure(top + row_height * len(names) + foot)
+    longest = max(len(name) for name in names)
+    left = 60.0 + 13.2 * longest
+    width = 0.5 * (1600.0 - left - 30.0) - 15.0
+    for number, (values, title) in enumerate(((before, "before"), (after, "after"))):
+        axes = pixel_axes(figure, left + number * (width + 30.0), top, width, row_height * len(names))
+        axes.imshow(values, cmap=bar.colour_map, norm=bar.norm, aspect="auto")
+        axes.set_title(title)
+        axes.grid(False)
+        axes.set_xticks(range(len(conditions)), conditions, rotation=40, ha="right")
+        axes.set_yticks(range(len(names)), names if number == 0 else [""] * len(names))
+        axes.tick_params(length=0)
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+        axes.axvline(len(conditions) - 2.5, color="white", linewidth=3.0)
+        for (row, column), value in np.ndenumerate(values):
+            if np.isfinite(value):
+                dark = sum(bar.colours(value)[:3]) < 1.6
+                axes.text(
+                    column,
+                    row,
+                    f"{value:.2f}",
+                    ha="center",
+                    va="center",
+                    fontsize=8.0,
+                    color="white" if dark else INK,
+                )
+    total = top + row_height * len(names) + foot
+    draw_colour_bar(pixel_axes(figure, 420.0, total - 84.0, 760.0, 20.0), bar)
+    set_title(
+        figure,
+        "What is left, by channel and condition",
+        f"A reading's noise is {noise:.2f} K; conditions overlap (speed band and heating or cooling).",
+    )
+    return figure
+
+
+@styled
+def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Figure | None:
+    """Heat over time which, at each credible place alone, would explain what the model leaves.
+
+    Parameters
+    ----------
+    data : Dataset
+    components : sequence of str
+        The most credible first; four are drawn.
+    number : int
+        Recording.
+    """
+    if "heat" not in data:
+        return None
+    tracks = best_tracks(data, components, number)
+    if not tracks:
+        return None
+    own = of_recording(data, number)
+    stop = float(own["time"].values[-1])
+    scale, unit = time_scale(stop)
+    figure = new_figure(140.0 + 290.0 * len(tracks) + 190.0)
+    shown = None
+    for position, (component, track) in enumerate(tracks.items()):
+        axes = pixel_axes(figure, 110.0, 130.0 + 290.0 * position, 1440.0, 210.0, sharex=shown)
+        shown = shown or axes
+        item = data.isel(track=track)
+        times = item["heat_time"].values
+        edges = np.append(times, max(stop, times[-1])) / scale
+        heat, sigma = item["heat"].values, item["heat_sigma"].values
+        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        axes.fill_between(
+            edges,
+            _to_the_end(heat - NORMAL_90 * sigma),
+            _to_the_end(heat + NORMAL_90 * sigma),
+            step="post",
+            color=CYCLE[5],
+            alpha=0.35,
+            linewidth=0.0,
+        )
+        axes.stairs(heat, edges, color=CYCLE[0], linewidth=1.8, baseline=None)
+        axes.set_ylabel("heat / W")
+        spot = str(item["track_spot"].values)
+        detail = "" if spot == component else f" (at {spot.replace('_', ' ')})"
+        axes.set_title(component.replace("_", " ") + detail)
+        axes.tick_params(labelbottom=False)
+        axes.margins(x=0.01)
+    strip = pixel_axes(figure, 110.0, 130.0 + 290.0 * len(tracks), 1440.0, 100.0, sharex=shown)
+    _draw_drive(strip, own, scale)
+    strip.set_xlabel(f"time / {unit}")
+    set_title(
+        figure,
+        f"{data['recording'].values[number]}: missing heat over time",
+        "If heat were missing at this place only; positive heats. Band: 90 % interval.",
+    )
+    return figure
+
+
+def _to_the_end(values: Array) -> Array:
+    return np.append(values, values[-1])
+
+
+def best_tracks(data: xr.Dataset, components: Sequence[str], number: int) -> dict[str, int]:
+    """Track of the best spot of each component in a recording, the four first components."""
+    evidence = dict(zip(data["spot"].values.tolist(), data["spot_log_evidence"].values, strict=True))
+    owner = dict(zip(data["spot"].values.tolist(), data["spot_component"].values.tolist(), strict=True))
+    found: dict[str, int] = {}
+    for component in components:
+        own = [
+            (evidence[str(spot)], index)
+            for index, spot in enumerate(data["track_spot"].values)
+            if int(data["track_recording"].values[index]) == number and owner[str(spot)] == component
+        ]
+        if own and len(found) < 4:
+            found[component] = max(own)[1]
+    return found
+
+
+def _draw_drive(axes: Axes, own: xr.Dataset, scale: float) -> None:
+    """The speed; without one, the input that changes most and is no temperature."""
+    names = [str(n) for n in own["input_name"].values]
+    units = [str(u) for u in own["input_unit"].values]
+    if not names:
+        return
+    values = own["input"].values
+
+    def changes(column: int) -> tuple[bool, bool, float]:
+        track = values[:, column]
+        size = float(np.nanmax(np.abs(track))) or 1.0
+        return names[column] == "speed", units[column] != "kelvin", float(np.nanstd(track)) / size
+
+    chosen = max(range(len(names)), key=changes)
+    track, label = values[:, chosen], f"{names[chosen].replace('_', ' ')} / {_symbol(units[chosen])}"
+    if "radian" in units[chosen]:
+        track, label = track * 30.0 / math.pi, f"{names[chosen].replace('_', ' ')} / rpm"
+    axes.step(own["time"].values / scale, track, where="post", color=INK, linewidth=1.3)
+    axes.set_title(label, fontsize=9.0, fontweight="normal", pad=3.0)
+    axes.set_ylim(bottom=min(0.0, float(np.nanmin(track))))
+
+
+def _symbol(unit: str) -> str:
+    """Symbol of an SI unit as recordings spell it.
+
+    >>> _symbol("kelvin"), _symbol("kilogram * meter ** 2 / second ** 3")
+    ('K', 'W')
+    """
+    known = {
+        "kelvin": "K",
+        "newton": "N",
+        "watt": "W",
+        "kilogram * meter ** 2 / second ** 3": "W",
+        "kilogram * meter / second ** 2": "N",
+        "meter ** 3 / second": "m³/s",
+        "dimensionless": "1",
+    }
+    return known.get(unit, unit)

@@ -1,0 +1,233 @@
+"""``diagnosis.nc``: what a diagnosis rests on, as one xarray Dataset with units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference.hypothesis_fit import Coordinate, Fit
+from spindle_fem.inference.mismatch_place import component_shares
+from spindle_fem.inference.next_measurement import hypothesis_words
+from spindle_fem.inference.verdict import rank
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.conditions import operating_conditions
+from spindle_fem.units import ZERO_CELSIUS_K
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from spindle_fem.inference.diagnosis import Diagnosis
+
+Array = NDArray[np.float64]
+
+DATA_SCHEMA = "spindle-fem/diagnosis-data/1"
+COMPRESSED = {"zlib": True, "complevel": 4}
+
+
+def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Array]) -> xr.Dataset:
+    """Readings, predictions, inputs, heat tracks, sets and parameters of a diagnosis.
+
+    Recordings follow one another along ``stamp``; ``recording_index`` tells
+    which a stamp belongs to.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    before, after : sequence of (N, c) ndarray, [K]
+        Predictions at the stamps of every recording, without and with what was found.
+
+    Returns
+    -------
+    Dataset
+        Temperatures in °C, inputs in SI.
+    """
+    import xarray as xr
+
+    recordings = diagnosis.plant.recordings
+    variables: dict[str, Any] = {}
+    variables |= _readings(diagnosis, before, after)
+    variables |= _inputs(recordings)
+    variables |= _conditions(recordings)
+    variables |= _heat(diagnosis)
+    variables |= _sets(diagnosis)
+    variables |= _parameters(diagnosis)
+    data = xr.Dataset(
+        variables,
+        coords={
+            "channel": list(_channels(recordings)),
+            "recording": [item.name for item in recordings],
+        },
+        attrs={
+            "schema": DATA_SCHEMA,
+            "machine": getattr(diagnosis.plant.fast.spec, "name", ""),
+            "kind": diagnosis.view.kind,
+            "verdict": diagnosis.judgement.verdict,
+            "heldout": diagnosis.heldout,
+            "slow_error_K": diagnosis.final.slow.sigma,
+            "slow_error_s": diagnosis.final.slow.time,
+        },
+    )
+    for name in ("measured", "before", "after", "input", "usable", "condition_holds"):
+        data[name].encoding |= COMPRESSED
+    return data
+
+
+def _channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for item in recordings for name in item.temperature_names))
+
+
+def _joined(
+    recordings: Sequence[Recording], values: Sequence[Array], empty: float, dtype: type = np.float32
+) -> Array:
+    """Columns of every recording under the channels of all, (stamps, channels)."""
+    names = _channels(recordings)
+    found = []
+    for item, own in zip(recordings, values, strict=True):
+        table = np.full((item.times.size, len(names)), empty, dtype=dtype)
+        table[:, [names.index(name) for name in item.temperature_names]] = own
+        found.append(table)
+    return np.concatenate(found)
+
+
+def _readings(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Array]) -> dict[str, Any]:
+    recordings = diagnosis.plant.recordings
+    names = _channels(recordings)
+    celsius = {"units": "degC"}
+    sigma = np.full((len(recordings), len(names)), np.nan)
+    for row, item in enumerate(recordings):
+        for column, name in enumerate(item.temperature_names):
+            rounding = item.noise[column].resolution / np.sqrt(12.0)
+            sigma[row, names.index(name)] = np.hypot(item.sigma[column], rounding)
+
+    def table(values: Sequence[Array], title: str) -> tuple:
+        shifted = [item - ZERO_CELSIUS_K for item in values]
+        return ("stamp", "channel"), _joined(recordings, shifted, np.nan), celsius | {"long_name": title}
+
+    return {
+        "time": (
+            "stamp",
+            np.concatenate([item.times for item in recordings]),
+            {"units": "s", "long_name": "time from the first stamp of the recording"},
+        ),
+        "recording_index": ("stamp", np.repeat(range(len(recordings)), [r.times.size for r in recordings])),
+        "held_out": (
+            "stamp",
+            np.concatenate([~mask for mask in diagnosis.plant.use]).astype(np.int8),
+            {"long_name": "1 where the fit did not see the readings"},
+        ),
+        "measured": table([item.temperature for item in recordings], "reading"),
+        "usable": (
+            ("stamp", "channel"),
+            _joined(recordings, [item.usable for item in recordings], 0, np.int8),
+            {"long_name": "1 where the reading carries no flag"},
+        ),
+        "before": table(before, "prediction, nothing added"),
+        "after": table(after, "prediction with what was found"),
+        "noise": (
+            ("recording", "channel"),
+            sigma,
+            {"units": "K", "long_name": "1 sigma of one reading, rounding included"},
+        ),
+        "start_stamp": ("recording", [item.start or "" for item in recordings]),
+    }
+
+
+def _inputs(recordings: Sequence[Recording]) -> dict[str, Any]:
+    names = tuple(dict.fromkeys(name for item in recordings for name in item.input_names))
+    units = {n: u for item in recordings for n, u in zip(item.input_names, item.input_units, strict=True)}
+    found = []
+    for item in recordings:
+        own = np.full((item.times.size, len(names)), np.nan, dtype=np.float32)
+        own[:, [names.index(name) for name in item.input_names]] = item.input_history().values
+        found.append(own)
+    return {
+        "input": (("stamp", "input_name"), np.concatenate(found), {"long_name": "inputs, SI"}),
+        "input_name": list(names),
+        "input_unit": ("input_name", [units[name] for name in names]),
+    }
+
+
+def _conditions(recordings: Sequence[Recording]) -> dict[str, Any]:
+    marks = [operating_conditions(item) for item in recordings]
+    names = tuple(dict.fromkeys(name for item in marks for name in item.names))
+    found = []
+    for item in marks:
+        own = np.zeros((len(item.marks), len(names)), dtype=np.int8)
+        own[:, [names.index(name) for name in item.names]] = item.marks
+        found.append(own)
+    return {"condition_holds": (("stamp", "condition"), np.concatenate(found)), "condition": list(names)}
+
+
+def _heat(diagnosis: Diagnosis) -> dict[str, Any]:
+    tracks = diagnosis.explanations
+    if not tracks:
+        return {}
+    spots = list(dict.fromkeys(item.spot for item in tracks))
+    evidence = {spot: sum(t.log_evidence for t in tracks if t.spot == spot) for spot in spots}
+    told, _ = component_shares(tracks, {})
+    reported = diagnosis.view.reported
+    watts = {"units": "W"}
+    return {
+        "heat_time": (("track", "onset"), np.array([t.times for t in tracks]), {"units": "s"}),
+        "heat": (
+            ("track", "onset"),
+            np.array([t.heat for t in tracks]),
+            watts | {"long_name": "heat at one place alone that explains what the model leaves"},
+        ),
+        "heat_sigma": (("track", "onset"), np.array([t.sigma for t in tracks]), watts),
+        "track_spot": ("track", [t.spot for t in tracks]),
+        "track_recording": ("track", np.array([t.recording for t in tracks])),
+        "spot": spots,
+        "spot_component": ("spot", [reported.get(spot, spot) for spot in spots]),
+        "spot_log_evidence": ("spot", np.array([evidence[spot] for spot in spots])),
+        "spot_share": (
+            "spot",
+            np.array([told[spot] for spot in spots]),
+            {"long_name": "probability that heat is missing here, if at one place"},
+        ),
+    }
+
+
+def _sets(diagnosis: Diagnosis) -> dict[str, Any]:
+    ranked = rank(diagnosis.hypotheses)
+    share = 1.0 - diagnosis.judgement.other
+    chosen = diagnosis.judgement.chosen.fit.keys
+    return {
+        "set_name": ("set", [hypothesis_words(item.fit) for item in ranked]),
+        "set_probability": ("set", np.array([share * item.probability for item in ranked])),
+        "set_misfit": (
+            "set",
+            np.array([np.sqrt(item.fit.reduced_misfit) for item in ranked]),
+            {"long_name": "root mean square of whitened residuals"},
+        ),
+        "set_chosen": ("set", np.array([item.fit.keys == chosen for item in ranked]).astype(np.int8)),
+        "not_in_catalogue": ((), diagnosis.judgement.other),
+    }
+
+
+def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
+    belief = diagnosis.calibrated.belief
+    own = belief.coordinates
+    known = np.linalg.inv(belief.root.T @ belief.root) if own else np.zeros((0, 0))
+    fit = diagnosis.final
+    rows = [_index(fit, item) for item in own]
+    spread = np.sqrt(np.diag(fit.covariance))
+    sigmas = {"units": "1", "long_name": "in prior standard deviations from nominal"}
+    return {
+        "parameter": [item.name for item in own],
+        "parameter_nominal": ("parameter", np.array([item.value for item in own])),
+        "parameter_prior_sigma": ("parameter", np.array([item.sigma for item in own])),
+        "parameter_logarithmic": ("parameter", np.array([item.logarithmic for item in own]).astype(np.int8)),
+        "parameter_unit": ("parameter", [item.unit for item in own]),
+        "parameter_known": ("parameter", np.asarray(belief.mean), sigmas),
+        "parameter_known_sigma": ("parameter", np.sqrt(np.diag(known)), sigmas),
+        "parameter_fitted": ("parameter", np.array([fit.position[i] for i in rows]), sigmas),
+        "parameter_fitted_sigma": ("parameter", np.array([spread[i] for i in rows]), sigmas),
+    }
+
+
+def _index(fit: Fit, coordinate: Coordinate) -> int:
+    return next(i for i, item in enumerate(fit.coordinates) if item.name == coordinate.name)

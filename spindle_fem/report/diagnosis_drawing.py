@@ -1,0 +1,185 @@
+"""Where heat would explain what the model leaves, drawn on the machine's half section."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
+from spindle_fem.machine.view.meridian_places import regions_of
+from spindle_fem.model.reduced.probe_places import NEAR, STANDARD_DISTANCE
+from spindle_fem.report.figure_style import (
+    FILM_MAP,
+    INK,
+    MUTED,
+    ColourBar,
+    draw_colour_bar,
+    new_figure,
+    pixel_axes,
+    set_title,
+    spread,
+    styled,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_MM = 1.0e3
+# As thick as a wall is drawn, m.
+WALL = 3.0e-3
+PLAIN = "#e9ecef"
+BAR_LABEL = "evidence for heat missing here, in % of the best place's"
+
+
+def explained_shares(data: xr.Dataset) -> dict[str, float]:
+    """Evidence over nothing of every spot in per cent of the best spot's; 0 where it explains nothing."""
+    evidence = data["spot_log_evidence"].values
+    best = float(evidence.max())
+    if best <= 0.0:
+        return dict.fromkeys(map(str, data["spot"].values), 0.0)
+    return {
+        str(spot): 100.0 * max(float(value), 0.0) / best
+        for spot, value in zip(data["spot"].values, evidence, strict=True)
+    }
+
+
+@styled
+def located_on_machine(
+    data: xr.Dataset, spec: MachineSpec, component: str, assembly: AssemblyGeometry | None = None
+) -> Figure | None:
+    """Half section with its spots coloured by how well heat there explains the residual; None without spots.
+
+    Parameters
+    ----------
+    data : Dataset
+        As ``diagnosis.nc`` has it.
+    spec : MachineSpec
+    component : str
+        What is outlined: where the mismatch is; may be empty.
+    assembly : AssemblyGeometry, optional
+    """
+    if "spot" not in data:
+        return None
+    assembly = build_assembly(spec) if assembly is None else assembly
+    segments = [segment for part in assembly.parts for segment in part.segments]
+    z_low, z_high = min(s.z_start for s in segments) * _MM, max(s.z_end for s in segments) * _MM
+    reach = 1.06 * max(s.outer_radius for s in segments) * _MM
+    pad = 0.03 * (z_high - z_low)
+    left, width = 100.0, 1470.0
+    scale = width / (z_high - z_low + 2.0 * pad)
+    top, height = 190.0, (reach + 4.0) * scale
+    total = top + height + 220.0
+    figure = new_figure(total)
+    axes = pixel_axes(figure, left, top, width, height)
+    axes.set(xlim=(z_low - pad, z_high + pad), ylim=(-4.0, reach), aspect="equal")
+    axes.grid(False)
+    axes.set(xlabel="z / mm", ylabel="radius / mm")
+    bar = ColourBar(FILM_MAP.reversed(), 0.0, 100.0, BAR_LABEL)
+    for segment in segments:
+        _patch(axes, segment.z_start, segment.z_end, segment.inner_radius, segment.outer_radius, PLAIN)
+    shares = explained_shares(data)
+    # Large spots first: what lies within them is drawn on top.
+    areas = {
+        spot: (regions_of(spec, spot), share) for spot, share in shares.items() if not spot.startswith(NEAR)
+    }
+    for regions, share in sorted(areas.values(), key=lambda item: -sum(r.volume for r in item[0])):
+        for region in regions:
+            inner, outer = region.r
+            _patch(axes, *region.z, inner, max(outer, inner + WALL), bar.colours(share))
+    for edge in assembly.edges:
+        if not edge.is_axis:
+            axes.plot(
+                np.array(edge.z) * _MM,
+                np.array(edge.r) * _MM,
+                color=INK,
+                linewidth=0.5 if edge.is_contact else 0.9,
+            )
+    for spot, share in shares.items():
+        for region in regions_of(spec, spot) if spot.startswith(NEAR) else ():
+            radius, place = region.middle
+            axes.add_patch(
+                Circle(
+                    (place * _MM, radius * _MM),
+                    0.35 * STANDARD_DISTANCE * _MM,
+                    facecolor=bar.colours(share),
+                    edgecolor=INK,
+                    linewidth=0.7,
+                    zorder=5,
+                )
+            )
+    for region in regions_of(spec, component) if component else ():
+        axes.add_patch(
+            Rectangle(
+                (region.z[0] * _MM - 1.5, region.r[0] * _MM - 1.5),
+                (region.z[1] - region.z[0]) * _MM + 3.0,
+                (region.r[1] - region.r[0]) * _MM + 3.0,
+                facecolor="none",
+                edgecolor="#D55E00",
+                linewidth=2.6,
+                zorder=6,
+            )
+        )
+    axes.axhline(0.0, color=MUTED, linewidth=0.9, dashes=(12, 3, 2, 3))
+    _label_probes(axes, spec, reach, scale)
+    draw_colour_bar(pixel_axes(figure, 420.0, total - 92.0, 760.0, 20.0), bar)
+    notes = "Circles: the neighbourhood of each probe. Grey: not asked."
+    if component and regions_of(spec, component):
+        notes += f" Framed in orange: where the diagnosis puts it ({component.replace('_', ' ')})."
+    set_title(figure, "Where missing heat would explain the readings", notes)
+    return figure
+
+
+def _patch(axes, z_start: float, z_end: float, inner: float, outer: float, colour) -> None:
+    axes.add_patch(
+        Rectangle(
+            (z_start * _MM, inner * _MM),
+            (z_end - z_start) * _MM,
+            (outer - inner) * _MM,
+            facecolor=colour,
+            edgecolor="none",
+        )
+    )
+
+
+def _label_probes(axes, spec: MachineSpec, reach: float, scale: float) -> None:
+    """Names of point probes above the section, with leaders."""
+    probes = [probe for probe in spec.probe if probe.kind == "point"]
+    if not probes:
+        return
+    low, high = axes.get_xlim()
+    centres = spread(
+        [probe.z * _MM for probe in probes],
+        [(12.5 * len(probe.name) + 20.0) / scale for probe in probes],
+        low,
+        high,
+    )
+    for probe, centre in zip(probes, centres, strict=True):
+        at = (probe.z * _MM, probe.r * _MM)
+        lift = reach + 26.0 / scale
+        axes.plot([at[0], centre], [at[1], lift], color=INK, linewidth=0.7, clip_on=False, zorder=6)
+        axes.plot(*at, marker="o", markersize=3.6, markerfacecolor="white", markeredgecolor=INK, zorder=7)
+        axes.text(centre, lift + 4.0 / scale, probe.name, ha="center", va="bottom", fontsize=9.0)
+
+
+@styled
+def located_on_network(data: xr.Dataset) -> Figure | None:
+    """Nodes by how well heat there explains the residual; None without spots."""
+    if "spot" not in data:
+        return None
+    shares = sorted(explained_shares(data).items(), key=lambda item: -item[1])
+    figure = new_figure(110.0 + 44.0 * len(shares) + 90.0)
+    left = 60.0 + 11.0 * max(len(name) for name, _ in shares)
+    axes = pixel_axes(figure, left, 100.0, 1540.0 - left, 44.0 * len(shares))
+    bar = ColourBar(FILM_MAP.reversed(), 0.0, 100.0, BAR_LABEL)
+    axes.barh(
+        range(len(shares)), [share for _, share in shares], color=[bar.colours(share) for _, share in shares]
+    )
+    axes.set_yticks(range(len(shares)), [name.replace("_", " ") for name, _ in shares])
+    axes.set(ylim=(len(shares) - 0.5, -0.5), xlim=(0.0, 100.0), xlabel=BAR_LABEL)
+    axes.grid(axis="y", visible=False)
+    set_title(figure, "Where missing heat would explain the readings", "Each node alone.")
+    return figure

@@ -1,0 +1,173 @@
+"""Charts of what a diagnosis concludes: probabilities of sets, intervals of findings and of parameters."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from spindle_fem.report.diagnosis_charts import HELD, NORMAL_90
+from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, pixel_axes, set_title, styled
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WRAPPED = 46
+
+
+@styled
+def set_probabilities(data: xr.Dataset) -> Figure:
+    """Probability of every set of effects that was fitted to the end, and of something else."""
+    names = [str(n) for n in data["set_name"].values]
+    chance = [float(p) for p in data["set_probability"].values]
+    misfit = [f"misfit {value:.2f}" for value in data["set_misfit"].values]
+    chosen = [bool(c) for c in data["set_chosen"].values]
+    names, chance, misfit = (
+        [*names[:9], "something else, or another law"],
+        [*chance[:9], float(data["not_in_catalogue"].values)],
+        [*misfit[:9], ""],
+    )
+    chosen = [*chosen[:9], False]
+    rows = len(names)
+    names = [textwrap.fill(name, WRAPPED) for name in names]
+    lines = [line for name in names for line in name.split("\n")]
+    height = 26.0 + 26.0 * max(name.count("\n") + 1 for name in names)
+    figure = new_figure(150.0 + height * rows + 70.0)
+    left = 50.0 + 11.0 * max(map(len, lines))
+    axes = pixel_axes(figure, left, 110.0, 1600.0 - left - 240.0, height * rows)
+    colours = [CYCLE[0] if item else "#a9b7c4" for item in chosen]
+    axes.barh(range(rows), chance, color=colours, height=0.64)
+    axes.set_yticks(range(rows), names)
+    axes.set(ylim=(rows - 0.5, -0.5), xlim=(0.0, 1.0))
+    axes.set_xlabel("probability")
+    axes.grid(axis="y", visible=False)
+    axes.tick_params(axis="y", length=0)
+    for row, (value, extra) in enumerate(zip(chance, misfit, strict=True)):
+        text = f"{value:.3f}" if value >= 5e-4 else "< 0.001"
+        axes.annotate(
+            f"{text}   {extra}",
+            (value, row),
+            xytext=(6, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=8.5,
+            annotation_clip=False,
+        )
+    set_title(
+        figure,
+        "Which explanations the data leave",
+        "Each set fitted with the machine's uncertain parameters. Misfit: residual in units of its noise.",
+    )
+    return figure
+
+
+@styled
+def finding_intervals(findings: Sequence[Mapping[str, Any]]) -> Figure | None:
+    """Value and 90 % interval of every parameter of the findings; None where there are none."""
+    rows = [
+        (item, name, value)
+        for item in findings
+        for name, value in item["parameters"].items()
+        if value["low"] is not None and value["high"] is not None
+    ]
+    if not rows:
+        return None
+    height = 74.0
+    figure = new_figure(110.0 + height * len(rows) + 20.0)
+    for number, (item, name, value) in enumerate(rows):
+        top = 104.0 + number * height
+        axes = pixel_axes(figure, 660.0, top, 620.0, 22.0)
+        low, high, middle = value["low"], value["high"], value["value"]
+        width = max(high - low, 1e-9 * max(abs(middle), 1.0))
+        axes.plot([low, high], [0.0, 0.0], color=CYCLE[0], linewidth=5.0, solid_capstyle="butt")
+        axes.plot(middle, 0.0, marker="o", color=INK, markersize=6)
+        axes.set(xlim=(low - 0.35 * width, high + 0.35 * width), yticks=[])
+        axes.locator_params(axis="x", nbins=5)
+        axes.tick_params(axis="x", labelsize=8.0)
+        axes.spines["left"].set_visible(False)
+        total = figure.get_size_inches()[1] * figure.dpi
+        y = 1.0 - (top + 12.0) / total
+        label = f"{item['effect'].replace('_', ' ')} ({item['component'].replace('_', ' ')}): "
+        figure.text(640.0 / 1600.0, y, label + name.replace("_", " "), ha="right", va="center", fontsize=9.0)
+        unit = str(value["unit"]).replace("degC", "°C")
+        text = f"{_short(middle)} {unit}  [{_short(low)}, {_short(high)}]"
+        figure.text(1300.0 / 1600.0, y, text, va="center", fontsize=9.0)
+    set_title(figure, "What was found, in numbers", "Dot: most probable value; bar: 90 % interval.")
+    return figure
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
+
+
+@styled
+def machine_parameters(data: xr.Dataset) -> Figure | None:
+    """The machine's own uncertain numbers before and after, in standard deviations of their priors."""
+    names = [str(n) for n in data["parameter"].values] if "parameter" in data else []
+    if not names:
+        return None
+    known, known_sigma = data["parameter_known"].values, data["parameter_known_sigma"].values
+    fitted, fitted_sigma = data["parameter_fitted"].values, data["parameter_fitted_sigma"].values
+    row = 40.0
+    top, foot = 150.0, 80.0
+    figure = new_figure(top + row * len(names) + foot)
+    left = min(60.0 + 10.4 * max(len(n) for n in names), 620.0)
+    axes = pixel_axes(figure, left, top, 1600.0 - left - 330.0, row * len(names))
+    axes.axvspan(-NORMAL_90, NORMAL_90, color=HELD, linewidth=0.0, zorder=0)
+    axes.axvline(0.0, color=MUTED, linewidth=0.8)
+    at = np.arange(len(names))
+    calibrated = bool(np.any(np.abs(known) > 1e-9) or np.any(np.abs(known_sigma - 1.0) > 1e-6))
+    handles = [Rectangle((0, 0), 1, 1, color=HELD)]
+    texts = ["prior, 90 %"]
+    if calibrated:
+        bars = axes.errorbar(
+            known, at - 0.17, xerr=NORMAL_90 * known_sigma, fmt="s", color=CYCLE[4], markersize=4, linewidth=2
+        )
+        handles.append(bars)
+        texts.append("after the calibration recordings")
+    bars = axes.errorbar(
+        fitted, at + 0.17, xerr=NORMAL_90 * fitted_sigma, fmt="o", color=CYCLE[0], markersize=4.5, linewidth=2
+    )
+    handles.append(bars)
+    texts.append("after the diagnosed recordings")
+    axes.set_yticks(at, [name.replace("_", " ") for name in names])
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlabel("shift from nominal in prior standard deviations")
+    transform = axes.get_yaxis_transform()
+    for number, name in enumerate(names):
+        axes.text(
+            1.02, number, _amount(data.sel(parameter=name)), transform=transform, va="center", fontsize=8.5
+        )
+    width, height = figure.get_size_inches() * figure.dpi
+    figure.legend(
+        handles, texts, ncols=3, loc="upper left", bbox_to_anchor=(15.0 / width, 1.0 - 82.0 / height)
+    )
+    set_title(
+        figure,
+        "The machine's own parameters",
+        "Value and 90 % interval; the prior holds a shift beyond the grey band with less than 10 %.",
+    )
+    return figure
+
+
+def _amount(item: xr.Dataset) -> str:
+    nominal, sigma = float(item["parameter_nominal"].values), float(item["parameter_prior_sigma"].values)
+    ends = [
+        float(item["parameter_fitted"].values)
+        + sign * NORMAL_90 * float(item["parameter_fitted_sigma"].values)
+        for sign in (0.0, -1.0, 1.0)
+    ]
+    if int(item["parameter_logarithmic"].values):
+        middle, low, high = (nominal * math.exp(sigma * end) for end in ends)
+        return f"× {middle:.2f} [{low:.2f}, {high:.2f}]"
+    middle, low, high = (nominal + sigma * end for end in ends)
+    unit = str(item["parameter_unit"].values)
+    if unit == "m":
+        middle, low, high, unit = 1e3 * middle, 1e3 * low, 1e3 * high, "mm"
+    return f"{middle:+.2f} {unit} [{low:+.2f}, {high:+.2f}]"

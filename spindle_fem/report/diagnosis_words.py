@@ -1,0 +1,200 @@
+"""A diagnosis in sentences: the verdict for a report, what to check, how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from spindle_fem.effects.framework.effect import capital, place_words
+from spindle_fem.effects.registry import catalogue
+from spindle_fem.report.run_tables import significant
+
+VERDICTS = {
+    "consistent": "nothing is missing",
+    "parameter": "a parameter is off",
+    "sensor": "a sensor does not tell the truth",
+    "missing_physics": "physics is missing",
+    "ambiguous": "the data cannot decide",
+    "unexplained": "no explanation",
+}
+
+
+def verdict_sentence(content: Mapping[str, Any]) -> str:
+    """The verdict with its numbers, to be put in a report as it is.
+
+    Parameters
+    ----------
+    content : mapping
+        Of ``diagnosis.json``.
+    """
+    verdict, fit = content["verdict"], content["fit"]
+    if verdict == "unexplained" and not content["findings"]:
+        reason = str(content.get("reason") or "the difference follows nothing that the catalogue holds")
+        return f"The difference between recording and model is not explained: {reason.rstrip('.')}."
+    if verdict == "consistent":
+        return (
+            f"The recording agrees with the machine: what differs, {kelvin(fit['after']['heldout_rmse_K'])} "
+            f"on held-out readings, is noise ({kelvin(fit['noise_K'])}), the slow error allowed to sensors "
+            f"and model ({kelvin(content['slow_error']['sigma_K'])}) and what the uncertain parameters "
+            f"absorb within their priors (p {level(content['mismatch']['p_value'])})."
+        )
+    if verdict == "ambiguous":
+        sets = [(content["findings"], content.get("set_probability"))]
+        sets += [(item["findings"], item["probability"]) for item in content["alternatives"]]
+        options = [f"{set_words(items)} ({chance(value)})" for items, value in sets]
+        reason = str(content.get("reason") or "several sets explain the data").rstrip(".")
+        return (
+            f"{_when(content)}the readings differ from the model by more than noise and uncertain "
+            f"parameters, but the data cannot tell apart {_or(options)}: {reason}. {_improvement(fit)}"
+        )
+    statements = " ".join(item["statement"] for item in content["findings"])
+    lead = "" if verdict == "sensor" else _heat_words(content)
+    probability = content.get("set_probability")
+    return f"{lead}{statements} Probability {chance(probability)}. {_improvement(fit)}"
+
+
+def set_words(findings: Sequence[Mapping[str, Any]]) -> str:
+    """Effects and places of a set.
+
+    >>> set_words([{"effect": "heat_scale", "component": "front_bearings"}])
+    'heat scale at the front bearings'
+    """
+    if not findings:
+        return "nothing missing"
+    return " with ".join(
+        f"{item['effect'].replace('_', ' ')} at {place_words(item['component'])}" for item in findings
+    )
+
+
+def chance(value: float | None) -> str:
+    """Probability as text.
+
+    >>> chance(0.934), chance(0.9999), chance(0.004), chance(None)
+    ('0.93', 'above 0.99', 'below 0.01', 'not known')
+    """
+    if value is None:
+        return "not known"
+    if value < 0.01:
+        return "below 0.01"
+    return "above 0.99" if value > 0.99 else f"{value:.2f}"
+
+
+def level(p_value: float) -> str:
+    """A p-value with its sign of relation.
+
+    >>> level(0.0312), level(0.0)
+    ('= 0.031', '< 10⁻¹⁰')
+    """
+    return f"= {significant(p_value, 2)}" if p_value >= 1.0e-10 else "< 10⁻¹⁰"
+
+
+def kelvin(value: float | None) -> str:
+    """Temperature difference as text.
+
+    >>> kelvin(0.1544), kelvin(None)
+    ('0.15 K', 'not known')
+    """
+    return "not known" if value is None else f"{value:.2f} K"
+
+
+def moment(value: float | str) -> str:
+    """A time of the file: seconds from the start as hours or minutes, stamps as they are.
+
+    >>> moment(5400.0), moment(90.0), moment("2024-01-01T10:00:00.123")
+    ('1.50 h', '2 min', '2024-01-01 10:00:00')
+    """
+    if isinstance(value, str):
+        return value[:19].replace("T", " ")
+    return f"{value / 3600.0:.2f} h" if abs(value) >= 3600.0 else f"{value / 60.0:.0f} min"
+
+
+def _when(content: Mapping[str, Any]) -> str:
+    condition = content["mismatch"]["where"].get("condition")
+    if not condition:
+        return ""
+    # "At 0-500 rpm", "During cooling".
+    return (
+        f"{'At' if condition[0].isdigit() or condition.startswith('standstill') else 'During'} {condition} "
+    )
+
+
+def _heat_words(content: Mapping[str, Any]) -> str:
+    """When, where and how much heat would be missing; empty where the place is no place of heat."""
+    mismatch = content["mismatch"]
+    component = mismatch["where"]["component"]
+    heat = mismatch["missing_heat_W"].get(component)
+    when = _when(content) or "Overall "
+    unrecorded = any(item["effect"].startswith("unrecorded_") for item in content["findings"])
+    if heat is None or unrecorded:
+        # An unrecorded source says itself how much; what the parameters absorb of it would confuse.
+        return ""
+    more = "more" if heat["mean"] >= 0.0 else "less"
+    return (
+        f"{when}the readings are as if {place_words(component)} gave {abs(heat['mean']):.0f} W on average "
+        f"(at most {abs(heat['peak']):.0f} W) {more} heat than modelled. "
+    )
+
+
+def _improvement(fit: Mapping[str, Any]) -> str:
+    before, after = fit["before"]["heldout_rmse_K"], fit["after"]["heldout_rmse_K"]
+    if before is None or after is None:
+        return ""
+    verb = "falls" if after < before else "goes"
+    return (
+        f"With it the held-out error {verb} from {kelvin(before)} to {kelvin(after)}; "
+        f"noise {kelvin(fit['noise_K'])}."
+    )
+
+
+def _or(items: Sequence[str]) -> str:
+    return " or ".join(filter(None, [", ".join(items[:-1]), items[-1] if items else ""]))
+
+
+def checks(content: Mapping[str, Any]) -> list[str]:
+    """What a maintenance engineer should look at, the most probable first."""
+    effects = catalogue()
+    found: dict[str, None] = {}
+    sets = [content["findings"], *(item["findings"] for item in content["alternatives"])]
+    for item in [finding for findings in sets for finding in findings]:
+        text = item.get("check") or (effects[item["effect"]].check if item["effect"] in effects else "")
+        if text:
+            place = capital(place_words(item["component"]))
+            found.setdefault(f"{place}: {text[0].lower() + text[1:]}")
+    if not found and content["verdict"] == "consistent":
+        return ["Nothing: the machine does what its definition says."]
+    return list(found)
+
+
+def confidence_words(content: Mapping[str, Any]) -> list[str]:
+    """How the answer was found and what it leaves open."""
+    mismatch, fit = content["mismatch"], content["fit"]
+    found = [
+        f"If nothing were missing, a difference as large would have the probability "
+        f"p = {significant(mismatch['p_value'], 2)}.",
+        f"Held out, never seen by the fit: {fit['heldout']}.",
+    ]
+    if content.get("candidates_tried"):
+        found.append(
+            f"{content['candidates_tried']} candidates of the catalogue were tried, "
+            f"{content.get('hypotheses_fitted', 0)} sets fitted to the end with the machine's uncertain "
+            "parameters and the places of the probes."
+        )
+    other = content.get("something_else_probability")
+    if other is not None:
+        found.append(
+            "Something that the catalogue does not hold, or holds with another law: probability "
+            f"{significant(other, 2)}."
+        )
+    slow = content.get("slow_error")
+    if slow:
+        found.append(
+            f"Beside white noise every channel is allowed a slow error of {kelvin(slow['sigma_K'])} that "
+            f"changes within {slow['time_s'] / 60.0:.0f} min: drift of logger and sensor, and what any model "
+            "leaves of its machine."
+        )
+    found.append(
+        "Probabilities are tempered: the catalogue's laws never hold exactly, so a difference of evidence "
+        "counts for a share of what it says, and no set is given more than sets of such evidence deserved "
+        "on concealed recordings. Intervals are 90 %."
+    )
+    return found

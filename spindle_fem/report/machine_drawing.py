@@ -1,0 +1,383 @@
+"""Drawing of a machine definition in the meridian plane: parts, bearings, channel, probes, films."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Rectangle
+
+from spindle_fem.definition.machine_spec import Channel, MachineSpec
+from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
+from spindle_fem.report.figure_style import CYCLE, INK, MUTED, Label, new_figure, pixel_axes, spread, styled
+from spindle_fem.units import ZERO_CELSIUS_K
+
+_BY_NAME = (
+    ("inner_ring", "#8fbf8b"),
+    ("outer_ring", "#7fa8d1"),
+    ("spacer", "#c8b1d8"),
+    ("shaft", "#b9c4cf"),
+    ("housing", "#e6d7b8"),
+    ("cover", "#e0b98a"),
+    ("flange", "#d8c9a6"),
+)
+_OTHERS = ("#d9a7a0", "#a9d4cf", "#e3c1d7", "#c7cf9b")
+BALL_COLOUR = "#f2f2f2"
+OIL_COLOUR = "#f0c419"
+_MM = 1.0e3
+
+
+def part_colours(names: Sequence[str]) -> tuple[str, ...]:
+    """Fill colours of parts: by the kind that the name tells, else in turn.
+
+    >>> part_colours(["shaft", "F1.inner_ring", "sleeve"])
+    ('#b9c4cf', '#8fbf8b', '#d9a7a0')
+    """
+    colours, others = [], 0
+    for name in names:
+        known = next((colour for text, colour in _BY_NAME if text in name), None)
+        if known is None:
+            known = _OTHERS[others % len(_OTHERS)]
+            others += 1
+        colours.append(known)
+    return tuple(colours)
+
+
+@styled
+def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None) -> Figure:
+    """Meridian section of the definition, θ = 0 above and θ = 180° below the axis, in mm.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    assembly : AssemblyGeometry, optional
+        Made from ``spec`` when left out.
+    """
+    assembly = build_assembly(spec) if assembly is None else assembly
+    segments = [segment for part in assembly.parts for segment in part.segments]
+    z_low, z_high = min(s.z_start for s in segments) * _MM, max(s.z_end for s in segments) * _MM
+    reach = max(s.outer_radius for s in segments) * _MM
+    margin, width_px = 24.0, 1600.0
+    z_margin = 0.05 * (z_high - z_low)
+    scale = (width_px - 2.0 * margin - 70.0) / (z_high - z_low + 2.0 * z_margin)
+    legend = _film_legend(spec)
+    rows = math.ceil(len(legend) / 2)
+    drawing_height = 2.0 * reach * 1.03 * scale
+    top, foot = 142.0, 138.0 + 30.0 * rows + 24.0
+    figure = new_figure(top + drawing_height + foot, width_px)
+    axes = pixel_axes(figure, margin + 70.0, top, width_px - 2.0 * margin - 70.0, drawing_height)
+    axes.set(xlim=(z_low - z_margin, z_high + z_margin), ylim=(-1.03 * reach, 1.03 * reach), aspect="equal")
+    axes.grid(False)
+    axes.set_ylabel("radius / mm")
+    axes.annotate(
+        "z / mm",
+        (1.0, 0.0),
+        xycoords="axes fraction",
+        xytext=(0, -9),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+    )
+    axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
+    axes.tick_params(axis="both", labelsize=8.5)
+    for spine in ("left", "bottom"):
+        axes.spines[spine].set_visible(False)
+    _draw_parts(axes, assembly)
+    _draw_channel(axes, spec)
+    _draw_bearings(axes, spec)
+    _draw_films(axes, spec, assembly)
+    axes.plot(
+        [z_low - 0.6 * z_margin, z_high + 0.6 * z_margin],
+        [0.0, 0.0],
+        color=MUTED,
+        linewidth=0.9,
+        dashes=(12, 3, 2, 3),
+    )
+    head = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    total = top + drawing_height + foot
+    head.set(xlim=(0.0, width_px), ylim=(total, 0.0))
+    head.axis("off")
+    head.patch.set_alpha(0.0)
+    head.text(margin, 34.0, spec.title or spec.name, fontsize=12.5, fontweight="bold", va="center")
+    head.text(margin, 66.0, _operating_point(spec), fontsize=9.0, color=MUTED, va="center")
+
+    def pixels(z: float, radius: float) -> tuple[float, float]:
+        left = margin + 70.0
+        return left + (z - z_low + z_margin) * scale, top + (1.03 * reach - radius) * scale
+
+    ends = (margin, width_px - margin)
+    _rail(head, _above(spec), pixels, top - 14.0, -1.0, ends)
+    _rail(head, _below(spec, assembly), pixels, top + drawing_height + 62.0, 1.0, ends)
+    for number, (colour, text) in enumerate(legend):
+        column, row = divmod(number, max(rows, 1))
+        x, y = margin + 10.0 + column * 0.5 * width_px, total - 24.0 - 30.0 * (rows - 1 - row)
+        head.add_line(Line2D([x, x + 44.0], [y, y], color=colour, linewidth=3.6))
+        head.text(x + 56.0, y, text, fontsize=8.8, va="center")
+    return figure
+
+
+def _operating_point(spec: MachineSpec) -> str:
+    operation = spec.operation
+    text = (
+        f"{operation.speed * 30.0 / math.pi:.0f} rpm, thrust {operation.thrust:.0f} N, "
+        f"ambient {operation.ambient_temperature - ZERO_CELSIUS_K:.1f} °C"
+    )
+    if spec.coolant is not None:
+        text += (
+            f", oil {spec.coolant.flow * 6.0e4:.3g} L/min at "
+            f"{spec.coolant.inlet_temperature - ZERO_CELSIUS_K:.1f} °C"
+        )
+    return text + ". Section through the axis: top θ = 0, bottom θ = 180°."
+
+
+def _draw_parts(axes: Axes, assembly: AssemblyGeometry) -> None:
+    colours = dict(zip(assembly.part_names, part_colours(assembly.part_names), strict=True))
+    for part in assembly.parts:
+        for segment in part.segments:
+            for sign in (1.0, -1.0):
+                low = min(sign * segment.inner_radius, sign * segment.outer_radius) * _MM
+                axes.add_patch(
+                    Rectangle(
+                        (segment.z_start * _MM, low),
+                        (segment.z_end - segment.z_start) * _MM,
+                        (segment.outer_radius - segment.inner_radius) * _MM,
+                        facecolor=colours[part.name],
+                        edgecolor="none",
+                    )
+                )
+    for edge in assembly.edges:
+        if edge.is_axis:
+            continue
+        for sign in (1.0, -1.0):
+            axes.plot(
+                np.array(edge.z) * _MM,
+                sign * np.array(edge.r) * _MM,
+                color=INK,
+                linewidth=0.7 if edge.is_contact else 1.1,
+                solid_capstyle="round",
+            )
+
+
+def channel_sections(channel: Channel, theta: float) -> list[float]:
+    """Axial places, m, at which the centre line of the channel passes the angle ``theta`` (rad).
+
+    >>> from spindle_fem.definition.machine_spec import Channel
+    >>> channel = Channel(part="housing", inner_radius="108 mm", depth="10 mm", width="12 mm", pitch="24 mm",
+    ...                   turns=2, z_start="48 mm")
+    >>> [round(1e3 * z) for z in channel_sections(channel, 0.0)]
+    [48, 72, 96]
+    """
+    sign = 1.0 if channel.hand == "right" else -1.0
+    total = 2.0 * math.pi * channel.turns
+    places = []
+    for start in range(channel.starts):
+        angle = (sign * theta - 2.0 * math.pi * start / channel.starts) % (2.0 * math.pi)
+        if angle > 2.0 * math.pi - 1.0e-9:
+            angle = 0.0
+        while angle <= total + 1.0e-9:
+            places.append(channel.z_start + channel.pitch * angle / (2.0 * math.pi))
+            angle += 2.0 * math.pi
+    return sorted(places)
+
+
+def _draw_channel(axes: Axes, spec: MachineSpec) -> None:
+    channel = spec.channel
+    if channel is None:
+        return
+    inner, outer = channel.inner_radius, channel.inner_radius + channel.depth
+    style = {"facecolor": OIL_COLOUR, "edgecolor": INK, "linewidth": 0.8}
+    for theta, sign in ((0.0, 1.0), (math.pi, -1.0)):
+        for z in channel_sections(channel, theta):
+            low = inner if sign > 0.0 else -outer
+            axes.add_patch(
+                Rectangle(
+                    ((z - 0.5 * channel.width) * _MM, low * _MM),
+                    channel.width * _MM,
+                    channel.depth * _MM,
+                    **style,
+                )
+            )
+    for z, sign in _ports_in_plane(spec):
+        reach = _outside_radius(spec, z)
+        start = inner + 0.5 * channel.depth
+        low = start if sign > 0.0 else -reach
+        axes.add_patch(
+            Rectangle(
+                ((z - 0.5 * channel.ports.diameter) * _MM, low * _MM),
+                channel.ports.diameter * _MM,
+                (reach - start) * _MM,
+                facecolor=OIL_COLOUR,
+                edgecolor=INK,
+                linewidth=0.8,
+            )
+        )
+
+
+def _ports_in_plane(spec: MachineSpec) -> list[tuple[float, float]]:
+    channel = spec.channel
+    if channel is None or channel.ports is None:
+        return []
+    hand = 1.0 if channel.hand == "right" else -1.0
+    found = []
+    for start in range(channel.starts):
+        for turns in (0.0, channel.turns):
+            theta = hand * 2.0 * math.pi * (turns + start / channel.starts)
+            if abs(math.sin(theta)) < 1.0e-6:
+                place = channel.z_start + channel.pitch * turns
+                found.append((place, math.copysign(1.0, math.cos(theta))))
+    return found
+
+
+def _outside_radius(spec: MachineSpec, z: float) -> float:
+    radii = [
+        0.5 * segment.outer_diameter
+        for part in spec.part
+        if part.name == spec.channel.part
+        for segment in part.segment
+        if segment.z[0] <= z <= segment.z[1]
+    ]
+    return max(radii, default=spec.channel.inner_radius + spec.channel.depth)
+
+
+def _draw_bearings(axes: Axes, spec: MachineSpec) -> None:
+    for group, bearing in spec.bearings:
+        kind = spec.bearing_types[group.bearing_type]
+        z = 0.5 * sum(bearing.z) * _MM
+        radius = 0.5 * kind.pitch * _MM
+        ball = 0.5 * kind.ball_diameter * _MM
+        lean = 1.0 if bearing.takes_thrust == "towards_rear" else -1.0
+        reach = 0.62 * (kind.outer_diameter - kind.bore_diameter) * _MM
+        step = np.array([lean * math.sin(kind.contact_angle), math.cos(kind.contact_angle)])
+        for sign in (1.0, -1.0):
+            axes.add_patch(
+                Circle(
+                    (z, sign * radius), ball, facecolor=BALL_COLOUR, edgecolor=INK, linewidth=1.0, zorder=4
+                )
+            )
+            line = np.array([z, radius])[:, None] + 0.5 * reach * step[:, None] * np.array([-1.0, 1.0])
+            axes.plot(line[0], sign * line[1], color="#b00020", linewidth=0.9, zorder=5)
+
+
+def _film_colours(spec: MachineSpec) -> dict[str, str]:
+    surfaces: dict[str, str] = {}
+    number = 0
+    for film in spec.film:
+        for name in film.surface:
+            surfaces[name] = CYCLE[number % len(CYCLE)]
+        number += 1
+    for gap in spec.gap:
+        for name in (gap.rotating, *gap.standing):
+            surfaces[name] = CYCLE[number % len(CYCLE)]
+        number += 1
+    return surfaces
+
+
+def _film_legend(spec: MachineSpec) -> list[tuple[str, str]]:
+    colours = _film_colours(spec)
+    entries = []
+    for number, film in enumerate(spec.film):
+        name = film.name or f"film {number + 1}"
+        if film.kind == "constant":
+            text = f"{film.coefficient.value:g} W/(m²·K)"
+        elif film.kind == "rotating":
+            text = f"by speed, at least {film.minimum:g} W/(m²·K)"
+        else:
+            text = f"natural convection and radiation, emissivity {film.emissivity:g}"
+        to = "ambient" if film.temperature == "ambient" else f"{film.temperature - ZERO_CELSIUS_K:.1f} °C"
+        entries.append((colours[film.surface[0]], f"{name.replace('_', ' ')}: {text} to {to}"))
+    for gap in spec.gap:
+        text = "by speed (annulus correlation)"
+        if gap.kind == "power_law":
+            text = f"{gap.at_rest:g} W/(m²·K) at rest"
+            if gap.rise:
+                speed = gap.reference_speed * 30.0 / math.pi
+                text = f"{gap.at_rest:g} + {gap.rise:g} (n/{speed:.0f} rpm)^{gap.exponent:g} W/(m²·K)"
+        entries.append((colours[gap.rotating], f"{gap.name.replace('_', ' ')}: {text}, shaft to housing"))
+    return entries
+
+
+def _draw_films(axes: Axes, spec: MachineSpec, assembly: AssemblyGeometry) -> None:
+    colours = _film_colours(spec)
+    for edge in assembly.edges:
+        if edge.name in colours:
+            for sign in (1.0, -1.0):
+                axes.plot(
+                    np.array(edge.z) * _MM,
+                    sign * np.array(edge.r) * _MM,
+                    color=colours[edge.name],
+                    linewidth=3.4,
+                    solid_capstyle="butt",
+                    zorder=3,
+                )
+
+
+def _above(spec: MachineSpec) -> list[Label]:
+    labels = []
+    for probe in spec.probe:
+        if probe.kind != "point":
+            continue
+        # Out of the plane a probe is turned into the nearer half, and its angle is told.
+        side = (
+            math.copysign(1.0, round(math.cos(probe.angle), 9)) if abs(math.cos(probe.angle)) > 1e-9 else 1.0
+        )
+        away = abs(math.sin(probe.angle)) > 0.02
+        text = f"{probe.name}\nθ = {math.degrees(probe.angle):.0f}°" if away else probe.name
+        labels.append(Label(text, np.array([probe.z * _MM, side * probe.r * _MM])))
+    for z, sign in _ports_in_plane(spec):
+        if sign > 0.0:
+            text = "oil in" if abs(z - spec.channel.z_start) < 1.0e-9 else "oil out"
+            labels.append(Label(text, np.array([z * _MM, _outside_radius(spec, z) * _MM])))
+    return labels
+
+
+def _below(spec: MachineSpec, assembly: AssemblyGeometry) -> list[Label]:
+    labels = []
+    for group, bearing in spec.bearings:
+        kind = spec.bearing_types[group.bearing_type]
+        labels.append(Label(bearing.name, np.array([0.5 * sum(bearing.z) * _MM, -0.5 * kind.pitch * _MM])))
+    rings = {
+        f"{bearing.name}.{ring}" for _, bearing in spec.bearings for ring in ("inner_ring", "outer_ring")
+    }
+    for part in assembly.parts:
+        if part.name in rings:
+            continue
+        longest = max(part.segments, key=lambda s: (s.z_end - s.z_start) * (s.outer_radius - s.inner_radius))
+        place = np.array(
+            [
+                0.5 * (longest.z_start + longest.z_end) * _MM,
+                -(0.35 * longest.inner_radius + 0.65 * longest.outer_radius) * _MM,
+            ]
+        )
+        labels.append(Label(_two_lines(part.name.replace("_", " ")), place))
+    return labels
+
+
+def _two_lines(name: str) -> str:
+    head, _, tail = name.rpartition(" ")
+    return f"{head}\n{tail}" if head else tail
+
+
+def _rail(
+    axes: Axes, labels: list[Label], pixels: object, edge: float, sign: float, ends: tuple[float, float]
+) -> None:
+    if not labels:
+        return
+    places = np.array([pixels(*label.at) for label in labels])
+    longest = [max(len(line) for line in label.text.split("\n")) for label in labels]
+    centres = spread(places[:, 0], [12.2 * characters + 20.0 for characters in longest], *ends)
+    for label, place, centre in zip(labels, places, centres, strict=True):
+        axes.plot([centre, place[0]], [edge, place[1]], color="white", linewidth=2.4, alpha=0.8)
+        axes.plot([centre, place[0]], [edge, place[1]], color=INK, linewidth=0.8)
+        axes.plot(*place, marker="o", markersize=4.2, markerfacecolor="white", markeredgecolor=INK)
+        axes.text(
+            centre,
+            edge + 4.0 * sign,
+            label.text,
+            ha="center",
+            va="bottom" if sign < 0.0 else "top",
+            fontsize=8.8,
+        )

@@ -1,0 +1,354 @@
+"""Loads that follow the temperatures while time runs.
+
+Each stage of a time step asks for the loads at its own time and at its own
+latest temperatures and is solved again until they agree, so the coupled
+scheme keeps the second order of the time steps. Coefficients of the matrix
+(films, ball contacts) are only renewed when they have moved by more than a
+small share: the matrix then serves many steps. Heat and surrounding
+temperatures are always those of the temperatures themselves. A step begins with
+what its predecessor ended with, unless an input jumps or a term is switched.
+"""
+
+from __future__ import annotations
+
+import bisect
+import copy
+import math
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import NoEquilibriumError, NoSteadyStateError, OutOfValidityError
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem
+from spindle_fem.model.mesh.time_stage import WEIGHTS
+from spindle_fem.model.mesh.time_stepper import ThermalState
+from spindle_fem.model.reduced.coefficients import CHANNEL_FILM
+from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
+from spindle_fem.operation.coolant_loop import CoolantState
+from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads
+from spindle_fem.operation.machine_loads import FieldState
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.coolant.march import march_enthalpy
+from spindle_fem.solvers.coupled_steady import PreparedMachine
+from spindle_fem.solvers.input_history import FIELD_OF, OperatingHistory
+from spindle_fem.solvers.mesh_terms import NO_PHYSICS, FieldTerms, Physics
+
+Array = NDArray[np.float64]
+
+# Bearings this close to their last temperatures make the same heat: some microwatts.
+SAME_TEMPERATURE_K = 1.0e-6
+# The end of a step is asked for an instant before it: time and inputs are then apart by rounding.
+SAME = 1.0e-12
+
+
+class HeatInMemory:
+    """A heat model that answers the same question only once.
+
+    Parameters
+    ----------
+    model : HeatModel
+    tolerance : float, [K]
+        Temperatures closer than this are the same.
+    """
+
+    def __init__(self, model: HeatModel, tolerance: float = SAME_TEMPERATURE_K) -> None:
+        self.model, self.tolerance = model, tolerance
+        self.calls = 0
+        self._last: tuple | None = None
+
+    def __call__(
+        self, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+    ) -> tuple[Mapping[str, BearingHeat], tuple]:
+        """Heat of every bearing; see :mod:`spindle_fem.operation.bearing_heat`."""
+        values = np.array([astuple(item) for item in temperatures.values()])
+        if self._last is not None:
+            last_point, last_values, answer = self._last
+            if point == last_point and np.abs(values - last_values).max(initial=0.0) <= self.tolerance:
+                return answer
+        answer = self.model(point, temperatures)
+        self.calls += 1
+        self._last = (point, values, answer)
+        return answer
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Loads as the solver asked for them at one time."""
+
+    time: float
+    point: OperatingPoint
+    loads: Loads
+    coolant: CoolantState | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """What was asked for last."""
+
+    evaluation: Evaluation
+    problem: ConductionProblem
+
+
+@dataclass(frozen=True, slots=True)
+class _ChannelStep:
+    """What the terms did to the channel in one step: inlet [K], factors on flow and film, at both ends."""
+
+    begin: float
+    end: float
+    first: tuple[float, float, float]
+    last: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, begin: float, end: float, first: Loads, last: Loads) -> _ChannelStep:
+        def channel(change: LoadChange) -> tuple[float, float, float]:
+            return change.inlet, change.flow, change.factor(CHANNEL_FILM)
+
+        return cls(begin, end, channel(first.change), channel(last.change))
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        part = min(max((time - self.begin) / (self.end - self.begin), 0.0), 1.0)
+        return tuple(a + part * (b - a) for a, b in zip(self.first, self.last, strict=True))
+
+
+class CoupledInputs:
+    """Callable ``(time, state) -> ConductionProblem`` of a machine.
+
+    Parameters
+    ----------
+    machine : PreparedMachine
+    history : OperatingHistory
+    coefficient_tolerance : float, [-]
+        Relative change of a film or contact coefficient below which the
+        matrix keeps the old one; 0 renews it at every stage.
+    physics : Physics, optional
+        Terms beyond the machine's own.
+    memory : ndarray, optional
+        What they remember of an earlier run.
+    """
+
+    def __init__(
+        self,
+        machine: PreparedMachine,
+        history: OperatingHistory,
+        coefficient_tolerance: float,
+        physics: Physics = NO_PHYSICS,
+        memory: Array | None = None,
+    ) -> None:
+        self._physics, self._memory = physics, memory
+        self._switches = frozenset(physics.breakpoints())
+        self._latest: _Answer | None = None
+        self._ended: _Answer | None = None
+        self._steps: list[_ChannelStep] = []
+        self.terms: FieldTerms | None = None
+        builder = copy.copy(machine.builder)
+        builder.heat_model = HeatInMemory(machine.builder.heat_model)
+        self.machine = replace(machine, builder=builder)
+        self.history = history
+        self.coefficient_tolerance = coefficient_tolerance
+        self._kept: dict[tuple[str, ...], Array] = {}
+        self._names: tuple[str, ...] | None = None
+        self._channel: tuple[Array, dict[str, Array]] | None = None
+        self._asked: list[Evaluation] = []
+        self.evaluations = 0
+
+    def lumped_names(self, start: Array) -> tuple[str, ...]:
+        """Names of the lumped nodes, in the order of their unknowns."""
+        first = float(self.history.inputs.times[0])
+        return tuple(node.name for node in self._loads(first, self.history.at(first), start, {})[1].lumped)
+
+    def __call__(self, time: float, state: ThermalState) -> ConductionProblem:
+        """Problem at a time and a state.
+
+        Raises
+        ------
+        NoSteadyStateError
+            A bearing has no equilibrium at these temperatures.
+        """
+        if self._names is None:
+            self._begin(time, state)
+        point = self.history.at(time)
+        if self._goes_on(time, point):
+            self._asked.append(replace(self._ended.evaluation, time=time, point=point))
+            return self._ended.problem
+        lumped = dict(zip(self._names, state.lumped_temperature.tolist(), strict=True))
+        change = NO_CHANGE
+        if self.terms is not None:
+            change = self.terms.at(time, point, state.temperature, state.lumped_temperature)
+            change = replace(change, coefficients=self._factors(change))
+        field, loads, coolant = self._loads(time, point, state.temperature, lumped, change)
+        loads = replace(loads, films=self._films(loads), lumped=self._lumped(loads))
+        if coolant is not None:
+            coolant = self._coolant(point.coolant_inlet_temperature + change.inlet, coolant, field)
+            loads = replace(loads, films={**loads.films, **self._channel_films(coolant)})
+        self.evaluations += 1
+        problem = self.machine.problem(loads)
+        self._asked.append(Evaluation(time, point, loads, coolant))
+        self._latest = _Answer(self._asked[-1], problem)
+        return problem
+
+    def stages_of_step(self, begin: float) -> tuple[Evaluation, Evaluation, Evaluation]:
+        """Evaluations of the three stages of the step that was just accepted; forgets older ones.
+
+        Parameters
+        ----------
+        begin : float, [s]
+            Start of the step.
+        """
+        found = [self._asked[-1]]
+        for evaluation in reversed(self._asked):
+            if evaluation.time != found[-1].time:
+                found.append(evaluation)
+            if found[-1].time <= begin:
+                break
+        self._asked.clear()
+        last, middle, first = found
+        return first, middle, last
+
+    def accept(self, state: ThermalState, stages: tuple[Evaluation, Evaluation, Evaluation]) -> None:
+        """Let the terms remember the end of an accepted step with these stages."""
+        self._ended = self._latest
+        if self.terms is not None:
+            self._steps.append(_ChannelStep.of(stages[0].time, state.time, stages[0].loads, stages[-1].loads))
+            before = self.history.at(float(np.nextafter(state.time, -np.inf)))
+            after = self.history.at(state.time)
+            self.terms.accept(state.time, before, after, state.temperature, state.lumped_temperature)
+
+    def coolant_at(self, time: float) -> tuple[OperatingPoint, float]:
+        """Operating point of the channel at a time that has passed, and factor on its film."""
+        point = self.history.at(time)
+        if not self._steps:
+            return point, 1.0
+        # Of two steps that meet there the later one: inputs jump at the start of a step.
+        later = bisect.bisect_right(self._steps, time, key=lambda step: step.begin)
+        inlet, flow, film = self._steps[max(later - 1, 0)].at(time)
+        moved = replace(
+            point,
+            coolant_inlet_temperature=point.coolant_inlet_temperature + inlet,
+            coolant_flow=point.coolant_flow * flow,
+        )
+        return moved, film
+
+    # -------------------------------------------------------------- details
+    def _begin(self, time: float, state: ThermalState) -> None:
+        self._names = self.lumped_names(state.temperature)
+        if self._physics.is_there:
+            self.terms = FieldTerms(self.machine, self._names, self._physics)
+            now = self.history.at(time)
+            self.terms.begin(time, now, state.temperature, state.lumped_temperature, self._memory)
+
+    def _goes_on(self, time: float, point: OperatingPoint) -> bool:
+        """Whether a step begins here as the last one ended."""
+        if self._ended is None or time in self._switches:
+            return False
+        last = self._ended.evaluation
+        return math.isclose(time, last.time, rel_tol=SAME) and _same_inputs(point, last.point)
+
+    def _loads(
+        self,
+        time: float,
+        point: OperatingPoint,
+        temperature: Array,
+        lumped: Mapping[str, float],
+        change: LoadChange = NO_CHANGE,
+    ) -> tuple[FieldState, Loads, CoolantState | None]:
+        try:
+            field = self.machine.field_state(temperature, lumped)
+            loads, coolant = self.machine.builder.at(point, field, change)
+        except (NoEquilibriumError, OutOfValidityError) as error:
+            raise NoSteadyStateError(
+                f"{self.machine.spec.name} after {time / 3600.0:.2f} h",
+                f"no loads at {point.speed * 30.0 / np.pi:.0f} rpm with these temperatures: {error}",
+            ) from error
+        return field, loads, coolant
+
+    def _keep(self, key: tuple[str, ...], fresh: Array) -> Array:
+        """The kept coefficient where the fresh one is as good, else the fresh one."""
+        kept = self._kept.get(key)
+        if kept is not None and kept.shape == fresh.shape:
+            allowed = self.coefficient_tolerance * float(np.abs(kept).max(initial=0.0))
+            if float(np.abs(fresh - kept).max(initial=0.0)) <= allowed:
+                return kept
+        self._kept[key] = fresh
+        return fresh
+
+    def _factors(self, change: LoadChange) -> dict[str, float]:
+        """Factors of what no film or node keeps: joints and conductivities."""
+        return {
+            name: float(self._keep(("factor", name), np.array([value]))[0])
+            if name.startswith(("joint.", "conductivity."))
+            else value
+            for name, value in change.coefficients.items()
+        }
+
+    def _films(self, loads: Loads) -> dict[str, FilmLoad]:
+        cells = self.machine.builder.cells
+        own = () if cells is None else cells.surfaces
+        return {
+            surface: replace(film, coefficient=self._keep(("film", surface), film.coefficient))
+            for surface, film in loads.films.items()
+            if surface not in own
+        }
+
+    def _lumped(self, loads: Loads) -> tuple:
+        return tuple(
+            replace(
+                node,
+                connections={
+                    surface: self._keep(("lumped", node.name, surface), value)
+                    for surface, value in node.connections.items()
+                },
+            )
+            for node in loads.lumped
+        )
+
+    def _coolant(self, inlet: float, fresh: CoolantState, field: FieldState) -> CoolantState:
+        """The march with the coefficients that the matrix has, so that walls and coolant agree."""
+        kept = self._keep(("channel",), fresh.film_coefficient)
+        if kept is fresh.film_coefficient:
+            return fresh
+        builder = self.machine.builder
+        march = march_enthalpy(
+            inlet,
+            fresh.march.mass_flow,
+            fresh.march.march.specific_heat_capacity,
+            builder.wall_temperature(field),
+            builder.cells.cell_area,
+            kept,
+            fresh.march.march.pumping_heat,
+        )
+        return replace(fresh, march=replace(fresh.march, march=march), film_coefficient=kept)
+
+    def _channel_films(self, coolant: CoolantState) -> dict[str, FilmLoad]:
+        cells = self.machine.builder.cells
+        bulk = np.broadcast_to(coolant.march.march.bulk_temperature, cells.cell_area.shape).ravel()
+        if self._channel is None or self._channel[0] is not coolant.film_coefficient:
+            flat = coolant.film_coefficient.ravel()
+            spread = {surface: flat[index] for surface, index in cells.facet_cell.items()}
+            self._channel = (coolant.film_coefficient, spread)
+        return {
+            surface: FilmLoad(surface, self._channel[1][surface], bulk[index])
+            for surface, index in cells.facet_cell.items()
+        }
+
+
+def _same_inputs(one: OperatingPoint, other: OperatingPoint) -> bool:
+    """Whether two operating points are the same but for rounding."""
+    return one.extra_heat == other.extra_heat and all(
+        math.isclose(getattr(one, name), getattr(other, name), rel_tol=SAME) for name in FIELD_OF.values()
+    )
+
+
+def coolant_heat(stages: tuple[Evaluation, Evaluation, Evaluation], step: float) -> tuple[float, float]:
+    """Enthalpy that the coolant carried away in a step, and friction heat made in it, both in J.
+
+    Weighted as the time step weights its stages.
+    """
+    rise = pumping = 0.0
+    for weight, stage in zip(WEIGHTS, stages, strict=True):
+        if stage.coolant is not None:
+            march = stage.coolant.march.march
+            rise += step * weight * march.enthalpy_rise
+            pumping += step * weight * float(np.sum(march.pumping_heat))
+    return rise, pumping

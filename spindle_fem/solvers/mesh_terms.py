@@ -1,0 +1,445 @@
+"""Terms of the effect catalogue in the finite-element model.
+
+What a term reads are means of the field over the fast model's places, and what
+it gives goes back into the same places: heat into volumes, surfaces and lumped
+nodes, factors onto films, joints, gaps, contacts of balls, conductivities and
+friction, shifts onto the temperatures of fluids. Everything is iterated with
+the field, at every stage of a time step.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from spindle_fem.definition.uncertain_parameters import with_parameters
+from spindle_fem.effects.framework.term import COOLANT_INLET, FLOW, FLUID_PREFIX, Term, TermContext
+from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.model.reduced.affine_operators import _places as places_of
+from spindle_fem.model.reduced.coefficients import CoefficientTable, build_coefficient_table, gap_radii_of
+from spindle_fem.operation.loads import LoadChange
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.coupled_steady import PreparedMachine, machine_on_mesh
+
+Array = NDArray[np.float64]
+
+# A memory that has had so much time has reached where it goes, s.
+LONG = 1.0e9
+
+
+@dataclass(frozen=True, slots=True)
+class Physics:
+    """What a machine has beyond its definition's tables.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+    values : mapping of str to float
+        Parameters of the terms by outer name; nominal where absent.
+    factors : mapping of str to float
+        On the machine's own parameters, by the names that its fast model knows.
+    """
+
+    terms: tuple[Term, ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict)
+    factors: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether there is anything."""
+        return bool(self.terms or self.factors)
+
+    def breakpoints(self) -> list[float]:
+        """Instants at which something is switched, s: a time step has to end there."""
+        return [
+            self.values.get(f"{term.name}.{item.name}", item.value)
+            for term in self.terms
+            for item in term.parameters
+            if item.unit == "s" and item.name.startswith(("start_", "end_"))
+        ]
+
+
+NO_PHYSICS = Physics()
+# Factors that no load or coefficient carries.
+OF_THE_DEFINITION = ("heat.inner_share", "heat_capacity_factor")
+
+
+def with_factors(machine: PreparedMachine, physics: Physics) -> tuple[PreparedMachine, Physics]:
+    """A machine with those factors that only its definition can hold, and the rest of the physics."""
+    own = {name: value for name, value in physics.factors.items() if name in OF_THE_DEFINITION}
+    if not own:
+        return machine, physics
+    rest = {name: value for name, value in physics.factors.items() if name not in own}
+    changed = machine_on_mesh(with_parameters(machine.spec, own), machine.mesh, machine.operators)
+    return replace(changed, timings=machine.timings), replace(physics, factors=rest)
+
+
+@dataclass(frozen=True, slots=True)
+class _Begin:
+    """What held at the start of a time step."""
+
+    time: float
+    sensed: Array
+    memory: Array
+    inputs: Mapping[str, float]
+
+
+class FieldTerms:
+    """Terms and factors on a machine with a mesh.
+
+    Parameters
+    ----------
+    machine : PreparedMachine
+    lumped_names : sequence of str
+        Lumped nodes in the order of their unknowns.
+    physics : Physics
+
+    Raises
+    ------
+    SpecError
+        A place, coefficient or bearing that the machine does not have.
+    """
+
+    def __init__(self, machine: PreparedMachine, lumped_names: Sequence[str], physics: Physics) -> None:
+        terms = physics.terms
+        self.machine, self.terms = machine, terms
+        if len({term.name for term in terms}) != len(terms):
+            raise SpecError("terms", "two of them have the same name.", "Give each a name of its own.")
+        self.values = [term.values(physics.values) for term in terms]
+        self.lumped_names = tuple(lumped_names)
+        self.table: CoefficientTable = build_coefficient_table(
+            machine.spec, tuple(machine.mesh.joints), gap_radii_of(machine)
+        )
+        self._n = machine.operators.n_unknowns
+        self._places = self._wanted_places()
+        self._factors = self._of_parameters(self.table.factors(physics.factors))
+        reads = [name for term in terms for name in term.reads]
+        size = self._n + len(self.lumped_names)
+        self._lossy = tuple(
+            dict.fromkeys(
+                n for term, own in zip(terms, self.values, strict=True) for n in term.place_conductance(own)
+            )
+        )
+        rows = [self._places[name] for name in (*reads, *self._lossy)]
+        self._sense = np.array(rows).reshape(-1, size)
+        ends = np.cumsum([0, *(len(term.reads) for term in terms)])
+        self._reads = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        ends = np.cumsum([0, *(term.n_states for term in terms)])
+        self._states = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        initial = [term.initial_state(own) for term, own in zip(terms, self.values, strict=True)]
+        self._initial = np.concatenate(initial) if initial else np.zeros(0)
+        self._scale, self._lumped_capacity = self._added_capacity()
+        self._begin: _Begin | None = None
+
+    # ---------------------------------------------------------------- set-up
+    def _wanted_places(self) -> dict[str, Array]:
+        found = dict(places_of(self.machine, self.lumped_names, self._n + len(self.lumped_names)))
+        wanted: dict[str, Array] = {}
+        for term, own in zip(self.terms, self.values, strict=True):
+            names = [*term.reads, *term.place_capacity(own), *term.place_conductance(own)]
+            names += [name for name in term.heat_places if not name.startswith(FLUID_PREFIX)]
+            for name in names:
+                if name not in found:
+                    raise SpecError(f"term {term.name}", f'names "{name}".', did_you_mean(name, found))
+                wanted[name] = found[name]
+            films = {f"{FLUID_PREFIX}{s}" for film in self.machine.spec.film for s in film.surface}
+            for name in set(term.heat_places) - set(names) - films - {COOLANT_INLET}:
+                raise SpecError(f"term {term.name}", f'shifts "{name}".', did_you_mean(name, films))
+            for name in term.coefficients:
+                self._require(term, name, self.table.groups)
+            for name in term.bearings:
+                self._require(term, name, [bearing.name for _, bearing in self.machine.spec.bearings])
+        return wanted
+
+    @staticmethod
+    def _require(term: Term, name: str, known: Sequence[str] | Mapping[str, object]) -> None:
+        if name not in known:
+            raise SpecError(f"term {term.name}", f'scales "{name}".', did_you_mean(name, known))
+
+    def _of_parameters(self, factors: Mapping[str, float]) -> dict[str, float]:
+        """Factors of coefficients, and of friction by ``heat.<bearing>``."""
+        found = {name: self.table.scale(name, factors) for name in self.table.groups}
+        for _, bearing in self.machine.spec.bearings:
+            own = self.table.heat_groups(bearing.name)
+            found[f"heat.{bearing.name}"] = float(np.prod([factors.get(name, 1.0) for name in own]))
+        return {name: value for name, value in found.items() if value != 1.0}
+
+    def _added_capacity(self) -> tuple[Array | None, dict[str, float]]:
+        """Scale of the capacity matrix, and capacity of lumped nodes, that hold added mass."""
+        lumped: dict[str, float] = {}
+        scale: Array | None = None
+        storage = None
+        for term, own in zip(self.terms, self.values, strict=True):
+            for place, capacity in term.place_capacity(own).items():
+                mean = self._places[place]
+                for node, share in zip(self.lumped_names, mean[self._n :], strict=True):
+                    if share:
+                        lumped[node] = lumped.get(node, 0.0) + share * capacity
+                if not mean[: self._n].any():
+                    continue
+                if storage is None:
+                    operators = self.machine.operators
+                    own_capacity = self.machine.volumetric_capacity
+                    each = np.array([own_capacity[part] for part in operators.mesh.part_names])
+                    storage = operators.matrix(operators.sum_storage(each))
+                    scale = np.ones(self._n)
+                scale = with_capacity(storage, scale, mean[: self._n] != 0.0, capacity)
+        return scale, lumped
+
+    # --------------------------------------------------------------- in time
+    @property
+    def memory(self) -> Array:
+        """What the terms remember at the end of the last step."""
+        return self._begin.memory
+
+    def begin(
+        self,
+        time: float,
+        point: OperatingPoint,
+        temperature: Array,
+        lumped: Array,
+        memory: Array | None = None,
+    ) -> None:
+        """Start a run, with nothing remembered or what an earlier run left.
+
+        Raises
+        ------
+        SpecError
+            A memory of other terms.
+        """
+        if memory is not None and memory.shape != self._initial.shape:
+            raise SpecError(
+                "memory", f"{memory.size} numbers.", f"These terms remember {self._initial.size}."
+            )
+        sensed = self._sensed(temperature, lumped)
+        remembered = self._initial if memory is None else memory
+        self._begin = _Begin(time, sensed, remembered, inputs_of(point))
+
+    def accept(
+        self,
+        time: float,
+        before: OperatingPoint,
+        after: OperatingPoint,
+        temperature: Array,
+        lumped: Array,
+    ) -> None:
+        """Remember the end of a time step as the start of the next.
+
+        Parameters
+        ----------
+        time : float, [s]
+        before, after : OperatingPoint
+            Just before and just after it: inputs may jump.
+        temperature, lumped : ndarray, [K]
+        """
+        sensed = self._sensed(temperature, lumped)
+        memory = self._memory(time, sensed, inputs_of(before))
+        self._begin = _Begin(time, sensed, memory, inputs_of(after))
+
+    def at(self, time: float, point: OperatingPoint, temperature: Array, lumped: Array) -> LoadChange:
+        """What the terms do at a stage of the time step that has begun."""
+        sensed, inputs = self._sensed(temperature, lumped), inputs_of(point)
+        return self._change(time, point, inputs, sensed, self._memory(time, sensed, inputs))
+
+    def steady(self, point: OperatingPoint, temperature: Array, lumped: Array) -> LoadChange:
+        """What the terms do in the long run: memories have gone where they go, clocks stand at zero."""
+        sensed, inputs = self._sensed(temperature, lumped), inputs_of(point)
+        return self._change(0.0, point, inputs, sensed, self.settled(point, temperature, lumped))
+
+    def settled(self, point: OperatingPoint, temperature: Array, lumped: Array) -> Array:
+        """Memory of terms that have long seen the same."""
+        sensed = self._sensed(temperature, lumped)
+        return self._advanced(0.0, LONG, inputs_of(point), sensed, self._initial)
+
+    # --------------------------------------------------------------- details
+    def _sensed(self, temperature: Array, lumped: Array) -> Array:
+        return self._sense @ np.concatenate((temperature, lumped))
+
+    def _context(
+        self, number: int, time: float, inputs: Mapping[str, float], sensed: Array, memory: Array
+    ) -> TermContext:
+        return TermContext(
+            time,
+            inputs,
+            sensed[self._reads[number], None].astype(complex),
+            memory[self._states[number], None].astype(complex),
+            {name: np.array([value], dtype=complex) for name, value in self.values[number].items()},
+        )
+
+    def _advanced(
+        self, time: float, step: float, inputs: Mapping[str, float], sensed: Array, memory: Array
+    ) -> Array:
+        after = memory.copy()
+        for number, term in enumerate(self.terms):
+            if term.n_states:
+                context = self._context(number, time, inputs, sensed, memory)
+                after[self._states[number]] = np.asarray(term.advance(context, step))[:, 0].real
+        return after
+
+    def _memory(self, time: float, sensed: Array, inputs: Mapping[str, float]) -> Array:
+        """Memory at a time of the step: the mean of what both ends would make of it."""
+        begin = self._begin
+        step = time - begin.time
+        if not self._initial.size or step <= 0.0:
+            return begin.memory
+        first = self._advanced(begin.time, step, begin.inputs, begin.sensed, begin.memory)
+        last = self._advanced(begin.time, step, inputs, sensed, begin.memory)
+        return 0.5 * (first + last)
+
+    def _change(
+        self,
+        time: float,
+        point: OperatingPoint,
+        inputs: Mapping[str, float],
+        sensed: Array,
+        memory: Array,
+    ) -> LoadChange:
+        factors = dict(self._factors)
+        fluids: dict[str, float] = {}
+        nodal: dict[str, Array] = {}
+        lumped: dict[str, float] = {}
+        inlet = 0.0
+        first_lossy = len(sensed) - len(self._lossy)
+        means = dict(zip(self._lossy, sensed[first_lossy:].tolist(), strict=True))
+        field = (time, inputs, sensed, memory)
+        for number, term in enumerate(self.terms):
+            context = self._context(number, *field)
+            own = self.values[number]
+            for name, value in term.operating_factor(point, own).items():
+                factors[name] = factors.get(name, 1.0) * value
+            for names, method, prefix in (
+                (term.coefficients, term.factor, ""),
+                (term.bearings, term.friction, "heat."),
+            ):
+                answers = np.asarray(method(context))[:, 0].real if names else ()
+                for name, value in zip(names, answers, strict=True):
+                    factors[prefix + name] = factors.get(prefix + name, 1.0) * float(value)
+            answers = np.asarray(term.heat(context))[:, 0].real if term.heat_places else ()
+            for place, value in zip(term.heat_places, answers, strict=True):
+                if place == COOLANT_INLET:
+                    inlet += float(value)
+                elif place in self._places:
+                    self._put(term.name, place, float(value), nodal, lumped)
+                else:
+                    surface = place.removeprefix(FLUID_PREFIX)
+                    fluids[surface] = fluids.get(surface, 0.0) + float(value)
+            for place, conductance in term.place_conductance(own).items():
+                heat = conductance * (point.ambient_temperature - means[place])
+                self._put(term.name, place, heat, nodal, lumped)
+        return LoadChange(
+            friction={n.removeprefix("heat."): v for n, v in factors.items() if n.startswith("heat.")},
+            coefficients=self._by_part(factors),
+            fluids=fluids,
+            inlet=inlet,
+            flow=factors.get(FLOW, 1.0),
+            nodal_heat=nodal,
+            lumped_heat=lumped,
+            lumped_capacity=self._lumped_capacity,
+            capacity_scale=self._scale,
+        )
+
+    def _put(
+        self, name: str, place: str, heat: float, nodal: dict[str, Array], lumped: dict[str, float]
+    ) -> None:
+        mean = self._places[place]
+        if mean[: self._n].any():
+            nodal[name] = nodal.get(name, 0.0) + heat * mean[: self._n]
+        for position in np.flatnonzero(mean[self._n :]):
+            node = self.lumped_names[position]
+            lumped[node] = lumped.get(node, 0.0) + heat * float(mean[self._n + position])
+
+    def _by_part(self, factors: Mapping[str, float]) -> dict[str, float]:
+        """Factors of coefficients with conductivities by part, as the problem has them."""
+        found = {}
+        materials = {id(item): name for name, item in self.machine.spec.materials.items()}
+        for name, value in factors.items():
+            if name.startswith("conductivity."):
+                for part in self.machine.mesh.part_names:
+                    material = materials[id(self.machine.spec.part_material(part))]
+                    if f"conductivity.{material}" == name:
+                        found[f"conductivity.{part}"] = value
+            elif not name.startswith("heat.") and name != FLOW:
+                found[name] = value
+        return found
+
+
+def steady_physics(machine: PreparedMachine, physics: Physics) -> Callable[..., LoadChange] | None:
+    """What :func:`.coupled_steady.solve_coupled` takes as ``beyond``; None without physics.
+
+    Memories have gone where they go, clocks stand at zero. Take the machine of
+    :func:`with_factors`.
+    """
+    if not physics.is_there:
+        return None
+    terms = _terms_of(machine, physics)
+    names = terms.lumped_names
+
+    def beyond(point: OperatingPoint, temperature: Array, lumped: Mapping[str, float]) -> LoadChange:
+        # Before the first solve, balls and air of gaps are as warm as the parts are on average.
+        mean = float(temperature.mean())
+        return terms.steady(point, temperature, np.array([lumped.get(name, mean) for name in names]))
+
+    return beyond
+
+
+def settled_memory(
+    machine: PreparedMachine, physics: Physics, point: OperatingPoint, temperature: Array, lumped: Array
+) -> Array | None:
+    """What the terms remember in a steady state, such as :func:`steady_physics` makes; None without physics.
+
+    Parameters
+    ----------
+    machine : PreparedMachine
+        Of :func:`with_factors`.
+    physics : Physics
+    point : OperatingPoint
+    temperature, lumped : ndarray, [K]
+    """
+    return _terms_of(machine, physics).settled(point, temperature, lumped) if physics.is_there else None
+
+
+def _terms_of(machine: PreparedMachine, physics: Physics) -> FieldTerms:
+    first = OperatingPoint.of(machine.spec)
+    uniform = np.full(machine.operators.n_unknowns, first.ambient_temperature)
+    loads, _ = machine.builder.at(first, machine.field_state(uniform, {}))
+    return FieldTerms(machine, tuple(node.name for node in loads.lumped), physics)
+
+
+def inputs_of(point: OperatingPoint) -> dict[str, float]:
+    """Inputs by the names that terms know."""
+    return {
+        "speed": point.speed,
+        "thrust": point.thrust,
+        "ambient": point.ambient_temperature,
+        "coolant_inlet": point.coolant_inlet_temperature,
+        "coolant_flow": point.coolant_flow,
+        **{f"heat.{name}": heat for name, heat in point.extra_heat.items()},
+        **point.beside,
+    }
+
+
+def with_capacity(storage: sparse.sparray, scale: Array, inside: NDArray[np.bool_], capacity: float) -> Array:
+    """Scale of the unknowns' capacity that adds so many J/K over some of them.
+
+    Parameters
+    ----------
+    storage : (n, n) sparse array, [J/K]
+    scale : (n,) ndarray
+        So far.
+    inside : (n,) bool ndarray
+    capacity : float, [J/K]
+
+    With g² the further scale inside, the content is ``D g² + 2 B g + A``: a
+    quadratic equation.
+    """
+    root = np.sqrt(scale)
+    within, beyond = np.where(inside, root, 0.0), np.where(inside, 0.0, root)
+    square, mixed = float(within @ (storage @ within)), float(within @ (storage @ beyond))
+    total = square + 2.0 * mixed + capacity
+    growth = (np.sqrt(mixed**2 + square * total) - mixed) / square
+    return np.where(inside, scale * growth**2, scale)

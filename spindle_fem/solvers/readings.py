@@ -1,0 +1,120 @@
+"""What probes and bearings show at any state, as rows over the unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from spindle_fem.model.mesh.evaluate import mean_matrix, probe_matrix
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.coupled_steady import PreparedMachine
+
+Array = NDArray[np.float64]
+CoolantAt = Callable[[float], tuple[OperatingPoint, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingRows:
+    """Linear outputs of a machine and how readings follow from them.
+
+    Attributes
+    ----------
+    machine : PreparedMachine
+    rows : (n_outputs, n + m) sparse array
+        Point probes, raceway means of every bearing, ball rows, channel cells.
+    probes : tuple of str
+        In the order of the definition.
+    bearings : tuple of str
+    """
+
+    machine: PreparedMachine
+    rows: sparse.csr_array
+    probes: tuple[str, ...]
+    bearings: tuple[str, ...]
+    _points: tuple[str, ...]
+
+    @classmethod
+    def of(cls, machine: PreparedMachine, lumped_names: tuple[str, ...]) -> ReadingRows:
+        """Rows of a machine whose lumped nodes have these names."""
+        spec, operators = machine.spec, machine.operators
+        points = [probe for probe in spec.probe if probe.kind == "point"]
+        bearings = tuple(bearing.name for _, bearing in spec.bearings)
+        blocks = []
+        if points:
+            places = [(-p.r * np.sin(p.angle), p.r * np.cos(p.angle), p.z) for p in points]
+            blocks.append(probe_matrix(operators, places, [p.part for p in points]))
+        surfaces = [f"{name}.{ring}_raceway" for name in bearings for ring in ("inner", "outer")]
+        if surfaces:
+            blocks.append(mean_matrix(operators, surfaces))
+        width = operators.n_unknowns + len(lumped_names)
+        blocks = [_widened(block, width) for block in blocks]
+        if bearings:
+            balls = sparse.lil_array((len(bearings), width))
+            for row, name in enumerate(bearings):
+                nodes = machine.builder.ball_nodes(name)
+                for node in nodes:
+                    balls[row, operators.n_unknowns + lumped_names.index(node)] = 1.0 / len(nodes)
+            blocks.append(sparse.csr_array(balls))
+        if machine.builder.cells is not None:
+            blocks.append(_widened(_cell_means(machine), width))
+        rows = sparse.csr_array(sparse.vstack(blocks)) if blocks else sparse.csr_array((0, width))
+        return cls(machine, rows, tuple(p.name for p in spec.probe), bearings, tuple(p.name for p in points))
+
+    def probe_readings(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
+        """Temperature of every probe, (n_times, n_probes) [K].
+
+        Parameters
+        ----------
+        outputs : (n_times, n_outputs) ndarray, [K]
+        times : (n_times,) ndarray, [s]
+        coolant_at : callable
+            Time [s] to the operating point of the channel and a factor on its film.
+        """
+        readings = np.empty((len(times), len(self.probes)))
+        for column, probe in enumerate(self.machine.spec.probe):
+            if probe.kind == "coolant_outlet":
+                readings[:, column] = self._coolant_outlet(outputs, times, coolant_at)
+            else:
+                readings[:, column] = outputs[:, self._points.index(probe.name)]
+        return readings
+
+    def bearing_temperatures(self, outputs: Array) -> tuple[Array, Array, Array]:
+        """Inner raceway, outer raceway and balls of every bearing, each (n_times, n_bearings) [K]."""
+        first, number = len(self._points), len(self.bearings)
+        rings = outputs[:, first : first + 2 * number]
+        return rings[:, 0::2], rings[:, 1::2], outputs[:, first + 2 * number : first + 3 * number]
+
+    def _coolant_outlet(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
+        builder = self.machine.builder
+        walls = outputs[:, outputs.shape[1] - builder.cells.cell_area.size :]
+        found = np.empty(len(times))
+        for index, time in enumerate(times):
+            wall = walls[index].reshape(builder.cells.cell_area.shape)
+            point, factor = coolant_at(float(time))
+            state = builder.coolant_loop.at(point, wall, film_factor=factor)
+            found[index] = state.march.march.mixed_outlet_temperature
+        return found
+
+
+def _widened(block: sparse.sparray, width: int) -> sparse.csr_array:
+    missing = sparse.csr_array((block.shape[0], width - block.shape[1]))
+    return sparse.csr_array(sparse.hstack((block, missing)))
+
+
+def _cell_means(machine: PreparedMachine) -> sparse.csr_array:
+    """Rows of the mean wall temperature in each coolant cell, (n_cells, n_unknowns)."""
+    cells, operators = machine.builder.cells, machine.operators
+    area = cells.cell_area.ravel()
+    rows = []
+    for cell in range(area.size):
+        total = np.zeros(operators.n_unknowns)
+        for surface, index in cells.facet_cell.items():
+            inside = np.where(index == cell, 1.0, 0.0)
+            if inside.any():
+                total += operators.facet_vector(inside, operators.surface_rows[surface])
+        rows.append(sparse.csr_array(total[None, :] / area[cell]))
+    return sparse.csr_array(sparse.vstack(rows))

@@ -1,0 +1,1 @@
+"""What the commands work out, one study a command."""

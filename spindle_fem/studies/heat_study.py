@@ -1,0 +1,235 @@
+"""Bearings of a machine over speed and thrust: loads, angles, films and heat term by term."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.errors import NoEquilibriumError, SpecError
+from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.bearings.bearing_state import BearingState
+from spindle_fem.physics.bearings.friction_heat import HEAT_LEVELS
+from spindle_fem.units import ZERO_CELSIUS_K
+from spindle_fem.validity import CodedWarning, fold_warnings
+
+HEAT_SCHEMA = "spindle-fem/heat/1"
+RPM = np.pi / 30.0
+DEFAULT_SPEEDS = tuple(rpm * RPM for rpm in range(500, 4501, 500))
+THRUST_STEPS = 11
+
+
+def heat_study(
+    spec: MachineSpec,
+    speeds: Sequence[float] = (),
+    temperature: float = 313.15,
+    *,
+    coupled: bool = False,
+    temperatures: Mapping[str, BearingTemperatures] | None = None,
+) -> dict[str, Any]:
+    """Speed sweep of every bearing, beside every heat model, and a thrust sweep.
+
+    Parameters
+    ----------
+    speeds : sequence of float, [rad/s]
+        500 to 4500 rpm in steps of 500 when empty.
+    temperature : float, [K]
+        Of rings, balls and grease; the uncoupled sweep has one for all.
+    coupled : bool
+        Solve the machine at every speed (on its mesh) and take the
+        temperatures from there.
+    temperatures : mapping of bearing to BearingTemperatures, optional
+        Of a solved machine, kept for every speed; the isothermal films keep
+        ``temperature``.
+
+    Returns
+    -------
+    dict
+        ``bearings`` (rows over speed), ``models`` (heat by every model at each
+        speed), ``thrust`` (rows over thrust at the definition's speed) and
+        ``warnings``, ready for JSON.
+
+    Raises
+    ------
+    SpecError
+        The machine has no bearings or no grease.
+    """
+    if not spec.bearing_set:
+        raise SpecError(spec.name, "has no [[bearing_set]].", "There is no bearing heat to study.")
+    if spec.grease is None:
+        raise SpecError(f"{spec.name}: grease", "is missing.", "Films and friction need it.")
+    chosen = tuple(speeds) or DEFAULT_SPEEDS
+    point = OperatingPoint.of(spec)
+    mechanics = BearingMechanics(spec)
+    names = [bearing.name for _, bearing in spec.bearings]
+    uniform = {name: BearingTemperatures(*(temperature,) * 5) for name in names}
+    by_speed = _solved_temperatures(spec, chosen) if coupled else {}
+    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in names}
+    models: list[dict[str, Any]] = []
+    warnings: list[CodedWarning] = []
+    for speed in chosen:
+        at_speed = replace(point, speed=speed)
+        here = by_speed.get(speed, temperatures or uniform)
+        try:
+            states = mechanics.states(at_speed, here, expand=spec.heat.thermal_preload)
+            isothermal = mechanics.states(at_speed, uniform, expand=False)
+        except NoEquilibriumError as error:
+            warnings.append(CodedWarning("no_equilibrium", f"{speed / RPM:.0f} rpm: {error}"))
+            continue
+        for name in names:
+            rows[name].append(_row(states[name], speed, here[name], isothermal[name]))
+            warnings += states[name].warnings
+        models.append(_by_model(mechanics, at_speed, here))
+    return {
+        "schema": HEAT_SCHEMA,
+        "machine": spec.name,
+        "model": spec.heat.model,
+        "temperature_degC": None if coupled or temperatures else temperature - ZERO_CELSIUS_K,
+        "bearings": rows,
+        "models": models,
+        "thrust": _thrust_sweep(spec, mechanics, point, dict(temperatures or uniform)),
+        "warnings": [
+            {"code": item.code, "text": item.text} for item in fold_warnings(warnings, tuple(names))
+        ],
+    }
+
+
+def _solved_temperatures(
+    spec: MachineSpec, speeds: Sequence[float]
+) -> dict[float, dict[str, BearingTemperatures]]:
+    from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
+
+    machine = prepare_machine(spec)
+    point = OperatingPoint.of(spec)
+    found = {}
+    start = None
+    for speed in speeds:
+        coupled = solve_coupled(machine, replace(point, speed=speed), start)
+        start = coupled.solution.temperature
+        lumped = dict(
+            zip(
+                coupled.solution.problem.lumped_names,
+                coupled.solution.lumped_temperature.tolist(),
+                strict=True,
+            )
+        )
+        found[speed] = machine.builder.bearing_temperatures(machine.field_state(start, lumped))
+    return found
+
+
+def _row(
+    state: BearingState, speed: float, temperatures: BearingTemperatures, isothermal: BearingState
+) -> dict[str, Any]:
+    balls = state.balls
+    first = {
+        name: float(getattr(balls, name)[0]) for name in ("centrifugal_force", "orbital_speed", "spin_speed")
+    }
+    contact = {
+        side: {
+            "contact_angle_deg": float(np.degrees(balls.contact_angle[0, index])),
+            "load_N": float(balls.load[0, index]),
+            "deformation_um": 1e6 * float(balls.deformation[0, index]),
+            "pressure_GPa": 1e-9 * float(balls.pressure[0, index]),
+            "semi_major_mm": 1e3 * float(balls.semi_major[0, index]),
+            "semi_minor_mm": 1e3 * float(balls.semi_minor[0, index]),
+            "film_um": 1e6 * float(balls.film_central[0, index]),
+            "film_isothermal_um": 1e6 * float(isothermal.balls.film_isothermal[0, index]),
+            "lambda": float(balls.film_thickness_ratio[0, index]),
+        }
+        for index, side in enumerate(("inner", "outer"))
+    }
+    return {
+        "speed_rpm": speed / RPM,
+        "heat_W": state.heat.total,
+        "terms_W": dict(state.heat.terms),
+        "friction_moment_Nmm": 1e3 * state.friction_moment,
+        "axial_load_N": state.axial_force,
+        "axial_displacement_um": 1e6 * state.axial_displacement,
+        "preload_N": state.preload,
+        "contact_angle_inner_deg": contact["inner"]["contact_angle_deg"],
+        "contact_angle_outer_deg": contact["outer"]["contact_angle_deg"],
+        "film_um": min(contact["inner"]["film_um"], contact["outer"]["film_um"]),
+        "lambda": min(contact["inner"]["lambda"], contact["outer"]["lambda"]),
+        "centrifugal_force_N": first["centrifugal_force"],
+        "gyroscopic_moment_Nmm": 1e3 * float(balls.gyroscopic_moment[0]),
+        "orbital_speed_rad_s": first["orbital_speed"],
+        "spin_speed_rad_s": first["spin_speed"],
+        "temperature_inner_degC": temperatures.inner - ZERO_CELSIUS_K,
+        "temperature_outer_degC": temperatures.outer - ZERO_CELSIUS_K,
+        "temperature_ball_degC": temperatures.ball - ZERO_CELSIUS_K,
+        "contacts": contact,
+    }
+
+
+def _by_model(
+    mechanics: BearingMechanics, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+) -> dict[str, Any]:
+    """Heat of every bearing by every model, side by side."""
+    heat: dict[str, dict[str, float]] = {}
+    for level in HEAT_LEVELS:
+        options = replace(mechanics.options, level=level)
+        states = mechanics.states(point, temperatures, expand=False, options=options)
+        heat[level] = {name: state.heat.total for name, state in states.items()}
+    return {"speed_rpm": point.speed / RPM, "heat_W": heat}
+
+
+def _thrust_sweep(
+    spec: MachineSpec,
+    mechanics: BearingMechanics,
+    point: OperatingPoint,
+    temperatures: dict[str, BearingTemperatures],
+) -> list[dict[str, Any]]:
+    """Axial load and displacement of the set that carries the thrust, up to twice the operating thrust."""
+    rows = []
+    carrying = {bearing.name for group, bearing in spec.bearings if group.carries_thrust}
+    for thrust in np.linspace(0.0, 2.0 * point.thrust, THRUST_STEPS):
+        states = mechanics.states(replace(point, thrust=float(thrust)), temperatures, expand=False)
+        rows.append(
+            {
+                "thrust_N": float(thrust),
+                "bearings": {
+                    name: {
+                        "axial_load_N": states[name].axial_force,
+                        "axial_displacement_um": 1e6 * states[name].axial_displacement,
+                    }
+                    for name in states
+                    if name in carrying
+                },
+            }
+        )
+    return rows
+
+
+def write_heat_study(content: dict[str, Any], folder: str | Path) -> None:
+    """Write ``heat.json``, ``heat.csv`` and the charts of a heat study.
+
+    Parameters
+    ----------
+    content : dict
+        As :func:`heat_study` returns it.
+    folder : str or Path
+        Made when missing; complete, or marked incomplete.
+    """
+    import pandas
+
+    from spindle_fem.report.heat_charts import write_heat_charts
+    from spindle_fem.results.output_folder import output_folder
+
+    rows = []
+    for name, entries in content["bearings"].items():
+        for entry in entries:
+            flat = {key: value for key, value in entry.items() if not isinstance(value, dict)}
+            flat |= {f"{term}_W": value for term, value in entry["terms_W"].items()}
+            for side, contact in entry["contacts"].items():
+                flat |= {f"{side}_{key}": value for key, value in contact.items()}
+            rows.append({"bearing": name, **flat})
+    with output_folder(folder) as place:
+        (place / "heat.json").write_text(json.dumps(content, indent=2, ensure_ascii=False), encoding="utf-8")
+        pandas.DataFrame(rows).to_csv(place / "heat.csv", index=False)
+        write_heat_charts(content, place / "figures")

@@ -1,0 +1,344 @@
+"""A network machine on a recording: what every temperature channel should have read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import (
+    ConvergenceError,
+    FaultsError,
+    RecordingError,
+    SpecError,
+    SpindleFemError,
+    UnitError,
+    did_you_mean,
+)
+from spindle_fem.model.lumped.exact_steps import LinearSystem
+from spindle_fem.model.lumped.network_steady import solve_steady
+from spindle_fem.model.lumped.network_transient import simulate_transient
+from spindle_fem.model.lumped.node_balance import NetworkBalance, explicit_derivative
+from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.input_samples import InputHistory, boundary_history, source_history
+from spindle_fem.units import registry
+
+Array = NDArray[np.float64]
+
+INITIAL_KINDS = ("first_reading", "ambient", "steady")
+ROTATIONAL_DIMENSION = "radian / second"
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkPrediction:
+    """Temperatures of every channel at every stamp of a recording.
+
+    Attributes
+    ----------
+    predicted : (N, c) float64 ndarray, [K]
+    sensitivity : (N, c, p) float64 ndarray, [K]
+        Derivative to the natural logarithm of each parameter.
+    parameters : tuple of Parameter
+    initial : (S, n) float64 ndarray, [K]
+        State of all nodes at the start of each segment.
+    method : str
+        "exact" or "implicit".
+    notes : tuple of str
+        What the reader should know: inputs that drive nothing, nodes that
+        nothing reads.
+    """
+
+    predicted: Array
+    sensitivity: Array
+    parameters: tuple[Parameter, ...]
+    initial: Array
+    method: str
+    notes: tuple[str, ...]
+
+
+def require_compatible(network: ThermalNetwork, recording: Recording) -> tuple[str, ...]:
+    """Check that a recording drives and reads a network; notes on what is left over.
+
+    Raises
+    ------
+    FaultsError
+        Every missing input, unknown probe and wrong unit at once.
+    """
+    faults: list[SpindleFemError] = []
+    where = recording.source
+    for column, probe in zip(recording.temperature_names, recording.probes, strict=True):
+        if probe not in network.node_names:
+            faults.append(
+                RecordingError(
+                    f"{where}: channel {column}",
+                    f'probe "{probe}" is not a node of the machine.',
+                    did_you_mean(probe, network.node_names),
+                )
+            )
+    for name in network.input_names:
+        if name not in recording.input_names:
+            faults.append(
+                RecordingError(
+                    where,
+                    f'no channel drives "{name}", which the machine needs.',
+                    did_you_mean(name, recording.input_names),
+                )
+            )
+    units = dict(zip(recording.input_names, recording.input_units, strict=True))
+    for boundary, name in zip(network.boundary_names, network.boundary_input, strict=True):
+        if name in units and units[name] != "kelvin":
+            faults.append(
+                UnitError(
+                    f'{where}: input "{name}"',
+                    f'drives the boundary "{boundary}" but is no temperature.',
+                    "Allowed: degC, K, degF.",
+                )
+            )
+    faults += _gain_unit_faults(network, units, where)
+    if faults:
+        raise FaultsError(where, faults)
+    notes = [
+        f'input "{name}" drives nothing' for name in recording.input_names if name not in network.input_names
+    ]
+    notes += [f'node "{name}" is not read' for name in network.node_names if name not in recording.probes]
+    if len(recording.segments) > 1:
+        notes.append(
+            f"{len(recording.segments)} segments between gaps above {recording.defects.long_gap_s:g} s: "
+            "each starts from its first readings"
+        )
+    return tuple(notes)
+
+
+def _gain_unit_faults(network: ThermalNetwork, units: dict[str, str], where: str) -> list[SpindleFemError]:
+    pint_units = registry()
+    power = dict(pint_units.Unit("W").dimensionality)
+    faults: list[SpindleFemError] = []
+    if not network.source_gain_unit:
+        return faults
+    for position, name in enumerate(network.source_input):
+        if name is None or name not in units:
+            continue
+        gain = network.source_gain_unit[position]
+        exponent = float(network.source_exponent[position])
+        found = dict(pint_units.Quantity(1.0, gain).dimensionality) if gain else {}
+        for dimension, number in pint_units.Unit(units[name]).dimensionality.items():
+            found[dimension] = found.get(dimension, 0.0) + number * exponent
+        keys = set(found) | set(power)
+        if any(abs(found.get(key, 0.0) - power.get(key, 0.0)) > 1.0e-9 for key in keys):
+            faults.append(
+                UnitError(
+                    f'{where}: source "{network.source_names[position]}"',
+                    f'gain in "{gain or "1"}" times "{name}" in "{units[name] or "1"}"'
+                    f" to the power {exponent:g} is no heat.",
+                    "Give the gain in W over the input's unit, or in W with a reference.",
+                )
+            )
+    return faults
+
+
+def magnitude_history(
+    network: ThermalNetwork, recording: Recording, names: tuple[str, ...] | None = None
+) -> InputHistory:
+    """The inputs a network needs, or others by name, rotational speeds without their direction.
+
+    Friction and windage do not know which way a spindle turns.
+    """
+    history = recording.input_history(network.input_names if names is None else names)
+    units = dict(zip(recording.input_names, recording.input_units, strict=True))
+    values = history.values.copy()
+    for column, name in enumerate(history.names):
+        if units[name] == ROTATIONAL_DIMENSION:
+            values[:, column] = np.abs(values[:, column])
+    return replace(history, values=values)
+
+
+def initial_state(
+    network: ThermalNetwork,
+    history: InputHistory,
+    readings: dict[str, float],
+    parameters: tuple[Parameter, ...] = (),
+    *,
+    kind: str = "first_reading",
+) -> tuple[Array, Array]:
+    """Temperatures at the start of a history and their derivatives to log-parameters.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    history : InputHistory
+        Its first row counts.
+    readings : mapping of str to float, [K]
+        First reading of the nodes that have one.
+    parameters : tuple of Parameter
+        Of kind "initial": their value replaces the node's reading.
+    kind : {"first_reading", "ambient", "steady"}
+        With "first_reading", a node without reading takes the temperature at
+        which its own balance is zero, its neighbours being as read. "ambient"
+        is the boundary of that name, or the only one. "steady" is the balance
+        of the whole network at the first inputs.
+
+    Returns
+    -------
+    state : (n,) ndarray, [K]
+    derivative : (n, p) ndarray, [K]
+
+    Raises
+    ------
+    SpecError
+        "ambient" in a network without such a boundary.
+    ConvergenceError
+        The balance of the unread nodes cannot be found.
+    """
+    n, number = network.n_nodes, len(parameters)
+    balance = NetworkBalance(network)
+    inputs = history.at_first()
+    boundary = boundary_history(network, history, history.values[:1])[0]
+    sources = source_history(network, history, history.values[:1])[0]
+    node_heat = network.node_heat(sources)
+    derivative = np.zeros((n, number))
+    if kind == "ambient":
+        names = network.boundary_names
+        if "ambient" not in names and len(names) != 1:
+            raise SpecError(
+                "initial", '"ambient" needs a boundary of that name.', did_you_mean("ambient", names)
+            )
+        place = names.index("ambient") if "ambient" in names else 0
+        for p, parameter in enumerate(parameters):
+            if parameter.kind == "temperature" and parameter.index == place:
+                derivative[:, p] = boundary[place]
+        return np.full(n, boundary[place]), derivative
+    if kind == "steady":
+        state = solve_steady(network, inputs).temperature.copy()
+        known = np.zeros(n, dtype=bool)
+    elif kind == "first_reading":
+        known = np.array([name in readings for name in network.node_names])
+        mean = np.mean([*readings.values()]) if readings else float(boundary.mean())
+        state = np.array([readings.get(name, mean) for name in network.node_names], dtype=float)
+    else:
+        raise SpecError("initial", f'"{kind}" is unknown.', f"Allowed: {', '.join(INITIAL_KINDS)}.")
+    for p, parameter in enumerate(parameters):
+        if parameter.kind == "initial":
+            state[parameter.index] = parameter.value
+            derivative[parameter.index, p] = parameter.value
+            known[parameter.index] = True
+    unread = np.flatnonzero(~known)
+    if unread.size == 0:
+        return state, derivative
+    for _ in range(50):
+        net, jacobian = balance(state, boundary, node_heat, inputs)
+        step = np.linalg.solve(jacobian[np.ix_(unread, unread)], -net[unread])
+        state[unread] += step
+        if np.abs(step).max() < 1.0e-8:
+            break
+        if network.is_linear:
+            break
+    else:
+        raise ConvergenceError("initial state", "the balance of the nodes without reading does not converge.")
+    jacobian = balance(state, boundary, node_heat, inputs)[1]
+    explicit = explicit_derivative(network, balance, parameters, state, boundary, sources)
+    driven = explicit[unread] + jacobian[np.ix_(unread, np.flatnonzero(known))] @ derivative[known]
+    derivative[unread] = np.linalg.solve(jacobian[np.ix_(unread, unread)], -driven)
+    return state, derivative
+
+
+def simulate_on_recording(
+    network: ThermalNetwork,
+    recording: Recording,
+    *,
+    parameters: tuple[Parameter, ...] = (),
+    initial: str = "first_reading",
+    step_error: float | None = 1.0e-2,
+) -> NetworkPrediction:
+    """Predict every temperature channel of a recording.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    recording : Recording
+    parameters : tuple of Parameter
+        Those to differentiate by; of the network, or of kind "initial" (they
+        then set the first segment's start).
+    initial : {"first_reading", "ambient", "steady"}
+        Start of every segment; see :func:`initial_state`.
+    step_error : float or None, [K]
+        Of each implicit step, where the network is not linear.
+
+    Returns
+    -------
+    NetworkPrediction
+
+    Raises
+    ------
+    FaultsError
+        The recording does not fit the machine.
+    """
+    notes = require_compatible(network, recording)
+    history = magnitude_history(network, recording)
+    number = len(parameters)
+    size = recording.times.size
+    predicted = np.empty((size, len(recording.probes)))
+    sensitivity = np.empty((size, len(recording.probes), number))
+    system = LinearSystem.of(network) if network.is_linear and network.is_symmetric else None
+    of_network = tuple(item for item in parameters if item.kind != "initial")
+    states = np.empty((len(recording.segments), network.n_nodes))
+    method = "exact"
+    for segment, (begin, end) in enumerate(recording.segments):
+        part = history.cut(begin, end)
+        # parameters of the initial state belong to the first segment; later ones start from their readings
+        chosen = parameters if segment == 0 else of_network
+        columns = [p for p, item in enumerate(parameters) if segment == 0 or item.kind != "initial"]
+        state, slope = initial_state(network, part, recording.first_readings(segment), chosen, kind=initial)
+        states[segment] = state
+        run = simulate_transient(
+            network,
+            part,
+            state,
+            nodes=recording.probes,
+            parameters=chosen,
+            initial_derivative=slope,
+            step_error=step_error,
+            system=system,
+        )
+        method = run.method
+        predicted[begin:end] = run.temperature
+        sensitivity[begin:end] = 0.0
+        sensitivity[begin:end][:, :, columns] = run.sensitivity
+    return NetworkPrediction(predicted, sensitivity, tuple(parameters), states, method, notes)
+
+
+def initial_parameters(
+    network: ThermalNetwork, recording: Recording, *, unread_sigma: float = 5.0
+) -> tuple[Parameter, ...]:
+    """Initial temperatures of the first segment as parameters with priors.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    recording : Recording
+    unread_sigma : float, [K]
+        Standard deviation of a node that nothing reads, about its estimate.
+
+    Returns
+    -------
+    tuple of Parameter
+        Kind "initial", named ``initial.<node>``; the logarithm of the
+        absolute temperature carries the spread.
+    """
+    begin, end = recording.segments[0]
+    part = magnitude_history(network, recording).cut(begin, end)
+    readings = recording.first_readings(0)
+    state, _ = initial_state(network, part, readings)
+    sigma = dict(zip(recording.probes, recording.sigma.tolist(), strict=True))
+    return tuple(
+        Parameter(
+            name=f"initial.{name}",
+            kind="initial",
+            index=index,
+            value=float(state[index]),
+            sigma_log=(sigma[name] if name in readings else unread_sigma) / float(state[index]),
+            unit="K",
+        )
+        for index, name in enumerate(network.node_names)
+    )

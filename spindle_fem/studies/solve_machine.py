@@ -1,0 +1,316 @@
+"""From a definition to a checked result: the one call behind ``spindle-fem run``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
+from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
+from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.results.thermal_result import (
+    BearingResult,
+    CoolantResult,
+    EnergyBalance,
+    ThermalResult,
+)
+from spindle_fem.solvers.coupled_steady import (
+    FIELD_TOLERANCE,
+    LINEAR_RESIDUAL_LIMIT,
+    Clock,
+    CoupledState,
+    PreparedMachine,
+    Progress,
+    coolant_mismatch,
+    prepare_machine,
+    solve_coupled,
+)
+from spindle_fem.studies import run_checks as checks
+from spindle_fem.studies.heat_study import heat_study
+from spindle_fem.validity import CodedWarning
+
+
+def solve(
+    spec: MachineSpec, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
+) -> ThermalResult:
+    """Steady temperatures of a machine, with its self-checks.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    point : OperatingPoint, optional
+        The definition's own by default.
+    progress : callable
+        Told each stage by name as it begins.
+
+    Returns
+    -------
+    ThermalResult
+        :func:`spindle_fem.studies.run_checks.require_checks` raises on a check that failed.
+
+    Raises
+    ------
+    GeometryError, MeshQualityError, NoSteadyStateError, ConvergenceError, EnergyBalanceError
+    """
+    return solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress)
+
+
+def solve_prepared(
+    machine: PreparedMachine, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
+) -> ThermalResult:
+    """Steady temperatures of a prepared machine; see :func:`solve`."""
+    clock = Clock(progress)
+    clock.begin("solve")
+    point = point or OperatingPoint.of(machine.spec)
+    beyond = None
+    if machine.spec.effects:
+        # loaded where needed: what effects read brings the fast model and recordings along
+        from spindle_fem.model.reduced.defined_effects import physics_of
+        from spindle_fem.solvers.mesh_terms import steady_physics, with_factors
+
+        machine, physics = with_factors(machine, physics_of(machine))
+        beyond = steady_physics(machine, physics)
+    coupled = solve_coupled(machine, point, beyond=beyond)
+    clock.begin("evaluate")
+    result = _build_result(machine, point, coupled)
+    clock.end()
+    return result.with_timings({**machine.timings, **clock.timings})
+
+
+def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState) -> ThermalResult:
+    spec, operators, solution = machine.spec, machine.operators, coupled.solution
+    nodes = temperature_at_nodes(operators, solution.temperature)
+    hottest = int(np.argmax(nodes))
+    balance = solution.balance
+    energy = EnergyBalance(
+        heat_in=balance.total_in, heat_in_by=dict(balance.heat_in), heat_out=dict(balance.films)
+    )
+    lumped = dict(zip(solution.problem.lumped_names, solution.lumped_temperature.tolist(), strict=True))
+    bearings = _bearings(machine, coupled, lumped)
+    coolant = _coolant(machine, point, coupled)
+    area_error, volume_error = operators.area_error(), operators.volume_error()
+    warnings = [CodedWarning("mesh_note", note) for note in machine.mesh.notes]
+    warnings += [CodedWarning("geometry_note", note) for note in machine.geometry_notes]
+    warnings += coupled.loads.warnings
+    done = [
+        checks.check_energy(energy),
+        checks.check_measures("areas", area_error),
+        checks.check_measures("volumes", volume_error),
+        checks.check_coldest(float(nodes.min()), point.coldest),
+        checks.check_residual(solution.residual, LINEAR_RESIDUAL_LIMIT),
+        checks.check_closing_shift(solution.closing_shift),
+        checks.check_fixed_point(
+            coupled.change, FIELD_TOLERANCE * max(1.0, float(nodes.max()) - point.coldest), coupled.iterations
+        ),
+    ]
+    if coupled.coolant is not None:
+        done.append(checks.check_coolant(coolant_mismatch(machine, solution, coupled.coolant)))
+    warnings += _omitted_preload(machine, point, coupled, lumped)
+    if spec.grease is not None and bearings:
+        grease = checks.check_grease(
+            {name: max(item.temperature_inner, item.temperature_outer) for name, item in bearings.items()},
+            spec.grease.temperature_limit,
+        )
+        done.append(grease)
+        if not grease.passed:
+            text = f"Grease reaches {grease.value:.1f} °C, its limit is {grease.limit:.1f} °C."
+            warnings.append(CodedWarning("grease_temperature", text))
+    films = coupled.loads.films
+    return ThermalResult(
+        spec=spec,
+        mesh=machine.mesh,
+        order=operators.order,
+        n_unknowns=operators.n_unknowns,
+        temperature=nodes,
+        air_temperature={name: value for name, value in lumped.items() if ".balls" not in name},
+        film_coefficient={name: film.coefficient for name, film in films.items()},
+        fluid_temperature={name: film.temperature for name, film in films.items()},
+        bearings=bearings,
+        coolant=coolant,
+        probes=_probes(machine, coupled, coolant),
+        energy=energy,
+        heat_flows=dict(balance.joints),
+        area_error_relative=area_error,
+        volume_error_relative=volume_error,
+        temperature_minimum=float(nodes.min()),
+        temperature_maximum=float(nodes[hottest]),
+        temperature_maximum_at=machine.mesh.points[hottest].copy(),
+        checks=tuple(done),
+        warnings=tuple(warnings),
+        iterations={"coupling": coupled.iterations, "linear": solution.iterations},
+        timings={},
+    )
+
+
+def _bearings(
+    machine: PreparedMachine, coupled: CoupledState, lumped: Mapping[str, float]
+) -> dict[str, BearingResult]:
+    state = machine.field_state(coupled.solution.temperature, lumped)
+    found = {}
+    for name, temperatures in machine.builder.bearing_temperatures(state).items():
+        heat = coupled.loads.bearing_heat[name]
+        found[name] = BearingResult(
+            heat=heat.total,
+            terms=dict(heat.terms),
+            heat_to=dict(coupled.loads.heat_to[name]),
+            temperature_inner=temperatures.inner,
+            temperature_outer=temperatures.outer,
+            temperature_ball=temperatures.ball,
+            contact_angle_inner=heat.contact_angle_inner,
+            contact_angle_outer=heat.contact_angle_outer,
+            preload=heat.preload,
+            film_thickness=heat.film_thickness,
+            film_thickness_ratio=heat.film_thickness_ratio,
+        )
+    return found
+
+
+def _omitted_preload(
+    machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState, lumped: Mapping[str, float]
+) -> list[CodedWarning]:
+    """What the temperatures found would do to the preload, where that is left out."""
+    spec = machine.spec
+    if spec.heat.thermal_preload or spec.heat.model == "table" or not spec.bearing_set:
+        return []
+    temperatures = machine.builder.bearing_temperatures(
+        machine.field_state(coupled.solution.temperature, lumped)
+    )
+    hint = "heat.thermal_preload = true follows it."
+    try:
+        states = BearingMechanics(spec).states(point, temperatures, expand=True)
+    except (NoEquilibriumError, OutOfValidityError) as error:
+        text = f"Thermal expansion is left out; with it there would be no equilibrium here ({error}). {hint}"
+        return [CodedWarning("thermal_preload_omitted", text)]
+    cold = coupled.loads.bearing_heat
+    name = max(states, key=lambda key: states[key].preload - cold[key].preload)
+    if not states[name].preload > 1.1 * cold[name].preload:
+        return []
+    text = (
+        f"Thermal expansion is left out: at these temperatures the preload of {name} would be "
+        f"{states[name].preload:.0f} N instead of {cold[name].preload:.0f} N, its friction heat "
+        f"{states[name].heat.total:.0f} W instead of {cold[name].total:.0f} W. {hint}"
+    )
+    return [CodedWarning("thermal_preload_omitted", text)]
+
+
+def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState) -> CoolantResult | None:
+    if coupled.coolant is None:
+        return None
+    state, loop, cells = coupled.coolant, machine.builder.coolant_loop, machine.builder.cells
+    march, section = state.march, loop.section
+    at_inlet = loop.coolant.properties(point.coolant_inlet_temperature)
+    velocity = section.velocity(point.coolant_flow)
+    area = cells.cell_area
+    field = machine.field_state(coupled.solution.temperature, {})
+    wall = machine.builder.wall_temperature(field)
+    regimes = np.atleast_1d(march.film.regime).ravel()
+    order = ("laminar", "transition", "turbulent")
+
+    def mean(values: np.ndarray) -> float:
+        # Of the channel itself; the short ports have a film of their own.
+        wall = area[:, ~cells.is_port]
+        return float((values[:, ~cells.is_port] * wall).sum() / wall.sum())
+
+    return CoolantResult(
+        flow=point.coolant_flow,
+        inlet_temperature=point.coolant_inlet_temperature,
+        outlet_temperature=march.march.mixed_outlet_temperature,
+        heat=march.march.enthalpy_rise,
+        reynolds=velocity * section.hydraulic_diameter / float(at_inlet.kinematic_viscosity),
+        prandtl=float(at_inlet.prandtl),
+        velocity=velocity,
+        regime=max(regimes.tolist(), key=order.index),
+        source=march.film.source,
+        in_range=bool(np.all(march.film.in_range)),
+        pressure_drop=state.pressure.total,
+        pumping_power=state.pressure.pumping_power,
+        hydraulic_diameter=section.hydraulic_diameter,
+        length=section.length,
+        wetted_area=float(area.sum()),
+        position=cells.position,
+        angle=cells.angle,
+        bulk_temperature=np.atleast_2d(march.march.bulk_temperature)[0],
+        wall_temperature=wall[0],
+        film_coefficient=state.film_coefficient[0],
+        film_low=state.film_low[0],
+        film_high=state.film_high[0],
+        mean_film_coefficient=mean(state.film_coefficient),
+        mean_film_low=mean(state.film_low),
+        mean_film_high=mean(state.film_high),
+    )
+
+
+def _probes(
+    machine: PreparedMachine, coupled: CoupledState, coolant: CoolantResult | None
+) -> dict[str, float]:
+    points = [probe for probe in machine.spec.probe if probe.kind == "point"]
+    readings: dict[str, float] = {}
+    if points:
+        places = [
+            (-probe.r * np.sin(probe.angle), probe.r * np.cos(probe.angle), probe.z) for probe in points
+        ]
+        rows = probe_matrix(machine.operators, places, [probe.part for probe in points])
+        values = rows @ coupled.solution.temperature
+        readings = {probe.name: float(value) for probe, value in zip(points, values, strict=True)}
+    return {
+        probe.name: coolant.outlet_temperature if probe.kind == "coolant_outlet" else readings[probe.name]
+        for probe in machine.spec.probe
+    }
+
+
+def with_heat_study(result: ThermalResult) -> ThermalResult:
+    """The same result with bearing loads, films and heat over speed, at its own temperatures.
+
+    Left as it is where the heat comes from a table.
+    """
+    spec = result.spec
+    if spec.heat.model == "table" or not result.bearings:
+        return result
+    temperatures = {
+        name: BearingTemperatures(
+            bearing.temperature_inner,
+            bearing.temperature_outer,
+            bearing.temperature_ball,
+            bearing.temperature_inner,
+            bearing.temperature_outer,
+        )
+        for name, bearing in result.bearings.items()
+    }
+    return replace(result, heat_study=heat_study(spec, temperatures=temperatures))
+
+
+def estimate_refinement(result: ThermalResult, spec: MachineSpec, ratio: float = 1.5) -> ThermalResult:
+    """Add what the probes and the hottest point change by on a second mesh.
+
+    Parameters
+    ----------
+    ratio : float
+        Between the element sizes of both meshes. The second one is coarser, or
+        finer where the preset is the coarsest already.
+
+    Returns
+    -------
+    ThermalResult
+        With ``mesh_refinement`` in ``extra``: the nodes of both, the change of
+        each probe in K, and ``estimate_K``, the error of this result when
+        errors fall with the power ``order + 1`` of the element size.
+    """
+    coarser = spec.mesh.preset != "coarse"
+    factor = spec.mesh.size_factor * (ratio if coarser else 1.0 / ratio)
+    second = solve_prepared(prepare_machine(spec, size_factor=factor))
+    change = {name: value - second.probes[name] for name, value in result.probes.items()}
+    change["hottest"] = result.temperature_maximum - second.temperature_maximum
+    power = ratio ** (spec.mesh.order + 1)
+    # A coarser mesh errs by `power` times as much as this one, a finer one by 1/power.
+    share = 1.0 / (power - 1.0) if coarser else power / (power - 1.0)
+    refinement = {
+        "nodes": result.n_unknowns,
+        "second_nodes": second.n_unknowns,
+        "change_K": change,
+        "estimate_K": {name: share * abs(value) for name, value in change.items()},
+    }
+    return replace(result, extra={**result.extra, "mesh_refinement": refinement})

@@ -1,0 +1,194 @@
+"""What designs of one mesh differ in, as arrays; which designs a projected model may answer."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.operation.joint_groups import group_of_contacts
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
+from spindle_fem.studies.sweep.fast.heat_tables import mechanical_keys
+
+Array = NDArray[np.float64]
+
+# Values of a definition that only move coefficients, heat or fluids; all else must be equal in a group.
+_FREE = {
+    "operation": ("speed", "thrust", "ambient_temperature"),
+    "coolant": ("inlet_temperature", "flow", "film_factor"),
+    "heat": ("inner_share", "ball_share", "table", "palmgren_f0", "skf_mu_ehl"),
+}
+_FREE_OF_LISTS = {
+    "bearing_set": ("preload", "heat_factor", "ball_row"),
+    "film": ("coefficient", "temperature", "diameter", "minimum", "factor"),
+    "gap": ("at_rest", "rise", "reference_speed", "exponent", "factor"),
+    "joint": ("conductance",),
+}
+_FREE_OF_MATERIALS = ("thermal_conductivity", "density", "specific_heat_capacity")
+_FREE_TABLES = ("grease", "heat_capacity_factor", "factor", "initial", "name", "title", "description")
+
+
+def structure_digest(dump: Mapping[str, Any]) -> str:
+    """Hash of a dumped definition without what only moves coefficients, heat or fluids."""
+    kept = {name: value for name, value in dump.items() if name not in _FREE_TABLES}
+    for table, keys in _FREE.items():
+        if table in kept:
+            kept[table] = _without(kept[table], keys)
+    for table, keys in _FREE_OF_LISTS.items():
+        if table in kept:
+            kept[table] = [_without(item, keys) for item in kept[table]]
+    materials = kept.get("materials", {})
+    kept["materials"] = {name: _without(item, _FREE_OF_MATERIALS) for name, item in materials.items()}
+    text = json.dumps(_without_marks(kept), sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _without(table: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    return {name: value for name, value in table.items() if name not in keys}
+
+
+def _without_marks(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _without_marks(item) for key, item in value.items() if key != "marks"}
+    return [_without_marks(item) for item in value] if isinstance(value, list) else value
+
+
+def refusal(spec: MachineSpec) -> str:
+    """Why no projected model can answer a machine; empty where one can."""
+    if any(isinstance(film, NaturalFilm) for film in spec.film):
+        return "a film follows the temperature of each place of its surface"
+    if spec.heat.thermal_preload and spec.heat.model != "table":
+        return "the preload follows the temperatures"
+    if any(group.conductance == "perfect" for group in spec.joint):
+        return "a joint has no resistance"
+    if not spec.mesh.circumferential_averaging:
+        return "rotating parts are not averaged around the axis"
+    if spec.effects:
+        return "the machine has effects"
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class DesignInputs:
+    """Designs of one structure as arrays, a row each.
+
+    Attributes
+    ----------
+    specs : tuple of MachineSpec
+    points : tuple of OperatingPoint
+    coefficients : (n, n_c) ndarray, SI
+        In the order of the model; those of the balls nan where they follow the contacts.
+    fluid : (n, n_f) ndarray, [K]
+        Temperature of the fluid of each film.
+    ambient, inlet : (n,) ndarray, [K]
+    flow : (n,) ndarray, [m³/s]
+    film_factor : (n,) ndarray
+    shares : (n, 3) ndarray
+        Of a bearing's heat: inner raceway, outer raceway, balls.
+    mechanics : tuple of str
+        Key of the mechanical state of each design: the same key, the same heat
+        at the same temperatures.
+    """
+
+    specs: tuple[MachineSpec, ...]
+    points: tuple[OperatingPoint, ...]
+    coefficients: Array
+    fluid: Array
+    ambient: Array
+    inlet: Array
+    flow: Array
+    film_factor: Array
+    shares: Array
+    mechanics: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.specs)
+
+    def take(self, rows: Sequence[int] | NDArray[np.int64]) -> DesignInputs:
+        """Some of the designs."""
+        index = np.asarray(rows, dtype=np.int64)
+        return DesignInputs(
+            tuple(self.specs[i] for i in index),
+            tuple(self.points[i] for i in index),
+            *(
+                getattr(self, name)[index]
+                for name in ("coefficients", "fluid", "ambient", "inlet", "flow", "film_factor", "shares")
+            ),
+            mechanics=tuple(self.mechanics[i] for i in index),
+        )
+
+
+def design_inputs(
+    specs: Sequence[MachineSpec],
+    names: Sequence[str],
+    fluid_names: Sequence[str],
+    contacts: Sequence[str],
+    gap_radii: Mapping[str, tuple[float, float]],
+    mechanics: Sequence[str] | None = None,
+) -> DesignInputs:
+    """Arrays of designs of one structure.
+
+    Parameters
+    ----------
+    specs : sequence of MachineSpec
+    names, fluid_names : sequence of str
+        Coefficients and films of the model.
+    contacts : sequence of str
+        Joints of the mesh.
+    gap_radii : mapping of gap to (float, float), [m]
+    mechanics : sequence of str, optional
+        Keys where they are known.
+    """
+    points = tuple(OperatingPoint.of(spec) for spec in specs)
+    groups = {name: group.name for name, group in group_of_contacts(specs[0], contacts).items()}
+    rows, fluids = [], []
+    for spec, point in zip(specs, points, strict=True):
+        values, fluid = _coefficients(spec, point, groups, gap_radii)
+        rows.append([values[name] for name in names])
+        fluids.append([fluid[name] for name in fluid_names])
+    balls = np.array([spec.heat.ball_share for spec in specs])
+    inner = np.array([spec.heat.inner_share.value for spec in specs])
+    has_channel = specs[0].coolant is not None
+    return DesignInputs(
+        tuple(specs),
+        points,
+        np.array(rows, dtype=float),
+        np.array(fluids, dtype=float).reshape(len(specs), -1),
+        np.array([point.ambient_temperature for point in points]),
+        np.array([point.coolant_inlet_temperature for point in points]),
+        np.array([point.coolant_flow for point in points]),
+        np.array([spec.coolant.film_factor.value if has_channel else 1.0 for spec in specs]),
+        np.column_stack(((1.0 - balls) * inner, (1.0 - balls) * (1.0 - inner), balls)),
+        tuple(mechanics) if mechanics is not None else mechanical_keys(specs, points),
+    )
+
+
+def _coefficients(
+    spec: MachineSpec,
+    point: OperatingPoint,
+    groups: Mapping[str, str],
+    gap_radii: Mapping[str, tuple[float, float]],
+) -> tuple[dict[str, float], dict[str, float]]:
+    values = {f"conductivity.{name}": item.thermal_conductivity for name, item in spec.materials.items()}
+    conductance = {group.name: group.conductance.value for group in spec.joint}
+    values |= {f"joint.{contact}": conductance[group] for contact, group in groups.items()}
+    fluids = {}
+    for film in spec.film:
+        fluid = point.ambient_temperature if film.temperature == "ambient" else film.temperature
+        value = float(film_coefficient(film, point, np.array([fluid]), fluid)[0][0])
+        for surface in film.surface:
+            values[f"film.{surface}"], fluids[f"film.{surface}"] = value, fluid
+    for gap in spec.gap:
+        values[f"gap.{gap.name}"] = gap_coefficient(gap, point, *gap_radii[gap.name])[0]
+    for group, bearing in spec.bearings:
+        constant = group.ball_row.kind == "constant"
+        for side in ("inner", "outer"):
+            values[f"balls.{bearing.name}.{side}"] = group.ball_row.conductance.value if constant else np.nan
+    return values, fluids

@@ -1,0 +1,370 @@
+"""Transient studies: phases of constant inputs, each for a time or until the machine has settled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError, model_validator
+
+from spindle_fem.definition.faults import validation_faults
+from spindle_fem.definition.field_types import (
+    Fault,
+    Force,
+    RotationalSpeed,
+    SpecModel,
+    Temperature,
+    VolumeFlow,
+    quantity_field,
+    raise_faults,
+)
+from spindle_fem.definition.load import read_toml
+from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.model.mesh.time_stepper import ThermalState
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.solvers.coupled_steady import PreparedMachine, solve_coupled
+from spindle_fem.solvers.coupled_transient import CoupledInputs
+from spindle_fem.solvers.input_history import FIELD_OF, OperatingHistory
+from spindle_fem.solvers.machine_transient import (
+    MachineTransient,
+    TransientOptions,
+    require_state,
+    simulate_full,
+    start_at,
+    start_from,
+)
+from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics, settled_memory, steady_physics, with_factors
+from spindle_fem.solvers.readings import ReadingRows
+
+Array = NDArray[np.float64]
+
+TRANSIENT_SCHEMA = "spindle-fem/transient/1"
+Duration = quantity_field("s", above=0.0)
+PositiveDifference = quantity_field("K", "temperature_difference", above=0.0)
+
+
+class Until(SpecModel):
+    """A phase ends when no probe changes by more than this."""
+
+    change: PositiveDifference
+    """Largest change of any probe."""
+    within: Duration
+    """Time over which the change is looked at."""
+    look_every: Duration
+    """How often readings are compared; divides ``within``."""
+    at_most: Duration
+    """Length of the phase if it does not settle."""
+
+    @model_validator(mode="after")
+    def _whole_looks(self) -> Until:
+        looks = self.within / self.look_every
+        if abs(looks - round(looks)) > 1e-9 or looks < 1.0 - 1e-9:
+            raise_faults(
+                [
+                    Fault(
+                        "look_every",
+                        f"{self.look_every:g} s does not divide {self.within:g} s.",
+                        "Allowed: a whole part of within.",
+                    )
+                ]
+            )
+        return self
+
+
+class Phase(SpecModel):
+    """A stretch of constant inputs; what is not given stays as before."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """For tables and pictures."""
+    speed: RotationalSpeed | None = None
+    """Of the shaft."""
+    thrust: Force | None = None
+    """External axial force, positive towards the rear."""
+    ambient_temperature: Temperature | None = None
+    """Of the air around the machine."""
+    coolant_inlet_temperature: Temperature | None = None
+    """Mixed, where the coolant enters."""
+    coolant_flow: VolumeFlow | None = None
+    """Of all starts together."""
+    duration: Duration | None = None
+    """Fixed length; else the phase ends as ``until`` says."""
+    until: Until | None = None
+    """Ends when settled; the study's own when absent."""
+
+
+class TransientStudy(SpecModel):
+    """A transient study file."""
+
+    schema_: Annotated[Literal["spindle-fem/transient/1"], Field(alias="schema")]
+    """Version of this format."""
+    name: Annotated[str, Field(min_length=1)]
+    """Title of the report."""
+    machine: str = "wu_tan_2016"
+    """Definition that is run unless another is given."""
+    start: Literal["ambient", "steady"] = "ambient"
+    """Everything at ambient temperature, or settled at the definition's own operating point."""
+    sample_every: Duration = 60.0
+    """Time between readings."""
+    error: PositiveDifference = 0.05
+    """Largest estimated error of one time step at any node."""
+    until: Until | None = None
+    """For phases without a duration."""
+    phase: Annotated[tuple[Phase, ...], Field(min_length=1)]
+    """In order."""
+
+    @model_validator(mode="after")
+    def _every_phase_ends(self) -> TransientStudy:
+        faults = [
+            Fault(f"phase.{phase.name}", "has no end.", "Give a duration, or an [until] table.")
+            for phase in self.phase
+            if phase.duration is None and phase.until is None and self.until is None
+        ]
+        faults += [
+            Fault(f"phase.{phase.name}", "has a duration and an until.", "Give one of both.")
+            for phase in self.phase
+            if phase.duration is not None and phase.until is not None
+        ]
+        raise_faults(faults)
+        return self
+
+    def end_of(self, phase: Phase) -> Until | None:
+        """What ends a phase, None for a fixed length."""
+        return None if phase.duration is not None else phase.until or self.until
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseResult:
+    """One phase as it ran.
+
+    Attributes
+    ----------
+    name : str
+    point : OperatingPoint
+    start, end : float, [s]
+    settled : bool or None
+        Whether it ended because the probes had settled; None for a phase of
+        fixed length.
+    transient : MachineTransient
+    """
+
+    name: str
+    point: OperatingPoint
+    start: float
+    end: float
+    settled: bool | None
+    transient: MachineTransient
+
+
+@dataclass(frozen=True, slots=True)
+class StudyResult:
+    """A study as it ran.
+
+    Attributes
+    ----------
+    study : TransientStudy
+    phases : tuple of PhaseResult
+    """
+
+    study: TransientStudy
+    phases: tuple[PhaseResult, ...]
+
+    @property
+    def state(self) -> ThermalState:
+        """At the end, to go on from."""
+        return self.phases[-1].transient.state
+
+    @property
+    def memory(self) -> Array | None:
+        """What terms remember at the end; None without terms."""
+        return self.phases[-1].transient.memory
+
+    def joined(self, name: str) -> Array:
+        """An array of :class:`MachineTransient` over all phases; a jump keeps the later sample."""
+        parts = [getattr(phase.transient, name) for phase in self.phases]
+        before = [
+            part[: np.count_nonzero(phase.transient.times < phase.end)]
+            for part, phase in zip(parts[:-1], self.phases[:-1], strict=True)
+        ]
+        return np.concatenate([*before, parts[-1]])
+
+    def step_record(self, name: str) -> Array:
+        """An array of :class:`StepRecord` over all phases."""
+        return np.concatenate([getattr(phase.transient.steps, name) for phase in self.phases])
+
+
+class Settled:
+    """Stop condition: no probe has changed by more than asked over a window.
+
+    Parameters
+    ----------
+    rows : ReadingRows
+    history : OperatingHistory
+    until : Until
+    start : ThermalState
+    """
+
+    def __init__(
+        self, rows: ReadingRows, history: OperatingHistory, until: Until, start: ThermalState
+    ) -> None:
+        self.rows, self.history, self.until = rows, history, until
+        number = int(np.floor(until.at_most / until.look_every * (1.0 + 1e-9)))
+        self.looks = start.time + until.look_every * np.arange(1, number + 1)
+        self._window = round(until.within / until.look_every)
+        self._seen = [self._read(start)]
+
+    def __call__(self, state: ThermalState) -> bool:
+        """Whether the probes have settled at this state; asked after every step."""
+        if not np.any(self.looks == state.time):
+            return False
+        self._seen.append(self._read(state))
+        if len(self._seen) <= self._window:
+            return False
+        return bool(np.abs(self._seen[-1] - self._seen[-1 - self._window]).max() < self.until.change)
+
+    def _read(self, state: ThermalState) -> Array:
+        outputs = (self.rows.rows @ state.vector())[None, :]
+        return self.rows.probe_readings(
+            outputs, np.array([state.time]), lambda time: (self.history.at(time), 1.0)
+        )[0]
+
+
+def load_study(path: str | Path) -> TransientStudy:
+    """Read a transient study; every fault at once.
+
+    Raises
+    ------
+    FaultsError
+    """
+    content = read_toml(Path(path))
+    return study_of(content, Path(path).name)
+
+
+def study_of(content: Mapping[str, Any], source: str = "study") -> TransientStudy:
+    """Study of raw tables; see :func:`load_study`."""
+    if content.get("schema") != TRANSIENT_SCHEMA:
+        what = f"{content['schema']!r} is not known." if "schema" in content else "is missing."
+        raise FaultsError(source, [SpecError(f"{source}: schema", what, f'Allowed: "{TRANSIENT_SCHEMA}".')])
+    try:
+        return TransientStudy.model_validate(dict(content))
+    except ValidationError as error:
+        raise FaultsError(source, validation_faults(error, source, TransientStudy, content)) from error
+
+
+def run_study(
+    machine: PreparedMachine,
+    study: TransientStudy,
+    *,
+    start: ThermalState | None = None,
+    memory: Array | None = None,
+    physics: Physics = NO_PHYSICS,
+    progress: Callable[[str], None] = lambda text: None,
+) -> StudyResult:
+    """Run every phase of a study, one after the other.
+
+    Parameters
+    ----------
+    machine : PreparedMachine
+    study : TransientStudy
+    start : ThermalState, optional
+        A saved state to go on from, in place of the study's own start.
+    memory : ndarray, optional
+        What the terms remembered then.
+    physics : Physics
+        Terms and factors beyond the machine's own; their memory goes on from phase to phase.
+    progress : callable
+    """
+    machine, physics = with_factors(machine, physics)
+    point = OperatingPoint.of(machine.spec)
+    if start is None and study.start == "steady":
+        progress("steady start")
+        start = start_from(solve_coupled(machine, point, beyond=steady_physics(machine, physics)))
+        memory = settled_memory(machine, physics, point, start.temperature, start.lumped_temperature)
+    if start is not None:
+        require_state(machine, start)
+    options = TransientOptions(error=study.error)
+    values = {name: getattr(point, field) for name, field in FIELD_OF.items()}
+    state, results = start, []
+    for phase in study.phase:
+        given = {name: getattr(phase, field) for name, field in FIELD_OF.items()}
+        values |= {name: value for name, value in given.items() if value is not None}
+        beyond = (physics, memory)
+        result = _run_phase(machine, study, phase, values, state, options, beyond, progress)
+        results.append(result)
+        memory = result.transient.memory
+        # the step's size says nothing after the inputs jump
+        last = result.transient.state
+        state = ThermalState(last.time, last.temperature, last.lumped_temperature)
+    return StudyResult(study, tuple(results))
+
+
+def _run_phase(
+    machine: PreparedMachine,
+    study: TransientStudy,
+    phase: Phase,
+    values: Mapping[str, float],
+    state: ThermalState | None,
+    options: TransientOptions,
+    beyond: tuple[Physics, Array | None],
+    progress: Callable[[str], None],
+) -> PhaseResult:
+    until = study.end_of(phase)
+    length = phase.duration if until is None else until.at_most
+    begin = 0.0 if state is None else state.time
+    inputs = InputHistory.constant(np.array([begin, begin + length]), values)
+    history = OperatingHistory.of(machine.spec, inputs)
+    if state is None:
+        state = start_at(machine, history, values["ambient"])
+    number = int(np.floor(length / study.sample_every * (1.0 + 1e-9)))
+    samples = np.union1d(begin + study.sample_every * np.arange(number + 1), [begin + length])
+    stop, looks = None, ()
+    if until is not None:
+        names = CoupledInputs(machine, history, 0.0).lumped_names(state.temperature)
+        stop = Settled(ReadingRows.of(machine, names), history, until, state)
+        looks = tuple(stop.looks)
+    progress(f"{phase.name}, from {begin / 3600.0:.2f} h")
+    transient = simulate_full(
+        machine,
+        inputs,
+        sample_times=samples[samples <= begin + length],
+        start=state,
+        options=options,
+        stop=stop,
+        breakpoints=looks,
+        physics=beyond[0],
+        memory=beyond[1],
+        progress=progress,
+    )
+    settled = None if until is None else transient.stopped
+    return PhaseResult(phase.name, history.at(begin), begin, transient.state.time, settled, transient)
+
+
+def time_to_stay_within(times: Array, readings: Array, final: Array, band: float) -> float:
+    """Time after which every reading stays within a band of its final value, [s].
+
+    Parameters
+    ----------
+    times : (n,) ndarray, [s]
+    readings : (n, c) ndarray, [K]
+    final : (c,) ndarray, [K]
+    band : float, [K]
+
+    Returns
+    -------
+    float
+        Counted from the first time; nan when the last reading is outside.
+
+    >>> t = np.arange(0.0, 10.0)
+    >>> time_to_stay_within(t, 10.0 * (1.0 - np.exp(-t))[:, None], np.array([10.0]), 0.5)
+    3.0
+    """
+    outside = np.flatnonzero(np.any(np.abs(readings - final) > band, axis=1))
+    if not outside.size:
+        return 0.0
+    if outside[-1] == len(times) - 1:
+        return float("nan")
+    return float(times[outside[-1] + 1] - times[0])

@@ -1,1 +1,0 @@
-"""Machines in time: heat, films, coolant and preload coupled while the inputs change."""
