@@ -10,13 +10,13 @@ from spindle_fem.report.block_page import Section, Text
 
 TITLE = "Networks, oil, fast model and transients against exact and full solutions"
 FILES = {
-    "tests/unit/test_network_model.py": ("Networks at rest", "Closed forms, balances, derivatives."),
-    "tests/unit/test_network_transient.py": (
+    "tests/unit/test_lumped_steady.py": ("Networks at rest", "Closed forms, balances, derivatives."),
+    "tests/unit/test_lumped_transient.py": (
         "Networks in time",
         "Exact steps against the matrix exponential and closed forms; the implicit scheme against the "
         "exact one.",
     ),
-    "tests/unit/test_coolant_marching.py": (
+    "tests/unit/test_coolant_march.py": (
         "Oil along the channel",
         "Enthalpy march against the exact solution along a wall, heat booked on both sides.",
     ),
@@ -28,15 +28,15 @@ FILES = {
         "The fast model",
         "Heat in and out, derivatives against differences, effects as terms and as changed definitions.",
     ),
-    "tests/integration/test_simulate_reduced.py": (
+    "tests/integration/test_reduced_against_full.py": (
         "Fast model against the full model",
         "Its operators, its steady state and a recorded run beside the coupled finite elements.",
     ),
-    "tests/integration/test_effects_fem.py": (
+    "tests/integration/test_effects_mesh_and_reduced.py": (
         "Effects in the full model",
         "Every way in which an effect acts, in the finite-element transient and in the fast model.",
     ),
-    "tests/integration/test_transient_run.py": (
+    "tests/integration/test_coupled_transient.py": (
         "Energy of transients",
         "Heat in less heat out is stored; oil by its own enthalpy; a steady state stays one.",
     ),

@@ -14,7 +14,7 @@ from spindle_fem.report.run_tables import column, number, rows_of, significant
 
 TITLE = "Lumped network against finite elements"
 MACHINE, MESH = "recorded_spindle", "coarse"
-FILE = "tests/verification/test_network_refinement.py"
+FILE = "tests/verification/test_lumped_refinement.py"
 FIGURES = {
     "difference": "Network minus elements, drawn on the machine.",
     "causes": "What makes the difference, node by node.",
