@@ -22,7 +22,9 @@ from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.model.lumped.machine_steady import solve_machine_network
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.steady_conduction import solve_steady
-from spindle_fem.model.mesh.time_stepper import StepControl, integrate, uniform_state
+from spindle_fem.model.mesh.step_control import StepControl
+from spindle_fem.model.mesh.thermal_state import uniform_state
+from spindle_fem.model.mesh.time_stepper import integrate
 from spindle_fem.model.reduced.build_reduced import build_reduced_model
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.report.run_outputs import write_outputs

@@ -10,12 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.errors import EnergyBalanceError, NoSteadyStateError, SpecError
-from spindle_fem.model.mesh.time_stepper import (
-    EnergyAccount,
-    ThermalState,
-    TransientResult,
-    integrate,
-)
+from spindle_fem.model.mesh.thermal_state import ThermalState
+from spindle_fem.model.mesh.time_stepper import EnergyAccount, TransientResult, integrate
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import RUNAWAY_TEMPERATURE, CoupledState, PreparedMachine
 from spindle_fem.solvers.coupled_transient import CoupledInputs, coolant_heat

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.model.mesh.time_stepper import STATE_SCHEMA, ThermalState
+from spindle_fem.model.mesh.thermal_state import STATE_SCHEMA, ThermalState
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import SpecError
 from spindle_fem.model.mesh.linear_solvers import Method
-from spindle_fem.model.mesh.time_stepper import StepControl, ThermalState
+from spindle_fem.model.mesh.step_control import StepControl
+from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.solvers.input_history import TEMPERATURE_RESOLUTION
 
 Array = NDArray[np.float64]

@@ -24,7 +24,7 @@ from spindle_fem.definition.field_types import (
 )
 from spindle_fem.definition.load import read_toml
 from spindle_fem.errors import FaultsError, SpecError
-from spindle_fem.model.mesh.time_stepper import ThermalState
+from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import PreparedMachine, solve_coupled

@@ -21,7 +21,7 @@ from spindle_fem.errors import (
     RecordingError,
     SpecError,
 )
-from spindle_fem.model.mesh.time_stepper import ThermalState
+from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled

@@ -13,7 +13,9 @@ from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, L
 from spindle_fem.model.mesh.equations import assemble_system
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.steady_conduction import solve_steady
-from spindle_fem.model.mesh.time_stepper import StepControl, integrate, uniform_state
+from spindle_fem.model.mesh.step_control import StepControl
+from spindle_fem.model.mesh.thermal_state import uniform_state
+from spindle_fem.model.mesh.time_stepper import integrate
 
 OPERATORS = {
     order: build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((1, 1), 12, 1)), order)

@@ -32,6 +32,7 @@ FLOORS = (
     "effects.catalogue",
     "effects.registry",
     "machine.view",
+    "model.trbdf2",
     "model.mesh",
     "operation",
     "model.lumped",
@@ -68,7 +69,6 @@ OPEN_CIRCLES: tuple[tuple[str, str], ...] = (
     ("spindle_fem.machine.geometry.faces", "spindle_fem.machine.geometry.assembly"),
     ("spindle_fem.machine.geometry.meridian", "spindle_fem.machine.geometry.assembly"),
     ("spindle_fem.report.figure_style", "spindle_fem.report.scenes"),
-    ("spindle_fem.model.mesh.time_stepper", "spindle_fem.model.mesh.time_stage"),
 )
 
 

@@ -24,8 +24,10 @@ from spindle_fem.model.mesh.conduction_problem import (
 )
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.steady_conduction import solve_steady
+from spindle_fem.model.mesh.step_control import StepControl
+from spindle_fem.model.mesh.thermal_state import ThermalState, uniform_state
 from spindle_fem.model.mesh.time_stage import same_coefficients
-from spindle_fem.model.mesh.time_stepper import StepControl, ThermalState, integrate, uniform_state
+from spindle_fem.model.mesh.time_stepper import integrate
 
 OPERATORS = build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((1, 1), 12, 2)), 1)
 PROBLEM = ConductionProblem(

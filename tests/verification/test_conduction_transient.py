@@ -17,7 +17,9 @@ from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, L
 from spindle_fem.model.mesh.evaluate import probe_matrix
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.steady_conduction import solve_steady
-from spindle_fem.model.mesh.time_stepper import StepControl, integrate, uniform_state
+from spindle_fem.model.mesh.step_control import StepControl
+from spindle_fem.model.mesh.thermal_state import uniform_state
+from spindle_fem.model.mesh.time_stepper import integrate
 
 AMBIENT, START = 300.0, 400.0
 K, CAPACITY = 40.0, 3.6e6

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +17,17 @@ from spindle_fem.model.mesh.heat_balance import BoundaryFlows, boundary_flows
 from spindle_fem.model.mesh.linear_solvers import Preconditioner, build_preconditioner, solve_linear
 from spindle_fem.model.mesh.linear_system import ThermalSystem
 from spindle_fem.model.mesh.steady_conduction import close_balance, split_unknowns
+from spindle_fem.model.mesh.step_control import StepControl
 from spindle_fem.model.mesh.temperature_films import linearise_films
-
-if TYPE_CHECKING:
-    from spindle_fem.model.mesh.time_stepper import StepControl, ThermalState
-
-GAMMA = 2.0 - np.sqrt(2.0)
-DIAGONAL = GAMMA / 2.0
-OUTER_WEIGHT = np.sqrt(2.0) / 4.0
-WEIGHTS = np.array([OUTER_WEIGHT, OUTER_WEIGHT, DIAGONAL])
-EMBEDDED = np.array([(1.0 - OUTER_WEIGHT) / 3.0, (3.0 * OUTER_WEIGHT + 1.0) / 3.0, DIAGONAL / 3.0])
+from spindle_fem.model.mesh.thermal_state import ThermalState
+from spindle_fem.model.trbdf2 import (
+    DIAGONAL,
+    GAMMA,
+    error_defect,
+    extrapolated_end,
+    right_of_end,
+    right_of_middle,
+)
 
 MAX_STAGE_ITERATIONS = 30
 # The error estimate itself is solved to this fraction of the tolerance.
@@ -155,11 +155,11 @@ class StageSolver:
         guess = first.unknowns if slope is None else first.unknowns + GAMMA * size * slope
         base = self._storage @ first.unknowns
         middle = self._solve_stage(
-            base + size * DIAGONAL * first.rate, state.time + GAMMA * size, size, guess, state
+            right_of_middle(base, size, first.rate), state.time + GAMMA * size, size, guess, state
         )
         guess = self._extrapolated(first.unknowns, middle.unknowns, size)
         last = self._solve_stage(
-            base + size * OUTER_WEIGHT * (first.rate + middle.rate),
+            right_of_end(base, size, first.rate, middle.rate),
             # inputs that jump at the end of the step are still the old ones there
             float(np.nextafter(end, state.time)),
             size,
@@ -170,10 +170,7 @@ class StageSolver:
 
     def step_error(self, stages: list[Stage], size: float) -> float:
         """Estimated error of a step, largest over all nodes, [K]."""
-        defect = size * sum(
-            (embedded - weight) * stage.rate
-            for embedded, weight, stage in zip(EMBEDDED, WEIGHTS, stages, strict=True)
-        )
+        defect = error_defect(size, tuple(stage.rate for stage in stages))
         defect[self._n :][self._lumped_capacity == 0.0] = 0.0
         tolerance = ERROR_SOLVE_FRACTION * (self._control.tolerance or 1.0)
         solution = solve_linear(
@@ -184,8 +181,6 @@ class StageSolver:
 
     def state_after(self, stages: list[Stage], end: float, step: float) -> ThermalState:
         """State at the end of an accepted step."""
-        from spindle_fem.model.mesh.time_stepper import ThermalState
-
         last = stages[-1]
         n = self._operators.n_unknowns
         return ThermalState(end, last.values[:n], last.values[n:], step)
@@ -215,13 +210,10 @@ class StageSolver:
         self, first: NDArray[np.float64], middle: NDArray[np.float64], size: float
     ) -> NDArray[np.float64]:
         """End of a step from its two stages and the start of the step before, on a parabola."""
-        guess = first + (middle - first) / GAMMA
         if self._kept.before is None:
-            return guess
-        back, earlier = self._kept.before
-        back /= size
-        curvature = ((middle - first) / GAMMA - (first - earlier) / back) / (GAMMA + back)
-        return guess + (1.0 - GAMMA) * curvature
+            return extrapolated_end(first, middle)
+        length, earlier = self._kept.before
+        return extrapolated_end(first, middle, earlier, length / size)
 
     def _first_stage(self, state: ThermalState) -> Stage:
         problem = self._linear(self._inputs(state.time, state), state.temperature)
@@ -249,8 +241,6 @@ class StageSolver:
         guess: NDArray[np.float64],
         state: ThermalState,
     ) -> Stage:
-        from spindle_fem.model.mesh.time_stepper import ThermalState
-
         n = self._operators.n_unknowns
         unknowns = guess
         past: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []

@@ -1,105 +1,28 @@
 """Temperatures in time: TR-BDF2 with step control in kelvin.
 
-A trapezoidal stage to ``γ = 2 − √2`` of the step and a BDF2 stage to its end
-share one matrix ``M + γ/2 Δt K``; the method is of second order, L-stable, and
-an embedded third-order formula estimates the error of each step. Both stages
-are solved so that heat stored = heat in − heat out holds to round-off.
-
-Sources: Bank et al. (1985), IEEE Trans. CAD 4, 436-451; error estimate: Hosea
-& Shampine (1996), Appl. Numer. Math. 20, 21-37.
+Both stages of a step (:mod:`spindle_fem.model.trbdf2`) are solved so that heat
+stored = heat in − heat out holds to round-off.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from spindle_fem.errors import BadInputError, ConvergenceError, EnergyBalanceError, SpecError
+from spindle_fem.errors import ConvergenceError, EnergyBalanceError, SpecError
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem
 from spindle_fem.model.mesh.heat_balance import BALANCE_TOLERANCE
-from spindle_fem.model.mesh.linear_solvers import Method
-from spindle_fem.model.mesh.time_stage import GAMMA, WEIGHTS, Stage, StageSolver
+from spindle_fem.model.mesh.step_control import DEFAULT_CONTROL, StepControl
+from spindle_fem.model.mesh.thermal_state import ThermalState
+from spindle_fem.model.mesh.time_stage import Stage, StageSolver
+from spindle_fem.model.trbdf2 import WEIGHTS, interpolate_step
 
-STATE_SCHEMA = "spindle-fem/thermal-state/1"
 SAFETY = 0.85
-ERROR_TOLERANCE_K = 0.05
 MAX_REJECTIONS = 30
-
-
-@dataclass(frozen=True, slots=True)
-class ThermalState:
-    """Temperatures at one time, enough to go on from.
-
-    Attributes
-    ----------
-    time : float, [s]
-    temperature : (n_unknowns,) ndarray, [K]
-    lumped_temperature : (m,) ndarray, [K]
-    step : float, [s]
-        Step size to go on with; 0 when unknown.
-    """
-
-    time: float
-    temperature: NDArray[np.float64]
-    lumped_temperature: NDArray[np.float64]
-    step: float = 0.0
-
-    def vector(self) -> NDArray[np.float64]:
-        """All temperatures, lumped nodes last, (n + m,) [K]."""
-        return np.concatenate((self.temperature, self.lumped_temperature))
-
-    def save(self, path: Path) -> None:
-        """Write to an ``.npz`` file."""
-        with Path(path).open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                schema=STATE_SCHEMA,
-                time=self.time,
-                temperature=self.temperature,
-                lumped_temperature=self.lumped_temperature,
-                step=self.step,
-            )
-
-    @classmethod
-    def load(cls, path: Path) -> ThermalState:
-        """Read what :meth:`save` wrote.
-
-        Raises
-        ------
-        BadInputError
-            Not a saved state, or of another version.
-        """
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                schema = str(data["schema"])
-                if schema != STATE_SCHEMA:
-                    raise BadInputError(str(path), f'schema "{schema}".', f'Allowed: "{STATE_SCHEMA}".')
-                return cls(
-                    float(data["time"]), data["temperature"], data["lumped_temperature"], float(data["step"])
-                )
-        except (OSError, ValueError, KeyError) as error:
-            raise BadInputError(str(path), f"no saved thermal state ({error}).") from error
-
-
-def uniform_state(problem: ConductionProblem, temperature: float, time: float = 0.0) -> ThermalState:
-    """State of one temperature everywhere.
-
-    Parameters
-    ----------
-    problem : ConductionProblem
-    temperature : float, [K]
-    time : float, [s]
-    """
-    return ThermalState(
-        time,
-        np.full(problem.operators.n_unknowns, float(temperature)),
-        np.full(len(problem.lumped_nodes), float(temperature)),
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,65 +84,6 @@ class TransientResult:
 
 
 Inputs = Callable[[float, ThermalState], ConductionProblem]
-
-
-@dataclass(frozen=True, slots=True)
-class StepControl:
-    """How steps are chosen.
-
-    Attributes
-    ----------
-    tolerance : float or None, [K]
-        Largest estimated error of a step at any node; None keeps
-        ``first_step``.
-    first_step : float or None, [s]
-        A ten-thousandth of the span when None.
-    largest_step : float, [s]
-    linear_tolerance : float or None, [K]
-        Error allowed to the linear solver; a thousandth of the tolerance when
-        None.
-    temperature_dependent : bool
-        Whether the inputs look at the temperatures: each stage is then
-        iterated. Film laws switch it on.
-    nonlinear_tolerance : float or None, [K]
-        Change at which that iteration ends; a hundredth of the tolerance when
-        None.
-    trust_contraction : bool
-        Whether it may end before, where the change times what the iteration
-        lately left of a change is as small: one solve a stage fewer. Heat of
-        temperature-dependent inputs is then that of fields so much further apart.
-    method : {"direct", "multigrid"} or None
-    """
-
-    tolerance: float | None = ERROR_TOLERANCE_K
-    first_step: float | None = None
-    largest_step: float = np.inf
-    linear_tolerance: float | None = None
-    temperature_dependent: bool = False
-    nonlinear_tolerance: float | None = None
-    trust_contraction: bool = False
-    method: Method | None = None
-
-    def __post_init__(self) -> None:
-        if self.tolerance is None and self.first_step is None:
-            raise SpecError("step control", "neither a tolerance nor a step.", "Give one of both.")
-        for name in ("tolerance", "first_step", "largest_step", "linear_tolerance", "nonlinear_tolerance"):
-            value = getattr(self, name)
-            if value is not None and not value > 0.0:
-                raise SpecError(f"step control: {name}", f"{value!r}.", "Allowed: above 0.")
-
-    @property
-    def linear(self) -> float:
-        """Error allowed to the linear solver, [K]."""
-        return self.linear_tolerance or 1e-3 * (self.tolerance or 1e-3)
-
-    @property
-    def nonlinear(self) -> float:
-        """Change at which a stage's iteration ends, [K]."""
-        return self.nonlinear_tolerance or 1e-2 * (self.tolerance or 1e-3)
-
-
-DEFAULT_CONTROL = StepControl()
 
 
 @dataclass(slots=True)
@@ -340,7 +204,8 @@ def integrate(
         ledger.ends.append(end)
         inside = (times > state.time) & (times <= end)
         if np.any(inside):
-            samples[inside] = _interpolate(rows, stages, state.time, size, times[inside])
+            place = ((times[inside] - state.time) / size)[:, None]
+            samples[inside] = interpolate_step(place, *(rows @ stage.values for stage in stages))
         step = _next_step(step, size, error, control.tolerance)
         solver.accept(stages, size)
         if end in stops:
@@ -374,19 +239,6 @@ def _next_step(step: float, size: float, error: float, tolerance: float | None) 
     if rungs > 0:
         return max(step, 2.0 ** (0.5 * rungs) * size)
     return step if size < step else size
-
-
-def _interpolate(
-    rows: sparse.csr_array, stages: list[Stage], start: float, size: float, times: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Outputs on the parabola through the step's start, inner stage and end."""
-    s = ((times - start) / size)[:, None]
-    first, middle, last = (rows @ stage.values for stage in stages)
-    return (
-        first * (s - GAMMA) * (s - 1.0) / GAMMA
-        + middle * s * (s - 1.0) / (GAMMA * (GAMMA - 1.0))
-        + last * s * (s - GAMMA) / (1.0 - GAMMA)
-    )
 
 
 def _close_account(ledger: _Ledger, stored: float) -> EnergyAccount:
