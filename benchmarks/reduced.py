@@ -22,13 +22,12 @@ from spindle_fem.definition.load import load_machine, read_toml
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.framework.term import Term, TermParameter
-from spindle_fem.model.reduced.adjoint import fast_gradient
-from spindle_fem.model.reduced.coefficients import free_parameters
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.model.reduced.steady_designs import SteadyDesigns
+from spindle_fem.operation.coefficients import free_parameters
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
 from spindle_fem.studies.simulate import fast_model_for
@@ -181,7 +180,7 @@ def report_designs(fast: FastModel, spec: MachineSpec, number: int) -> None:
 
 
 def report_times(fast: FastModel, spec: MachineSpec, number: int) -> None:
-    """4 h at 10 s: steps, derivatives, gradient, nonlinear terms."""
+    """4 h at 10 s: steps, derivatives, nonlinear terms."""
     start = spec.operation.ambient_temperature
     times = np.arange(0.0, 4 * 3600.0 + 1.0, 10.0)
     speeds = np.array([0.0, 3000.0, 1500.0, 4000.0])[np.minimum(times // 3600.0, 3).astype(int)]
@@ -204,10 +203,6 @@ def report_times(fast: FastModel, spec: MachineSpec, number: int) -> None:
     print(f"4 h at 10 s, {len(names)} live parameters: {plain:.3f} s; a step {1e6 * march / steps:.1f} us, "
           f"operators and all {1e6 * plain / steps:.1f} us")  # fmt: skip
     print(f"  with all derivatives {derived:.3f} s, {derived / plain:.1f} times")
-    if not any(term.is_dynamic for term in own):
-        ones = np.ones((times.size, len(fast.channels)))
-        adjoint = median_time(lambda: fast_gradient(fast, drive, start, ones, names, parameters=factors))
-        print(f"  gradient of a misfit (adjoint) {adjoint:.3f} s, {adjoint / plain:.1f} times")
     print(f"  with two nonlinear terms {nonlinear:.3f} s")
     print(f"  and all derivatives, so the gradient of the misfit: {both:.3f} s, {both / nonlinear:.1f} times")
 

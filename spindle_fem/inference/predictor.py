@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
-from spindle_fem.model.reduced.coefficients import INNER_SHARE
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import Drive, drive_of_recording, inputs_at
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import FastTransient, simulate_fast
+from spindle_fem.operation.coefficients import INNER_SHARE
 from spindle_fem.recordings.align import Recording
 from spindle_fem.studies.simulate_network import initial_parameters, simulate_on_recording
 

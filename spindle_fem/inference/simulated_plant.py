@@ -20,13 +20,13 @@ from spindle_fem.effects.framework.term import Term
 from spindle_fem.inference.drive_steps import coarse_drive, even_drive
 from spindle_fem.inference.reading_noise import ChannelBins, channel_bins
 from spindle_fem.inference.recording_gaps import WARMTH, gap_pieces, hidden_in, unseen_jumps
-from spindle_fem.model.reduced.coefficients import INNER_SHARE
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import FastTransient, TransientRun, grid_weights
 from spindle_fem.model.reduced.run_start import Start
+from spindle_fem.operation.coefficients import INNER_SHARE
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]

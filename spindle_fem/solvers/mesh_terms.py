@@ -20,9 +20,9 @@ from scipy import sparse
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.framework.term import COOLANT_INLET, FLOW, FLUID_PREFIX, Term, TermContext
 from spindle_fem.errors import SpecError, did_you_mean
-from spindle_fem.model.reduced.affine_operators import _places as places_of
-from spindle_fem.model.reduced.coefficients import CoefficientTable, build_coefficient_table, gap_radii_of
+from spindle_fem.operation.coefficients import CoefficientTable, build_coefficient_table, gap_radii_of
 from spindle_fem.operation.loads import LoadChange
+from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.coupled_steady import PreparedMachine, machine_on_mesh
 
@@ -113,7 +113,7 @@ class FieldTerms:
         self.values = [term.values(physics.values) for term in terms]
         self.lumped_names = tuple(lumped_names)
         self.table: CoefficientTable = build_coefficient_table(
-            machine.spec, tuple(machine.mesh.joints), gap_radii_of(machine)
+            machine.spec, tuple(machine.mesh.joints), gap_radii_of(machine.spec, machine.operators)
         )
         self._n = machine.operators.n_unknowns
         self._places = self._wanted_places()
@@ -138,7 +138,7 @@ class FieldTerms:
 
     # ---------------------------------------------------------------- set-up
     def _wanted_places(self) -> dict[str, Array]:
-        found = dict(places_of(self.machine, self.lumped_names, self._n + len(self.lumped_names)))
+        found = dict(named_places(self.machine, self.lumped_names, self._n + len(self.lumped_names)))
         wanted: dict[str, Array] = {}
         for term, own in zip(self.terms, self.values, strict=True):
             names = [*term.reads, *term.place_capacity(own), *term.place_conductance(own)]

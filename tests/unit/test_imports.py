@@ -57,7 +57,6 @@ OPEN: set[tuple[str, str]] = {
     ("recordings", "model.reduced"),
     ("recordings", "model.lumped"),
     ("recordings", "studies"),
-    ("solvers", "model.reduced"),
     ("studies", "commands"),
     ("studies", "report"),
 }

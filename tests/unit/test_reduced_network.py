@@ -12,7 +12,6 @@ from spindle_fem.definition.network_tables import validate_network_machine
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.model.lumped.written_network import build_network
-from spindle_fem.model.reduced.adjoint import fast_gradient
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.run_start import Start
@@ -203,16 +202,6 @@ def test_derivatives_with_a_term_follow_differences(fast, which, request):
         expected = by_differences(fast, recording, name, (Warming(),), values, name != "warming.shift")
         assert np.abs(expected).max() > 0.05, name
         assert_allclose(run.sensitivity[:, :, column], expected, atol=2e-5 * np.abs(expected).max() + 2e-5)
-
-
-def test_the_adjoint_gives_the_gradient_through_starts_and_gaps(fast, broken):
-    names = (*FREE, "initial.winding")
-    drive = fast.drive(broken)
-    start = fast.start(broken, drive, derivatives=names, initial=fast.initial_parameters(broken))
-    run = simulate_fast(fast, drive, start, derivatives=names)
-    weights = np.random.default_rng(3).normal(size=run.temperature.shape)
-    found = fast_gradient(fast, drive, start, weights, names)
-    assert_allclose(found, np.einsum("nc,ncp->p", weights, run.sensitivity), rtol=1e-8)
 
 
 def test_a_drive_with_gaps_needs_a_state_after_each(fast, broken):

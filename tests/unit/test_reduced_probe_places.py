@@ -9,7 +9,7 @@ from spindle_fem.errors import GeometryError
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.model.mesh.evaluate import probe_matrix
 from spindle_fem.model.mesh.mesh_operators import build_operators
-from spindle_fem.model.reduced.probe_places import (
+from spindle_fem.operation.probe_places import (
     around_places,
     harmonics,
     near_places,

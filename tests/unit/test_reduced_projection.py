@@ -10,9 +10,9 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpecError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.model.reduced.affine_operators import build_affine_system
-from spindle_fem.model.reduced.coefficients import build_coefficient_table
 from spindle_fem.model.reduced.projected_model import reduced_digest
 from spindle_fem.model.reduced.snapshots import SnapshotSpace, helix_profiles, orthonormalise
+from spindle_fem.operation.coefficients import build_coefficient_table
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.surroundings.rotating_surfaces import rotating_film
 

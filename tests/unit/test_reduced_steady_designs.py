@@ -10,11 +10,11 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
-from spindle_fem.model.reduced.coefficients import free_parameters
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.steady_designs import SteadyDesigns
+from spindle_fem.operation.coefficients import free_parameters
 from spindle_fem.operation.operating_point import OperatingPoint
 
 

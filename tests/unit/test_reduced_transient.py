@@ -15,14 +15,13 @@ from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.model.reduced import dynamic_terms as nonlinear
 from spindle_fem.model.reduced import term_march
-from spindle_fem.model.reduced.adjoint import fast_gradient
-from spindle_fem.model.reduced.coefficients import free_parameters
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.projected_model import ReducedModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.term_layout import OneInstant
 from spindle_fem.model.reduced.term_march import TermMarch
+from spindle_fem.operation.coefficients import free_parameters
 from spindle_fem.physics.surroundings.still_air import outside_coefficient
 
 CELLS = 12
@@ -190,17 +189,6 @@ def test_every_derivative_is_that_of_differences(fast, spec, steps):
         ]
         difference = (ends[0] - ends[1]) / 2e-5
         assert run.sensitivity[:, :, column] == pytest.approx(difference, abs=1e-6), name
-
-
-def test_the_adjoint_is_the_contracted_sensitivity(fast, spec, steps):
-    names = (*free_parameters(spec), "heat.F2", "steady.bypass", "steady.mass", "steady.path")
-    run = simulate_fast(fast, steps, 293.15, derivatives=names, terms=(Steady(),))
-    weights = np.random.default_rng(4).normal(size=run.temperature.shape)
-    gradient = fast_gradient(fast, steps, 293.15, weights, names, terms=(Steady(),))
-    expected = np.einsum("nc,ncp->p", weights, run.sensitivity)
-    assert gradient == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
-    with pytest.raises(SpecError, match=r"depends on temperature or time"):
-        fast_gradient(fast, steps, 293.15, weights, names[:3], terms=(Feedback(),))
 
 
 def test_halving_the_steps_changes_little_and_less_each_time(fast):

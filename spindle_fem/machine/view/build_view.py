@@ -27,10 +27,10 @@ from spindle_fem.machine.view.usual_sizes import (
     quantities_of,
     usual_rise,
 )
-from spindle_fem.model.reduced.coefficients import free_parameters
 from spindle_fem.model.reduced.drive import heat_of_table, standard_inputs
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.probe_places import ACROSS, AROUND, NEAR, UP, ringed_probes
+from spindle_fem.operation.coefficients import free_parameters
+from spindle_fem.operation.probe_places import ACROSS, AROUND, NEAR, UP, ringed_probes
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.align import Recording

@@ -8,7 +8,6 @@ lumped nodes (ball rows, bands of mixed air).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,20 +18,10 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import SpecError
 from spindle_fem.model.mesh.equations import ThermalSystem
 from spindle_fem.model.mesh.evaluate import probe_matrix
-from spindle_fem.model.reduced.probe_places import (
-    ACROSS,
-    UP,
-    around_places,
-    harmonics,
-    near_places,
-    probe_positions,
-    probe_slopes,
-    ringed_probes,
-    sided_names,
-)
-from spindle_fem.operation.joint_groups import group_of_contacts
 from spindle_fem.operation.machine_loads import FieldState
+from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.probe_places import probe_positions, probe_slopes
 from spindle_fem.solvers.coupled_steady import PreparedMachine
 
 Array = NDArray[np.float64]
@@ -181,7 +170,7 @@ def build_affine_system(machine: PreparedMachine) -> AffineSystem:
             coefficients[key] = coefficients[key] + matrix if key in coefficients else matrix
     cell_film, cell_load, cell_area = _channel(machine, size)
     storage = _storage(machine, names, size)
-    places = dict(_places(machine, names, size))
+    places = dict(named_places(machine, names, size))
     points = [probe for probe in spec.probe if probe.kind == "point"]
     rows = probe_matrix(operators, probe_positions(points), [p.part for p in points])
     return AffineSystem(
@@ -325,55 +314,3 @@ def _storage(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> di
             (share, (nodes, nodes)), shape=(size, size)
         ).tocsr()
     return found
-
-
-def _places(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> Iterator[tuple[str, Array]]:
-    spec, operators = machine.spec, machine.operators
-    mesh = operators.mesh
-    z = mesh.points[: operators.n_unknowns, 2]
-
-    def padded(vector: Array) -> Array:
-        return np.concatenate((vector, np.zeros(size - len(vector)))) / vector.sum()
-
-    sided = dict.fromkeys(sided_names(spec))
-
-    for index, part in enumerate(mesh.part_names):
-        own = np.where(operators.part_of_unknown == index, operators.part_load, 0.0)
-        yield part, padded(own)
-        for segment in next((p.segment for p in spec.part if p.name == part), ()):
-            inside = (z >= segment.z[0] - 1e-9) & (z <= segment.z[1] + 1e-9)
-            vector = np.where(inside, own, 0.0)
-            # Quadratic corner functions integrate to less than zero: a thin slice may have no volume left.
-            if vector.sum() > 1e-3 * own.sum():
-                name = f"{part}.{segment.name}"
-                yield name, padded(vector)
-                if name in sided:
-                    sided[name] = vector / vector.sum()
-    for surface, rows in operators.surface_rows.items():
-        if not surface.endswith(".adiabatic"):
-            yield surface, padded(operators.facet_vector(np.ones(rows.stop - rows.start), rows))
-    for contact, sides in operators.joint_rows.items():
-        if not contact.endswith(":face"):
-            for number, rows in enumerate(sides):
-                vector = operators.facet_vector(np.ones(rows.stop - rows.start), rows)
-                yield f"{contact}@{number}", padded(vector)
-    for _, bearing in spec.bearings:
-        nodes = [
-            operators.n_unknowns + lumped.index(node) for node in machine.builder.ball_nodes(bearing.name)
-        ]
-        vector = np.zeros(size)
-        vector[nodes] = 1.0 / len(nodes)
-        yield f"{bearing.name}.balls", vector
-    for name, near in near_places(operators, [probe for probe in spec.probe if probe.kind == "point"]):
-        yield name, padded(near)
-    for name, ring in around_places(operators, ringed_probes(spec)):
-        yield name, padded(ring)
-    for name, mean in sided.items():
-        if mean is not None:
-            for prefix, harmonic in zip((UP, ACROSS), harmonics(operators, mean), strict=True):
-                yield prefix + name, np.concatenate((harmonic, np.zeros(size - len(harmonic))))
-
-
-def contact_group_names(spec: MachineSpec, contacts: tuple[str, ...]) -> dict[str, str]:
-    """``joint.<group>`` of every contact."""
-    return {name: f"joint.{group.name}" for name, group in group_of_contacts(spec, contacts).items()}

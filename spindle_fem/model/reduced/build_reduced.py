@@ -12,15 +12,7 @@ from scipy.stats import qmc
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.model.reduced.affine_operators import AffineSystem, build_affine_system
-from spindle_fem.model.reduced.coefficients import (
-    CHANNEL_FILM,
-    CoefficientTable,
-    build_coefficient_table,
-    free_parameters,
-    gap_radii_of,
-)
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.probe_places import ACROSS, AROUND, NEAR, UP
 from spindle_fem.model.reduced.projected_model import (
     ReducedModel,
     family_of,
@@ -35,8 +27,16 @@ from spindle_fem.model.reduced.snapshots import (
     load_columns,
     shifted_systems,
 )
+from spindle_fem.operation.coefficients import (
+    CHANNEL_FILM,
+    CoefficientTable,
+    build_coefficient_table,
+    free_parameters,
+    gap_radii_of,
+)
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.probe_places import ACROSS, AROUND, NEAR, UP
 from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
 
 Array = NDArray[np.float64]
@@ -245,7 +245,7 @@ def build_reduced_model(
     spec = machine.spec
     progress("reduced model: operators")
     affine = build_affine_system(machine)
-    radii = gap_radii_of(machine)
+    radii = gap_radii_of(machine.spec, machine.operators)
     table = build_coefficient_table(spec, machine.mesh.joints, radii)
     workshop = _Workshop(machine, affine, table, free_parameters(spec), chosen)
     nominal = workshop.sample({}, workshop.usual_speed)

@@ -17,12 +17,10 @@ from spindle_fem.effects.registry import build, effect_of
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
 from spindle_fem.machine.view.build_view import view_of, view_of_network
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
-from spindle_fem.model.reduced.affine_operators import build_affine_system
-from spindle_fem.model.reduced.coefficients import gap_radii_of
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.machine_names import MachineNames
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
-from spindle_fem.model.reduced.projected_model import project
+from spindle_fem.operation.machine_names import MachineNames
+from spindle_fem.operation.named_places import named_places
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.defined_point import at_the_defined_point, of_a_network
 from spindle_fem.solvers.coupled_steady import PreparedMachine
@@ -315,17 +313,11 @@ def physics_of(machine: PreparedMachine) -> Physics:
     return Physics(effects.terms, {}, effects.factors)
 
 
-def _names_of(machine: PreparedMachine) -> FastModel:
-    """A fast model of one unknown: its names are those of the machine."""
-    affine = build_affine_system(machine)
-    model = project(
-        affine,
-        np.ones((affine.size, 1)),
-        np.ones(1),
-        cells=machine.builder.cells,
-        contacts=tuple(machine.mesh.joints),
-        gap_radii=gap_radii_of(machine),
-        ranges={},
-        digest="names",
+def _names_of(machine: PreparedMachine) -> MachineNames:
+    """Names of a machine without the slices of parts that its mesh cannot tell apart."""
+    names = MachineNames.of(machine.spec)
+    balls = tuple(
+        node for _, bearing in machine.spec.bearings for node in machine.builder.ball_nodes(bearing.name)
     )
-    return FastModel(model, machine.spec)
+    meshed = {name for name, _ in named_places(machine, balls, machine.operators.n_unknowns + len(balls))}
+    return replace(names, place_names=tuple(name for name in names.place_names if name in meshed))

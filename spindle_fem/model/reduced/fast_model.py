@@ -15,12 +15,12 @@ from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.effects.framework.term import FLOW, FLUID_PREFIX, RecordedHeat, Term
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.model.reduced.coefficient_directions import ConductingDirections
-from spindle_fem.model.reduced.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
 from spindle_fem.model.reduced.coolant_maps import CoolantMaps, UniformFilmMaps, coolant_maps, film_derivative
 from spindle_fem.model.reduced.drive import Drive, WarmedPoint, heat_of_table
 from spindle_fem.model.reduced.natural_films import natural_film_terms
 from spindle_fem.model.reduced.projected_model import ReducedModel
 from spindle_fem.model.reduced.trbdf2_matrices import build_propagator
+from spindle_fem.operation.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
 

@@ -16,8 +16,8 @@ from scipy import sparse
 from spindle_fem.cache import cache_directory, load_record, save_record, source_digest
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.model.reduced.affine_operators import AffineSystem
-from spindle_fem.model.reduced.coefficients import CoefficientTable, build_coefficient_table
 from spindle_fem.operation.channel_cells import ChannelCells
+from spindle_fem.operation.coefficients import CoefficientTable, build_coefficient_table
 
 Array = NDArray[np.float64]
 

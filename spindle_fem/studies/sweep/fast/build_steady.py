@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.model.mesh.linear_solvers import build_preconditioner, solve_many
 from spindle_fem.model.reduced.affine_operators import AffineSystem, build_affine_system
-from spindle_fem.model.reduced.coefficients import gap_radii_of
+from spindle_fem.operation.coefficients import gap_radii_of
 from spindle_fem.solvers.coupled_steady import PreparedMachine
 from spindle_fem.studies.sweep.fast.coolant_batch import ChannelBatch
 from spindle_fem.studies.sweep.fast.design_inputs import DesignInputs, design_inputs
@@ -77,7 +77,7 @@ def build_steady_model(
         affine.coefficient_names,
         tuple(affine.fluid_load),
         machine.mesh.joints,
-        gap_radii_of(machine),
+        gap_radii_of(machine.spec, machine.operators),
     )
     if film_band:
         inputs = with_band_ends(inputs, affine, machine)

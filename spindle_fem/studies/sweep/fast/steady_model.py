@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from spindle_fem.cache import cache_directory, load_record, save_record
 from spindle_fem.model.mesh.evaluate import temperature_at_nodes
 from spindle_fem.model.reduced.affine_operators import AffineSystem
-from spindle_fem.model.reduced.coefficients import gap_radii_of
 from spindle_fem.operation.channel_cells import ChannelCells
+from spindle_fem.operation.coefficients import gap_radii_of
 from spindle_fem.solvers.coupled_steady import PreparedMachine
 
 Array = NDArray[np.float64]
@@ -182,7 +182,7 @@ def project(machine: PreparedMachine, affine: AffineSystem, basis: Array, one: A
         one=one,
         ranges=np.empty((0, 2)),
         contacts=tuple(mesh.joints),
-        gap_radii=gap_radii_of(machine),
+        gap_radii=gap_radii_of(machine.spec, machine.operators),
         surface_area={name: float(machine.builder.facet_area[name].sum()) for name in mesh.surfaces},
         mesh_numbers={
             "nodes": machine.operators.n_unknowns,

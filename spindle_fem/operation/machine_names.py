@@ -10,8 +10,8 @@ import numpy as np
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.geometry.faces import MeridianEdge
-from spindle_fem.model.reduced.coefficients import CoefficientTable, build_coefficient_table
-from spindle_fem.model.reduced.probe_places import ACROSS, AROUND, NEAR, UP, ringed_probes, sided_names
+from spindle_fem.operation.coefficients import CoefficientTable, build_coefficient_table
+from spindle_fem.operation.probe_places import ACROSS, AROUND, NEAR, UP, ringed_probes, sided_names
 from spindle_fem.units import Uncertain
 
 

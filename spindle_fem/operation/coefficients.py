@@ -10,10 +10,10 @@ import numpy as np
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.errors import SpecError, did_you_mean
-from spindle_fem.model.reduced.affine_operators import contact_group_names
+from spindle_fem.model.mesh.thermal_operators import ThermalOperators
+from spindle_fem.operation.joint_groups import group_of_contacts
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
-from spindle_fem.solvers.coupled_steady import PreparedMachine
 
 CHANNEL_FILM = "channel.film"
 INNER_SHARE = "heat.inner_share"
@@ -143,7 +143,7 @@ def build_coefficient_table(
         f"conductivity.{name}": (f"conductivity.{name}",) for name in spec.materials
     }
     groups |= {
-        f"joint.{name}": (f"joint.{name}", group) for name, group in contact_group_names(spec, names).items()
+        f"joint.{name}": (f"joint.{name}", group) for name, group in _joint_groups(spec, names).items()
     }
     for number, film in enumerate(spec.film, 1):
         owner = f"film.{film.name}" if film.name else f"film[{number}]"
@@ -164,21 +164,21 @@ def build_coefficient_table(
     return CoefficientTable(spec, names, dict(gap_radii), groups, (*known, INNER_SHARE))
 
 
-def gap_radii_of(machine: PreparedMachine) -> dict[str, tuple[float, float]]:
+def _joint_groups(spec: MachineSpec, contacts: tuple[str, ...]) -> dict[str, str]:
+    """``joint.<group>`` of every contact."""
+    return {name: f"joint.{group.name}" for name, group in group_of_contacts(spec, contacts).items()}
+
+
+def gap_radii_of(spec: MachineSpec, operators: ThermalOperators) -> dict[str, tuple[float, float]]:
     """Mean radii of both sides of every gap, m."""
-    operators = machine.operators
-    points = machine.mesh.points
+    mesh = operators.mesh
 
     def mean_radius(surfaces: tuple[str, ...]) -> float:
-        centres = np.concatenate(
-            [points[machine.mesh.surfaces[name][:, :3]].mean(axis=1) for name in surfaces]
-        )
+        centres = np.concatenate([mesh.points[mesh.surfaces[name][:, :3]].mean(axis=1) for name in surfaces])
         areas = np.concatenate([operators.facet_areas(name) for name in surfaces])
         return float(areas @ np.hypot(centres[:, 0], centres[:, 1]) / areas.sum())
 
-    return {
-        gap.name: (mean_radius((gap.rotating,)), mean_radius(tuple(gap.standing))) for gap in machine.spec.gap
-    }
+    return {gap.name: (mean_radius((gap.rotating,)), mean_radius(tuple(gap.standing))) for gap in spec.gap}
 
 
 def free_parameters(spec: MachineSpec) -> dict[str, float]:
