@@ -4,16 +4,10 @@ The floors are modest, so that they fail on damage and not on one unlucky case; 
 asked for stand in the book's chapter of the concealed study, on two hundred cases.
 """
 
-import sys
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-from validation import generate, run_study  # noqa: E402
-from validation.score import score_study  # noqa: E402
+from validation import generate, run_study
+from validation.score import score_study
 
 CASES, SEED = 20, 104729
 

@@ -1,8 +1,5 @@
 """Both fits of a diagnosis through the finite-element model, on a recording that the full model made."""
 
-import importlib.util
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,6 +19,7 @@ from spindle_fem.report.diagnosis_full_model import full_model_sections
 from spindle_fem.solvers.coupled_steady import prepare_machine
 from spindle_fem.solvers.machine_transient import simulate_full
 from spindle_fem.solvers.mesh_terms import Physics
+from tests.support.lumped_spindle import lumped_model
 
 PROBES = ("SP01", "SP05", "COOLANT_OUT")
 MANIFEST = """
@@ -38,15 +36,6 @@ CHANNEL = '{column = "%s", role = "temperature", probe = "%s", unit = "degC", si
 TIMES = np.arange(0.0, 1801.0, 60.0)
 MACHINE = {"heat.front": 1.1, "film.outside": 1.2}
 HEAT, OFFSET = 150.0, 2.0
-
-
-def lumped_model(spec):
-    path = Path(__file__).parents[1] / "unit" / "test_reduced_transient.py"
-    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
-    module = importlib.util.module_from_spec(loaded)
-    sys.modules[loaded.name] = module
-    loaded.loader.exec_module(module)
-    return module.lumped_model(spec)
 
 
 def recorded_as(folder, temperatures):

@@ -2,21 +2,16 @@
 
 import json
 import re
-import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-from book import build as building  # noqa: E402
-from book import causes  # noqa: E402
-from book.chapters import ENTRIES, bench_motor, concealed, turning_centre  # noqa: E402
-from book.page import Chapter, Entry, Pictures, render_chapter  # noqa: E402
-from book.work import Desk  # noqa: E402
-from spindle_fem.errors import BadInputError  # noqa: E402
-from spindle_fem.report.block_page import Section, Text  # noqa: E402
+from book import build as building
+from book import causes
+from book.chapters import ENTRIES, bench_motor, concealed, turning_centre
+from book.page import Chapter, Entry, Pictures, render_chapter
+from book.work import Desk
+from spindle_fem.errors import BadInputError
+from spindle_fem.report.block_page import Section, Text
 
 
 @pytest.fixture

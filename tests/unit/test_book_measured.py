@@ -11,10 +11,9 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
+from book.measured import comparison_of, read_tests, worst_by_assertion
 
-from book.measured import comparison_of, read_tests, worst_by_assertion  # noqa: E402
+ROOT = Path(__file__).parents[2]
 
 SAMPLE = '''
 """Head of the file."""

@@ -1,10 +1,7 @@
 """Every effect of the catalogue on a lumped spindle and a small network."""
 
-import importlib.util
-import sys
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -31,6 +28,7 @@ from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
+from tests.support.lumped_spindle import lumped_model
 
 SPINDLE_RECORDING = """
 schema = "spindle-fem/recording/1"
@@ -99,15 +97,6 @@ reference = "1000 rpm"
 """
 
 
-def _lumped_model():
-    path = Path(__file__).with_name("test_reduced_transient.py")
-    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
-    module = importlib.util.module_from_spec(loaded)
-    sys.modules[loaded.name] = module
-    loaded.loader.exec_module(module)
-    return module.lumped_model
-
-
 def _spindle(folder):
     """Fast model, recording, view and drive of a lumped reference spindle."""
     time = np.arange(0.0, 7200.0, 30.0)
@@ -127,7 +116,7 @@ def _spindle(folder):
         text += INPUT % (column, hold, drives, unit)
     recording = _written(folder, "spindle", columns, text)
     spec = load_machine("recorded_spindle")
-    fast = FastModel(_lumped_model()(spec), spec)
+    fast = FastModel(lumped_model(spec), spec)
     return fast, recording, view_of(fast, recording), drive_of_recording(spec, recording)
 
 

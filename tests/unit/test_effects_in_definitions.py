@@ -1,9 +1,6 @@
 """Effects that a machine definition switches on: how they are written, refused and used."""
 
-import importlib.util
-import sys
 import tomllib
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,6 +24,7 @@ from spindle_fem.model.reduced.defined_effects import (
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.studies.simulate import simulate_recordings
+from tests.support.lumped_spindle import lumped_model
 
 NETWORK = """
 schema = "spindle-fem/machine/1"
@@ -81,17 +79,6 @@ channel = [
 {column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
 ]
 """
-
-
-@pytest.fixture(scope="module")
-def lumped_model():
-    """Maker of a spindle of one unknown per part."""
-    path = Path(__file__).with_name("test_reduced_transient.py")
-    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
-    module = importlib.util.module_from_spec(loaded)
-    sys.modules[loaded.name] = module
-    loaded.loader.exec_module(module)
-    return module.lumped_model
 
 
 @pytest.fixture(scope="module")
@@ -323,7 +310,7 @@ def half_an_hour(folder, *, flow):
 
 
 @pytest.mark.parametrize("flow", [20.0, 0.0])
-def test_a_machine_that_was_improved_on_one_recording_runs_on_a_shorter_one(tmp_path, lumped_model, flow):
+def test_a_machine_that_was_improved_on_one_recording_runs_on_a_shorter_one(tmp_path, flow):
     path = tmp_path / "improved_machine.toml"
     path.write_text(IMPROVED)
     spec = load_machine(path)
@@ -343,7 +330,7 @@ def test_a_machine_that_was_improved_on_one_recording_runs_on_a_shorter_one(tmp_
     assert np.ptp(improved[:2, 1]) < 0.1 * np.ptp(nominal[:2, 1])
 
 
-def test_the_physical_limits_of_an_entry_hold_on_every_recording(tmp_path, lumped_model):
+def test_the_physical_limits_of_an_entry_hold_on_every_recording(tmp_path):
     spec = load_machine("recorded_spindle")
     fast = FastModel(lumped_model(spec), spec)
     recording = half_an_hour(tmp_path, flow=20.0)

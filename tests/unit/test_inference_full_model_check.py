@@ -1,9 +1,6 @@
 """What of a fit reaches the finite-element model, and when it is not run at all."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -32,6 +29,7 @@ from spindle_fem.recordings.align import read_recording
 from spindle_fem.report.diagnosis_full_model import full_model_sections
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.mesh_terms import inputs_of
+from tests.support.lumped_spindle import lumped_model
 
 MANIFEST = """
 schema = "spindle-fem/recording/1"
@@ -45,15 +43,6 @@ channel = [
 {column = "SP05", role = "temperature", probe = "SP05", unit = "degC", sigma = 0.1},
 ]
 """
-
-
-def lumped_model(spec):
-    path = Path(__file__).with_name("test_reduced_transient.py")
-    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
-    module = importlib.util.module_from_spec(loaded)
-    sys.modules[loaded.name] = module
-    loaded.loader.exec_module(module)
-    return module.lumped_model(spec)
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,9 @@
 """Where, when, what next and the report, on a lumped spindle that was made to differ in a known way."""
 
-import importlib.util
 import json
 import re
-import sys
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -48,6 +45,7 @@ from spindle_fem.recordings.align import read_recording
 from spindle_fem.report.diagnosis_data import diagnosis_dataset
 from spindle_fem.report.diagnosis_report import SCHEMA, draw_figures, write_diagnosis_report
 from spindle_fem.report.diagnosis_words import verdict_sentence
+from tests.support.lumped_spindle import lumped_model
 
 PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
 MANIFEST = """
@@ -80,15 +78,6 @@ RUNS, STOPS = 1800.0, 8100.0
 FROM, UNTIL, HEAT = 3000.0, 6000.0, 200.0
 
 
-def _lumped_model():
-    path = Path(__file__).with_name("test_reduced_transient.py")
-    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
-    module = importlib.util.module_from_spec(loaded)
-    sys.modules[loaded.name] = module
-    loaded.loader.exec_module(module)
-    return module.lumped_model
-
-
 def written(folder, temperatures):
     columns = {
         "t": TIMES,
@@ -108,7 +97,7 @@ class Case:
     def __init__(self, folder):
         self.folder = folder
         self.spec = load_machine("recorded_spindle")
-        model = _lumped_model()(self.spec)
+        model = lumped_model(self.spec)
         slopes = np.zeros((len(model.probe_names), 2, model.size))
         model = replace(
             model,

@@ -1,9 +1,6 @@
 """A machine on its recordings: derivatives and first-order answers against differences of full runs."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -18,6 +15,7 @@ from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.drive import drive_of_recording
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
+from tests.support.lumped_spindle import lumped_model
 
 PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
 MANIFEST = """
@@ -34,15 +32,6 @@ channel = [
 CHANNEL = '{column = "%s", role = "temperature", probe = "%s", unit = "degC", sigma = 0.1},\n'
 # The machine is not at its nominal parameters, and a feedback is in it already.
 NOW = {"heat.front": 1.15, "coolant.film_factor": 0.85, "film.outside": 1.2}
-
-
-def lumped_model(spec):
-    path = Path(__file__).with_name("test_reduced_transient.py")
-    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
-    module = importlib.util.module_from_spec(loaded)
-    sys.modules[loaded.name] = module
-    loaded.loader.exec_module(module)
-    return module.lumped_model(spec)
 
 
 @pytest.fixture(scope="module")

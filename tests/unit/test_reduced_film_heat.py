@@ -1,9 +1,6 @@
 """Friction of an analytical heat model as a map, against the model itself."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,6 +22,7 @@ from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.bearing_heat import BearingMechanics
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import Uncertain
+from tests.support.lumped_spindle import drive_of, lumped_model
 
 RPM = np.pi / 30.0
 THRUSTS = (875.0, 1312.5, 1750.0)
@@ -233,14 +231,9 @@ def test_values_at_an_operating_point_are_remembered_and_do_not_mix(spec, fricti
 @pytest.fixture(scope="module")
 def lumped(spec, friction, table):
     """The tabulated machine with one unknown a part, and a drive through two speeds and a rest."""
-    path = Path(__file__).with_name("test_reduced_transient.py")
-    loaded = importlib.util.spec_from_file_location("lumped_spindle_of_films", path)
-    module = importlib.util.module_from_spec(loaded)
-    sys.modules[loaded.name] = module
-    loaded.loader.exec_module(module)
-    fast = FastModel(module.lumped_model(table), table, (FilmHeat(friction, spec, table),))
+    fast = FastModel(lumped_model(table), table, (FilmHeat(friction, spec, table),))
     times = np.arange(0.0, 5400.0, 60.0)
-    return fast, module.drive_of(times, np.select([times < 2400, times < 3600], [3000.0, 1000.0], 0.0))
+    return fast, drive_of(times, np.select([times < 2400, times < 3600], [3000.0, 1000.0], 0.0))
 
 
 def test_given_terms_are_always_there_and_stay_on_a_smaller_basis(lumped):

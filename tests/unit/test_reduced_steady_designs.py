@@ -1,8 +1,6 @@
 """Steady designs on a spindle of one unknown per part, against the transient that leads to them."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,14 +14,7 @@ from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.steady_designs import SteadyDesigns
 from spindle_fem.operation.coefficients import free_parameters
 from spindle_fem.operation.operating_point import OperatingPoint
-
-
-def lumped_model(spec):
-    path = Path(__file__).parent / "test_reduced_transient.py"
-    loaded = importlib.util.spec_from_file_location("lumped_spindle", path)
-    module = importlib.util.module_from_spec(loaded)
-    loaded.loader.exec_module(module)
-    return module.lumped_model(spec)
+from tests.support.lumped_spindle import lumped_model
 
 
 @pytest.fixture(scope="module")
