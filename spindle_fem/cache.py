@@ -75,7 +75,11 @@ def _with_imports(modules: Sequence[str]) -> dict[str, Path]:
         if path is None:
             raise FileNotFoundError(f"there is no module {name}")
         found[name] = path
-        for package, listed in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        text = path.read_text(encoding="utf-8")
+        if "registry(__name__)" in text:
+            # Its files are imported by name when they are asked for.
+            waiting += [f"{name}.{file.stem}" for file in path.parent.glob("*.py") if file != path]
+        for package, listed in _IMPORT.findall(text):
             # What is imported from a package may be a module of it or a name inside it.
             members = (f"{package}.{member}" for member in re.findall(r"\w+", listed))
             waiting += [item for item in (package, *members) if _module_file(item) is not None]

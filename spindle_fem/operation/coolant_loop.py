@@ -12,8 +12,8 @@ from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.duct_friction import PressureDrop, channel_pressure_drop
+from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
 from spindle_fem.physics.coolant.march import ChannelMarch, march_channel
-from spindle_fem.physics.coolant.nusselt import nusselt_sieder_tate
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
 

@@ -13,14 +13,17 @@ from fluids.friction import (
     helical_transition_Re_Schmidt,
 )
 
-from spindle_fem.physics.coolant import nusselt, nusselt_helical
 from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
 from spindle_fem.physics.coolant.duct_friction import (
     channel_pressure_drop,
     fanning_reynolds_rectangle,
     friction_factor_curved_laminar,
 )
-from spindle_fem.physics.coolant.properties import OilIsoVg32
+from spindle_fem.physics.coolant.film_models.dravid import nusselt_dravid
+from spindle_fem.physics.coolant.film_models.janssen_hoogendoorn import nusselt_janssen_hoogendoorn
+from spindle_fem.physics.coolant.film_models.paper import nusselt_paper_turbulent
+from spindle_fem.physics.coolant.film_models.straight_developing import nusselt_rectangle
 from spindle_fem.physics.coolant.regimes import (
     ChannelState,
     critical_reynolds_ito,
@@ -82,7 +85,7 @@ def test_channel_of_the_reference_spindle(case):
     assert film.candidates["schmidt"] == pytest.approx(schmidt, rel=1e-2)
     on_depth = film.reynolds * channel.depth / channel.hydraulic_diameter
     conductivity = float(OIL.properties(celsius + 273.15).thermal_conductivity)
-    number = nusselt.nusselt_paper_turbulent(on_depth, film.prandtl, extrapolate=True)
+    number = nusselt_paper_turbulent(on_depth, film.prandtl, extrapolate=True)
     assert float(number) * conductivity / channel.depth == pytest.approx(turbulent, rel=1e-2)
 
 
@@ -158,15 +161,15 @@ def test_two_independent_measurements_of_coils_agree(reynolds, prandtl):
     # Janssen & Hoogendoorn and Dravid et al. where both apply: 20 % is the scatter that
     # reviews of curved tubes quote for each. (Seban & McLaughlin's oil data lie up to 37 %
     # lower at Pr 100 and meet them near Pr 1000.)
-    one = nusselt_helical.nusselt_janssen_hoogendoorn(reynolds, prandtl, 0.048)
-    other = nusselt_helical.nusselt_dravid(reynolds * np.sqrt(0.048), prandtl)
+    one = nusselt_janssen_hoogendoorn(reynolds, prandtl, 0.048)
+    other = nusselt_dravid(reynolds * np.sqrt(0.048), prandtl)
     assert float(one) == pytest.approx(float(other), rel=0.2)
 
 
 def test_shah_london_limits():
     # Shah & London (1978), table 42: uniform wall temperature, developed.
     aspect, expected = [1.0, 0.5, 0.25, 0.125], [2.976, 3.391, 4.439, 5.597]
-    np.testing.assert_allclose(nusselt.nusselt_rectangle(aspect), expected, rtol=3e-3)
+    np.testing.assert_allclose(nusselt_rectangle(aspect), expected, rtol=3e-3)
     # Table 42: f Re of square, 1:2 and 1:4.
     np.testing.assert_allclose(
         fanning_reynolds_rectangle([1.0, 0.5, 0.25]), [14.227, 15.548, 18.233], rtol=1e-3

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import OutOfValidityError
-from spindle_fem.physics.coolant import nusselt, nusselt_helical
 from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
 from spindle_fem.physics.coolant.duct_friction import (
     channel_pressure_drop,
     friction_factor_channel,
@@ -13,7 +13,16 @@ from spindle_fem.physics.coolant.duct_friction import (
     friction_factor_helical_turbulent,
     port_loss_coefficient,
 )
-from spindle_fem.physics.coolant.properties import CoolantProperties, OilIsoVg32
+from spindle_fem.physics.coolant.film_models.dravid import nusselt_dravid
+from spindle_fem.physics.coolant.film_models.gnielinski_helical import nusselt_gnielinski_helical
+from spindle_fem.physics.coolant.film_models.janssen_hoogendoorn import nusselt_janssen_hoogendoorn
+from spindle_fem.physics.coolant.film_models.manlapaz_churchill import nusselt_manlapaz_churchill
+from spindle_fem.physics.coolant.film_models.paper import nusselt_paper_turbulent
+from spindle_fem.physics.coolant.film_models.schmidt import nusselt_schmidt
+from spindle_fem.physics.coolant.film_models.seban_mclaughlin import nusselt_seban_mclaughlin
+from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
+from spindle_fem.physics.coolant.film_models.straight_developing import nusselt_hausen, nusselt_rectangle
+from spindle_fem.physics.coolant.properties import CoolantProperties
 from spindle_fem.physics.coolant.transition import (
     critical_reynolds_ito,
     critical_reynolds_schmidt,
@@ -25,24 +34,24 @@ CRITICAL = float(critical_reynolds_schmidt(CHANNEL.curvature_ratio))
 OIL = OilIsoVg32()
 
 REFUSALS = [
-    (nusselt.nusselt_paper_turbulent, (5.0e3, 100.0), "reynolds is 5000, allowed 10000 to 120000"),
-    (nusselt.nusselt_paper_turbulent, (2.0e4, 562.0), "prandtl is 562, allowed 0.7 to 160"),
-    (nusselt.nusselt_sieder_tate, (5.0,), "graetz is 5, allowed at least 10"),
-    (nusselt.nusselt_sieder_tate, (50.0, 12.0), "viscosity_ratio is 12"),
-    (nusselt.nusselt_rectangle, (1.2,), "aspect_ratio is 1.2, allowed 0 to 1"),
-    (nusselt.nusselt_hausen, (-1.0, 3.0), "graetz is -1"),
-    (nusselt_helical.nusselt_schmidt, (50.0, 10.0, 0.05), "reynolds is 50, allowed 100 to 22000"),
-    (nusselt_helical.nusselt_schmidt, (500.0, 10.0, 0.5), "curvature_ratio is 0.5, allowed 0.012 to 0.2"),
-    (nusselt_helical.nusselt_manlapaz_churchill, (-1.0, 10.0), "dean is -1"),
-    (nusselt_helical.nusselt_seban_mclaughlin, (292.0, 1214.0, 0.048), "prandtl is 1214, allowed 100 to 657"),
+    (nusselt_paper_turbulent, (5.0e3, 100.0), "reynolds is 5000, allowed 10000 to 120000"),
+    (nusselt_paper_turbulent, (2.0e4, 562.0), "prandtl is 562, allowed 0.7 to 160"),
+    (nusselt_sieder_tate, (5.0,), "graetz is 5, allowed at least 10"),
+    (nusselt_sieder_tate, (50.0, 12.0), "viscosity_ratio is 12"),
+    (nusselt_rectangle, (1.2,), "aspect_ratio is 1.2, allowed 0 to 1"),
+    (nusselt_hausen, (-1.0, 3.0), "graetz is -1"),
+    (nusselt_schmidt, (50.0, 10.0, 0.05), "reynolds is 50, allowed 100 to 22000"),
+    (nusselt_schmidt, (500.0, 10.0, 0.5), "curvature_ratio is 0.5, allowed 0.012 to 0.2"),
+    (nusselt_manlapaz_churchill, (-1.0, 10.0), "dean is -1"),
+    (nusselt_seban_mclaughlin, (292.0, 1214.0, 0.048), "prandtl is 1214, allowed 100 to 657"),
     (
-        nusselt_helical.nusselt_janssen_hoogendoorn,
+        nusselt_janssen_hoogendoorn,
         (292.0, 300.0, 0.048),
         "dean is 63.974, allowed 100 to 830",
     ),
-    (nusselt_helical.nusselt_dravid, (100.0, 562.0), "prandtl is 562, allowed 5 to 175"),
+    (nusselt_dravid, (100.0, 562.0), "prandtl is 562, allowed 5 to 175"),
     (
-        nusselt_helical.nusselt_gnielinski_helical,
+        nusselt_gnielinski_helical,
         (290.0, 200.0, 0.05),
         "reynolds is 290, allowed 22000 to 150000",
     ),
@@ -65,8 +74,8 @@ def test_refuses_outside_the_range_of_its_source(correlation, arguments, message
 
 def test_extrapolation_must_be_asked_for():
     with pytest.raises(OutOfValidityError):
-        nusselt_helical.nusselt_seban_mclaughlin(292.0, 1214.0, 0.048)
-    assert float(nusselt_helical.nusselt_seban_mclaughlin(292.0, 1214.0, 0.048, extrapolate=True)) > 0.0
+        nusselt_seban_mclaughlin(292.0, 1214.0, 0.048)
+    assert float(nusselt_seban_mclaughlin(292.0, 1214.0, 0.048, extrapolate=True)) > 0.0
 
 
 def test_expanded_equation_30_equals_its_dimensionless_form():
@@ -82,9 +91,7 @@ def test_expanded_equation_30_equals_its_dimensionless_form():
         * oil.specific_heat_capacity**0.3
         * oil.dynamic_viscosity**-0.5
     )
-    number = nusselt.nusselt_paper_turbulent(
-        speed * depth / oil.kinematic_viscosity, oil.prandtl, extrapolate=True
-    )
+    number = nusselt_paper_turbulent(speed * depth / oil.kinematic_viscosity, oil.prandtl, extrapolate=True)
     assert float(number * oil.thermal_conductivity / depth) == pytest.approx(float(printed), rel=1e-12)
 
 
@@ -95,12 +102,12 @@ def test_expanded_equation_31_equals_its_dimensionless_form():
     volumetric = oil.density * oil.specific_heat_capacity
     printed = 1.86 * np.cbrt(speed / (depth * length) * oil.thermal_conductivity**2 * volumetric)
     graetz = speed * depth / oil.kinematic_viscosity * oil.prandtl * depth / length
-    number = nusselt.nusselt_sieder_tate(graetz)
+    number = nusselt_sieder_tate(graetz)
     assert float(number * oil.thermal_conductivity / depth) == pytest.approx(float(printed), rel=1e-12)
 
 
 def test_straight_limits_of_the_curved_correlations():
-    assert float(nusselt_helical.nusselt_manlapaz_churchill(0.0, 100.0)) == pytest.approx(3.657, rel=1e-12)
+    assert float(nusselt_manlapaz_churchill(0.0, 100.0)) == pytest.approx(3.657, rel=1e-12)
     assert float(friction_factor_curved_laminar(0.0)) == 1.0
     # Blasius.
     assert float(friction_factor_helical_turbulent(1.0e4, 0.0)) == pytest.approx(0.03164, rel=1e-12)
@@ -108,34 +115,30 @@ def test_straight_limits_of_the_curved_correlations():
 
 def test_gnielinski_straight_limit_is_the_petukhov_form():
     # f = 0.3164 Re^-0.25 at Re 5e4, Pr 7, by hand: f/8 = 0.0026449, Nu = 925.7/2.7369.
-    assert float(nusselt_helical.nusselt_gnielinski_helical(5.0e4, 7.0, 0.0)) == pytest.approx(
-        338.2, rel=1e-3
-    )
+    assert float(nusselt_gnielinski_helical(5.0e4, 7.0, 0.0)) == pytest.approx(338.2, rel=1e-3)
 
 
 def test_wall_correction_has_the_exponent_of_its_source():
-    plain = nusselt_helical.nusselt_schmidt(500.0, 300.0, 0.05) - 3.66
-    corrected = nusselt_helical.nusselt_schmidt(500.0, 300.0, 0.05, 2.0) - 3.66
+    plain = nusselt_schmidt(500.0, 300.0, 0.05) - 3.66
+    corrected = nusselt_schmidt(500.0, 300.0, 0.05, 2.0) - 3.66
     assert float(corrected / plain) == pytest.approx(2.0**0.14, rel=1e-12)
-    ratio = nusselt.nusselt_sieder_tate(500.0, 2.0) / nusselt.nusselt_sieder_tate(500.0)
+    ratio = nusselt_sieder_tate(500.0, 2.0) / nusselt_sieder_tate(500.0)
     assert float(ratio) == pytest.approx(2.0**0.14, rel=1e-12)
 
 
 def test_gnielinski_corrects_by_the_prandtl_numbers():
-    ratio = nusselt_helical.nusselt_gnielinski_helical(
-        3e4, 50.0, 0.05, 2.0
-    ) / nusselt_helical.nusselt_gnielinski_helical(3e4, 50.0, 0.05)
+    ratio = nusselt_gnielinski_helical(3e4, 50.0, 0.05, 2.0) / nusselt_gnielinski_helical(3e4, 50.0, 0.05)
     assert float(ratio) == pytest.approx(2.0**0.14, rel=1e-12)
 
 
 def test_manlapaz_churchill_in_the_printed_form():
     # De 10, Pr 9.57: De² Pr = 957, so x3 = 4; x4 = 1 + 0.477/9.57.
     expected = np.cbrt((3.657 + 4.343 / 4.0) ** 3 + 1.158 * (10.0 / (1.0 + 0.477 / 9.57)) ** 1.5)
-    assert float(nusselt_helical.nusselt_manlapaz_churchill(10.0, 9.57)) == pytest.approx(expected, rel=1e-12)
+    assert float(nusselt_manlapaz_churchill(10.0, 9.57)) == pytest.approx(expected, rel=1e-12)
 
 
 def test_hausen_forgets_the_inlet_far_from_it():
-    assert float(nusselt.nusselt_hausen(1e-6, 3.0)) == pytest.approx(3.0, abs=1e-6)
+    assert float(nusselt_hausen(1e-6, 3.0)) == pytest.approx(3.0, abs=1e-6)
 
 
 def test_white_against_mishra_and_gupta():

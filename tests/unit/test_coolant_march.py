@@ -6,8 +6,9 @@ from scipy.integrate import solve_ivp
 
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
+from spindle_fem.physics.coolant.coolants.water import Water
 from spindle_fem.physics.coolant.march import linearise_march, march_channel, march_enthalpy
-from spindle_fem.physics.coolant.properties import OilIsoVg32, Water
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
 OIL = OilIsoVg32()

@@ -2,13 +2,11 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import OutOfValidityError
-from spindle_fem.physics.coolant.properties import (
-    COOLANT_NAMES,
-    OilIsoVg32,
-    UserCoolant,
-    Water,
-    coolant_by_name,
-)
+from spindle_fem.physics.coolant.coolants import COOLANTS
+from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
+from spindle_fem.physics.coolant.coolants.water import Water
+from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.physics.coolant.user_coolant import UserCoolant
 
 # Temperatures of any shape give properties of that shape.
 SHAPES = [(), (3,), (2, 3)]
@@ -123,7 +121,7 @@ def test_user_coolant_that_cannot_be(changes, message):
 
 
 def test_names():
-    assert COOLANT_NAMES == ("iso_vg_32", "water")
+    assert tuple(COOLANTS) == ("iso_vg_32", "water")
     assert coolant_by_name("water").name == "water"
     with pytest.raises(OutOfValidityError, match='Did you mean "iso_vg_32"'):
         coolant_by_name("iso_vg_46")

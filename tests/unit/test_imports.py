@@ -18,6 +18,8 @@ FLOORS = (
     "units",
     "validity",
     "cache",
+    "registry",
+    "correlation",
     "parallel",
     "definition",
     "physics.bearings",

@@ -21,7 +21,8 @@ from spindle_fem.model.lumped.resistances import (
     ring_housing_resistance,
 )
 from spindle_fem.physics.bearings.contact_conduction import ball_resistance, constriction_resistance
-from spindle_fem.physics.coolant.nusselt import nusselt_paper_turbulent, nusselt_sieder_tate
+from spindle_fem.physics.coolant.film_models.paper import nusselt_paper_turbulent
+from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
 
 K = 42.0
 

@@ -7,108 +7,63 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spindle_fem.correlation import Array, correlation
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import CoolantProperties
 from spindle_fem.physics.coolant.transition import TURBULENT_FROM_REYNOLDS, transition_weight
 from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, CodedWarning, range_fault, require_range
 
-_HOW_TO_FIX = "Let coolant.friction.channel_pressure_drop choose the correlation."
-_WHITE_DEAN_RANGE = (0.0, 2000.0)
-_HELICAL_TURBULENT_RANGE = (4500.0, 1.0e5)
+_HOW_TO_FIX = "Let coolant.duct_friction.channel_pressure_drop choose the correlation."
 _INCH_M = 0.0254
 
 
-def fanning_reynolds_rectangle(aspect_ratio: ArrayLike) -> NDArray[np.float64]:
+@correlation(how_to_fix="Give the short over the long side.", aspect_ratio=(0.0, 1.0))
+def fanning_reynolds_rectangle(aspect_ratio: Array) -> Array:
     """Fanning friction factor times Reynolds number, laminar, straight rectangular duct.
+
+    Developed flow, on the hydraulic diameter.
 
     Parameters
     ----------
     aspect_ratio : (n,) array_like, [-]
-        Short over long side.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        On the hydraulic diameter.
-
-    Raises
-    ------
-    OutOfValidityError
-        Aspect ratio outside 0–1.
-
-    Range: 0 (slit) to 1 (square), developed laminar flow.
+        Short over long side: 0 (slit) to 1 (square).
 
     Source: Shah & London (1978), Laminar Flow Forced Convection in Ducts, eq. 341.
 
     >>> float(fanning_reynolds_rectangle(10.0 / 12.0).round(2))
     14.33
     """
-    a = np.asarray(aspect_ratio, float)
-    require_range(
-        "fanning_reynolds_rectangle",
-        aspect_ratio=(a, 0.0, 1.0),
-        how_to_fix="Give the short over the long side.",
-    )
+    a = aspect_ratio
     return 24.0 * (1.0 + a * (-1.3553 + a * (1.9467 + a * (-1.7012 + a * (0.9564 - 0.2537 * a)))))
 
 
-def friction_factor_curved_laminar(dean: ArrayLike, *, extrapolate: bool = False) -> NDArray[np.float64]:
-    """Laminar friction factor of a curved duct over that of the straight one.
+@correlation(how_to_fix=_HOW_TO_FIX, dean=(0.0, 2000.0))
+def friction_factor_curved_laminar(dean: Array) -> Array:
+    """Laminar friction factor of a curved duct over that of the straight one; 1 up to De = 11.6.
 
     Parameters
     ----------
     dean : (n,) array_like, [-]
-        Re √(D_h/D_c).
-    extrapolate : bool
-        Compute above Range too.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        1 up to De = 11.6.
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range, unless ``extrapolate``.
-
-    Range: De <= 2000. Mishra & Gupta (1979) give the same within 2 % up to 3000.
+        Re √(D_h/D_c). Mishra & Gupta (1979) give the same within 2 % up to 3000.
 
     Source: White (1929), Proc. R. Soc. A 123, 645–663.
 
     >>> friction_factor_curved_laminar([10.0, 64.0, 1000.0]).round(3).tolist()
     [1.0, 1.334, 3.64]
     """
-    de = np.asarray(dean, float)
-    if not extrapolate:
-        require_range("friction_factor_curved_laminar", dean=(de, *_WHITE_DEAN_RANGE), how_to_fix=_HOW_TO_FIX)
-    reduced = (11.6 / np.maximum(de, 11.6)) ** 0.45
+    reduced = (11.6 / np.maximum(dean, 11.6)) ** 0.45
     return 1.0 / (1.0 - (1.0 - reduced) ** (1.0 / 0.45))
 
 
-def friction_factor_helical_turbulent(
-    reynolds: ArrayLike, curvature_ratio: ArrayLike, *, extrapolate: bool = False
-) -> NDArray[np.float64]:
-    """Darcy friction factor of turbulent flow in a smooth helical coil.
+@correlation(how_to_fix=_HOW_TO_FIX, reynolds=(4500.0, 1.0e5), curvature_ratio=(0.0, 0.2))
+def friction_factor_helical_turbulent(reynolds: Array, curvature_ratio: Array) -> Array:
+    """Darcy friction factor of turbulent, isothermal flow in a smooth helical coil.
 
     Parameters
     ----------
     reynolds : (n,) array_like, [-]
     curvature_ratio : (n,) array_like, [-]
         Hydraulic over coil diameter; 0 is a straight duct (Blasius).
-    extrapolate : bool
-        Compute outside Range too.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range, unless ``extrapolate``.
-
-    Range: 4500 <= Re <= 1e5, D_h/D_c <= 0.2, isothermal.
 
     Source: Mishra & Gupta (1979), Ind. Eng. Chem. Process Des. Dev. 18,
     130–137; as used by Gnielinski (1986).
@@ -116,15 +71,7 @@ def friction_factor_helical_turbulent(
     >>> float(friction_factor_helical_turbulent(2.2e4, 0.05).round(5))
     0.03269
     """
-    re, delta = np.broadcast_arrays(np.asarray(reynolds, float), np.asarray(curvature_ratio, float))
-    if not extrapolate:
-        require_range(
-            "friction_factor_helical_turbulent",
-            reynolds=(re, *_HELICAL_TURBULENT_RANGE),
-            curvature_ratio=(delta, 0.0, 0.2),
-            how_to_fix=_HOW_TO_FIX,
-        )
-    return 0.3164 * re**-0.25 + 0.03 * np.sqrt(delta)
+    return 0.3164 * reynolds**-0.25 + 0.03 * np.sqrt(curvature_ratio)
 
 
 def friction_factor_channel(
@@ -327,9 +274,11 @@ def _friction_warnings(
 ) -> tuple[CodedWarning, ...]:
     if reynolds <= critical_reynolds:
         dean = reynolds * np.sqrt(section.curvature_ratio)
-        fault = range_fault("Dean number", dean, *_WHITE_DEAN_RANGE)
+        fault = range_fault("Dean number", dean, *friction_factor_curved_laminar.ranges["dean"])
     else:
-        fault = range_fault("Reynolds number", reynolds, 0.0, _HELICAL_TURBULENT_RANGE[1])
+        fault = range_fault(
+            "Reynolds number", reynolds, 0.0, friction_factor_helical_turbulent.ranges["reynolds"][1]
+        )
     if not fault:
         return ()
     return (CodedWarning("coolant_friction_extrapolated", f"Friction of the channel: {fault}."),)

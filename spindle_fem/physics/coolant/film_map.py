@@ -85,7 +85,7 @@ def film_map(
 
     Source: Wu & Tan (2016), Adv. Mech. Eng. 8(8), Figure 22.
 
-    >>> from spindle_fem.physics.coolant.properties import OilIsoVg32
+    >>> from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
     >>> channel = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
     >>> chart = film_map("paper", channel, OilIsoVg32(), [0.010, 0.019], [288.15, 304.15], velocity=5.7)
     >>> chart.regime.tolist()

@@ -308,7 +308,7 @@ def march_channel(
     ConvergenceError
         The properties do not settle (they do within ten iterations).
 
-    >>> from spindle_fem.physics.coolant.properties import OilIsoVg32
+    >>> from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
     >>> channel = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
     >>> result = march_channel(
     ...     channel, OilIsoVg32(), 20e-3 / 60, 288.15, [295.0] * 20, [0.1562 / 20] * 20, model="sieder_tate"

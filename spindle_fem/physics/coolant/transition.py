@@ -5,45 +5,34 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spindle_fem.correlation import Array, correlation
 from spindle_fem.validity import require_range
 
 TURBULENT_FROM_REYNOLDS = 2.2e4
 
 
-def critical_reynolds_schmidt(curvature_ratio: ArrayLike) -> NDArray[np.float64]:
+@correlation(
+    how_to_fix="A channel this tightly wound has no source; use a larger coil diameter.",
+    curvature_ratio=(0.0, 0.2),
+)
+def critical_reynolds_schmidt(curvature_ratio: Array) -> Array:
     """Reynolds number at which laminar flow in a helical coil ends.
 
     Parameters
     ----------
     curvature_ratio : (n,) array_like, [-]
-        Hydraulic over coil diameter.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range.
-
-    Range: 0 (straight) to 0.2.
+        Hydraulic over coil diameter, 0 for a straight duct.
 
     Source: Schmidt (1967), Chem.-Ing.-Techn. 39, 781–789.
 
     >>> float(critical_reynolds_schmidt(10.909 / 226.0).round(0))
     7357.0
     """
-    delta = np.asarray(curvature_ratio, float)
-    require_range(
-        "critical_reynolds_schmidt",
-        curvature_ratio=(delta, 0.0, 0.2),
-        how_to_fix="A channel this tightly wound has no source; use a larger coil diameter.",
-    )
-    return 2300.0 * (1.0 + 8.6 * delta**0.45)
+    return 2300.0 * (1.0 + 8.6 * curvature_ratio**0.45)
 
 
-def critical_reynolds_ito(curvature_ratio: ArrayLike) -> NDArray[np.float64]:
+@correlation(how_to_fix="Use critical_reynolds_schmidt.", curvature_ratio=(0.0012, 0.067))
+def critical_reynolds_ito(curvature_ratio: Array) -> Array:
     """Reynolds number at which laminar flow in a curved pipe ends, from friction.
 
     Parameters
@@ -51,29 +40,12 @@ def critical_reynolds_ito(curvature_ratio: ArrayLike) -> NDArray[np.float64]:
     curvature_ratio : (n,) array_like, [-]
         Pipe over coil diameter.
 
-    Returns
-    -------
-    (n,) ndarray, [-]
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range.
-
-    Range: 0.0012 to 0.067.
-
     Source: Ito (1959), J. Basic Eng. 81, 123–134.
 
     >>> float(critical_reynolds_ito(10.909 / 226.0).round(0))
     7582.0
     """
-    delta = np.asarray(curvature_ratio, float)
-    require_range(
-        "critical_reynolds_ito",
-        curvature_ratio=(delta, 0.0012, 0.067),
-        how_to_fix="Use critical_reynolds_schmidt.",
-    )
-    return 2.0e4 * delta**0.32
+    return 2.0e4 * curvature_ratio**0.32
 
 
 def transition_weight(reynolds: ArrayLike, critical_reynolds: ArrayLike) -> NDArray[np.float64]:

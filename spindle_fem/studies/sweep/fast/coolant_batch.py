@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.physics.coolant.duct_friction import PressureDrop, channel_pressure_drop
+from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
 from spindle_fem.physics.coolant.march import linearise_march, march_enthalpy
-from spindle_fem.physics.coolant.nusselt import nusselt_sieder_tate
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.physics.coolant.regimes import (
     ChannelState,
