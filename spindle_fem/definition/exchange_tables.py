@@ -23,6 +23,7 @@ from spindle_fem.definition.field_types import (
     UncertainFilm,
     UncertainNumber,
     VolumeFlow,
+    choice_field,
     quantity_field,
     raise_faults,
 )
@@ -31,6 +32,8 @@ from spindle_fem.units import Uncertain
 # Least wall left between neighbouring turns of the channel, for the milling cutter.
 LEAST_LAND = 3.0e-3
 
+Fluid = choice_field("spindle_fem.physics.coolant.coolants")
+FilmModel = choice_field("spindle_fem.physics.coolant.film_models")
 ReferenceSpeed = quantity_field("rad/s", above=0.0)
 
 
@@ -89,14 +92,14 @@ class Channel(SpecModel):
 class Coolant(SpecModel):
     """Oil in the channel."""
 
-    fluid: Literal["iso_vg_32", "water"] = "iso_vg_32"
+    fluid: Fluid = "iso_vg_32"
     """Whose properties are taken."""
     inlet_temperature: Temperature
     """Mixed, where the oil enters."""
     flow: VolumeFlow
     """Of all starts together."""
-    film_model: Literal["paper", "sieder_tate", "helical"] = "helical"
-    """Equations 29-31, the laminar one on the hydraulic diameter, or a helical duct's."""
+    film_model: FilmModel = "helical"
+    """Which correlation of the channel's film."""
     film_factor: UncertainNumber = Uncertain(1.0)
     """Factor on the film coefficient of the channel."""
     properties_at: Literal["inlet", "bulk"] = "bulk"

@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSeriali
 from pydantic_core import PydanticCustomError
 
 from spindle_fem.errors import SpindleFemError, did_you_mean
+from spindle_fem.registry import Registry, registry
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain, to_si, uncertain_to_si
 
 MARKS = {
@@ -268,6 +269,32 @@ class RangeRule:
 
     single: bool
     example: str = '["45 mm", "137 mm"]'
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChoiceRule:
+    """What a field may be that names a registered thing; also the source of the reference page.
+
+    Attributes
+    ----------
+    things : Registry
+    """
+
+    things: Registry
+
+    def read(self, value: Any) -> str:
+        """The name, if there is such a thing."""
+        names = tuple(self.things)
+        if not isinstance(value, str) or value not in names:
+            shown = f'"{value}"' if isinstance(value, str) else repr(value)
+            _refuse(f"{shown} is not allowed.", did_you_mean(str(value), names))
+        return value
+
+
+def choice_field(package: str) -> Any:
+    """Annotated text: the name of a thing that a registry has, one file each in a package."""
+    rule = ChoiceRule(registry(package))
+    return Annotated[str, BeforeValidator(rule.read), rule]
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from spindle_fem.definition.field_types import FreeQuantityRule, Name, QuantityRule, RangeRule
+from spindle_fem.definition.field_types import ChoiceRule, FreeQuantityRule, Name, QuantityRule, RangeRule
 from spindle_fem.units import quantity_example
 
 
@@ -103,14 +103,16 @@ def quantity_rule(annotation: Any) -> QuantityRule | None:
 
 def literal_values(annotation: Any) -> tuple[Any, ...]:
     """The allowed values of a field that takes one of a few."""
-    alternatives, _ = _peeled(annotation)
-    return tuple(value for item in alternatives if get_origin(item) is Literal for value in get_args(item))
+    alternatives, metadata = _peeled(annotation)
+    listed = [value for item in alternatives if get_origin(item) is Literal for value in get_args(item)]
+    return (*listed, *(name for item in metadata if isinstance(item, ChoiceRule) for name in item.things))
 
 
 def is_text(annotation: Any) -> bool:
     """Whether a field takes any text."""
-    alternatives, _ = _peeled(annotation)
-    return str in alternatives and quantity_rule(annotation) is None
+    alternatives, metadata = _peeled(annotation)
+    chosen = any(isinstance(item, ChoiceRule) for item in metadata)
+    return str in alternatives and quantity_rule(annotation) is None and not chosen
 
 
 def annotation_of(field: FieldInfo) -> Any:
