@@ -18,6 +18,10 @@ from spindle_fem.errors import UnitError
 
 ZERO_CELSIUS_K = 273.15
 
+# Units of recorded inputs as pint writes them.
+TEMPERATURE_UNIT = "kelvin"
+ANGULAR_SPEED_UNIT = "radian / second"
+
 # 90 % of a normal distribution lie within this many standard deviations.
 NORMAL_90_PERCENT = 1.6448536269514722
 

@@ -97,7 +97,7 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
     from spindle_fem.definition.load import find_machine, read_definition
     from spindle_fem.definition.network_tables import is_network_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
-    from spindle_fem.operation.joint_groups import group_of_contacts
+    from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 
     if is_network_machine(read_definition(find_machine(machine))):
         return _check_network(machine, overrides)
@@ -234,8 +234,8 @@ def _load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpe
     """Machine whose parts fit together; faults of its tables, geometry and effects at once."""
     from spindle_fem.definition.load import examine_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
+    from spindle_fem.machine.geometry.joint_groups import group_of_contacts
     from spindle_fem.model.reduced.defined_effects import check_effects, require_known_effects
-    from spindle_fem.operation.joint_groups import group_of_contacts
 
     overrides = tuple(overrides)
 

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import spindle_fem.effects.catalogue as package
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffect, Intervals, Reading
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermParameter
@@ -59,6 +60,11 @@ def effect_of(name: str, where: str = "effect") -> Effect:
     if name not in _found():
         raise SpecError(where, f'"{name}" is not in the catalogue.', did_you_mean(name, _found()))
     return _found()[name]
+
+
+def effects_in_definition(spec: MachineSpec) -> frozenset[str]:
+    """Ids of the effects that a machine definition switches on without an ``[[effect]]``."""
+    return frozenset(name for name, effect in _found().items() if effect.in_definition(spec))
 
 
 def candidates_for(view: MachineView) -> tuple[Candidate, ...]:

@@ -15,8 +15,9 @@ from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.errors import RecordingError
 from spindle_fem.inference.heldout import heldout_stamps
-from spindle_fem.machine.view.build_view import view_of, view_of_network
+from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.machine.view.usual_sizes import common_quantities
+from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.fast_model import FastModel
@@ -96,7 +97,7 @@ def open_machine(
     fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
     for recording in (*recordings, *calibration):
         fast.require_channels(recording.probes, recording.source)
-    view = _widest([view_of(fast, _seen(recording, heldout)) for recording in recordings])
+    view = _widest([view_of(fast.names, _seen(recording, heldout)) for recording in recordings])
     return DiagnosedMachine(
         spec.name,
         spec,

@@ -10,12 +10,11 @@ import numpy as np
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.machine.view.machine_names import coefficient_groups
 from spindle_fem.model.mesh.thermal_operators import ThermalOperators
-from spindle_fem.operation.joint_groups import group_of_contacts
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
 
-CHANNEL_FILM = "channel.film"
 INNER_SHARE = "heat.inner_share"
 # A natural film's constant part is taken where the wall is this much warmer than the air.
 NATURAL_DIFFERENCE = 10.0
@@ -139,34 +138,11 @@ def build_coefficient_table(
                 f'kind "{group.ball_row.kind}" has no constant conductance for the reduced model.',
                 'Give kind = "constant" with a conductance.',
             )
-    groups: dict[str, tuple[str, ...]] = {
-        f"conductivity.{name}": (f"conductivity.{name}",) for name in spec.materials
-    }
-    groups |= {
-        f"joint.{name}": (f"joint.{name}", group) for name, group in _joint_groups(spec, names).items()
-    }
-    for number, film in enumerate(spec.film, 1):
-        owner = f"film.{film.name}" if film.name else f"film[{number}]"
-        groups |= {f"film.{surface}": (f"film.{surface}", owner) for surface in film.surface}
-    groups |= {f"gap.{gap.name}": (f"gap.{gap.name}",) for gap in spec.gap}
-    for group, bearing in spec.bearings:
-        for side in ("inner", "outer"):
-            name = f"balls.{bearing.name}.{side}"
-            groups[name] = (name, f"ball_row.{bearing.name}", f"ball_row.{group.name}")
-    groups[CHANNEL_FILM] = (CHANNEL_FILM, "coolant.film_factor")
-    groups |= {f"capacity.{name}": (f"capacity.{name}", "heat_capacity_factor") for name in spec.materials}
-    for _, bearing in spec.bearings:
-        name = f"capacity.{bearing.name}.balls"
-        groups[name] = (name, "heat_capacity_factor")
+    groups = coefficient_groups(spec, names)
     known = dict.fromkeys(name for entry in groups.values() for name in entry)
     for group, bearing in spec.bearings:
         known |= dict.fromkeys((f"heat.{bearing.name}", f"heat.{group.name}"))
     return CoefficientTable(spec, names, dict(gap_radii), groups, (*known, INNER_SHARE))
-
-
-def _joint_groups(spec: MachineSpec, contacts: tuple[str, ...]) -> dict[str, str]:
-    """``joint.<group>`` of every contact."""
-    return {name: f"joint.{group.name}" for name, group in group_of_contacts(spec, contacts).items()}
 
 
 def gap_radii_of(spec: MachineSpec, operators: ThermalOperators) -> dict[str, tuple[float, float]]:

@@ -9,17 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.view.place_names import ACROSS, UP, ringed_probes, sided_names
 from spindle_fem.model.mesh.thermal_operators import ThermalOperators
 from spindle_fem.operation.machine_loads import LoadsBuilder
-from spindle_fem.operation.probe_places import (
-    ACROSS,
-    UP,
-    around_places,
-    harmonics,
-    near_places,
-    ringed_probes,
-    sided_names,
-)
+from spindle_fem.operation.probe_places import around_places, harmonics, near_places
 
 Array = NDArray[np.float64]
 

@@ -13,18 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from spindle_fem.definition.machine_spec import MachineSpec, Probe
+from spindle_fem.definition.machine_spec import Probe
 from spindle_fem.errors import GeometryError
+from spindle_fem.machine.view.place_names import AROUND, NEAR, STANDARD_DISTANCE
 from spindle_fem.model.mesh.evaluate import locate_points, probe_matrix
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators
 
 Array = NDArray[np.float64]
 
-NEAR, AROUND = "near.", "around."
-# First harmonics around the axis of a standing place: along y, where a probe's angle is 0, and along -x.
-UP, ACROSS = "up.", "across."
-# Root mean square distance from the probe, in space, of a patch that no wall cuts.
-STANDARD_DISTANCE = 20e-3
 DISPLACEMENT = 0.5e-3
 # A curved wall and its quadratic mesh differ by less.
 WALL_TOLERANCE = 2e-5
@@ -73,29 +69,6 @@ def _patch(operators: ThermalOperators, part: str, squared: Array) -> Array:
         weight = operators.prolongation @ weight
     vector = operators.part_storage(part) @ weight
     return vector / vector.sum()
-
-
-def ringed_probes(spec: MachineSpec) -> tuple[Probe, ...]:
-    """Point probes in standing parts, away from the bearings: a bearing is a ring itself."""
-    standing = {part.name for part in spec.part if not part.rotating}
-    sets = [[z for bearing in group.bearing for z in bearing.z] for group in spec.bearing_set]
-    return tuple(
-        probe
-        for probe in spec.probe
-        if probe.kind == "point"
-        and probe.part in standing
-        and not any(min(ends) <= probe.z <= max(ends) for ends in sets)
-    )
-
-
-def sided_names(spec: MachineSpec) -> tuple[str, ...]:
-    """Places that have sides: segments of standing parts with more than one."""
-    return tuple(
-        f"{part.name}.{segment.name}"
-        for part in spec.part
-        if not part.rotating and len(part.segment) > 1
-        for segment in part.segment
-    )
 
 
 def harmonics(operators: ThermalOperators, mean: Array) -> tuple[Array, Array]:

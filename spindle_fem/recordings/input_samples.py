@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import OutOfValidityError, RecordingError, did_you_mean
-from spindle_fem.model.lumped.thermal_network import Array, ThermalNetwork
+from spindle_fem.errors import RecordingError, did_you_mean
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class InputHistory:
-    """What drives a network, at strictly increasing times.
+    """What drives a machine, at strictly increasing times.
 
     Attributes
     ----------
@@ -73,38 +74,3 @@ class InputHistory:
     def at_first(self) -> dict[str, float]:
         """Inputs at the first time."""
         return dict(zip(self.names, self.values[0].tolist(), strict=True))
-
-
-def boundary_history(network: ThermalNetwork, history: InputHistory, values: Array) -> Array:
-    """Boundary temperatures, ``(N, b) [K]``, of input values ``(N, m)``."""
-    result = np.tile(network.boundary_temperature, (len(values), 1))
-    for position, name in enumerate(network.boundary_input):
-        if name is not None:
-            result[:, position] = values[:, history.column(name)]
-    return result
-
-
-def source_history(network: ThermalNetwork, history: InputHistory, values: Array) -> Array:
-    """Heat of each source, ``(N, s) [W]``, of input values ``(N, m)``.
-
-    Raises
-    ------
-    OutOfValidityError
-        A negative input under an exponent that is not a whole number.
-    """
-    result = np.tile(network.source_gain, (len(values), 1))
-    for position, name in enumerate(network.source_input):
-        if name is None:
-            continue
-        driven, exponent = values[:, history.column(name)], float(network.source_exponent[position])
-        if exponent == 1.0:
-            result[:, position] *= driven
-            continue
-        if not exponent.is_integer() and np.any(driven < 0.0):
-            raise OutOfValidityError(
-                f'source "{network.source_names[position]}"',
-                f'input "{name}" falls to {driven.min():g}, which has no power {exponent:g}.',
-                "Give the magnitude of the input, or a whole exponent.",
-            )
-        result[:, position] *= driven**exponent
-    return result

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from spindle_fem.recordings.align import Recording
+from spindle_fem.units import TEMPERATURE_UNIT
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,6 @@ LONGEST_REACH, NEGLIGIBLE = 60, 4.0
 JUMP_SIGMAS, MEDIAN_WINDOW = 2.0, 5
 # A walk slower than this share of the noise in each reading cannot be told from none.
 SLOWEST = 1.0e-3
-TEMPERATURE_UNIT = "kelvin"
 
 
 def walk_and_noise(values: Array) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from spindle_fem.errors import OutOfValidityError, RecordingError
 from spindle_fem.recordings.align import SMALLEST_SIGMA, Recording
 from spindle_fem.recordings.channel_checks import Flag
 from spindle_fem.recordings.defects import Thinning
-from spindle_fem.studies.simulate_network import ROTATIONAL_DIMENSION
+from spindle_fem.units import ANGULAR_SPEED_UNIT
 
 Array = NDArray[np.float64]
 
@@ -153,7 +153,7 @@ def _inputs(
     found = np.empty((len(stamps), len(history.names)))
     for column, name in enumerate(history.names):
         values = history.values[:, column]
-        if recording.input_units[column] == ROTATIONAL_DIMENSION:
+        if recording.input_units[column] == ANGULAR_SPEED_UNIT:
             values = np.abs(values)
         exponent = exponents.get(name, 1.0)
         if exponent != 1.0:

@@ -11,7 +11,7 @@ from matplotlib.patches import Circle, Rectangle
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
 from spindle_fem.machine.view.meridian_places import regions_of
-from spindle_fem.operation.probe_places import NEAR, STANDARD_DISTANCE
+from spindle_fem.machine.view.place_names import NEAR, STANDARD_DISTANCE
 from spindle_fem.report.figure_style import (
     FILM_MAP,
     INK,

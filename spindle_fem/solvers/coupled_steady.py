@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import ConvergenceError, NoEquilibriumError, NoSteadyStateError, OutOfValidityError
 from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
@@ -20,7 +21,6 @@ from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operat
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady
 from spindle_fem.operation.bearing_heat import heat_model_of
 from spindle_fem.operation.coolant_loop import CoolantState
-from spindle_fem.operation.joint_groups import group_of_contacts
 from spindle_fem.operation.loads import NO_CHANGE, LoadChange, Loads
 from spindle_fem.operation.machine_loads import FieldState, LoadsBuilder
 from spindle_fem.operation.operating_point import OperatingPoint

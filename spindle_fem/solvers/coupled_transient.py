@@ -20,12 +20,12 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import NoEquilibriumError, NoSteadyStateError, OutOfValidityError
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.model.trbdf2 import WEIGHTS
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
-from spindle_fem.operation.coefficients import CHANNEL_FILM
 from spindle_fem.operation.coolant_loop import CoolantState
 from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads
 from spindle_fem.operation.machine_loads import FieldState

@@ -16,19 +16,19 @@ from spindle_fem.errors import (
     UnitError,
     did_you_mean,
 )
+from spindle_fem.model.lumped.driven_inputs import boundary_history, source_history
 from spindle_fem.model.lumped.exact_steps import LinearSystem
 from spindle_fem.model.lumped.network_steady import solve_steady
 from spindle_fem.model.lumped.network_transient import simulate_transient
 from spindle_fem.model.lumped.node_balance import NetworkBalance, explicit_derivative
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
 from spindle_fem.recordings.align import Recording
-from spindle_fem.recordings.input_samples import InputHistory, boundary_history, source_history
-from spindle_fem.units import registry
+from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.units import ANGULAR_SPEED_UNIT, registry
 
 Array = NDArray[np.float64]
 
 INITIAL_KINDS = ("first_reading", "ambient", "steady")
-ROTATIONAL_DIMENSION = "radian / second"
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ def magnitude_history(
     units = dict(zip(recording.input_names, recording.input_units, strict=True))
     values = history.values.copy()
     for column, name in enumerate(history.names):
-        if units[name] == ROTATIONAL_DIMENSION:
+        if units[name] == ANGULAR_SPEED_UNIT:
             values[:, column] = np.abs(values[:, column])
     return replace(history, values=values)
 

@@ -56,7 +56,7 @@ def test_the_full_model_confirms_what_was_found(tmp_path, monkeypatch):
     spec = load_machine("recorded_spindle")
     fast = FastModel(lumped_model(spec), spec)
     blank = recorded_as(tmp_path, np.full((TIMES.size, len(PROBES)), 20.0))
-    view = view_of(fast, blank)
+    view = view_of(fast.names, blank)
     lying = next(c for c in candidates_for(view) if (c.effect, c.component) == ("sensor_offset", "SP05"))
     source = effect_of("unrecorded_heat_source").over(view, "housing", [(300.0, 1500.0)])
     effects = {source.amplitude: HEAT, lying.amplitude: OFFSET}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import load_machine
-from spindle_fem.effects.catalogue.coolant_film import TransitionTerm, reynolds_number
+from spindle_fem.effects.catalogue.coolant_film import TransitionTerm
 from spindle_fem.effects.catalogue.thermal_preload import ThermalPreloadTerm
 from spindle_fem.effects.framework.laws import amplitude
 from spindle_fem.effects.framework.machine_view import ChannelFlow
@@ -64,7 +64,7 @@ def transition(machine):
     )
     area = channel.depth * channel.width * channel.starts
     flow = ChannelFlow(machine.spec.coolant.fluid, section.hydraulic_diameter, area)
-    low, high = (reynolds_number(flow, litres * LITRE_PER_MINUTE, 290.15) for litres in (12.0, 24.0))
+    low, high = (flow.reynolds_number(litres * LITRE_PER_MINUTE, 290.15) for litres in (12.0, 24.0))
     return TransitionTerm("transition", flow, (low, high))
 
 

@@ -11,13 +11,13 @@ from scipy.sparse.linalg import splu, spsolve
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.machine.view.place_names import ACROSS, UP
 from spindle_fem.model.reduced.affine_operators import build_affine_system
 from spindle_fem.model.reduced.build_reduced import ReductionOptions, build_reduced_model, reduced_model_of
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.probe_places import ACROSS, UP
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled

@@ -20,7 +20,8 @@ from spindle_fem.effects.registry import (
     interval_effects,
 )
 from spindle_fem.errors import SpecError, UnitError
-from spindle_fem.machine.view.build_view import view_of, view_of_network
+from spindle_fem.machine.view.build_view import view_of
+from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.drive import drive_of_recording
 from spindle_fem.model.reduced.fast_model import FastModel
@@ -117,7 +118,7 @@ def _spindle(folder):
     recording = _written(folder, "spindle", columns, text)
     spec = load_machine("recorded_spindle")
     fast = FastModel(lumped_model(spec), spec)
-    return fast, recording, view_of(fast, recording), drive_of_recording(spec, recording)
+    return fast, recording, view_of(fast.names, recording), drive_of_recording(spec, recording)
 
 
 def _network(folder):

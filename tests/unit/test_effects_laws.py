@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from spindle_fem.effects.catalogue.ambient_drift import HUMP, RAMP, STEADY, DriftTerm
 from spindle_fem.effects.catalogue.chiller_cycling import PEAK, SHARPNESS, ChillerCyclingTerm
-from spindle_fem.effects.catalogue.coolant_film import TransitionTerm, reynolds_number
+from spindle_fem.effects.catalogue.coolant_film import TransitionTerm
 from spindle_fem.effects.catalogue.coolant_heating import CoolantHeatingTerm
 from spindle_fem.effects.catalogue.gap_closure import GapClosureTerm
 from spindle_fem.effects.catalogue.grease_churning import GreaseChurningTerm
@@ -293,7 +293,7 @@ def test_a_hump_of_the_room_comes_and_goes():
 def test_the_channels_reynolds_number_is_the_reference_ones():
     channel = ChannelFlow("iso_vg_32", 0.010909, 0.010 * 0.012)
     # reference/spindle.md: about 292 at 15 °C and 20 L/min.
-    assert reynolds_number(channel, 20e-3 / 60, 288.15) == pytest.approx(292.0, rel=0.01)
+    assert channel.reynolds_number(20e-3 / 60, 288.15) == pytest.approx(292.0, rel=0.01)
     term = TransitionTerm("t", channel, (290.0, 850.0))
     assert term.law(2000.0, {"film_increase": 2.0, "onset_reynolds": 600.0, "width": 50.0}) == pytest.approx(
         3.0

@@ -50,13 +50,7 @@ MAY_LOAD_PYVISTA = {"report", "cli"}
 # Climbs that are left to mend: from, to.
 OPEN: set[tuple[str, str]] = {
     ("inference", "studies"),
-    ("machine.view", "model.reduced"),
-    ("machine.view", "operation"),
-    ("machine.view", "model.lumped"),
     ("model.reduced", "studies"),
-    ("recordings", "model.reduced"),
-    ("recordings", "model.lumped"),
-    ("recordings", "studies"),
     ("studies", "commands"),
     ("studies", "report"),
 }

@@ -65,7 +65,7 @@ def plant(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def candidates(plant):
-    view = view_of(plant.fast, plant.recordings[0])
+    view = view_of(plant.fast.names, plant.recordings[0])
     found = {(c.effect, c.component): c for c in reversed(candidates_for(view))}
     heat = effect_of("unrecorded_heat_source").over(view, "housing", [(900.0, 2000.0)])
     return found | {(heat.effect, heat.component): heat}

@@ -27,7 +27,7 @@ from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates, slow_error_of
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener, likely_slow_error
 from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, Plant
-from spindle_fem.machine.view.network_view import view_of_network
+from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.recordings.align import read_recording

@@ -107,7 +107,7 @@ class Case:
         )
         self.fast = FastModel(model, self.spec)
         self.blank = written(folder, np.tile(20.0, (TIMES.size, len(PROBES))))
-        self.view = view_of(self.fast, self.blank)
+        self.view = view_of(self.fast.names, self.blank)
         self.candidates = {(c.effect, c.component): c for c in reversed(candidates_for(self.view))}
         heat = effect_of("unrecorded_heat_source").over(self.view, "front_bearings", [(FROM, UNTIL)])
         self.candidates[heat.effect, heat.component] = heat

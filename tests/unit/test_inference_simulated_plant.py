@@ -65,7 +65,7 @@ def plant(recording):
 
 @pytest.fixture(scope="module")
 def view(plant, recording):
-    return view_of(plant.fast, recording)
+    return view_of(plant.fast.names, recording)
 
 
 @pytest.fixture(scope="module")
@@ -267,7 +267,7 @@ def test_covariates_are_means_over_the_steps_and_end_none(plant, recording):
     exact = np.trapezoid(flicker[read], recording.times[read])
     exact += flicker[read][0] * recording.times[read][0]
     assert float(drive.start[:, -1] @ drive.steps) == pytest.approx(exact, rel=1e-9)
-    quantities = {item.name: item for item in view_of(plant.fast, beside).quantities}
+    quantities = {item.name: item for item in view_of(plant.fast.names, beside).quantities}
     assert list(quantities) == ["change of speed", "load"]
     assert (quantities["load"].input, quantities["load"].beside) == ("covariate.load", True)
     assert quantities["load"].highest == np.nanmax(flicker)

@@ -7,6 +7,7 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import Probe
 from spindle_fem.errors import GeometryError
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
+from spindle_fem.machine.view.place_names import ringed_probes
 from spindle_fem.model.mesh.evaluate import probe_matrix
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.operation.probe_places import (
@@ -15,7 +16,6 @@ from spindle_fem.operation.probe_places import (
     near_places,
     probe_positions,
     probe_slopes,
-    ringed_probes,
 )
 
 # Two tubes, radii 100, 150 and 200 mm, 100 mm long.

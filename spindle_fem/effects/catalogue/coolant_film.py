@@ -10,29 +10,13 @@ import numpy as np
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported
 from spindle_fem.effects.framework.laws import amplitude, factor, linear, shape, smooth_step
 from spindle_fem.effects.framework.machine_view import ChannelFlow, MachineView
-from spindle_fem.effects.framework.term import Operating, Term
-from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.effects.framework.term import CHANNEL_FILM, Operating, Term
 
-CHANNEL_FILM = "channel.film"
 FILM_FACTOR = "coolant.film_factor"
 FOULING, TRANSITION, CURVATURE = "fouling", "transition", "curvature"
 ONSETS = 8
 # A law of the Reynolds number needs this ratio of its ends to show.
 LEAST_RANGE = 1.1
-
-
-def reynolds_number(channel: ChannelFlow, flow: float, temperature: float) -> float:
-    """Of the channel at inlet temperature, on the hydraulic diameter.
-
-    Parameters
-    ----------
-    channel : ChannelFlow
-    flow : float, [m³/s]
-        Of all starts.
-    temperature : float, [K]
-    """
-    viscosity = float(coolant_by_name(channel.fluid).properties(temperature).kinematic_viscosity)
-    return flow / channel.area * channel.hydraulic_diameter / viscosity
 
 
 class ReynoldsFilmTerm(Term, ABC):
@@ -55,7 +39,7 @@ class ReynoldsFilmTerm(Term, ABC):
         """Of the class's operating point."""
         if point.coolant_flow <= 0.0:
             return {}
-        reynolds = reynolds_number(self._channel, point.coolant_flow, point.coolant_inlet_temperature)
+        reynolds = self._channel.reynolds_number(point.coolant_flow, point.coolant_inlet_temperature)
         return {CHANNEL_FILM: self.law(reynolds, parameters)}
 
 

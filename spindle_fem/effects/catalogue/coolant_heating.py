@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature, rows
 from spindle_fem.effects.framework.machine_view import MachineView, fluid_place
@@ -58,6 +59,10 @@ class CoolantHeating(Effect):
     kind = "missing_physics"
     title = "the coolant warms on its way, so that what it passes last is cooled less"
     check = "Coolant flow and its rise from inlet to outlet: heat taken up over flow times heat capacity."
+
+    def in_definition(self, spec: MachineSpec) -> bool:
+        """Every channel with a flow warms its coolant."""
+        return spec.channel is not None
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Coolants of a network that pass several nodes, in both directions."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, power
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -41,6 +42,10 @@ class NaturalConvection(Effect):
         "Outside surfaces for covers, draught and dirt; measure wall and air temperature at two steady "
         "states of different heat."
     )
+
+    def in_definition(self, spec: MachineSpec) -> bool:
+        """A natural film has free convection and radiation."""
+        return any(isinstance(film, NaturalFilm) for film in spec.film)
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """The standing outside; boundary links of a network."""

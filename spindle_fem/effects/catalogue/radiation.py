@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -47,6 +48,10 @@ class Radiation(Effect):
         "Paint and bare metal of the outside (emissivity), hot or cold bodies in sight (oven, window, "
         "coolant tank); compare a surface with and without a reflecting foil."
     )
+
+    def in_definition(self, spec: MachineSpec) -> bool:
+        """A natural film has free convection and radiation."""
+        return any(isinstance(film, NaturalFilm) for film in spec.film)
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """The standing outside; boundary links of a network."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, power, relaxed, repeated, shape, softplus
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -69,6 +70,10 @@ class ThermalPreload(Effect):
         "check spacer lengths, and whether the outer rings can still slide; compare cooling of housing "
         "and shaft."
     )
+
+    def in_definition(self, spec: MachineSpec) -> bool:
+        """Where heat follows expansion."""
+        return spec.heat.thermal_preload
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """One a bearing set."""

@@ -51,6 +51,8 @@ class UnrecordedCooling(UnrecordedEffect):
 
     name = "unrecorded_cooling"
     kind = "missing_physics"
+    # It can take almost any course, so that less speaks for it than for a law.
+    prior_weight = 0.5
     title = "something cools this place that no recorded input explains"
     check = (
         "What runs in these intervals: cutting fluid, air blast, an open door or guard, a second coolant "
@@ -58,6 +60,7 @@ class UnrecordedCooling(UnrecordedEffect):
     )
     check_law = "What blows or flows at this place with the {}; vary it alone and watch this place."
     interval_forms = ("conductance", "heat")
+    takes_heat_away = True
 
     def usual(self, machine: MachineView, form: str) -> float:
         """A fifth of all heat, or what carries it at the usual rise."""

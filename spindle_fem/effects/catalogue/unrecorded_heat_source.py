@@ -16,6 +16,8 @@ class UnrecordedHeatSource(UnrecordedEffect):
 
     name = "unrecorded_heat_source"
     kind = "missing_physics"
+    # It can take almost any course, so that less speaks for it than for a law.
+    prior_weight = 0.5
     title = "something heats this place that no recorded input explains"
     check = (
         "What runs in these intervals: cutting, hydraulic clamping, chip heap, lamp, neighbouring drive; "

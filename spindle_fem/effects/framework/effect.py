@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermParameter
@@ -171,6 +172,8 @@ class Effect(ABC):
         In plain words, for reports: "the grease thins as it warms".
     check : str
         What a maintenance engineer should look at when it is found.
+    prior_weight : float
+        How likely the effect is before the data, beside the others of the catalogue.
     law_sigma : mapping of str to float
         1 σ of the logarithm of what a finding states, by name, that a fit of so simple a law cannot
         know of; widens the stated interval.
@@ -180,7 +183,12 @@ class Effect(ABC):
     kind: Kind
     title: str
     check: str
+    prior_weight: float = 1.0
     law_sigma: Mapping[str, float] = MappingProxyType({})
+
+    def in_definition(self, spec: MachineSpec) -> bool:
+        """Whether the definition of a machine with geometry switches it on without an ``[[effect]]``."""
+        return False
 
     def candidates(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Every form at every place of a machine; none where the definition already has it."""
@@ -338,9 +346,12 @@ class IntervalEffect(Effect):
     ----------
     interval_forms : tuple of str
         Forms that :meth:`over` takes, the usual one first.
+    takes_heat_away : bool
+        Whether heat over the intervals leaves the machine.
     """
 
     interval_forms: tuple[str, ...] = ("",)
+    takes_heat_away: bool = False
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Those that follow laws; candidates for intervals come from the data."""

@@ -12,6 +12,12 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.physics.coolant.properties import coolant_by_name
+
+Array = NDArray[np.float64]
 NOTHING: Mapping = MappingProxyType({})
 
 
@@ -65,6 +71,18 @@ class FrictionTable:
     thrust_coefficient: float = 0.0
     reference_thrust: float = 1750.0
 
+    def heat_at(self, speed: Array, thrust: Array) -> Array:
+        """Heat at speeds (n,) [rad/s] and thrusts (n,) [N], (n,) [W].
+
+        Beyond the table's ends the last straight line goes on; heat is never negative.
+        """
+        grid, values = np.asarray(self.speed), np.asarray(self.heat)
+        segment = np.clip(np.searchsorted(grid, speed, side="right") - 1, 0, len(grid) - 2)
+        fraction = (speed - grid[segment]) / (grid[segment + 1] - grid[segment])
+        nominal = values[segment] + fraction * (values[segment + 1] - values[segment])
+        factor = 1.0 + self.thrust_coefficient * (thrust / self.reference_thrust - 1.0)
+        return np.maximum(0.0, nominal * factor)
+
 
 @dataclass(frozen=True, slots=True)
 class ChannelFlow:
@@ -82,6 +100,11 @@ class ChannelFlow:
     fluid: str
     hydraulic_diameter: float
     area: float
+
+    def reynolds_number(self, flow: float, temperature: float) -> float:
+        """On the hydraulic diameter, for a flow of all starts [m³/s] at the inlet temperature [K]."""
+        viscosity = float(coolant_by_name(self.fluid).properties(temperature).kinematic_viscosity)
+        return flow / self.area * self.hydraulic_diameter / viscosity
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 FLOW = "coolant.flow"
 FLUID_PREFIX = "fluid."
 COOLANT_INLET = "fluid.coolant_inlet"
+# Coefficient of the film in the cooling channel.
+CHANNEL_FILM = "channel.film"
 # Inputs that drive nothing but terms that follow them: ``covariate.<column>``.
 COVARIATE = "covariate."
 

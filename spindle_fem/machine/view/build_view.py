@@ -7,11 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
-from spindle_fem.effects.catalogue.coolant_film import reynolds_number
-from spindle_fem.effects.framework.machine_view import ChannelFlow, FrictionTable, MachineView
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.uncertain_parameters import uncertain_parameters
+from spindle_fem.effects.framework.machine_view import ChannelFlow, MachineView
+from spindle_fem.effects.registry import effects_in_definition
 from spindle_fem.machine.view.contact_groups import seats_of
-from spindle_fem.machine.view.network_view import view_of_network
+from spindle_fem.machine.view.friction_tables import friction_tables
+from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.machine.view.part_roles import (
     CHANNEL_WALL,
     SHAFT_GAP,
@@ -20,6 +22,7 @@ from spindle_fem.machine.view.part_roles import (
     segment_volume,
     volume,
 )
+from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP, ringed_probes
 from spindle_fem.machine.view.usual_sizes import (
     LEAST_HEAT,
     input_series,
@@ -27,20 +30,15 @@ from spindle_fem.machine.view.usual_sizes import (
     quantities_of,
     usual_rise,
 )
-from spindle_fem.model.reduced.drive import heat_of_table, standard_inputs
-from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.operation.coefficients import free_parameters
-from spindle_fem.operation.probe_places import ACROSS, AROUND, NEAR, UP, ringed_probes
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.standard_inputs import standard_inputs
 
 Array = NDArray[np.float64]
 
-__all__ = ["view_of", "view_of_network"]
 
-
-def view_of(fast: FastModel, recording: Recording) -> MachineView:
+def view_of(names: MachineNames, recording: Recording) -> MachineView:
     """A machine with geometry on one recording.
 
     Parts are told by what they are and where they lie: the largest rotating
@@ -50,25 +48,27 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
 
     Parameters
     ----------
-    fast : FastModel
+    names : MachineNames
     recording : Recording
     """
-    spec = fast.spec
-    places = set(fast.model.place_names)
+    spec, bearings = names.spec, names.bearings
+    places = set(names.place_names)
     layout = Layout(spec, places)
     sets = {f"{group.name}_bearings": tuple(b.name for b in group.bearing) for group in spec.bearing_set}
-    sets |= {name: (name,) for name in fast.bearings}
-    sides = {side: {name: f"{name}.{side}_ring" for name in fast.bearings} for side in ("inner", "outer")}
+    sets |= {name: (name,) for name in bearings}
+    sides = {side: {name: f"{name}.{side}_ring" for name in bearings} for side in ("inner", "outer")}
     heat = layout.heat()
     for key, members in sets.items():
         heat[key] = tuple(f"{name}.{side}_raceway" for name in members for side in ("inner", "outer"))
-    films, walls, fluids, surroundings = _films(spec, layout, fast)
-    seats, outer_seats = seats_of(spec, fast, layout, sets)
-    spots, reported = _spots(fast, layout, heat, sets)
+    films, walls, fluids, surroundings = _films(names, layout)
+    seats, outer_seats = seats_of(names, layout, sets)
+    spots, reported = _spots(layout, heat, sets)
     known = standard_inputs(spec)
     inputs = {name: input_series(recording, name, known[name]) for name in known}
     channel = _channel(spec)
     speed = np.abs(inputs["speed"])
+    tables = friction_tables(spec)
+    tabulated = sum((t.heat_at(speed, inputs["thrust"]) for t in tables.values()), np.zeros(speed.size))
     return MachineView(
         kind="geometry",
         sets=sets,
@@ -78,7 +78,7 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
         films=films,
         joints={seat.component: (seat.parameter,) for seat in seats if seat.parameter},
         joint_coefficients=outer_seats,
-        parameters=free_parameters(spec),
+        parameters={item.name: item.sigma_log for item in uncertain_parameters(spec)},
         channels=recording.temperature_names,
         inputs=tuple(dict.fromkeys((*known, *recording.input_names))),
         quantities=quantities_of(recording, ("speed",)),
@@ -100,16 +100,11 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
         speed_inputs=dict.fromkeys((*sets, *heat, "shaft"), ("speed",)),
         input_scale={name: float(np.nanmax(np.abs(values))) for name, values in inputs.items()},
         capacity=_capacities(spec, layout),
-        typical_heat=max(
-            LEAST_HEAT,
-            float(heat_of_table(spec, speed, inputs["thrust"]).sum(axis=1).max())
-            if spec.heat.table is not None
-            else LEAST_HEAT,
-        ),
+        typical_heat=max(LEAST_HEAT, float(tabulated.max())),
         typical_rise=usual_rise(recording, inputs["ambient"]),
         channel=channel,
         reynolds=_reynolds(channel, inputs["coolant_flow"], inputs["coolant_inlet"]),
-        friction=_friction(spec),
+        friction=tables if spec.heat.model == "table" else {},
         inner_share=spec.heat.inner_share.value,
         ring_share=1.0 - spec.heat.ball_share,
         surroundings=surroundings,
@@ -118,18 +113,18 @@ def view_of(fast: FastModel, recording: Recording) -> MachineView:
 
 
 def _films(
-    spec: MachineSpec, layout: Layout, fast: FastModel
+    names: MachineNames, layout: Layout
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, str], dict[str, str | float], dict[str, tuple[str, ...]]]:
     """Films by component, the wall and fluid of each, and those of the ambient."""
     films: dict[str, list[str]] = {}
     walls: dict[str, str] = {}
     fluids: dict[str, str | float] = {}
-    places = set(fast.model.place_names)
+    spec, places = names.spec, layout.places
     rotating = {part.name for part in spec.part if part.rotating}
     for film in spec.film:
         for name in film.surface:
             coefficient = f"film.{name}"
-            if coefficient not in fast.model.fluid_names:
+            if coefficient not in names.fluid_names:
                 continue
             surface = layout.surface(name)
             walls[coefficient] = name if name in places else surface.part
@@ -145,7 +140,7 @@ def _films(
                 films.setdefault("housing", []).append(coefficient)
     ambient = tuple(name for name, fluid in fluids.items() if fluid == "ambient")
     return (
-        {key: tuple(names) for key, names in films.items()},
+        {key: tuple(own) for key, own in films.items()},
         walls,
         fluids,
         {"ambient": ambient} if ambient else {},
@@ -153,7 +148,6 @@ def _films(
 
 
 def _spots(
-    fast: FastModel,
     layout: Layout,
     heat: Mapping[str, tuple[str, ...]],
     sets: Mapping[str, tuple[str, ...]],
@@ -217,13 +211,7 @@ def _focal(
 def _switched_on(spec: MachineSpec) -> frozenset[str]:
     """What the machine already has, by id, or by id and component where that is all it concerns."""
     found = {f"{entry.effect} @ {entry.component}" for entry in spec.effects}
-    if spec.channel is not None:
-        found.add("coolant_heating")
-    if spec.heat.thermal_preload:
-        found.add("thermal_preload")
-    if any(isinstance(film, NaturalFilm) for film in spec.film):
-        found |= {"natural_convection", "radiation"}
-    return frozenset(found)
+    return frozenset(found) | effects_in_definition(spec)
 
 
 def _capacities(spec: MachineSpec, layout: Layout) -> dict[str, float]:
@@ -254,21 +242,6 @@ def _wetted_volume(spec: MachineSpec) -> float:
     """Coolant in the channel, m³."""
     section = _section(spec)
     return spec.channel.depth * spec.channel.width * section.length * spec.channel.starts
-
-
-def _friction(spec: MachineSpec) -> dict[str, FrictionTable]:
-    table = spec.heat.table
-    if table is None or spec.heat.model != "table":
-        return {}
-    return {
-        bearing.name: FrictionTable(
-            tuple(table.speed),
-            tuple(value * group.heat_factor.value for value in table.heat[bearing.name]),
-            table.thrust_coefficient.get(bearing.name, 0.0),
-            table.reference_thrust,
-        )
-        for group, bearing in spec.bearings
-    }
 
 
 def _viscosity(spec: MachineSpec) -> dict[str, tuple[float, float]]:
@@ -307,7 +280,7 @@ def _reynolds(channel: ChannelFlow | None, flow: Array, inlet: Array) -> tuple[f
             np.argmax(inlet[flowing]),
         ]
     )
-    values = [reynolds_number(channel, float(flow[flowing][i]), float(inlet[flowing][i])) for i in ranks]
+    values = [channel.reynolds_number(float(flow[flowing][i]), float(inlet[flowing][i])) for i in ranks]
     return (min(values), max(values))
 
 

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.effects.framework.machine_view import Seat
+from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.machine.view.part_roles import Layout, volume
-from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.operation.operating_point import OperatingPoint
 
 
 def seats_of(
-    spec: MachineSpec, fast: FastModel, layout: Layout, sets: Mapping[str, tuple[str, ...]]
+    names: MachineNames, layout: Layout, sets: Mapping[str, tuple[str, ...]]
 ) -> tuple[tuple[Seat, ...], dict[str, tuple[str, ...]]]:
     """Groups of contacts that may differ together, and the outer seats of every set and bearing."""
-    conducting = [
-        name.removeprefix("joint.")
-        for name, value in fast.table.base(OperatingPoint.of(spec)).items()
-        if name.startswith("joint.") and value > 0.0
-    ]
+    spec, conducting = names.spec, names.conducting_contacts
     by_ends = {name: name.removesuffix(":face").split("|") for name in conducting}
     housing = layout.housing.name if layout.housing is not None else ""
     owner = {b: key for key, members in sets.items() if members != (key,) for b in members}
@@ -50,13 +45,11 @@ def seats_of(
             if side == "outer":
                 outer[key] = own
             if members == (key,) or owner.get(members[0]) == key:
-                found.append(Seat(key, f"{side} ring seats", own, _own_parameter(fast, own)))
+                found.append(Seat(key, f"{side} ring seats", own, names.shared_parameter(own)))
     seen = {frozenset(seat.coefficients) for seat in found}
     # The machine's own groups, and single contacts between other parts.
     for group in spec.joint:
-        own = tuple(
-            n for n in (f"joint.{c}" for c in conducting) if f"joint.{group.name}" in fast.table.groups[n]
-        )
+        own = tuple(n for n in (f"joint.{c}" for c in conducting) if f"joint.{group.name}" in names.groups[n])
         if own and frozenset(own) not in seen:
             components = {layout.component_of(e) for n in own for e in by_ends[n.removeprefix("joint.")]}
             place = _common(components, owner)
@@ -74,23 +67,9 @@ def seats_of(
             layout.is_flange_back(layout.surface(s)) for s in film.surface
         ):
             own = tuple(f"film.{surface}" for surface in film.surface)
-            name = f"film.{film.name}" if film.name else own[0]
-            found.append(Seat("flange", "to the frame", own, name if name in fast.table.names else ""))
+            parameter = f"film.{film.name}" if film.name else own[0]
+            found.append(Seat("flange", "to the frame", own, parameter))
     return tuple(found), outer
-
-
-def _own_parameter(fast: FastModel, coefficients: tuple[str, ...]) -> str:
-    """Parameter that scales exactly these coefficients; empty where there is none."""
-    if len(coefficients) == 1:
-        return coefficients[0]
-    common = set.intersection(*(set(fast.table.groups[name]) for name in coefficients))
-    for name in sorted(common):
-        scaled = {
-            key for key, groups in fast.table.groups.items() if name in groups and key.startswith("joint.")
-        }
-        if scaled == set(coefficients):
-            return name
-    return ""
 
 
 def _common(components: set[str], owner: Mapping[str, str]) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.view.part_roles import CHANNEL_WALL, SHAFT_GAP, STANDING_GAP, Layout
-from spindle_fem.operation.probe_places import AROUND, NEAR, STANDARD_DISTANCE
+from spindle_fem.machine.view.place_names import AROUND, NEAR, STANDARD_DISTANCE
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.machine_view import RecordedQuantity
 from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.recordings.align import Recording
-from spindle_fem.recordings.smooth_inputs import TEMPERATURE_UNIT
-from spindle_fem.units import registry
+from spindle_fem.units import TEMPERATURE_UNIT, registry
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from spindle_fem.model.lumped.driven_inputs import boundary_history, source_history
 from spindle_fem.model.lumped.thermal_network import Array, Parameter, ThermalNetwork
-from spindle_fem.recordings.input_samples import InputHistory, boundary_history, source_history
+from spindle_fem.recordings.input_samples import InputHistory
 
 # Taylor series of the phi functions below this argument; the recursion above loses at most 1e-13 there.
 SERIES_BELOW = 0.5

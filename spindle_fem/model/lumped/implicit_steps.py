@@ -19,9 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.model.lumped.driven_inputs import boundary_history, source_history
 from spindle_fem.model.lumped.node_balance import NetworkBalance, explicit_derivative
 from spindle_fem.model.lumped.thermal_network import Array, Parameter, ThermalNetwork
-from spindle_fem.recordings.input_samples import InputHistory, boundary_history, source_history
+from spindle_fem.recordings.input_samples import InputHistory
 
 GAMMA = 2.0 - np.sqrt(2.0)
 DIAGONAL = 0.5 * GAMMA

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import GeometryError, SpecError
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
+from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.lumped.cells import Channelling, MeridianCells, build_cells, channel_zone
 from spindle_fem.model.lumped.links import (
     NodeCentres,
@@ -37,7 +38,6 @@ from spindle_fem.model.lumped.partition import (
 )
 from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.coolant_loop import CoolantLoop
-from spindle_fem.operation.joint_groups import group_of_contacts
 
 Array = NDArray[np.float64]
 AIR_VOLUMETRIC_CAPACITY = 1.2 * 1005.0

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP
 from spindle_fem.model.reduced.affine_operators import AffineSystem, build_affine_system
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.projected_model import (
@@ -28,7 +30,6 @@ from spindle_fem.model.reduced.snapshots import (
     shifted_systems,
 )
 from spindle_fem.operation.coefficients import (
-    CHANNEL_FILM,
     CoefficientTable,
     build_coefficient_table,
     free_parameters,
@@ -36,7 +37,6 @@ from spindle_fem.operation.coefficients import (
 )
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.probe_places import ACROSS, AROUND, NEAR, UP
 from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
 
 Array = NDArray[np.float64]

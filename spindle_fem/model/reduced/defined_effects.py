@@ -15,14 +15,15 @@ from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.effects.registry import build, effect_of
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
-from spindle_fem.machine.view.build_view import view_of, view_of_network
+from spindle_fem.machine.view.build_view import view_of
+from spindle_fem.machine.view.defined_point import at_the_defined_point
+from spindle_fem.machine.view.machine_names import MachineNames
+from spindle_fem.model.lumped.network_view import day_of_a_network, view_of_network
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
-from spindle_fem.operation.machine_names import MachineNames
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.recordings.align import Recording
-from spindle_fem.recordings.defined_point import at_the_defined_point, of_a_network
 from spindle_fem.solvers.coupled_steady import PreparedMachine
 from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics
 
@@ -255,7 +256,7 @@ def check_network_effects(entries: Sequence[EffectEntry | None], network: Therma
         faults: list[BadInputError] = []
         for speeds in _possible_speeds(network, entry.form):
             if speeds not in views:
-                views[speeds] = view_of_network(network, of_a_network(network, speeds))
+                views[speeds] = view_of_network(network, day_of_a_network(network, speeds))
             try:
                 return _candidate(entry, views[speeds], where)
             except BadInputError as error:
@@ -289,7 +290,7 @@ def effects_on(
         return NO_EFFECTS
     if isinstance(fast, NetworkFastModel):
         return active_effects(entries, view_of_network(fast.network, recording), fast.channels)
-    return active_effects(entries, view_of(fast, recording), fast.channels, _outlets(fast.spec))
+    return active_effects(entries, view_of(fast.names, recording), fast.channels, _outlets(fast.spec))
 
 
 def _outlets(spec: MachineSpec) -> tuple[str, ...]:

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.errors import RecordingError
+from spindle_fem.machine.view.friction_tables import friction_tables
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.standard_inputs import standard_inputs
 
 Array = NDArray[np.float64]
 
@@ -92,18 +94,6 @@ class Drive:
     def first(self, name: str) -> float:
         """Value of an input at the start."""
         return float(self.start[0, self.column(name)])
-
-
-def standard_inputs(spec: MachineSpec) -> dict[str, float]:
-    """Inputs as the definition has them, for those that a recording does not give."""
-    point = OperatingPoint.of(spec)
-    return {
-        "speed": point.speed,
-        "thrust": point.thrust,
-        "ambient": point.ambient_temperature,
-        "coolant_inlet": point.coolant_inlet_temperature,
-        "coolant_flow": point.coolant_flow,
-    }
 
 
 def drive_of_recording(
@@ -310,18 +300,8 @@ def heat_of_table(spec: MachineSpec, speed: Array, thrust: Array) -> Array:
     speed : (n,) ndarray, [rad/s]
     thrust : (n,) ndarray, [N]
     """
-    table = spec.heat.table
-    grid = np.asarray(table.speed)
-    segment = np.clip(np.searchsorted(grid, speed, side="right") - 1, 0, len(grid) - 2)
-    fraction = (speed - grid[segment]) / (grid[segment + 1] - grid[segment])
-    found = np.empty((len(speed), len(spec.bearings)))
-    for column, (group, bearing) in enumerate(spec.bearings):
-        values = np.asarray(table.heat[bearing.name])
-        nominal = values[segment] + fraction * (values[segment + 1] - values[segment])
-        slope = table.thrust_coefficient.get(bearing.name, 0.0)
-        factor = 1.0 + slope * (thrust / table.reference_thrust - 1.0)
-        found[:, column] = np.maximum(0.0, nominal * factor) * group.heat_factor.value
-    return found
+    tables = friction_tables(spec)
+    return np.column_stack([tables[bearing.name].heat_at(speed, thrust) for _, bearing in spec.bearings])
 
 
 def inputs_at(drive: Drive, times: Array) -> Mapping[str, Array]:

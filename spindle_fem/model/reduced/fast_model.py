@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
-from spindle_fem.effects.framework.term import FLOW, FLUID_PREFIX, RecordedHeat, Term
+from spindle_fem.effects.framework.term import CHANNEL_FILM, FLOW, FLUID_PREFIX, RecordedHeat, Term
 from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.model.reduced.coefficient_directions import ConductingDirections
 from spindle_fem.model.reduced.coolant_maps import CoolantMaps, UniformFilmMaps, coolant_maps, film_derivative
 from spindle_fem.model.reduced.drive import Drive, WarmedPoint, heat_of_table
 from spindle_fem.model.reduced.natural_films import natural_film_terms
 from spindle_fem.model.reduced.projected_model import ReducedModel
 from spindle_fem.model.reduced.trbdf2_matrices import build_propagator
-from spindle_fem.operation.coefficients import CHANNEL_FILM, INNER_SHARE, CoefficientTable
+from spindle_fem.operation.coefficients import INNER_SHARE, CoefficientTable
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
 
@@ -123,6 +124,13 @@ class FastModel:
         self._fluid_rows = {name: i for i, name in enumerate(model.fluid_names)}
         self._fluid_columns = {name: self._column_of_fluid(name) for name in model.fluid_names}
         self._heat_loads = np.array([model.place(place) for place in friction]).reshape(-1, model.size).T
+
+    @property
+    def names(self) -> MachineNames:
+        """Names of places and coefficients."""
+        return MachineNames(
+            self.spec, self.model.place_names, tuple(self.model.fluid_names), self.table.groups
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """Without sums that another process makes as fast as it reads them."""

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesv
 from scipy.stats import qmc
 
+from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.model.reduced.coolant_maps import coolant_maps
 from spindle_fem.model.reduced.drive import heat_of_table
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.natural_films import natural_film_terms
-from spindle_fem.operation.coefficients import CHANNEL_FILM
 from spindle_fem.operation.operating_point import OperatingPoint
 
 Array = NDArray[np.float64]

@@ -17,11 +17,11 @@ from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementQuad2, FacetBasis, LinearForm, MeshQuad
 
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.lumped.cells import Faces, MeridianCells
 from spindle_fem.model.lumped.heat_laws import CoolantLaw
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.model.lumped.machine_steady import MachineNetworkState
-from spindle_fem.operation.joint_groups import group_of_contacts
 from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
 
 Array = NDArray[np.float64]

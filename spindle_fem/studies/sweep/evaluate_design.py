@@ -21,6 +21,7 @@ from spindle_fem.definition.load import validate
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import FaultsError, GeometryError, MeshQualityError, SpecError, SpindleFemError
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
+from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.mesh_cache import mesh_digest
 from spindle_fem.machine.meshing.sizes import build_sizes
@@ -29,7 +30,6 @@ from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operat
 from spindle_fem.model.mesh.threads import one_thread
 from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.coolant_loop import CoolantLoop
-from spindle_fem.operation.joint_groups import group_of_contacts
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.results.run_summary import build_summary
 from spindle_fem.results.thermal_result import ThermalResult

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
-from spindle_fem.operation.joint_groups import group_of_contacts
+from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
 from spindle_fem.studies.sweep.fast.heat_tables import mechanical_keys

@@ -6,21 +6,17 @@ recording. Without one, these stand in for it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.model.lumped.thermal_network import ThermalNetwork
-from spindle_fem.model.reduced.drive import standard_inputs
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import ChannelNoise
 from spindle_fem.recordings.defects import DefectReport
-from spindle_fem.units import ZERO_CELSIUS_K
+from spindle_fem.recordings.standard_inputs import standard_inputs
 
 DAY = 86400.0
-ROOM = ZERO_CELSIUS_K + 20.0
-ANGULAR = "radian / second"
 # Flow and speed range over this share of what the definition has, as laws of the Reynolds number ask for it.
 RANGE = 0.5
 
@@ -33,32 +29,28 @@ def at_the_defined_point(spec: MachineSpec) -> Recording:
         name: ((1.0 - spread[name]) * value, (1.0 + spread[name]) * value) for name, value in inputs.items()
     }
     probes = tuple(probe.name for probe in spec.probe)
-    return _recording(spec.name, probes, inputs["ambient"], ends, {})
+    return defined_recording(spec.name, probes, inputs["ambient"], ends, {})
 
 
-def of_a_network(network: ThermalNetwork, speeds: Sequence[str] = ()) -> Recording:
-    """A day in which every input of a written network is 1 in SI, temperatures 20 °C, and every node is read.
-
-    Parameters
-    ----------
-    network : ThermalNetwork
-    speeds : sequence of str
-        Inputs in rad/s, beside those of the network or among them.
-    """
-    temperatures = {name for name in network.boundary_input if name is not None}
-    names = dict.fromkeys((*network.input_names, *speeds))
-    values = {name: ROOM if name in temperatures else 1.0 for name in names}
-    ends = {name: (value, value) for name, value in values.items()}
-    return _recording("network", network.node_names, ROOM, ends, dict.fromkeys(speeds, ANGULAR))
-
-
-def _recording(
+def defined_recording(
     source: str,
     probes: tuple[str, ...],
     temperature: float,
     inputs: Mapping[str, tuple[float, float]],
     units: Mapping[str, str],
 ) -> Recording:
+    """A day that ends of inputs enclose, every probe at one temperature [K].
+
+    Parameters
+    ----------
+    source : str
+    probes : tuple of str
+    temperature : float, [K]
+    inputs : mapping of str to (float, float)
+        Value at the start and at the end, SI.
+    units : mapping of str to str
+        Of the inputs that need one.
+    """
     times = np.array([0.0, DAY])
     noise = ChannelNoise(0.0, 0.0, 0.0, 0.0)
     return Recording(

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.machine_view import MachineView, Seat
+from spindle_fem.machine.view.defined_point import defined_recording
 from spindle_fem.machine.view.usual_sizes import LEAST_HEAT, lowest_speed, quantities_of, usual_rise
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.recordings.align import Recording
+from spindle_fem.units import ANGULAR_SPEED_UNIT, ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
-ANGULAR = "radian / second"
+ROOM = ZERO_CELSIUS_K + 20.0
 COOLANT_WORD = re.compile("coolant|oil|water|chiller", re.IGNORECASE)
 
 
@@ -42,7 +44,7 @@ def view_of_network(
         for name in recording.input_names
     }
     units = dict(zip(recording.input_names, recording.input_units, strict=True))
-    turning = tuple(name for name in recording.input_names if units[name] == ANGULAR)
+    turning = tuple(name for name in recording.input_names if units[name] == ANGULAR_SPEED_UNIT)
     boundary = _boundary_temperatures(network)
     films: dict[str, tuple[str, ...]] = {}
     walls: dict[str, str] = {}
@@ -180,3 +182,20 @@ def _room(
     else:
         series = np.full(recording.times.size, float(np.nanmean(recording.temperature)))
     return series, float(np.nanmean(series))
+
+
+def day_of_a_network(network: ThermalNetwork, speeds: Sequence[str] = ()) -> Recording:
+    """A day in which every input of a written network is 1 in SI, temperatures 20 °C, and every node is read.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    speeds : sequence of str
+        Inputs in rad/s, beside those of the network or among them.
+    """
+    temperatures = {name for name in network.boundary_input if name is not None}
+    names = dict.fromkeys((*network.input_names, *speeds))
+    values = {name: ROOM if name in temperatures else 1.0 for name in names}
+    ends = {name: (value, value) for name, value in values.items()}
+    units = dict.fromkeys(speeds, ANGULAR_SPEED_UNIT)
+    return defined_recording("network", network.node_names, ROOM, ends, units)
