@@ -20,9 +20,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from spindle_fem.commands.sweep_command import PreparedStudy, prepare_study
+from spindle_fem.parallel import WorkerPool
 from spindle_fem.studies.sweep import run_tasks as runner
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, evaluate_tasks
 from spindle_fem.studies.sweep.results_table import ResultTable, Row
@@ -54,6 +56,10 @@ def ready_answer(tasks: Sequence[DesignTask], question: Question) -> list[Row]:
     ]
 
 
+def _rows(pool: WorkerPool, jobs: list[partial]) -> list[dict]:
+    return [row for _, found in pool.stream(jobs) for row in found]
+
+
 def on_cluster(prepared: PreparedStudy, workers: int) -> dict[str, float]:
     """Rows a second and overhead a row with so many local workers."""
     from distributed import LocalCluster
@@ -65,21 +71,15 @@ def on_cluster(prepared: PreparedStudy, workers: int) -> dict[str, float]:
         pieces = runner.chunks_of(prepared.tasks, workers)
         # every worker imports, and reads the mesh, before the clock starts
         first = [list(pieces[0][:1])] * (2 * workers)
-        list(runner._on_cluster(evaluate_tasks, first, prepared.question, address))
+        pool = WorkerPool(scheduler=address)
+        question = prepared.question
+        list(pool.stream([partial(evaluate_tasks, piece, question) for piece in first]))
         begin = time.perf_counter()
-        rows = [
-            row
-            for found in runner._on_cluster(evaluate_tasks, pieces, prepared.question, address)
-            for row in found
-        ]
+        rows = _rows(pool, [partial(evaluate_tasks, piece, question) for piece in pieces])
         seconds = time.perf_counter() - begin
-        repeated = [piece for _ in range(8) for piece in pieces]
+        repeated = [partial(ready_answer, piece, question) for _ in range(8) for piece in pieces]
         begin = time.perf_counter()
-        empty = [
-            row
-            for found in runner._on_cluster(ready_answer, repeated, prepared.question, address)
-            for row in found
-        ]
+        empty = _rows(pool, repeated)
         overhead = time.perf_counter() - begin
     return {
         "workers": workers,

@@ -104,6 +104,10 @@ class ConvergenceError(SpindleFemError):
     """An iteration ended without reaching its tolerance."""
 
 
+class WorkerDiedError(SpindleFemError):
+    """A worker process ended before its time."""
+
+
 class EnergyBalanceError(SpindleFemError):
     """Heat in and heat out differ by more than the tolerance."""
 

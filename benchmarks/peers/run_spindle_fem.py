@@ -24,6 +24,7 @@ from spindle_fem.model.mesh.linear_solvers import build_preconditioner, multiply
 from spindle_fem.model.mesh.linear_system import ThermalSystem, merged
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.time_stage import add_scaled
+from spindle_fem.parallel import thread_count
 
 # Estimated error that each step may leave.
 STEP_TOLERANCE_K = 1e-6
@@ -63,7 +64,7 @@ def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, 
     mesh, number = numbered(mesh)
     first = number[first]
     start = case["start_temperature"]
-    record.notes["threads"] = threads.thread_count()
+    record.notes["threads"] = thread_count()
     record.notes["compiled"] = threads.has_compiled()
     record.notes["mesh_kB"] = protocol.resident_kilobytes()
 

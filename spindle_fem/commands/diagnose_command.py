@@ -29,7 +29,7 @@ from spindle_fem.inference.next_measurement import next_measurement
 from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.inference.worker_processes import Workers
-from spindle_fem.model.mesh.threads import thread_count
+from spindle_fem.parallel import thread_count
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.results.output_folder import output_folder, replace_text

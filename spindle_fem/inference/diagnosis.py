@@ -27,7 +27,7 @@ from spindle_fem.inference.prepared_problem import (
 from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.inference.verdict import NEAR, NEAR_MISFIT, Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
-from spindle_fem.model.mesh.threads import thread_count
+from spindle_fem.parallel import thread_count
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,14 @@ from threadpoolctl import threadpool_limits
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import COVARIATE
-from spindle_fem.errors import EnergyBalanceError, SpecError, SpindleFemError
+from spindle_fem.errors import EnergyBalanceError, SpecError, SpindleFemError, WorkerDiedError
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import channel_errors, channel_noise, predictions_at_stamps, rmse
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX, Plant
-from spindle_fem.model.mesh.threads import one_thread, thread_count
 from spindle_fem.model.reduced.drive import Drive
+from spindle_fem.parallel import WorkerPool, one_thread, thread_count
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
 from spindle_fem.solvers.input_history import OperatingHistory
@@ -339,17 +340,12 @@ def _side_by_side(
     progress: Progress,
 ) -> dict[str, FullFit]:
     """Each fit in a process of its own; in this one, and said, where a process ends before its time."""
-    from joblib import Parallel, delayed, parallel_config
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
     progress(f"full model: {' and '.join(fits)}")
+    jobs = [partial(_run_alone, machine.spec, plant, fit, options) for fit in fits.values()]
     try:
-        with parallel_config(backend="loky", inner_max_num_threads=1):
-            answers = Parallel(n_jobs=len(fits))(
-                delayed(_run_alone)(machine.spec, plant, fit, options) for fit in fits.values()
-            )
-    except TerminatedWorkerError:
-        progress("full model: a process ended before its time")
+        answers = WorkerPool(len(fits)).map(jobs, [f"full model: {name}" for name in fits])
+    except WorkerDiedError as error:
+        progress(f"{error.where}: {error.what}")
         return _one_by_one(machine, plant, fits, options, progress)
     return dict(zip(fits, answers, strict=True))
 

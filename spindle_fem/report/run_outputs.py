@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from spindle_fem.parallel import BackgroundProcess
 from spindle_fem.report.run_report import (
     FIGURE_FOLDER,
     OVER_SPEED,
@@ -22,7 +23,6 @@ from spindle_fem.report.run_report import (
     peak_memory_MB,
     render_run_report,
 )
-from spindle_fem.report.second_process import Helper
 from spindle_fem.results.output_folder import replace_text
 from spindle_fem.results.run_summary import build_summary
 
@@ -51,8 +51,8 @@ class OutputHelpers:
 
     def __init__(self) -> None:
         # A copy of a process that has drawn would share the threads of its renderer without having them.
-        self._pictures = Helper(_PictureWorker, beside=_no_renderer())
-        self._charts = Helper(_ChartWorker)
+        self._pictures = BackgroundProcess(_PictureWorker, beside=_no_renderer())
+        self._charts = BackgroundProcess(_ChartWorker)
         self._waiting: dict[str, Callable[[], Any]] = {}
         self._begun: Path | None = None
 

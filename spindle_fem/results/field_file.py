@@ -7,16 +7,16 @@ as elements of their own, so that film and fluid temperature have a place.
 
 from __future__ import annotations
 
-import os
 import zlib
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.parallel import in_threads
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -241,10 +241,7 @@ def _compress(arrays: list[NDArray]) -> list[bytes]:
     for array in arrays:
         data = memoryview(array).cast("B")
         tasks.append([data[first : first + _BLOCK_BYTES] for first in range(0, len(data), _BLOCK_BYTES)])
-    with ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1)) as pool:
-        packed = iter(
-            list(pool.map(lambda block: zlib.compress(block, 1), [item for task in tasks for item in task]))
-        )
+    packed = iter(in_threads([partial(zlib.compress, block, 1) for task in tasks for block in task]))
     result = []
     for task in tasks:
         blocks = [next(packed) for _ in task]

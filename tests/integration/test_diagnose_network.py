@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
+from spindle_fem import parallel
 from spindle_fem.commands.diagnose_command import diagnose
 from spindle_fem.effects.registry import candidates_for
 from spindle_fem.errors import BadInputError, ConvergenceError
@@ -404,14 +405,14 @@ def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine
     offsets = [c for c in candidates_for(opened.view) if c.effect == "sensor_offset"][:2]
     orders = [FitOrder((candidate,), {}, iterations=1) for candidate in offsets]
     sent, here = [], []
-    plain_dumps, plain_fit = abreast.dumps, abreast.fit_order
+    plain_dumps, plain_fit = parallel._dumps, abreast.fit_order
 
     def dumps(item):
         if isinstance(item, Problem):
             sent.append(item)
         return plain_dumps(item)
 
-    monkeypatch.setattr(abreast, "dumps", dumps)
+    monkeypatch.setattr(parallel, "_dumps", dumps)
     monkeypatch.setattr(
         abreast, "fit_order", lambda problem, order: here.append(problem) or plain_fit(problem, order)
     )

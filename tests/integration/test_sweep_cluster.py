@@ -7,7 +7,7 @@ import pytest
 
 from spindle_fem.commands.sweep_command import sweep_machine
 from spindle_fem.errors import BadInputError
-from spindle_fem.studies.sweep import run_tasks as runner
+from spindle_fem.parallel import WorkerPool
 from spindle_fem.studies.sweep.results_table import RESULTS
 
 distributed = pytest.importorskip("distributed")
@@ -34,16 +34,16 @@ def test_a_killed_worker_loses_no_row_and_changes_no_digit(tmp_path, monkeypatch
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
         victim = next(iter(cluster.workers.values())).pid
-        original = runner._on_cluster
+        original = WorkerPool.stream
 
-        def killing(answer, pieces, question, address):
-            for rows in original(answer, pieces, question, address):
+        def killing(self, jobs, names=()):
+            for place, rows in original(self, jobs, names):
                 if not landed:
                     os.kill(victim, signal.SIGKILL)
                 landed.extend(row["design"] for row in rows)
-                yield rows
+                yield place, rows
 
-        monkeypatch.setattr(runner, "_on_cluster", killing)
+        monkeypatch.setattr(WorkerPool, "stream", killing)
         sweep_machine("small_two_start", path, tmp_path / "dask", QUICK, scheduler=cluster.scheduler_address)
     assert sorted(landed) == [1, 2, 3, 4, 5, 6]
     assert (tmp_path / "dask" / RESULTS).read_bytes() == (tmp_path / "serial" / RESULTS).read_bytes()

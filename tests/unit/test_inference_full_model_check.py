@@ -6,11 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.registry import candidates_for, effect_of
-from spindle_fem.errors import EnergyBalanceError, MeshQualityError, SpecError
+from spindle_fem.errors import EnergyBalanceError, MeshQualityError, SpecError, WorkerDiedError
 from spindle_fem.inference import full_model_check as full_model
 from spindle_fem.inference.findings import predictions_at_stamps
 from spindle_fem.inference.full_model_check import (
@@ -25,6 +24,7 @@ from spindle_fem.inference.full_model_check import (
 from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.parallel import WorkerPool
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.report.diagnosis_full_model import full_model_sections
 from spindle_fem.solvers.input_history import OperatingHistory
@@ -228,12 +228,9 @@ def test_a_balance_that_asks_for_a_better_fixed_point_gets_it(plant, monkeypatch
 
 
 def test_a_process_that_ends_before_its_time_is_said_and_done_without(plant, monkeypatch):
-    class Killed:
-        def __init__(self, n_jobs):
-            assert n_jobs == 2
-
-        def __call__(self, tasks):
-            raise TerminatedWorkerError("A process was killed.")
+    def killed(self, jobs, names):
+        assert len(jobs) == self.size() == 2
+        raise WorkerDiedError(names[1], "its worker process ended before its time.")
 
     def run_fit(machine, plant, fit, options):
         return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7, 1.0)
@@ -242,12 +239,12 @@ def test_a_process_that_ends_before_its_time_is_said_and_done_without(plant, mon
     monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model, "run_fit", run_fit)
     monkeypatch.setattr(full_model, "thread_count", lambda: 2)
-    monkeypatch.setattr("joblib.Parallel", Killed)
+    monkeypatch.setattr(WorkerPool, "map", killed)
     machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
     nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
     said = []
     found = full_model_errors(diagnosis_of(plant, nothing, heat), machine, progress=said.append)
-    assert "full model: a process ended before its time" in said
+    assert "full model: after: its worker process ended before its time." in said
     assert said[-2:] == ["full model: before", "full model: after"]
     assert found["after"]["train_rmse_K"] != found["before"]["train_rmse_K"]
 

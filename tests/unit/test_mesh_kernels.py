@@ -7,6 +7,7 @@ import pytest
 from scipy import sparse
 from skfem import Basis, ElementTetP1, MeshTet
 
+from spindle_fem import parallel
 from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes
 from spindle_fem.machine.meshing.tagged_mesh import Joint
@@ -32,7 +33,7 @@ def loops(monkeypatch):
 
     def switch(count):
         monkeypatch.setattr(threads, "has_compiled", lambda: count > 0)
-        monkeypatch.setattr(threads, "thread_count", lambda: count)
+        monkeypatch.setattr(parallel, "_thread_count", lambda: count)
         monkeypatch.setattr(threads, "COMPILED_ABOVE", 0)
         monkeypatch.setattr(threads, "LEAST_ROWS", 50)
         monkeypatch.setattr(threads, "ENTRIES_A_CHUNK", 500)
@@ -290,7 +291,7 @@ def test_space_for_rows_grows_until_they_fit(loops):
 
 
 def test_rows_of_several_ranges_come_without_gaps(monkeypatch):
-    monkeypatch.setattr(threads, "thread_count", lambda: 3)
+    monkeypatch.setattr(parallel, "_thread_count", lambda: 3)
     monkeypatch.setattr(threads, "LEAST_ROWS", 10)
 
     def rows(low, high, counts, columns, values):
@@ -320,37 +321,37 @@ def test_room_is_an_array_of_its_own(shape):
 def test_the_environment_says_how_many_threads_and_whether_to_compile(monkeypatch):
     for name in ("SPINDLE_FEM_THREADS", "OMP_NUM_THREADS", "SPINDLE_FEM_COMPILED"):
         monkeypatch.delenv(name, raising=False)
-    threads._given_threads.cache_clear()
+    parallel._thread_count.cache_clear()
     threads.has_compiled.cache_clear()
     try:
-        assert threads.thread_count() >= 1
+        assert parallel.thread_count() >= 1
         assert threads.has_compiled()
         monkeypatch.setenv("OMP_NUM_THREADS", "3")
         monkeypatch.setenv("SPINDLE_FEM_COMPILED", "0")
-        threads._given_threads.cache_clear()
+        parallel._thread_count.cache_clear()
         threads.has_compiled.cache_clear()
-        assert threads.thread_count() == 3
+        assert parallel.thread_count() == 3
         assert not threads.use_compiled(10**7)
         monkeypatch.setenv("SPINDLE_FEM_THREADS", "5")
-        threads._given_threads.cache_clear()
-        assert threads.thread_count() == 5
+        parallel._thread_count.cache_clear()
+        assert parallel.thread_count() == 5
     finally:
-        threads._given_threads.cache_clear()
+        parallel._thread_count.cache_clear()
         threads.has_compiled.cache_clear()
 
 
 def test_work_that_fails_in_another_thread_fails_where_it_was_asked(monkeypatch):
-    monkeypatch.setattr(threads, "thread_count", lambda: 3)
+    monkeypatch.setattr(parallel, "_thread_count", lambda: 3)
 
     def refuse():
         raise SpecError("work", "it was refused.")
 
     for place in range(4):
         jobs = [lambda k=k: k for k in range(4)]
-        assert threads.run_jobs(jobs) == [0, 1, 2, 3]
+        assert parallel.in_threads(jobs) == [0, 1, 2, 3]
         jobs[place] = refuse
         with pytest.raises(SpecError, match="it was refused"):
-            threads.run_jobs(jobs)
+            parallel.in_threads(jobs)
 
 
 def test_a_team_does_every_chunk_once_whoever_comes(loops):
@@ -408,7 +409,7 @@ def test_sparse_arrays_keep_room_as_it_is():
 
 
 def test_ranges_cover_all_rows_and_return_in_order(monkeypatch):
-    monkeypatch.setattr(threads, "thread_count", lambda: 3)
+    monkeypatch.setattr(parallel, "_thread_count", lambda: 3)
     monkeypatch.setattr(threads, "LEAST_ROWS", 10)
     bounds = threads.row_blocks(100)
     assert bounds.tolist() == [0, 33, 66, 100]
@@ -446,8 +447,8 @@ def test_several_right_hand_sides_are_solved_as_one_by_one(loops, count):
 
 
 def test_one_thread_is_what_it_says_whatever_the_machine_has(monkeypatch):
-    monkeypatch.setattr(threads, "_given_threads", lambda: 4)
+    monkeypatch.setattr(parallel, "_thread_count", lambda: 4)
     assert len(threads.row_blocks(10 * threads.LEAST_ROWS)) == 5
-    with threads.one_thread():
+    with parallel.one_thread():
         assert threads.row_blocks(10 * threads.LEAST_ROWS).tolist() == [0, 10 * threads.LEAST_ROWS]
-    assert threads.thread_count() == 4
+    assert parallel.thread_count() == 4

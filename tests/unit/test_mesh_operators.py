@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from spindle_fem import parallel
 from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError, UnknownSurfaceError
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes, build_tube
 from spindle_fem.model.mesh import forms, threads
@@ -21,7 +22,7 @@ def loops(request, monkeypatch):
     if request.param == "compiled":
         pytest.importorskip("numba")
         monkeypatch.setattr(threads, "has_compiled", lambda: True)
-        monkeypatch.setattr(threads, "thread_count", lambda: 2)
+        monkeypatch.setattr(parallel, "_thread_count", lambda: 2)
         monkeypatch.setattr(threads, "COMPILED_ABOVE", 0)
         monkeypatch.setattr(threads, "LEAST_ROWS", 50)
     else:

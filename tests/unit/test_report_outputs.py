@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import re
 from html.parser import HTMLParser
 
@@ -21,7 +20,6 @@ from spindle_fem.report.figure_style import new_figure
 from spindle_fem.report.interactive_view import SURFACE_GROUP, display_surface, viewer_payload
 from spindle_fem.report.run_outputs import OutputHelpers, write_outputs
 from spindle_fem.report.run_report import in_order, rebuild_report, render_run_report
-from spindle_fem.report.second_process import Helper, start_beside
 from spindle_fem.results.dataset import build_dataset, default_paths, read_dataset, spec_digest, write_dataset
 from spindle_fem.results.output_folder import MARKER, is_complete, output_folder, require_complete
 from spindle_fem.results.run_summary import build_summary
@@ -248,91 +246,6 @@ def test_reports_of_other_commands_are_put_together_from_blocks():
         assert expected in text
     assert text.count('class="passed"') == text.count('class="failed"') == 1
     assert 'width="200" height="120"' in text
-
-
-# ------------------------------------------------------------------ a second process
-def test_a_task_beside_answers_from_another_process():
-    parent = os.getpid()
-    wait = start_beside(lambda: os.getpid())
-    if len(os.sched_getaffinity(0)) > 1:
-        assert wait() != parent
-
-
-def test_an_error_of_a_task_beside_is_raised_here():
-    def fail():
-        raise BadInputError("task", "cannot be done.")
-
-    wait = start_beside(fail)
-    with pytest.raises(BadInputError, match="cannot be done"):
-        wait()
-
-
-def test_an_answer_larger_than_a_pipe_arrives_whole():
-    assert len(start_beside(lambda: "x" * 500_000)()) == 500_000
-
-
-class Counter:
-    """A worker that remembers what it was asked for."""
-
-    def __init__(self):
-        self.total = 0
-
-    def add(self, number):
-        self.total += number
-        return self.total, os.getpid()
-
-    def add_largest(self, values):
-        return self.add(max(values.values()))[0]
-
-    def fail(self):
-        raise BadInputError("worker", "cannot do it.")
-
-    def fail_beside(self, parent):
-        if os.getpid() != parent:
-            raise ValueError("only in the other process")
-        return self.total
-
-
-def test_a_helper_answers_in_order_from_one_other_process():
-    with Helper(Counter) as helper:
-        first, second = helper.ask("add", 1), helper.ask("add", 2)
-        assert second()[0] == 3
-        assert first()[0] == 1
-        assert first()[1] == second()[1]
-        if len(os.sched_getaffinity(0)) > 1:
-            assert first()[1] != os.getpid()
-
-
-def test_a_helper_that_may_not_be_beside_works_here():
-    with Helper(Counter, beside=False) as helper:
-        first, second = helper.ask("add", 1), helper.ask("add", 2)
-        assert second() == (3, os.getpid())
-        assert first() == (1, os.getpid())
-
-
-def test_what_a_failed_helper_was_asked_is_done_here_from_the_start():
-    with Helper(Counter) as helper:
-        before = helper.ask("add", 5)
-        assert before()[0] == 5
-        at_failure, after = helper.ask("fail_beside", os.getpid()), helper.ask("add", 2)
-        assert after() == (7, os.getpid())
-        assert at_failure() == 5
-        assert before()[0] == 5
-
-
-def test_an_error_of_a_helper_is_raised_here():
-    with Helper(Counter) as helper:
-        answer = helper.ask("fail")
-        with pytest.raises(BadInputError, match="cannot do it"):
-            answer()
-
-
-def test_a_helper_takes_large_and_read_only_arguments_while_it_is_still_made():
-    import types
-
-    values = types.MappingProxyType({index: index for index in range(200_000)})
-    with Helper(Counter) as helper:
-        assert helper.ask("add_largest", values)() == 199_999
 
 
 # ------------------------------------------------------------------ the viewer

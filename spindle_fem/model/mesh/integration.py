@@ -24,10 +24,10 @@ from spindle_fem.model.mesh.threads import (
     fill_rows,
     row_blocks,
     run_blocks,
-    run_jobs,
     unsigned,
     use_compiled,
 )
+from spindle_fem.parallel import in_threads
 
 # Elements integrated at once where the compiled loops do not integrate themselves.
 BATCH = 1 << 16
@@ -200,7 +200,7 @@ def _compiled(
     around = room(nodes.size, np.int32)
     straight = is_straight(mesh.points, tetrahedra) if order == 1 else np.zeros(len(tetrahedra), dtype=bool)
     values, integrate = _straight_elements(mesh, nodes, part, straight)
-    starts, (part_of_unknown, shared), joined, *integrated = run_jobs(
+    starts, (part_of_unknown, shared), joined, *integrated = in_threads(
         [
             partial(compiled.elements_of_nodes, nodes, n_unknowns, around),
             partial(compiled.part_of_nodes, nodes, part, n_unknowns),

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import os
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextvars import ContextVar
+from collections.abc import Callable
 from functools import cache, partial
 from importlib.util import find_spec
-from queue import SimpleQueue
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.model.mesh.huge_pages import room
+from spindle_fem.parallel import hand_over, in_threads, thread_count
 
 # Loading compiled code takes as long as it saves on so many unknowns.
 COMPILED_ABOVE = 40_000
@@ -26,7 +23,6 @@ ENTRIES_A_CHUNK = 30_000
 MOST_CHUNKS = 32
 # Room for the two counters of a team, on cache lines of their own.
 N_COUNTERS = 32
-_ONE: ContextVar[bool] = ContextVar("one_thread", default=False)
 
 
 @cache
@@ -38,52 +34,6 @@ def has_compiled() -> bool:
 def use_compiled(n_unknowns: int) -> bool:
     """Whether a problem of this size is worth compiled loops, and they are there."""
     return n_unknowns >= COMPILED_ABOVE and has_compiled()
-
-
-def thread_count() -> int:
-    """Threads of compiled loops: one within :func:`one_thread`, else what the machine gives."""
-    return 1 if _ONE.get() else _given_threads()
-
-
-@contextlib.contextmanager
-def one_thread() -> Iterator[None]:
-    """Compiled loops with one thread: the order of sums, and so the last digits, depend on their number."""
-    token = _ONE.set(True)
-    try:
-        yield
-    finally:
-        _ONE.reset(token)
-
-
-@cache
-def _given_threads() -> int:
-    """``SPINDLE_FEM_THREADS``, else ``OMP_NUM_THREADS``, else the cores given."""
-    for name in ("SPINDLE_FEM_THREADS", "OMP_NUM_THREADS"):
-        given = os.environ.get(name, "")
-        if given.isdigit() and int(given) > 0:
-            return int(given)
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@cache
-def _jobs(count: int, process: int) -> SimpleQueue:
-    """Where so many threads of a process wait for work; handing over to a pool takes five times as long."""
-    jobs: SimpleQueue = SimpleQueue()
-    for index in range(count):
-        threading.Thread(target=_serve, args=(jobs,), name=f"spindle-fem-{index}", daemon=True).start()
-    return jobs
-
-
-def _serve(jobs: SimpleQueue) -> None:
-    while True:
-        jobs.get()()
-
-
-def _hand_over(count: int, job: Callable[[], object]) -> None:
-    """Have a job called by so many other threads, once each."""
-    jobs = _jobs(count, os.getpid())
-    for _ in range(count):
-        jobs.put(job)
 
 
 def row_blocks(n_rows: int) -> NDArray[np.int64]:
@@ -114,41 +64,13 @@ def run_team(function: Callable, n_chunks: int, *arguments: object) -> None:
     counters = np.zeros(N_COUNTERS, dtype=np.int64)
     count = min(thread_count(), n_chunks)
     if count > 1:
-        _hand_over(count - 1, partial(function, False, counters, *arguments))
+        hand_over(count - 1, partial(function, False, counters, *arguments))
     function(True, counters, *arguments)
-
-
-def run_jobs(jobs: Sequence[Callable[[], object]]) -> list:
-    """Call functions, each in whatever thread is free, and return what they return in their order.
-
-    The calling thread takes part; idle threads sleep.
-    """
-    answers: list = [None] * len(jobs)
-    places, done = iter(range(len(jobs))), SimpleQueue()
-
-    def work() -> None:
-        # taking the next of a range is one step of the interpreter
-        for place in places:
-            try:
-                answers[place] = jobs[place]()
-                done.put(None)
-            except Exception as error:  # noqa: BLE001 - the caller raises it
-                done.put(error)
-
-    count = min(thread_count(), len(jobs))
-    if count > 1:
-        _hand_over(count - 1, work)
-    work()
-    errors = [done.get() for _ in jobs]
-    for error in errors:
-        if error is not None:
-            raise error
-    return answers
 
 
 def run_blocks(function: Callable, bounds: NDArray[np.int64], *arguments: object) -> list:
     """Call ``function(low, high, *arguments)`` for every range, and return what the calls return."""
-    return run_jobs([partial(function, low, high, *arguments) for low, high in itertools.pairwise(bounds)])
+    return in_threads([partial(function, low, high, *arguments) for low, high in itertools.pairwise(bounds)])
 
 
 def fill_rows(

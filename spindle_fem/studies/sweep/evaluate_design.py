@@ -27,10 +27,10 @@ from spindle_fem.machine.meshing.mesh_cache import mesh_digest
 from spindle_fem.machine.meshing.sizes import build_sizes
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
-from spindle_fem.model.mesh.threads import one_thread
 from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.parallel import one_thread
 from spindle_fem.results.run_summary import build_summary
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.solvers.coupled_steady import machine_on_mesh

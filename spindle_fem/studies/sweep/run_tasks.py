@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from collections.abc import Callable, Sequence
+from functools import partial
 
-from spindle_fem.errors import BadInputError, SpindleFemError
+from spindle_fem.parallel import WorkerPool
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, evaluate_tasks
 from spindle_fem.studies.sweep.fast.backend import GroupTask, answer_group
 from spindle_fem.studies.sweep.fast.fast_outputs import ONLY_FULL
@@ -21,7 +19,6 @@ CHUNK = 4
 LEAST_GROUP = 32
 
 Land = Callable[[Row], None]
-Task = TypeVar("Task")
 
 
 def run_tasks(
@@ -52,29 +49,29 @@ def run_tasks(
     ------
     BadInputError
         Dask is not installed, or no scheduler answers there.
-    SpindleFemError
-        The cluster lost a task for good.
+    WorkerDiedError
+        A worker process died; the rows so far have landed.
     """
     for task in tasks:
         if task.spec is None:
             land(evaluate_tasks([task], question)[0])
+    pool = WorkerPool(jobs, scheduler)
     left = {task.key: task for task in tasks if task.spec is not None}
     groups = groups_of(plan, tuple(left.values()), question)
     for answer, pieces in ((answer_group, groups), (evaluate_tasks, None)):
         if pieces is None:
-            pieces = _pieces(tuple(left.values()), jobs, scheduler)
-        if not pieces:
-            continue
-        if scheduler is not None:
-            found = _on_cluster(answer, pieces, question, scheduler)
-        elif worker_count(jobs) == 1 or len(pieces) == 1:
-            found = (answer(piece, question) for piece in pieces)
-        else:
-            found = _in_processes(answer, pieces, question, worker_count(jobs))
-        for rows in found:
+            pieces = _pieces(tuple(left.values()), pool)
+        calls = [partial(answer, piece, question) for piece in pieces]
+        for _, rows in pool.stream(calls, [_designs_of(piece) for piece in pieces]):
             for row in rows:
                 land(row)
                 del left[row["key"]]
+
+
+def _designs_of(piece: Sequence[DesignTask] | GroupTask) -> str:
+    """Name of a piece of work, for error messages."""
+    tasks = piece.wanted if isinstance(piece, GroupTask) else piece
+    return f"sweep, designs {', '.join(str(task.design.number) for task in tasks)}"
 
 
 def groups_of(
@@ -96,19 +93,8 @@ def groups_of(
     return found
 
 
-def _pieces(
-    tasks: Sequence[DesignTask], jobs: int, scheduler: str | None
-) -> list[list[DesignTask]] | list[Sequence[DesignTask]]:
-    if scheduler is None and worker_count(jobs) == 1:
-        return [[task] for task in _sorted(tasks)]
-    return chunks_of(tasks, worker_count(jobs) if scheduler is None else _cluster_size(scheduler))
-
-
-def worker_count(jobs: int) -> int:
-    """Number of worker processes; one a usable core where ``jobs`` is below 1."""
-    if jobs >= 1:
-        return jobs
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def _pieces(tasks: Sequence[DesignTask], pool: WorkerPool) -> list[list[DesignTask]]:
+    return [[task] for task in _sorted(tasks)] if pool.is_alone else chunks_of(tasks, pool.size())
 
 
 def chunks_of(tasks: Sequence[DesignTask], workers: int) -> list[list[DesignTask]]:
@@ -145,60 +131,3 @@ def _sorted(tasks: Sequence[DesignTask]) -> list[DesignTask]:
         first.setdefault(_mesh_of(task), position)
         first.setdefault(task.geometry, position)
     return sorted(tasks, key=lambda task: (first[_mesh_of(task)], first[task.geometry]))
-
-
-def _in_processes(
-    answer: Callable[[Task, Question], list[Row]], pieces: Sequence[Task], question: Question, jobs: int
-) -> Iterator[list[Row]]:
-    from joblib import Parallel, delayed, parallel_config
-
-    with parallel_config(backend="loky", inner_max_num_threads=1):
-        parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
-        yield from parallel(delayed(answer)(piece, question) for piece in pieces)
-
-
-def _cluster_size(address: str) -> int:
-    with _client(address) as client:
-        return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-
-
-def _on_cluster(
-    answer: Callable[[Task, Question], list[Row]], pieces: Sequence[Task], question: Question, address: str
-) -> Iterator[list[Row]]:
-    with _client(address) as client:
-        from distributed import as_completed
-        from distributed.scheduler import KilledWorker
-
-        # A piece that dies with its worker goes to another one; Dask gives up after some.
-        futures = client.map(answer, pieces, question=question, pure=False)
-        for future in as_completed(futures):
-            try:
-                rows = future.result()
-            except KilledWorker as error:
-                raise SpindleFemError(
-                    f"scheduler {address}",
-                    f"several workers died on the same designs ({error}).",
-                    "The rows so far are kept; give the workers more memory and run the command again.",
-                ) from error
-            future.release()
-            yield rows
-
-
-@contextmanager
-def _client(address: str) -> Iterator[Any]:
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise BadInputError(
-            "--scheduler", "needs the package distributed.", "Install spindle-fem[cluster]."
-        ) from error
-    try:
-        client = Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise BadInputError(
-            f"--scheduler {address}",
-            f"no Dask scheduler answers ({error}).",
-            "For example tcp://127.0.0.1:8786.",
-        ) from error
-    with client:
-        yield client

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from spindle_fem import __version__
 from spindle_fem.cache import source_digest
 from spindle_fem.errors import SpindleFemError
-from spindle_fem.model.mesh.threads import one_thread
+from spindle_fem.parallel import one_thread
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.solvers.coupled_steady import machine_on_mesh
 from spindle_fem.studies.sweep.evaluate_design import (

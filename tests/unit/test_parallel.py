@@ -1,0 +1,230 @@
+"""Threads, worker processes and the background process: order, errors, deaths, what is sent when."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import types
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import spindle_fem
+from spindle_fem import parallel
+from spindle_fem.errors import BadInputError, WorkerDiedError
+from spindle_fem.parallel import BackgroundProcess, Shared, WorkerPool
+
+SEVERAL_CORES = parallel.core_count() > 1
+
+
+# ------------------------------------------------------------------ worker processes
+class Told:
+    """Notes which thread sends it."""
+
+    def __init__(self, senders):
+        self.senders = senders
+
+    def __reduce__(self):
+        self.senders.append(threading.current_thread())
+        return str, ("sent",)
+
+
+def die_beside(parent):
+    if os.getpid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return parent
+
+
+def refuse():
+    raise BadInputError("work", "it was refused.")
+
+
+def threads_there():
+    return parallel.thread_count(), os.environ["OPENBLAS_NUM_THREADS"]
+
+
+def largest(shared):
+    return max(shared.value), id(shared.value), os.getpid()
+
+
+def test_a_job_that_is_started_is_sent_before_anything_goes_on():
+    senders, sizes = [], {"a": 1}
+    waiting = WorkerPool(2).start(partial(str, Told(senders)))
+    assert senders == [threading.main_thread()]
+    counted = WorkerPool(2).start(partial(len, sizes))
+    sizes |= {"b": 2}
+    assert (waiting(), counted()) == ("sent", 1)
+
+
+def test_jobs_are_sent_by_the_thread_that_has_them_and_answers_keep_their_order():
+    senders = []
+    jobs = [partial(lambda told, number: number, Told(senders), number) for number in range(5)]
+    assert WorkerPool(2).map(jobs) == [0, 1, 2, 3, 4]
+    assert set(senders) == {threading.main_thread()}
+
+
+def test_alone_nothing_is_sent():
+    senders, pool = [], WorkerPool(1)
+    assert pool.is_alone
+    assert pool.start(partial(len, {"a": 1}))() == 1
+    jobs = [partial(isinstance, Told(senders), Told)] * 2
+    assert pool.map(jobs) == [True, True]
+    assert list(pool.stream(jobs)) == [(0, True), (1, True)]
+    assert senders == []
+
+
+def test_other_processes_are_woken_where_there_are_any(monkeypatch):
+    started = []
+    idle = types.SimpleNamespace(submit=lambda job: None)
+    monkeypatch.setattr(parallel, "_executor", lambda number: started.append(number) or idle)
+    WorkerPool(1).wake()
+    assert started == []
+    WorkerPool(3).wake()
+    assert started == [2, 2]
+
+
+def test_a_stream_answers_every_job_from_workers_with_one_thread_each():
+    found = dict(WorkerPool(2).stream([threads_there] * 5))
+    assert found == dict.fromkeys(range(5), (1, "1"))
+
+
+def test_what_is_shared_is_read_once_a_worker():
+    shared = Shared([3, 1, 2])
+    found = dict(WorkerPool(2).stream([partial(largest, shared)] * 6))
+    assert {value for value, _, _ in found.values()} == {3}
+    assert len({(place, process) for _, place, process in found.values()}) <= 2
+    assert os.getpid() not in {process for _, _, process in found.values()}
+
+
+def test_an_error_of_a_job_is_raised_here_whoever_ran_it():
+    pool = WorkerPool(2)
+    for ask in (lambda: pool.map([refuse] * 3), lambda: list(pool.stream([refuse] * 3)), pool.start(refuse)):
+        with pytest.raises(BadInputError, match="it was refused"):
+            ask()
+
+
+def test_a_worker_that_dies_is_an_error_that_names_its_job():
+    pool, job = WorkerPool(2), partial(die_beside, os.getpid())
+    with pytest.raises(WorkerDiedError, match="design 8: its worker process ended before its time"):
+        list(pool.stream([partial(len, "a"), job, job], ["design 7", "design 8", "design 8"]))
+    with pytest.raises(WorkerDiedError, match=r"^the fit: "):
+        pool.start(job, "the fit")()
+    with pytest.raises(WorkerDiedError, match=r"die_beside [1-4] of 4"):
+        pool.map([job] * 4)
+    # and the next pool has new processes
+    assert sorted(dict(pool.stream([partial(len, "ab")] * 3)).values()) == [2, 2, 2]
+
+
+def test_workers_are_as_many_as_asked_for_or_one_a_core(monkeypatch):
+    assert parallel.worker_count(3) == WorkerPool(3).size() == 3
+    monkeypatch.setenv("SPINDLE_FEM_THREADS", "7")
+    parallel.core_count.cache_clear()
+    try:
+        assert parallel.worker_count(0) == 7
+    finally:
+        monkeypatch.undo()
+        parallel.core_count.cache_clear()
+
+
+# ------------------------------------------------------------------ a background process
+class Counter:
+    """Remembers what it was asked for."""
+
+    def __init__(self):
+        self.total = 0
+
+    def add(self, number):
+        self.total += number
+        return self.total, os.getpid()
+
+    def add_largest(self, values):
+        return self.add(max(values.values()))[0]
+
+    def fail(self):
+        raise BadInputError("worker", "cannot do it.")
+
+    def die(self):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_background_process_answers_in_order():
+    with BackgroundProcess(Counter) as process:
+        first, second = process.ask("add", 1), process.ask("add", 2)
+        assert second()[0] == 3
+        assert first()[0] == 1
+        assert first()[1] == second()[1]
+        assert (first()[1] != os.getpid()) == SEVERAL_CORES
+
+
+def test_what_may_not_be_beside_works_here():
+    with BackgroundProcess(Counter, beside=False) as process:
+        first, second = process.ask("add", 1), process.ask("add", 2)
+        assert second() == (3, os.getpid())
+        assert first() == (1, os.getpid())
+
+
+def test_an_error_in_a_background_process_is_raised_here_and_it_goes_on():
+    with BackgroundProcess(Counter) as process:
+        wrong, right = process.ask("fail"), process.ask("add", 2)
+        with pytest.raises(BadInputError, match="cannot do it"):
+            wrong()
+        assert right()[0] == 2
+
+
+@pytest.mark.skipif(not SEVERAL_CORES, reason="works in this process on one core")
+def test_a_background_process_that_dies_is_an_error_that_names_the_call():
+    with BackgroundProcess(Counter) as process:
+        before, at, after = process.ask("add", 1), process.ask("die"), process.ask("add", 2)
+        assert before()[0] == 1
+        with pytest.raises(WorkerDiedError, match="Counter, die: its process ended"):
+            at()
+        with pytest.raises(WorkerDiedError, match="Counter, add: its process ended"):
+            after()
+
+
+def test_large_and_read_only_arguments_are_taken_while_the_object_is_still_made():
+    values = types.MappingProxyType({index: index for index in range(200_000)})
+    with BackgroundProcess(Counter) as process:
+        assert process.ask("add_largest", values)() == 199_999
+
+
+def test_a_background_process_ends_with_the_one_that_started_it(tmp_path):
+    code = (
+        "import os, sys, time; from spindle_fem.parallel import BackgroundProcess\n"
+        "class Named:\n    def pid(self): return os.getpid()\n"
+        "process = BackgroundProcess(Named); print(process.ask('pid')(), flush=True); os._exit(0)"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    other = int(answer.stdout)
+    for _ in range(100):
+        if not _runs(other):
+            break
+        threading.Event().wait(0.1)
+    assert not _runs(other)
+
+
+def _runs(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z"
+    except OSError:
+        return False
+
+
+# ------------------------------------------------------------------ the only place
+def test_nothing_else_starts_threads_or_processes():
+    folder = Path(spindle_fem.__file__).parent
+    starts = re.compile(
+        r"^\s*(from|import) (concurrent|multiprocessing|joblib|distributed)\b|\bThread\(|\bos\.fork\b",
+        re.MULTILINE,
+    )
+    found = {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*.py")
+        if starts.search(path.read_text(encoding="utf-8"))
+    }
+    assert found == {"parallel.py"}
