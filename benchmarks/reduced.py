@@ -24,13 +24,13 @@ from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.model.reduced.steady_designs import SteadyDesigns
 from spindle_fem.operation.coefficients import free_parameters
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
-from spindle_fem.studies.simulate import fast_model_for
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.transient_study import StudyResult, run_study, study_of
 

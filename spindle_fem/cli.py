@@ -225,7 +225,7 @@ def simulate(
     """What every channel of a recording should have read, beside what it read."""
     from spindle_fem.commands.console import print_simulation
     from spindle_fem.commands.machine_commands import stages
-    from spindle_fem.studies.simulate import simulate_machine
+    from spindle_fem.commands.simulate_command import simulate_machine
 
     with stages(not as_json) as tell:
         content = simulate_machine(

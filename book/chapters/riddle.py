@@ -162,7 +162,7 @@ def _draw(desk: Desk, seed: int) -> Draw:
 
 
 def _run(folder: Path, seed: int) -> None:
-    from spindle_fem.studies.simulate import simulate_machine
+    from spindle_fem.commands.simulate_command import simulate_machine
     from validation.reduction import load_reduced
 
     inputs = folder / "inputs" / riddle.NAME

@@ -22,11 +22,11 @@ from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
 from spindle_fem.recordings.smooth_inputs import without_input_noise
 from spindle_fem.recordings.thin import thinned_recording
-from spindle_fem.studies.simulate import fast_model_for
 
 Progress = Callable[[str], None]
 

@@ -7,8 +7,8 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.inference.coverage import coverage_study
 from spindle_fem.inference.predictor import MachinePredictor
+from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.studies.simulate import fast_model_for
 
 PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
 INPUTS = ("speed", "thrust", "ambient", "coolant_inlet")

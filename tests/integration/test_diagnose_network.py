@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from spindle_fem import parallel
 from spindle_fem.commands.diagnose_command import diagnose
+from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.effects.registry import candidates_for
 from spindle_fem.errors import BadInputError, ConvergenceError
 from spindle_fem.inference import worker_processes as abreast
@@ -23,7 +24,6 @@ from spindle_fem.inference.screening import screen
 from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.inference.worker_processes import FitOrder, Workers, fit_order
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.studies.simulate import simulate_machine
 
 MACHINE = """
 schema = "spindle-fem/machine/1"

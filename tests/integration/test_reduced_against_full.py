@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from scipy.sparse.linalg import splu, spsolve
 
+from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.inference.simulated_plant import Plant
@@ -16,13 +17,13 @@ from spindle_fem.model.reduced.affine_operators import build_affine_system
 from spindle_fem.model.reduced.build_reduced import ReductionOptions, build_reduced_model, reduced_model_of
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
-from spindle_fem.studies.simulate import fast_model_for, simulate_machine
 
 RPM = np.pi / 30.0
 OVERRIDES = ("mesh.preset=coarse", "mesh.order=1")
@@ -215,7 +216,9 @@ def made(fast, recorded_in, tmp_path_factory):
 
 
 def test_simulate_writes_what_every_channel_should_have_read(fast, made, tmp_path, monkeypatch):
-    monkeypatch.setattr("spindle_fem.studies.simulate.reduced_model_of", lambda spec, **options: fast.model)
+    monkeypatch.setattr(
+        "spindle_fem.model.reduced.recorded_model.reduced_model_of", lambda spec, **options: fast.model
+    )
     folder = tmp_path / "out"
     plain = simulate_machine("recorded_spindle", made, folder, overrides=OVERRIDES)
     assert json.loads((folder / "simulation.json").read_text())["channels"] == plain["channels"]
@@ -266,7 +269,7 @@ def test_speeds_beyond_the_table_get_a_range_of_their_own(fast, monkeypatch):
         asked.append(options)
         return fast.model
 
-    monkeypatch.setattr("spindle_fem.studies.simulate.reduced_model_of", remember)
+    monkeypatch.setattr("spindle_fem.model.reduced.recorded_model.reduced_model_of", remember)
     for speed in (4000.0, 6000.0):
         recording = type("R", (), {"input_names": ("speed",), "inputs": np.array([[speed * RPM]])})()
         fast_model_for(fast.spec, [recording])

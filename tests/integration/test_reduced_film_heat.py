@@ -6,16 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.film_heat import FilmHeat
+from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import prepare_machine
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
-from spindle_fem.studies.simulate import fast_model_for, simulate_machine
 
 RPM = np.pi / 30.0
 OVERRIDES = ("mesh.preset=coarse", "mesh.order=1")

@@ -9,8 +9,8 @@ import pytest
 
 from spindle_fem.commands.console import print_simulation
 from spindle_fem.commands.machine_commands import rebuild
+from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.errors import BadInputError, RecordingError
-from spindle_fem.studies.simulate import simulate_machine
 
 MACHINE = """
 schema = "spindle-fem/machine/1"

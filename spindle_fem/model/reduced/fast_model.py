@@ -451,7 +451,7 @@ class FastModel:
             raise SpecError(
                 "heat.model",
                 f'"{self.spec.heat.model}" follows the temperatures of every bearing.',
-                'The fast model takes heat.model = "table"; studies.simulate.fast_model_for makes one.',
+                'The fast model takes heat.model = "table"; recorded_model.fast_model_for makes one.',
             )
         recorded = tuple(RecordedHeat(name) for name in drive.names if name.startswith("heat."))
         return (*natural_film_terms(self.spec), *self.extra_terms, *recorded)
