@@ -76,7 +76,7 @@ def _with_imports(modules: Sequence[str]) -> dict[str, Path]:
             raise FileNotFoundError(f"there is no module {name}")
         found[name] = path
         text = path.read_text(encoding="utf-8")
-        if "registry(__name__)" in text:
+        if path.name == "__init__.py" and "registry(__name__)" in text:
             # Its files are imported by name when they are asked for.
             waiting += [f"{name}.{file.stem}" for file in path.parent.glob("*.py") if file != path]
         for package, listed in _IMPORT.findall(text):
