@@ -3,7 +3,7 @@
     python benchmarks/reduced.py [--machine recorded_spindle] [--preset coarse] [--order 2] [--whole]
 
 The full model is the reference: the step test 0-4500 rpm by 500, 40 min each or, with ``--whole``,
-each until the probes have settled, then switched off for 4 h; and steady designs. Times are medians of
+each until the probes have settled, then switched off for 4 h. Times are medians of
 several runs, in process time so that other load on the machine counts little.
 """
 
@@ -20,18 +20,14 @@ import numpy as np
 
 from spindle_fem.definition.load import load_machine, read_toml
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.run_start import Start
-from spindle_fem.model.reduced.steady_designs import SteadyDesigns
 from spindle_fem.operation.coefficients import free_parameters
-from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
-from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.transient_study import StudyResult, run_study, study_of
 
 RPM = np.pi / 30.0
@@ -143,42 +139,6 @@ def report_step_test(fast: FastModel, machine: PreparedMachine, *, whole: bool) 
     print(f"  full model {spent:.0f} s for {full.shape[0] / 60:.1f} h, heat closed to {imbalance:.1g}")
 
 
-def report_designs(fast: FastModel, spec: MachineSpec, number: int) -> None:
-    """Steady designs: time one by one and together, error against the full model."""
-    point = OperatingPoint.of(spec)
-    names = tuple(free_parameters(spec))
-    begin = time.process_time()
-    designs = SteadyDesigns(fast, point, names)
-    made = time.process_time() - begin
-    print(f"steady designs, {len(names)} parameters, {len(designs.loads)} loads: {designs.size} vectors, "
-          f"made in {made:.2f} s, "
-          f"checked {designs.checked_error:.2g} K against the fast model")  # fmt: skip
-    rng = np.random.default_rng(5)
-    logs = designs.limits / 3.0 * np.clip(rng.normal(size=(1000, len(names))), -2.9, 2.9)
-    row = inputs(np.zeros(1), point.speed, spec)
-    loads = np.array(
-        [
-            fast.load_inputs(STANDARD, row, fast.table.factors(dict(zip(names, np.exp(log), strict=True))))[
-                0
-            ][0]
-            for log in logs
-        ]
-    )
-    amounts = designs.amounts(loads)
-    alone = median_time(
-        lambda: [designs.temperatures(log, own) for log, own in zip(logs, amounts, strict=True)]
-    )
-    together = median_time(lambda: designs.many(logs, amounts))
-    print(f"  one by one {1e3 * alone:.0f} us each, together {1e3 * together:.0f} us")
-    worst = 0.0
-    for log, own in zip(logs[:number], amounts, strict=False):
-        other = with_parameters(spec, dict(zip(names, np.exp(log).tolist(), strict=True)))
-        full = solve_prepared(prepare_machine(other)).probes
-        found = designs.temperatures(log, own)
-        worst = max(worst, *(abs(found[fast.channels.index(name)] - value) for name, value in full.items()))
-    print(f"  against {number} full solutions: {worst:.2g} K")
-
-
 def report_times(fast: FastModel, spec: MachineSpec, number: int) -> None:
     """4 h at 10 s: steps, derivatives, nonlinear terms."""
     start = spec.operation.ambient_temperature
@@ -216,7 +176,6 @@ def main() -> None:
     parser.add_argument("--preset", default="coarse")
     parser.add_argument("--order", type=int, default=2)
     parser.add_argument("--parameters", type=int, default=30)
-    parser.add_argument("--designs", type=int, default=3, help="Steady designs solved in full beside.")
     parser.add_argument("--whole", action="store_true", help="Each step of the test until settled.")
     parser.add_argument("--times-only", action="store_true", help="No full transient.")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE")
@@ -235,8 +194,6 @@ def main() -> None:
     model, checked = fast.model, fast.model.errors["probes"]
     print(f"{model.n_full} unknowns -> {model.size}, made or read in {built:.1f} s, checked {checked:.2g} K")
     report_times(fast, spec, options.parameters)
-    if not fast.extra_terms:
-        report_designs(fast, spec, options.designs)
     if not options.times_only:
         report_step_test(fast, prepare_machine(spec), whole=options.whole)
 

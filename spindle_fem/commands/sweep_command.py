@@ -24,7 +24,7 @@ from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.studies.sweep.designs import Axis, Design, build_axes, plan_designs, reference_designs
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, TaskBuilder, solve_task
-from spindle_fem.studies.sweep.fast.fast_outputs import ONLY_FULL
+from spindle_fem.studies.sweep.fast_outputs import ONLY_FULL
 from spindle_fem.studies.sweep.file_names import MACHINE_FILE, STUDY_FILE, SUMMARY_FILE
 from spindle_fem.studies.sweep.judge_designs import Limit, judged, limits_of
 from spindle_fem.studies.sweep.optimise import search_designs

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import Channel
 from spindle_fem.errors import GeometryError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.facet_centres import facet_centres
 from spindle_fem.operation.gap_bands import angle_of
 
@@ -46,6 +47,13 @@ class ChannelCells:
     def n_starts(self) -> int:
         """Number of parallel channels."""
         return self.cell_area.shape[0]
+
+
+def cells_of_model(model: ThermalModel) -> ChannelCells:
+    """The coolant's cells of a thermal model, without the mesh's facets."""
+    return ChannelCells(
+        (), {}, {}, model.cell_area, model.cell_angle, model.cell_position, model.cell_is_port
+    )
 
 
 def helix_coordinates(

@@ -7,19 +7,19 @@ from spindle_fem.cache import CACHE_VARIABLE
 from spindle_fem.commands.sweep_command import prepare_study, sweep_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import FaultsError
+from spindle_fem.model.reduced.build_for_designs import FIRST_TABLES
+from spindle_fem.model.reduced.design_inputs import refusal
+from spindle_fem.model.reduced.heat_tables import BearingTables
+from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.studies.sweep.designs import Design
 from spindle_fem.studies.sweep.evaluate_design import Question, TaskBuilder, row_of, solve_checked
-from spindle_fem.studies.sweep.fast.backend import (
+from spindle_fem.studies.sweep.fast_backend import (
     LARGEST_ERROR,
     GroupTask,
     answer_group,
     answer_tasks,
     model_of,
 )
-from spindle_fem.studies.sweep.fast.build_steady import FIRST_TABLES
-from spindle_fem.studies.sweep.fast.design_inputs import refusal
-from spindle_fem.studies.sweep.fast.heat_tables import BearingTables
-from spindle_fem.studies.sweep.fast.steady_model import SteadyModel
 from spindle_fem.studies.sweep.results_table import RESULTS, read_results
 
 QUICK = ("mesh.preset=coarse", "mesh.order=1")
@@ -224,13 +224,13 @@ def test_machines_that_no_projected_model_can_answer(tmp_path):
 def test_a_model_comes_back_from_disk(by_table, tmp_path):
     model, _ = cached_model(by_table[0])
     model.save(tmp_path / "model.npz")
-    again = SteadyModel.load(tmp_path / "model.npz")
+    again = ThermalModel.load(tmp_path / "model.npz")
     assert again.checked == model.checked
-    assert again.gap_radii == {name: list(pair) for name, pair in model.gap_radii.items()}
+    assert again.gap_radii == model.gap_radii
     assert np.array_equal(again.operators, model.operators)
     (tmp_path / "model.npz").write_bytes(b"damaged")
-    assert SteadyModel.load(tmp_path / "model.npz") is None
-    assert SteadyModel.load(tmp_path / "none.npz") is None
+    assert ThermalModel.load(tmp_path / "model.npz") is None
+    assert ThermalModel.load(tmp_path / "none.npz") is None
 
 
 def test_a_structure_is_what_the_mesh_and_the_operators_depend_on(by_table):

@@ -7,7 +7,7 @@ import numpy as np
 
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
-from spindle_fem.model.reduced.projected_model import ReducedModel
+from spindle_fem.model.thermal_model import ThermalModel
 
 CELLS = 12
 RPM = np.pi / 30.0
@@ -61,7 +61,7 @@ def lumped_model(spec):
     points = [probe for probe in spec.probe if probe.kind == "point"]
     rings = ("F1.outer_ring", "F2.outer_ring", "F3.outer_ring", "housing", "R1.outer_ring")
     area = 0.156 / CELLS
-    return ReducedModel(
+    return ThermalModel(
         coefficient_names=tuple(operators),
         operators=np.array(list(operators.values())),
         fluid_names=tuple(films),

@@ -33,6 +33,7 @@ FLOORS = (
     "effects.registry",
     "machine.view",
     "model.trbdf2",
+    "model.thermal_model",
     "model.mesh",
     "operation",
     "model.lumped",

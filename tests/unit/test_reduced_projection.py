@@ -9,9 +9,10 @@ from scipy import sparse
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpecError
 from spindle_fem.machine.geometry.assembly import build_assembly
-from spindle_fem.model.reduced.affine_operators import build_affine_system
-from spindle_fem.model.reduced.projected_model import reduced_digest
-from spindle_fem.model.reduced.snapshots import SnapshotSpace, helix_profiles, orthonormalise
+from spindle_fem.model.reduced.mesh_model import build_mesh_model
+from spindle_fem.model.reduced.reduced_cache import reduced_digest
+from spindle_fem.model.reduced.snapshots import SnapshotSpace, orthonormalise
+from spindle_fem.model.reduced.unit_loads import helix_profiles
 from spindle_fem.operation.coefficients import build_coefficient_table
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.surroundings.rotating_surfaces import rotating_film
@@ -134,7 +135,7 @@ def test_what_has_no_constant_coefficient_is_refused():
         build_coefficient_table(spec, build_assembly(spec).joint_names, RADII)
     machine = SimpleNamespace(spec=None, operators=None, joint_conductance={"A|B": np.inf, "B|C": 1.0})
     with pytest.raises(SpecError, match=r"A\|B is .perfect.*Give a large conductance"):
-        build_affine_system(machine)
+        build_mesh_model(machine)
 
 
 def test_the_identity_of_a_model_follows_coefficients_but_not_words_or_operation():

@@ -13,8 +13,8 @@ from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.projected_model import ReducedModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.coefficients import free_parameters
 from spindle_fem.physics.surroundings.still_air import outside_coefficient
 from tests.support.lumped_spindle import drive_of
@@ -173,10 +173,10 @@ def test_the_range_of_the_basis_is_watched(fast):
 def test_a_model_comes_back_from_disk_as_it_was(fast, tmp_path):
     path = tmp_path / "model.npz"
     fast.model.save(path)
-    again = ReducedModel.load(path)
+    again = ThermalModel.load(path)
     assert again.ranges == fast.model.ranges
     assert again.coefficient_names == fast.model.coefficient_names
     assert np.array_equal(again.operators, fast.model.operators)
     path.write_bytes(path.read_bytes()[:1000])
-    assert ReducedModel.load(path) is None
-    assert ReducedModel.load(tmp_path / "none.npz") is None
+    assert ThermalModel.load(path) is None
+    assert ThermalModel.load(tmp_path / "none.npz") is None

@@ -8,13 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spindle_fem.definition.load import load_machine
-from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of
-from spindle_fem.operation.channel_cells import ChannelCells
-from spindle_fem.operation.coolant_loop import CoolantLoop
-from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.studies.sweep.fast.coolant_batch import ChannelBatch, pressure_drops
-from spindle_fem.studies.sweep.fast.fast_outputs import extreme_temperatures
-from spindle_fem.studies.sweep.fast.heat_tables import (
+from spindle_fem.model.reduced.coolant_batch import ChannelBatch, pressure_drops
+from spindle_fem.model.reduced.heat_tables import (
     QUANTITIES,
     BearingTables,
     chebyshev_points,
@@ -23,6 +18,11 @@ from spindle_fem.studies.sweep.fast.heat_tables import (
     is_constant,
     mechanical_keys,
 )
+from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of
+from spindle_fem.operation.channel_cells import ChannelCells
+from spindle_fem.operation.coolant_loop import CoolantLoop
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.studies.sweep.fast_outputs import extreme_temperatures
 
 
 @given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.floats(280.0, 340.0))

@@ -109,7 +109,7 @@ class Term:
     name : str
     parameters : tuple of TermParameter
     heat_places : tuple of str
-        Places of :class:`spindle_fem.model.reduced.projected_model.ReducedModel`, in W; or
+        Places of :class:`spindle_fem.model.thermal_model.ThermalModel`, in W; or
         ``fluid.<surface>`` (the film's fluid) and ``fluid.coolant_inlet``, in
         K above what the inputs say.
     coefficients : tuple of str

@@ -13,27 +13,20 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP
-from spindle_fem.model.reduced.affine_operators import AffineSystem, build_affine_system
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.projected_model import (
-    ReducedModel,
-    family_of,
-    project,
-    reduced_digest,
-    reduced_path,
-)
+from spindle_fem.model.reduced.mesh_model import MeshModel, build_mesh_model
+from spindle_fem.model.reduced.reduced_cache import family_of, reduced_digest, reduced_path
 from spindle_fem.model.reduced.snapshots import (
     Sample,
     SnapshotSpace,
-    helix_profiles,
-    load_columns,
     shifted_systems,
 )
+from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads, friction_loads
+from spindle_fem.model.thermal_model import ThermalModel, project
 from spindle_fem.operation.coefficients import (
     CoefficientTable,
     build_coefficient_table,
     free_parameters,
-    gap_radii_of,
 )
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -89,12 +82,10 @@ class ReductionOptions:
 # Laplace frequencies, 1/s: steady state, hours, minutes, half a minute.
 SHIFTS = (0.0, 3.0e-4, 3.0e-3)
 FAST_SHIFT = 3.0e-2
-FRICTION_HEAT = 80.0
 PLACE_HEAT = 50.0
 GUESS_SIZE = 80
 # Of an error itself.
 CHECK_TOLERANCE = 0.05
-FLUID_RISE = 10.0
 # Steps of the series in the change of one contact that the basis holds, and the share of its conductance
 # that is left where all contacts of a group have opened.
 CONTACT_ORDERS, OPENED = 2, 0.05
@@ -107,7 +98,7 @@ class _Workshop:
     """What building the snapshots needs beside the operators."""
 
     machine: PreparedMachine
-    affine: AffineSystem
+    full: MeshModel
     table: CoefficientTable
     sigma: Mapping[str, float]
     options: ReductionOptions
@@ -125,7 +116,7 @@ class _Workshop:
         chosen.pop("heat.inner_share", None)
         base = self.table.base(point)
         coefficients = {
-            name: base[name] * self.table.scale(name, chosen) for name in self.affine.coefficient_names
+            name: base[name] * self.table.scale(name, chosen) for name in self.full.coefficient_names
         }
         capacities = {
             name: value * self.table.scale(name, chosen) for name, value in self.table.capacities().items()
@@ -180,7 +171,7 @@ def reduced_model_of(
     options: ReductionOptions | None = None,
     as_given: bool = False,
     progress: Progress = lambda stage: None,
-) -> ReducedModel:
+) -> ThermalModel:
     """Reduced model of a machine, from the cache where it was made before.
 
     Parameters
@@ -196,11 +187,11 @@ def reduced_model_of(
     """
     chosen = options or ReductionOptions()
     digest = reduced_digest(spec, chosen.key(spec))
-    found = ReducedModel.load(reduced_path(digest))
+    found = ThermalModel.load(reduced_path(digest))
     if found is not None and found.digest == digest:
         return found
     for path in family_of(digest) if as_given else []:
-        found = ReducedModel.load(path)
+        found = ThermalModel.load(path)
         if found is not None and _holds(found, spec, chosen.highest_speed_of(spec)):
             return found
     machine = prepare_machine(spec, progress=progress)
@@ -209,7 +200,7 @@ def reduced_model_of(
     return model
 
 
-def _holds(model: ReducedModel, spec: MachineSpec, highest_speed: float) -> bool:
+def _holds(model: ThermalModel, spec: MachineSpec, highest_speed: float) -> bool:
     """Whether every coefficient of a machine is in the range of a model, from rest to a speed (rad/s)."""
     fast = FastModel(model, spec)
     values = [fast.table.capacities()]
@@ -224,7 +215,7 @@ def build_reduced_model(
     options: ReductionOptions | None = None,
     *,
     progress: Progress = lambda stage: None,
-) -> ReducedModel:
+) -> ThermalModel:
     """Project a prepared machine and check the projection against the full model.
 
     Snapshots are full solutions at several Laplace frequencies (moment
@@ -244,36 +235,29 @@ def build_reduced_model(
     chosen = options or ReductionOptions()
     spec = machine.spec
     progress("reduced model: operators")
-    affine = build_affine_system(machine)
-    radii = gap_radii_of(machine.spec, machine.operators)
-    table = build_coefficient_table(spec, machine.mesh.joints, radii)
-    workshop = _Workshop(machine, affine, table, free_parameters(spec), chosen)
+    full = build_mesh_model(machine)
+    table = build_coefficient_table(spec, full.contacts, full.gap_radii)
+    workshop = _Workshop(machine, full, table, free_parameters(spec), chosen)
     nominal = workshop.sample({}, workshop.usual_speed)
     progress("reduced model: snapshots")
     energy = (
-        affine.conduction(nominal.coefficients, nominal.channel_film)
-        + 1e-4 * affine.capacity(nominal.capacities)
+        full.conduction(nominal.coefficients, nominal.channel_film) + 1e-4 * full.capacity(nominal.capacities)
     ).tocsr()
-    space = SnapshotSpace(energy, np.ones((affine.size, 1)), chosen.tolerance)
-    _add_nominal(space, affine, nominal, spec)
+    space = SnapshotSpace(energy, full.one[:, None], chosen.tolerance)
+    _add_nominal(space, full, nominal, spec)
     opened = [workshop.sample({f"joint.{group.name}": OPENED}, workshop.usual_speed) for group in spec.joint]
     for sample in (*opened, *workshop.random_samples(chosen.samples, 1, chosen.sigmas)):
         # Fields at other coefficients begin as the best combination of those known.
         known = space.basis(GUESS_SIZE)
-        loads = physical_loads(affine, sample, spec)
-        systems = shifted_systems(affine, sample, SHIFTS, known)
+        loads = physical_loads(full, sample, spec)
+        systems = shifted_systems(full, sample, SHIFTS, known)
         space.add(np.hstack([system.solve(loads) for system in systems]))
     seed = 2
     for attempt in range(3):
         progress("reduced model: basis")
         basis = space.basis(chosen.largest + 30 * attempt)
-        model = project(
-            affine,
-            basis,
-            basis.T @ (energy @ np.ones(affine.size)),
-            cells=machine.builder.cells,
-            contacts=tuple(machine.mesh.joints),
-            gap_radii=radii,
+        model = replace(
+            project(full, basis, basis.T @ (energy @ full.one)),
             ranges=workshop.ranges(),
             digest=reduced_digest(spec, chosen.key(spec)),
         )
@@ -281,7 +265,7 @@ def build_reduced_model(
         worst: dict[str, float] = {}
         # Solutions that have joined can no longer judge: every round draws others.
         for sample in workshop.random_samples(chosen.checks, seed, 0.9 * chosen.sigmas):
-            found = _check(affine, basis, sample, spec)
+            found = _check(full, basis, sample, spec)
             worst = {key: max(value, worst.get(key, 0.0)) for key, value in found.errors.items()}
             if found.errors["probes"] > chosen.error:
                 for solution in found.solutions:
@@ -297,41 +281,41 @@ def build_reduced_model(
     )
 
 
-def _source_places(affine: AffineSystem, spec: MachineSpec) -> tuple[list[str], list[str]]:
-    """Places where friction heat enters, and those where a diagnosis may need a source."""
-    friction = [
-        f"{bearing.name}.{side}"
-        for _, bearing in spec.bearings
-        for side in ("inner_raceway", "outer_raceway", "balls")
-    ]
+def _source_places(full: MeshModel, spec: MachineSpec) -> list[str]:
+    """Places where a diagnosis may need a source, beside those of friction."""
     rings = {
         f"{bearing.name}.{side}" for _, bearing in spec.bearings for side in ("inner_ring", "outer_ring")
     }
     segments = {f"{part.name}.{segment.name}" for part in spec.part for segment in part.segment}
     single = {f"{part.name}.{part.segment[0].name}" for part in spec.part if len(part.segment) == 1}
-    other = [name for name in affine.place_names if name in segments - single or name in rings]
+    other = [name for name in full.place_names if name in segments - single or name in rings]
     other += [part.name for part in spec.part if len(part.segment) == 1]
-    other += [name for name in affine.place_names if name.startswith((NEAR, AROUND, UP, ACROSS))]
-    return friction, other
+    other += [name for name in full.place_names if name.startswith((NEAR, AROUND, UP, ACROSS))]
+    return other
 
 
-def _add_nominal(space: SnapshotSpace, affine: AffineSystem, nominal: Sample, spec: MachineSpec) -> None:
+def _add_nominal(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: MachineSpec) -> None:
     """Every source and fluid by itself at the nominal coefficients."""
-    friction, other = _source_places(affine, spec)
-    heat = FRICTION_HEAT * load_columns(affine, friction)
-    fluids = [nominal.coefficients[name] * FLUID_RISE * load for name, load in affine.fluid_load.items()]
-    columns = [heat, PLACE_HEAT * load_columns(affine, other), np.array(fluids).reshape(-1, affine.size).T]
-    columns.append(_coolant_loads(affine, nominal, 5))
-    loads = np.hstack(columns)
+    heat = friction_loads(
+        full, [[bearing.name] for _, bearing in spec.bearings], ("inner_raceway", "outer_raceway", "balls")
+    )
+    loads = np.hstack(
+        (
+            heat,
+            PLACE_HEAT * full.place_rows(_source_places(full, spec)).T,
+            fluid_loads(full, nominal.coefficients, together=False),
+            coolant_loads(full, nominal.channel_film, 5),
+        )
+    )
     known = None
     for shift in (*SHIFTS, FAST_SHIFT):
-        [system] = shifted_systems(affine, nominal, [shift], known)
+        [system] = shifted_systems(full, nominal, [shift], known)
         space.add(system.solve(heat if shift == FAST_SHIFT else loads))
         known = space.basis(GUESS_SIZE)
-    _add_contacts(space, affine, nominal, spec)
+    _add_contacts(space, full, nominal, spec)
 
 
-def _add_contacts(space: SnapshotSpace, affine: AffineSystem, nominal: Sample, spec: MachineSpec) -> None:
+def _add_contacts(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: MachineSpec) -> None:
     """What each contact by itself changes, at the nominal coefficients.
 
     The uncertain parameters move the contacts of a set together: the field beside one seat that is worse
@@ -340,11 +324,11 @@ def _add_contacts(space: SnapshotSpace, affine: AffineSystem, nominal: Sample, s
     """
     contacts = [
         nominal.coefficients[name] * operator
-        for name, operator in zip(affine.coefficient_names, affine.operators, strict=True)
+        for name, operator in zip(full.coefficient_names, full.operators, strict=True)
         if name.startswith("joint.")
     ]
-    loads = physical_loads(affine, nominal, spec)
-    for system in shifted_systems(affine, nominal, SHIFTS, space.basis(GUESS_SIZE)):
+    loads = physical_loads(full, nominal, spec)
+    for system in shifted_systems(full, nominal, SHIFTS, space.basis(GUESS_SIZE)):
         fields = system.solve(loads)
         # All loads press heat through a contact much alike: the largest combination stands for them.
         columns = [_largest_combination(contact @ fields) for contact in contacts]
@@ -360,25 +344,16 @@ def _largest_combination(columns: Array) -> Array:
     return columns @ vectors[:, -1]
 
 
-def _coolant_loads(affine: AffineSystem, sample: Sample, degree: int) -> Array:
-    if not affine.cell_film:
-        return np.zeros((affine.size, 0))
-    profiles = helix_profiles(*affine.cell_area.shape, degree) * FLUID_RISE
-    return np.asarray(affine.cell_load.T @ (sample.channel_film[:, None] * profiles))
-
-
-def physical_loads(affine: AffineSystem, sample: Sample, spec: MachineSpec) -> Array:
+def physical_loads(full: MeshModel, sample: Sample, spec: MachineSpec) -> Array:
     """Loads that occur: heat of each set on inner and on outer raceways, air, coolant."""
-    columns = []
-    for group in spec.bearing_set:
-        for side in ("inner_raceway", "outer_raceway"):
-            names = [f"{bearing.name}.{side}" for bearing in group.bearing]
-            columns.append(FRICTION_HEAT * load_columns(affine, names).sum(axis=1))
-    if affine.fluid_load:
-        films = sum(sample.coefficients[name] * load for name, load in affine.fluid_load.items())
-        columns.append(FLUID_RISE * films)
-    coolant = _coolant_loads(affine, sample, 1)
-    return np.column_stack([*columns, *coolant.T])
+    groups = [[bearing.name for bearing in group.bearing] for group in spec.bearing_set]
+    return np.hstack(
+        (
+            friction_loads(full, groups, ("inner_raceway", "outer_raceway")),
+            fluid_loads(full, sample.coefficients, together=True),
+            coolant_loads(full, sample.channel_film, 1),
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -397,16 +372,16 @@ class _Check:
     solutions: tuple[Array, ...]
 
 
-def _check(affine: AffineSystem, basis: Array, sample: Sample, spec: MachineSpec) -> _Check:
+def _check(full: MeshModel, basis: Array, sample: Sample, spec: MachineSpec) -> _Check:
     """Correct the projected solutions by the full model; the corrections are the errors."""
-    loads = physical_loads(affine, sample, spec)
+    loads = physical_loads(full, sample, spec)
     worst = {"probes": 0.0, "places": 0.0}
     solutions = []
-    for system in shifted_systems(affine, sample, SHIFTS, basis):
+    for system in shifted_systems(full, sample, SHIFTS, basis):
         projected = basis @ np.linalg.solve(system.projected, basis.T @ loads)
         missing = system.correct(loads, projected, CHECK_TOLERANCE)
-        worst["probes"] = max(worst["probes"], _largest(affine.probes @ missing))
-        worst["places"] = max(worst["places"], _largest(affine.places @ missing))
+        worst["probes"] = max(worst["probes"], _largest(full.probes @ missing))
+        worst["places"] = max(worst["places"], _largest(full.places @ missing))
         solutions.append(projected + missing)
     return _Check(worst, tuple(solutions))
 

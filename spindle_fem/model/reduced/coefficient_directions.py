@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from spindle_fem.model.reduced.projected_model import ReducedModel
+from spindle_fem.model.thermal_model import ThermalModel
 
 Array = NDArray[np.float64]
 
@@ -21,14 +21,14 @@ class ConductingDirections:
 
     Parameters
     ----------
-    model : ReducedModel
+    model : ThermalModel
     spread : (r,) ndarray, optional
         How large each coordinate of the states is. The directions are then those in which
         such states flow, far fewer: ``Q = L W`` with ``K_i = L Lᵀ`` and the first columns
         of ``W`` in ``Lᵀ diag(spread) = W S Zᵀ``.
     """
 
-    def __init__(self, model: ReducedModel, spread: Array | None = None) -> None:
+    def __init__(self, model: ThermalModel, spread: Array | None = None) -> None:
         self._model, self._spread = model, spread
         self._known: dict[str, tuple[Array, Array]] = {}
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.model.reduced.projected_model import ReducedModel
+from spindle_fem.model.thermal_model import ThermalModel
 
 Array = NDArray[np.float64]
 
@@ -46,13 +46,13 @@ class CoolantMaps:
 
 
 def coolant_maps(
-    model: ReducedModel, film: Array, capacity_rate: float, pumping_heat: float = 0.0
+    model: ThermalModel, film: Array, capacity_rate: float, pumping_heat: float = 0.0
 ) -> CoolantMaps:
     """Maps of given films.
 
     Parameters
     ----------
-    model : ReducedModel
+    model : ThermalModel
     film : (n_cells,) ndarray, [W/(m²·K)]
         May be complex, for derivatives.
     capacity_rate : float, [W/K]
@@ -81,7 +81,7 @@ def coolant_maps(
 
 
 def film_derivative(
-    model: ReducedModel, film: Array, capacity_rate: float, pumping_heat: float = 0.0
+    model: ThermalModel, film: Array, capacity_rate: float, pumping_heat: float = 0.0
 ) -> CoolantMaps:
     """Derivative of :func:`coolant_maps` to the logarithm of a factor on the film, by a complex step."""
     maps = coolant_maps(model, film * (1.0 + 1j * COMPLEX_STEP), capacity_rate, pumping_heat)
@@ -103,10 +103,10 @@ class UniformFilmMaps:
 
     Parameters
     ----------
-    model : ReducedModel
+    model : ThermalModel
     """
 
-    def __init__(self, model: ReducedModel) -> None:
+    def __init__(self, model: ThermalModel) -> None:
         self._model = model
         self._nodes: dict[int, Array] = {}
         self._stencils: dict[int, Array] = {}

@@ -19,9 +19,14 @@ from spindle_fem.model.reduced.coefficient_directions import ConductingDirection
 from spindle_fem.model.reduced.coolant_maps import CoolantMaps, UniformFilmMaps, coolant_maps, film_derivative
 from spindle_fem.model.reduced.drive import Drive, WarmedPoint, heat_of_table
 from spindle_fem.model.reduced.natural_films import natural_film_terms
-from spindle_fem.model.reduced.projected_model import ReducedModel
 from spindle_fem.model.reduced.trbdf2_matrices import build_propagator
-from spindle_fem.operation.coefficients import INNER_SHARE, CoefficientTable
+from spindle_fem.model.thermal_model import ThermalModel, project
+from spindle_fem.operation.channel_cells import cells_of_model
+from spindle_fem.operation.coefficients import (
+    INNER_SHARE,
+    CoefficientTable,
+    build_coefficient_table,
+)
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
 
@@ -70,7 +75,7 @@ class FastModel:
 
     Parameters
     ----------
-    model : ReducedModel
+    model : ThermalModel
     spec : MachineSpec
         The machine that the model was made of, or one that differs only in
         coefficients, operation and effects.
@@ -83,7 +88,7 @@ class FastModel:
 
     def __init__(
         self,
-        model: ReducedModel,
+        model: ThermalModel,
         spec: MachineSpec,
         extra_terms: Sequence[Term] = (),
         spread: Array | None = None,
@@ -92,7 +97,7 @@ class FastModel:
         self.spec = spec
         self.extra_terms = tuple(extra_terms)
         self.directions = ConductingDirections(model, spread)
-        self.table: CoefficientTable = model.table(spec)
+        self.table: CoefficientTable = build_coefficient_table(spec, model.contacts, model.gap_radii)
         self.bearings = tuple(bearing.name for _, bearing in spec.bearings)
         self.channels = tuple(probe.name for probe in spec.probe)
         self._outlet_row = next(
@@ -110,7 +115,7 @@ class FastModel:
         self._scales: tuple[dict[str, float], Array] | None = None
         self._reached: dict[str, frozenset[str]] = {}
         self._rows: dict[str, tuple[int, ...]] = {}
-        self.loop = CoolantLoop(spec, model.channel_cells()) if spec.channel is not None else None
+        self.loop = CoolantLoop(spec, cells_of_model(model)) if spec.channel is not None else None
         self.fixed_fluids = tuple(
             dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
         )
@@ -143,7 +148,9 @@ class FastModel:
 
     def projected(self, basis: Array, spread: Array | None = None) -> FastModel:
         """The same machine on a smaller basis, (r, s), in which states spread so far, (s,)."""
-        return FastModel(self.model.projected(basis), self.spec, self.extra_terms, spread)
+        return FastModel(
+            project(self.model, basis, basis.T @ self.model.one), self.spec, self.extra_terms, spread
+        )
 
     # ------------------------------------------------------------- operators
     def storage(self, factors: Mapping[str, float], added: Mapping[str, float] = NO_CHANGES) -> Array:

@@ -31,7 +31,7 @@ from spindle_fem.model.reduced.network_operators import (
     LINK,
     NetworkTable,
     boundary_of_links,
-    network_as_reduced,
+    network_thermal_model,
     source_power,
 )
 from spindle_fem.model.reduced.run_start import Start
@@ -68,7 +68,7 @@ class NetworkFastModel:
 
     Attributes
     ----------
-    model : ReducedModel
+    model : ThermalModel
         Unknowns are the nodes; places are the nodes, coefficients
         ``link.<link>``, fluids those of them that end at a boundary.
     bearings : tuple of str
@@ -100,7 +100,7 @@ class NetworkFastModel:
         names = network.boundary_names
         self.ambient_boundary = "ambient" if "ambient" in names else names[0] if len(names) == 1 else None
         self._boundary_of = boundary_of_links(network)
-        self.model = network_as_reduced(network, tuple(self._boundary_of))
+        self.model = network_thermal_model(network, tuple(self._boundary_of))
         self.directions = ConductingDirections(self.model)
         self._conductance = {
             f"{LINK}{name}": float(value)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import OutOfValidityError, SpecError, did_you_mean
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
-from spindle_fem.model.reduced.projected_model import ReducedModel
+from spindle_fem.model.thermal_model import ThermalModel
 
 Array = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def boundary_of_links(network: ThermalNetwork) -> dict[str, str]:
     return found
 
 
-def network_as_reduced(network: ThermalNetwork, fluids: tuple[str, ...]) -> ReducedModel:
+def network_thermal_model(network: ThermalNetwork, fluids: tuple[str, ...]) -> ThermalModel:
     """Unit operators of a network; a link between two boundaries moves nothing."""
     n, unit = network.n_nodes, np.eye(network.n_nodes)
     names = tuple(f"{LINK}{name}" for name in network.link_names)
@@ -113,17 +113,11 @@ def network_as_reduced(network: ThermalNetwork, fluids: tuple[str, ...]) -> Redu
     loads = [np.diag(operators[names.index(name)]) for name in fluids]
     storage = np.zeros((n, n, n))
     storage[np.arange(n), np.arange(n), np.arange(n)] = 1.0
-    return ReducedModel(
+    return ThermalModel(
         coefficient_names=names,
         operators=operators,
         fluid_names=fluids,
         fluid_load=np.array(loads).reshape(-1, n),
-        cell_film=np.zeros((0, n, n)),
-        cell_load=np.zeros((0, n)),
-        cell_area=np.zeros((0, 0)),
-        cell_angle=np.zeros(0),
-        cell_position=np.zeros(0),
-        cell_is_port=np.zeros(0, dtype=bool),
         storage_names=tuple(f"capacity.{name}" for name in network.node_names),
         storage=storage,
         place_names=network.node_names,
@@ -131,9 +125,5 @@ def network_as_reduced(network: ThermalNetwork, fluids: tuple[str, ...]) -> Redu
         probe_names=network.node_names,
         probes=unit,
         one=np.ones(n),
-        contacts=(),
-        gap_radii={},
-        ranges={},
         n_full=n,
-        digest="network",
     )

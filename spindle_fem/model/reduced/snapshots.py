@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.linalg import eigh
 
 from spindle_fem.model.mesh.linear_solvers import build_preconditioner, solve_many
-from spindle_fem.model.reduced.affine_operators import AffineSystem
+from spindle_fem.model.reduced.mesh_model import MeshModel
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,7 @@ class Sample:
     coefficients : mapping of str to float
     channel_film : (n_cells,) ndarray, [W/(m²·K)]
     capacities : mapping of str to float
+        Not needed for steady solutions.
     """
 
     coefficients: dict[str, float]
@@ -52,51 +53,59 @@ class ShiftedSystem:
         Independent fields from which first guesses are combined.
     projected : (k, k) ndarray
         The matrix on them.
-    affine : AffineSystem
+    full : MeshModel
+    tolerance : float
+        Of each solution, relative to its norm in energy.
     """
 
     shift: float
     matrix: sparse.csr_array
     known: Array
     projected: Array
-    affine: AffineSystem
+    full: MeshModel
+    tolerance: float = SOLVER_TOLERANCE
 
     def solve(self, loads: Array) -> Array:
         """``(K + s M)⁻¹ F``, (n, m) [K], from loads (n, m) [W]."""
         guesses = None
         if self.known.shape[1]:
             guesses = self.known @ np.linalg.solve(self.projected, self.known.T @ loads)
-        return self._iterate(loads, guesses, SOLVER_TOLERANCE)
+        return self._iterate(loads, guesses, self.tolerance)
 
     def correct(self, loads: Array, solutions: Array, relative_tolerance: float) -> Array:
         """What is missing from approximate solutions, to a share of it, (n, m) [K]."""
         return self._iterate(loads - self.matrix @ solutions, None, relative_tolerance)
 
     def _iterate(self, loads: Array, guesses: Array | None, relative_tolerance: float) -> Array:
-        preconditioner = build_preconditioner(self.affine.system(self.matrix))
+        preconditioner = build_preconditioner(self.full.system(self.matrix))
         return solve_many(self.matrix, loads, preconditioner, guesses, relative_tolerance=relative_tolerance)
 
 
 def shifted_systems(
-    affine: AffineSystem, sample: Sample, shifts: Sequence[float], known: Array | None = None
+    full: MeshModel,
+    sample: Sample,
+    shifts: Sequence[float],
+    known: Array | None = None,
+    tolerance: float = SOLVER_TOLERANCE,
 ) -> Iterator[ShiftedSystem]:
     """Systems of one sample at several Laplace frequencies.
 
     Parameters
     ----------
-    affine : AffineSystem
+    full : MeshModel
     sample : Sample
     shifts : sequence of float, [1/s]
     known : (n, k) ndarray, optional
-        See :class:`ShiftedSystem`.
+    tolerance : float
+        As :class:`ShiftedSystem` has them.
     """
-    conduction = affine.conduction(sample.coefficients, sample.channel_film)
-    capacity = affine.capacity(sample.capacities)
-    fields = np.zeros((affine.size, 0)) if known is None else known
+    conduction = full.conduction(sample.coefficients, sample.channel_film)
+    capacity = full.capacity(sample.capacities) if any(shifts) else sparse.csr_array(conduction.shape)
+    fields = np.zeros((full.size, 0)) if known is None else known
     parts = [fields.T @ (matrix @ fields) for matrix in (conduction, capacity)]
     for shift in shifts:
         matrix = conduction + shift * capacity if shift > 0.0 else conduction
-        yield ShiftedSystem(shift, matrix.tocsr(), fields, parts[0] + shift * parts[1], affine)
+        yield ShiftedSystem(shift, matrix.tocsr(), fields, parts[0] + shift * parts[1], full, tolerance)
 
 
 class SnapshotSpace:
@@ -163,20 +172,3 @@ def orthonormalise(vectors: Array, energy: sparse.csr_array) -> Array:
         factor = np.linalg.cholesky(0.5 * (gram + gram.T))
         vectors = np.linalg.solve(factor, vectors.T).T
     return vectors
-
-
-def helix_profiles(n_starts: int, n_along: int, degree: int) -> Array:
-    """Bulk temperature shapes along each start, Legendre polynomials, (n_cells, m)."""
-    along = (np.arange(n_along) + 0.5) / n_along * 2.0 - 1.0
-    shapes = np.polynomial.legendre.legvander(along, degree)
-    profiles = np.zeros((n_starts * n_along, n_starts * (degree + 1)))
-    for start in range(n_starts):
-        rows = slice(start * n_along, (start + 1) * n_along)
-        profiles[rows, start * (degree + 1) : (start + 1) * (degree + 1)] = shapes
-    return profiles
-
-
-def load_columns(affine: AffineSystem, places: Sequence[str]) -> Array:
-    """Load of 1 W on each of some places, (n, m)."""
-    rows = [affine.place_names.index(name) for name in places]
-    return affine.places[rows].toarray().T

@@ -27,6 +27,7 @@ from spindle_fem.machine.meshing.mesh_cache import mesh_digest
 from spindle_fem.machine.meshing.sizes import build_sizes
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
+from spindle_fem.model.reduced.heat_tables import mechanical_key
 from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -37,11 +38,10 @@ from spindle_fem.solvers.coupled_steady import machine_on_mesh
 from spindle_fem.studies.run_checks import require_checks
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.sweep.designs import Design
-from spindle_fem.studies.sweep.fast.design_inputs import refusal, structure_digest
-from spindle_fem.studies.sweep.fast.heat_tables import mechanical_key
 from spindle_fem.studies.sweep.morphing import lattice_assembly, move_mesh, moved_digest
 from spindle_fem.studies.sweep.outputs import derived_values, value_of
 from spindle_fem.studies.sweep.results_table import FAILED, FULL, IMPOSSIBLE, MOVED, NEW, OK, Row
+from spindle_fem.studies.sweep.structure import refusal, structure_digest
 
 LOGGER = logging.getLogger(__name__)
 

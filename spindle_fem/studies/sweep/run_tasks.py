@@ -8,8 +8,8 @@ from functools import partial
 
 from spindle_fem.parallel import WorkerPool
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, evaluate_tasks
-from spindle_fem.studies.sweep.fast.backend import GroupTask, answer_group
-from spindle_fem.studies.sweep.fast.fast_outputs import ONLY_FULL
+from spindle_fem.studies.sweep.fast_backend import GroupTask, answer_group
+from spindle_fem.studies.sweep.fast_outputs import ONLY_FULL
 from spindle_fem.studies.sweep.results_table import Row
 
 # Rows that a worker holds before they land in the table: few are lost when it dies,

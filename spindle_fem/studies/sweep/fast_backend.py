@@ -12,8 +12,18 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spindle_fem import __version__
-from spindle_fem.cache import source_digest
+from spindle_fem.cache import cache_directory, source_digest
+from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import SpindleFemError
+from spindle_fem.model.reduced.build_for_designs import (
+    FIRST_TABLES,
+    build_model_for_designs,
+    state_coefficients,
+)
+from spindle_fem.model.reduced.design_inputs import DesignInputs, design_inputs
+from spindle_fem.model.reduced.heat_tables import BearingTables
+from spindle_fem.model.reduced.steady_batch import SteadyBatch, SteadySolver
+from spindle_fem.model.thermal_model import FORMAT, ThermalModel
 from spindle_fem.parallel import one_thread
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.solvers.coupled_steady import machine_on_mesh
@@ -28,16 +38,7 @@ from spindle_fem.studies.sweep.evaluate_design import (
     shared_operators,
     solve_checked,
 )
-from spindle_fem.studies.sweep.fast.build_steady import (
-    FIRST_TABLES,
-    build_steady_model,
-    state_coefficients,
-)
-from spindle_fem.studies.sweep.fast.design_inputs import DesignInputs, design_inputs
-from spindle_fem.studies.sweep.fast.fast_outputs import band_ratios, extreme_temperatures, values_of
-from spindle_fem.studies.sweep.fast.heat_tables import BearingTables
-from spindle_fem.studies.sweep.fast.solve_batch import SteadyBatch, SteadySolver
-from spindle_fem.studies.sweep.fast.steady_model import FORMAT, SteadyModel, model_path
+from spindle_fem.studies.sweep.fast_outputs import band_ratios, extreme_temperatures, values_of
 from spindle_fem.studies.sweep.results_table import OK, REDUCED, Row
 
 Array = NDArray[np.float64]
@@ -46,6 +47,9 @@ Array = NDArray[np.float64]
 LARGEST_ERROR = 0.02
 CHECKS = 3
 AT_ONCE = 256
+# Errors of a model at the designs that were solved in full: the largest in K, and the largest ratio of a
+# true error to its estimate, at least 1.
+TRUE, RATIO = "true", "true over estimated"
 # Beyond the coefficients that the basis was made for by more than this, the full solve answers.
 RANGE_SLACK = 1.0e-6
 
@@ -78,7 +82,7 @@ def answer_group(group: GroupTask, question: Question) -> list[Row]:
             model, rows, tables = model_of(group, question)
         except SpindleFemError:
             return []  # the full solves will say what is wrong, design by design
-        if not model.checked_error <= LARGEST_ERROR:
+        if not model.errors[TRUE] <= LARGEST_ERROR:
             return rows
         wanted = {task.key for task in group.wanted} - {row["key"] for row in rows} - set(model.checked)
         for tasks in (group.plan, tuple(t for t in group.wanted if t not in group.plan)):
@@ -89,7 +93,7 @@ def answer_group(group: GroupTask, question: Question) -> list[Row]:
 
 
 def answer_tasks(
-    model: SteadyModel, tables: BearingTables, tasks: Sequence[DesignTask], question: Question
+    model: ThermalModel, tables: BearingTables, tasks: Sequence[DesignTask], question: Question
 ) -> list[Row]:
     """Rows of designs inside the model's range."""
     specs = [task.spec for task in tasks]
@@ -124,8 +128,8 @@ def _answer(
             for row in _answer(solver, inputs, part, tasks, question)
         ]
     model = solver.model
-    error = model.calibration * np.max([state.estimate for state in states], axis=0)
-    error = np.maximum(error, model.checked_error)
+    error = model.errors[RATIO] * np.max([state.estimate for state in states], axis=0)
+    error = np.maximum(error, model.errors[TRUE])
     good = np.all([state.settled for state in states], axis=0) & (error <= LARGEST_ERROR)
     good &= inside_range(model, states[0])
     rows = []
@@ -158,15 +162,15 @@ def _states(solver: SteadySolver, inputs: DesignInputs, question: Question) -> l
     return [nominal, *(solver.solve(inputs, ratio) for ratio in band_ratios(nominal.channel))]
 
 
-def inside_range(model: SteadyModel, batch: SteadyBatch) -> NDArray[np.bool_]:
+def inside_range(model: ThermalModel, batch: SteadyBatch) -> NDArray[np.bool_]:
     """Whether every coefficient of a design lies among those that the basis was made for, (n,)."""
     values = state_coefficients(batch)
-    low, high = model.ranges.T
+    low, high = np.array([model.ranges[name] for name in (*model.coefficient_names, CHANNEL_FILM)]).T
     slack = RANGE_SLACK * np.maximum(np.abs(low), np.abs(high))
     return np.all((values >= low - slack) & (values <= high + slack), axis=1)
 
 
-def _inputs(model: SteadyModel, tasks: Sequence[DesignTask]) -> DesignInputs:
+def _inputs(model: ThermalModel, tasks: Sequence[DesignTask]) -> DesignInputs:
     return design_inputs(
         [task.spec for task in tasks],
         model.coefficient_names,
@@ -177,12 +181,12 @@ def _inputs(model: SteadyModel, tasks: Sequence[DesignTask]) -> DesignInputs:
     )
 
 
-def model_of(group: GroupTask, question: Question) -> tuple[SteadyModel, list[Row], BearingTables]:
+def model_of(group: GroupTask, question: Question) -> tuple[ThermalModel, list[Row], BearingTables]:
     """Checked model of the planned designs, from the cache where it was made before.
 
     Returns
     -------
-    SteadyModel
+    ThermalModel
     list of Row
         Of the designs that were solved in full to check it; none from the cache.
     BearingTables
@@ -193,14 +197,14 @@ def model_of(group: GroupTask, question: Question) -> tuple[SteadyModel, list[Ro
         The machine cannot be meshed, solved or projected.
     """
     first = group.plan[0]
-    path = model_path(_digest(group, question))
+    path = cache_directory() / f"designs-{_digest(group, question)}.npz"
     tables = BearingTables(*FIRST_TABLES)
-    found = SteadyModel.load(path)
+    found = ThermalModel.load(path)
     if found is not None:
         return found, [], tables
     mesh, operators = shared_operators(first)
     machine = machine_on_mesh(first.spec, mesh, operators)
-    model, solver = build_steady_model(
+    model, solver = build_model_for_designs(
         machine, [task.spec for task in group.plan], film_band=question.film_uncertainty
     )
     model, rows = checked_model(model, solver, group.plan, question)
@@ -216,14 +220,14 @@ def _digest(group: GroupTask, question: Question) -> str:
 
 
 def checked_model(
-    model: SteadyModel, solver: SteadySolver, plan: Sequence[DesignTask], question: Question
-) -> tuple[SteadyModel, list[Row]]:
+    model: ThermalModel, solver: SteadySolver, plan: Sequence[DesignTask], question: Question
+) -> tuple[ThermalModel, list[Row]]:
     """The model with its true error at some designs: the worst estimated, the hottest, and one at random.
 
     Returns
     -------
-    SteadyModel
-        With ``checked_error``, ``calibration`` and ``checked``.
+    ThermalModel
+        With its ``errors`` and the designs ``checked``.
     list of Row
         Of these designs, from the full solves.
     """
@@ -246,15 +250,18 @@ def checked_model(
     return (
         replace(
             model,
-            checked_error=max(errors) if errors else float("inf"),
-            calibration=max(ratios),
+            errors={
+                **model.errors,
+                TRUE: max(errors) if errors else float("inf"),
+                RATIO: max(ratios),
+            },
             checked=tuple(plan[row].key for row in chosen),
         ),
         rows,
     )
 
 
-def _designs_to_check(model: SteadyModel, solver: SteadySolver, inputs: DesignInputs) -> list[int]:
+def _designs_to_check(model: ThermalModel, solver: SteadySolver, inputs: DesignInputs) -> list[int]:
     estimate, hottest = np.zeros(len(inputs)), np.zeros(len(inputs))
     for first in range(0, len(inputs), AT_ONCE):
         index = np.arange(first, min(first + AT_ONCE, len(inputs)))
@@ -266,7 +273,7 @@ def _designs_to_check(model: SteadyModel, solver: SteadySolver, inputs: DesignIn
 
 
 def true_error(
-    model: SteadyModel, batch: SteadyBatch, row: int, ends: tuple[float, float], result: ThermalResult
+    model: ThermalModel, batch: SteadyBatch, row: int, ends: tuple[float, float], result: ThermalResult
 ) -> float:
     """Largest difference to a full solve: extremes of the field, bearings, probes, coolant outlet, in K."""
     found = [ends[0] - result.temperature_minimum, ends[1] - result.temperature_maximum]

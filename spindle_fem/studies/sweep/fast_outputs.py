@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.model.reduced.coolant_batch import pressure_drops
+from spindle_fem.model.reduced.design_inputs import DesignInputs
+from spindle_fem.model.reduced.heat_tables import QUANTITIES
+from spindle_fem.model.reduced.steady_batch import SteadyBatch
+from spindle_fem.model.thermal_model import ThermalModel
+from spindle_fem.operation.channel_cells import cells_of_model
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.physics.coolant.properties import coolant_by_name
-from spindle_fem.studies.sweep.fast.coolant_batch import pressure_drops
-from spindle_fem.studies.sweep.fast.design_inputs import DesignInputs
-from spindle_fem.studies.sweep.fast.heat_tables import QUANTITIES
-from spindle_fem.studies.sweep.fast.solve_batch import SteadyBatch
-from spindle_fem.studies.sweep.fast.steady_model import SteadyModel
 from spindle_fem.studies.sweep.outputs import derived_values, value_of
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -29,13 +30,13 @@ FIELDS_AT_ONCE = 64
 
 
 def values_of(
-    model: SteadyModel, inputs: DesignInputs, batch: SteadyBatch, outputs: Sequence[str]
+    model: ThermalModel, inputs: DesignInputs, batch: SteadyBatch, outputs: Sequence[str]
 ) -> list[dict[str, Any]]:
     """Values of the outputs of every design.
 
     Parameters
     ----------
-    model : SteadyModel
+    model : ThermalModel
     inputs : DesignInputs
     batch : SteadyBatch
         Their states.
@@ -80,12 +81,12 @@ def _without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def extreme_temperatures(model: SteadyModel, unknowns: Array, reference: Array) -> tuple[Array, Array]:
+def extreme_temperatures(model: ThermalModel, unknowns: Array, reference: Array) -> tuple[Array, Array]:
     """Lowest and highest temperature of any node of the mesh, (n,) K each.
 
     Parameters
     ----------
-    model : SteadyModel
+    model : ThermalModel
     unknowns : (n, r) ndarray
     reference : (n,) ndarray, [K]
         A temperature near the field's: single precision takes the rise above it.
@@ -130,12 +131,14 @@ def _bearings(inputs: DesignInputs, batch: SteadyBatch) -> Iterator[dict[str, An
         yield found
 
 
-def _coolant(model: SteadyModel, inputs: DesignInputs, batch: SteadyBatch) -> Iterator[dict[str, Any] | None]:
+def _coolant(
+    model: ThermalModel, inputs: DesignInputs, batch: SteadyBatch
+) -> Iterator[dict[str, Any] | None]:
     if batch.channel is None:
         yield from (None for _ in inputs.specs)
         return
     spec, field = inputs.specs[0], batch.channel
-    loop = CoolantLoop(spec, model.channel_cells())
+    loop = CoolantLoop(spec, cells_of_model(model))
     section = loop.section
     properties = coolant_by_name(spec.coolant.fluid).properties(inputs.inlet)
     velocity = section.velocity(inputs.flow)
@@ -168,7 +171,7 @@ def _coolant(model: SteadyModel, inputs: DesignInputs, batch: SteadyBatch) -> It
         }
 
 
-def mean_film(model: SteadyModel, film: Array) -> Array:
+def mean_film(model: ThermalModel, film: Array) -> Array:
     """Area mean over the channel without its ports, (n,) W/(m²·K)."""
     weight = np.where(model.cell_is_port, 0.0, model.cell_area)
     return (film * weight).sum(axis=(1, 2)) / weight.sum()
@@ -186,7 +189,7 @@ def band_ratios(field: Any) -> tuple[Array, Array]:
     return tuple(np.broadcast_to(ratio, shape)[:, 0] for ratio in _band(field))
 
 
-def _probes(model: SteadyModel, inputs: DesignInputs, batch: SteadyBatch) -> Iterator[Mapping[str, float]]:
+def _probes(model: ThermalModel, inputs: DesignInputs, batch: SteadyBatch) -> Iterator[Mapping[str, float]]:
     readings = batch.unknowns @ model.probes.T
     for row in range(len(inputs)):
         found = dict(zip(model.probe_names, (readings[row] - ZERO_CELSIUS_K).tolist(), strict=True))
@@ -196,10 +199,10 @@ def _probes(model: SteadyModel, inputs: DesignInputs, batch: SteadyBatch) -> Ite
         yield found
 
 
-def _energy(model: SteadyModel, inputs: DesignInputs, batch: SteadyBatch) -> Iterator[dict[str, Any]]:
+def _energy(model: ThermalModel, inputs: DesignInputs, batch: SteadyBatch) -> Iterator[dict[str, Any]]:
     surfaces = [name.removeprefix("film.") for name in model.fluid_names]
     columns = [model.coefficient_names.index(name) for name in model.fluid_names]
-    area = np.array([model.surface_area[name] for name in surfaces])
+    area = model.fluid_load @ model.one
     means = batch.unknowns @ np.array([model.place(name) for name in surfaces]).reshape(-1, model.size).T
     out = batch.coefficients[:, columns] * area * (means - inputs.fluid)
     heat = batch.bearings[:, :, QUANTITIES.index("total")].sum(axis=1)

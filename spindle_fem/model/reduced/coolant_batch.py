@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.model.reduced.design_inputs import DesignInputs
+from spindle_fem.model.thermal_model import ThermalModel
+from spindle_fem.operation.channel_cells import cells_of_model
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.physics.coolant.duct_friction import PressureDrop, channel_pressure_drop
 from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
@@ -18,8 +21,6 @@ from spindle_fem.physics.coolant.regimes import (
     critical_reynolds_schmidt,
     select_film,
 )
-from spindle_fem.studies.sweep.fast.design_inputs import DesignInputs
-from spindle_fem.studies.sweep.fast.steady_model import SteadyModel
 
 Array = NDArray[np.float64]
 
@@ -56,17 +57,17 @@ class ChannelBatch:
 
     Parameters
     ----------
-    model : SteadyModel
+    model : ThermalModel
     inputs : DesignInputs
     band : (n, n_along) ndarray, optional
         Further factor on the film of each cell.
     """
 
-    def __init__(self, model: SteadyModel, inputs: DesignInputs, band: Array | None = None) -> None:
+    def __init__(self, model: ThermalModel, inputs: DesignInputs, band: Array | None = None) -> None:
         spec = inputs.specs[0]
         self.settings = spec.coolant
         self.coolant = coolant_by_name(spec.coolant.fluid)
-        self.loop = CoolantLoop(spec, model.channel_cells())
+        self.loop = CoolantLoop(spec, cells_of_model(model))
         self.section = self.loop.section
         self.area = model.cell_area
         self.inlet = inputs.inlet[:, None, None]

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.studies.sweep.fast.coolant_batch import ChannelBatch, ChannelField
-from spindle_fem.studies.sweep.fast.design_inputs import DesignInputs
-from spindle_fem.studies.sweep.fast.heat_tables import (
+from spindle_fem.model.reduced.coolant_batch import ChannelBatch, ChannelField
+from spindle_fem.model.reduced.design_inputs import DesignInputs
+from spindle_fem.model.reduced.heat_tables import (
     QUANTITIES,
     BearingTables,
     HeatTable,
     grease_temperature,
 )
-from spindle_fem.studies.sweep.fast.steady_model import SteadyModel
+from spindle_fem.model.thermal_model import ThermalModel
 
 Array = NDArray[np.float64]
 
@@ -69,13 +69,14 @@ class SteadySolver:
 
     Parameters
     ----------
-    model : SteadyModel
+    model : ThermalModel
+        Dense, its unknowns by falling weight.
     tables : BearingTables
     bearings : sequence of str
         In the order of the definition.
     """
 
-    def __init__(self, model: SteadyModel, tables: BearingTables, bearings: Sequence[str]) -> None:
+    def __init__(self, model: ThermalModel, tables: BearingTables, bearings: Sequence[str]) -> None:
         self.model, self.tables, self.bearings = model, tables, tuple(bearings)
         size = model.size
         names = model.coefficient_names
@@ -88,11 +89,17 @@ class SteadySolver:
             for end in ("inner_raceway", "outer_raceway", "balls")
         ]
         self.heat_places = np.array(places).reshape(-1, size)
+        area = model.cell_area.ravel()
+        # Mean wall temperature of each cell, (n_cells, r): what the coolant's march takes up whole.
+        self.cell_mean = model.cell_load / area[:, None]
+        # The rest of a cell's film is that of its uneven wall.
+        rest = model.cell_film - area[:, None, None] * self.cell_mean[:, :, None] * self.cell_mean[:, None]
         # What changes with temperature: ball conductances, then films of the channel's cells.
-        self.moving = np.concatenate((model.operators[self.balls], model.cell_rest)).reshape(-1, size, size)
+        self.moving = np.concatenate((model.operators[self.balls], rest)).reshape(-1, size, size)
         self.fixed = model.operators[self.steady].reshape(len(self.steady), -1)
         self.fluids = [names.index(name) for name in model.fluid_names]
-        self.functionals = model.functionals()
+        # Everything that an output may read: places, probes, cells of the channel.
+        self.functionals = np.vstack((model.places, model.probes, self.cell_mean))
 
     def solve(self, inputs: DesignInputs, band: Array | None = None) -> SteadyBatch:
         """Steady states of designs.
@@ -168,7 +175,7 @@ class _Run:
         return (unknowns @ self.solver.heat_places.T).reshape(self.number, -1, 3)
 
     def _wall(self, unknowns: Array) -> Array:
-        return (unknowns @ self.model.cell_mean.T).reshape(self.number, *self.model.cell_area.shape)
+        return (unknowns @ self.solver.cell_mean.T).reshape(self.number, *self.model.cell_area.shape)
 
     def _follow(self, unknowns: Array) -> tuple[Array, Array]:
         """Bearings and coolant at a field: quantities of the bearings, their grease's temperature."""
@@ -188,7 +195,7 @@ class _Run:
             lines, constant = self.channel.linear(self.field)
             along = self.model.cell_area.shape[1]
             for start in range(lines.shape[1]):
-                mean = self.model.cell_mean[start * along : (start + 1) * along]
+                mean = self.solver.cell_mean[start * along : (start + 1) * along]
                 matrix += mean.T @ (lines[:, start] @ mean)
                 load -= constant[:, start] @ mean
         return matrix, load
@@ -203,7 +210,7 @@ class _Run:
         residual -= np.einsum("nij,nj->ni", self.base, unknowns)
         residual -= np.einsum("nm,nmr->nr", moving, acted, optimize=True)
         if self.field is not None:
-            residual -= self.field.heat.reshape(self.number, -1) @ self.model.cell_mean
+            residual -= self.field.heat.reshape(self.number, -1) @ self.solver.cell_mean
         return residual
 
     def _heat_slope(self, grease: Array) -> Array:

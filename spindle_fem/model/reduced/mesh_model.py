@@ -1,13 +1,13 @@
-"""The finite-element model of a machine as a sum of named operators.
+"""The finite-element model of a machine as a thermal model of named sparse operators.
 
-``K = Σ c_i K_i`` with one symmetric, positive semi-definite ``K_i`` for every
-conductivity, contact, film, gap and ball row, so that each coefficient stays
-free after the projection. Unknowns are the mesh's temperatures followed by the
-lumped nodes (ball rows, bands of mixed air).
+Unknowns are the mesh's temperatures followed by the lumped nodes (ball rows,
+bands of mixed air). Every conductivity, contact, film, gap and ball row keeps
+its own unit operator, so that each coefficient stays free after a projection.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,8 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import SpecError
 from spindle_fem.model.mesh.equations import ThermalSystem
 from spindle_fem.model.mesh.evaluate import probe_matrix
+from spindle_fem.model.thermal_model import ThermalModel
+from spindle_fem.operation.coefficients import gap_radii_of
 from spindle_fem.operation.machine_loads import FieldState
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -25,78 +27,24 @@ from spindle_fem.operation.probe_places import probe_positions, probe_slopes
 from spindle_fem.solvers.coupled_steady import PreparedMachine
 
 Array = NDArray[np.float64]
+# Wetted surfaces of one lumped node, each with its exchange coefficient by facet.
+Pieces = list[tuple[str, Array]]
 
 
-@dataclass(frozen=True, slots=True)
-class AffineSystem:
-    """Unit operators of a machine on its mesh.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeshModel(ThermalModel):
+    """Thermal model of a machine on its mesh, every operator sparse.
 
     Attributes
     ----------
-    coefficient_names : tuple of str
-        ``conductivity.<material>``, ``joint.<contact>``, ``film.<surface>``,
-        ``gap.<gap>``, ``balls.<bearing>.inner``, ``balls.<bearing>.outer``.
-    operators : tuple of (n, n) csr_array
-        Of unit coefficient, in the order of the names.
-    fluid_load : mapping of coefficient name to (n,) ndarray
-        ``K_i · 1``: what a fluid of 1 K puts in, for films.
-    cell_film : tuple of (n, n) csr_array, [m²]
-        Unit film of each coolant cell.
-    cell_load : (n_cells, n) csr_array, [m²]
-        ``∫ N dA`` over each cell's wall.
-    cell_area : (n_starts, n_along) ndarray, [m²]
-    storage_names : tuple of str
-        ``capacity.<material>`` [J/(m³·K)] and ``capacity.<bearing>.balls`` [J/K].
-    storage : tuple of (n, n) csr_array
-    place_names : tuple of str
-        Volumes (``<part>.<segment>``, ``<bearing>.inner_ring``), surfaces,
-        ``<bearing>.balls``, seats (``<contact>@0``, ``@1``) and the
-        neighbourhoods of point probes (``near.<probe>``, ``around.<probe>``).
-    places : (n_places, n) csr_array
-        Mean over each place; its transpose is the load of 1 W spread over it.
-    probe_names : tuple of str
-    probes : (n_probes, n) csr_array
-        Point probes only.
-    probe_slopes : (2 n_probes, n) csr_array, [1/m]
-        Change of each with a displacement along r and along z.
-    n_unknowns, n_lumped : int
+    n_unknowns : int
+        Temperatures of the mesh; the lumped nodes follow them.
     prolongation : (n_unknowns, n_corners) csr_array or None
+        From linear to quadratic temperatures, for the linear solvers.
     """
 
-    coefficient_names: tuple[str, ...]
-    operators: tuple[sparse.csr_array, ...]
-    fluid_load: dict[str, Array]
-    cell_film: tuple[sparse.csr_array, ...]
-    cell_load: sparse.csr_array
-    cell_area: Array
-    storage_names: tuple[str, ...]
-    storage: tuple[sparse.csr_array, ...]
-    place_names: tuple[str, ...]
-    places: sparse.csr_array
-    probe_names: tuple[str, ...]
-    probes: sparse.csr_array
-    probe_slopes: sparse.csr_array
     n_unknowns: int
-    n_lumped: int
     prolongation: sparse.csr_array | None
-
-    @property
-    def size(self) -> int:
-        """Unknowns, lumped nodes included."""
-        return self.n_unknowns + self.n_lumped
-
-    def place(self, name: str) -> Array:
-        """Dense functional of one place, (n,)."""
-        return self.places[[self.place_names.index(name)]].toarray()[0]
-
-    def conduction(self, coefficients: dict[str, float], channel_film: Array) -> sparse.csr_array:
-        """``Σ c_i K_i`` with the channel's film by cell; the coolant counts as given."""
-        total = _weighted(self.operators, [coefficients[name] for name in self.coefficient_names], self.size)
-        return total + _weighted(self.cell_film, np.ravel(channel_film), self.size)
-
-    def capacity(self, volumetric: dict[str, float]) -> sparse.csr_array:
-        """``Σ m_i M_i``."""
-        return _weighted(self.storage, [volumetric[name] for name in self.storage_names], self.size)
 
     def system(self, matrix: sparse.csr_array) -> ThermalSystem:
         """A matrix over all unknowns in the blocks that the linear solvers take."""
@@ -107,29 +55,14 @@ class AffineSystem:
             np.zeros(n),
             (-matrix[:n, n:]).tocsc(),
             matrix[n:, n:].toarray(),
-            np.zeros(self.n_lumped),
+            np.zeros(self.size - n),
             0.0,
             None,
             self.prolongation,
         )
 
 
-def _weighted(matrices: tuple[sparse.csr_array, ...], weights: object, size: int) -> sparse.csr_array:
-    """Weighted sum by one concatenation: much cheaper than adding one after the other."""
-    rows, columns, values = [], [], []
-    for matrix, weight in zip(matrices, weights, strict=True):
-        if weight != 0.0:
-            entries = matrix.tocoo()
-            rows.append(entries.row.astype(np.int32, copy=False))
-            columns.append(entries.col.astype(np.int32, copy=False))
-            values.append(weight * entries.data)
-    if not rows:
-        return sparse.csr_array((size, size))
-    joined = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sparse.coo_array(joined, shape=(size, size)).tocsr()
-
-
-def build_affine_system(machine: PreparedMachine) -> AffineSystem:
+def build_mesh_model(machine: PreparedMachine) -> MeshModel:
     """Split a prepared machine into its unit operators.
 
     Raises
@@ -147,50 +80,56 @@ def build_affine_system(machine: PreparedMachine) -> AffineSystem:
             'Give a large conductance instead, such as "1e6 W/m**2/K".',
         )
     lumped = _lumped_nodes(machine)
+    size = operators.n_unknowns + len(lumped)
     names = tuple(name for name, _ in lumped)
-    size = operators.n_unknowns + len(names)
-    coefficients: dict[str, sparse.csr_array] = {}
-    for material in dict.fromkeys(_materials(spec, operators.mesh.part_names).values()):
-        own = [p for p, m in _materials(spec, operators.mesh.part_names).items() if m == material]
-        coefficients[f"conductivity.{material}"] = _padded(
-            sum((operators.part_conduction(part) for part in own[1:]), operators.part_conduction(own[0])),
-            size,
-        )
-    for contact in operators.mesh.joints:
-        coefficients[f"joint.{contact}"] = _padded(operators.joint_matrix(contact), size)
-    fluid_load: dict[str, Array] = {}
-    for film in spec.film:
-        for surface in film.surface:
-            name = f"film.{surface}"
-            coefficients[name] = _padded(operators.film_matrix(surface), size)
-            fluid_load[name] = coefficients[name] @ np.ones(size)
-    for index, (_, connections) in enumerate(lumped):
-        for key, pieces in connections.items():
-            matrix = _exchange_matrix(machine, operators.n_unknowns + index, pieces, size)
-            coefficients[key] = coefficients[key] + matrix if key in coefficients else matrix
-    cell_film, cell_load, cell_area = _channel(machine, size)
+    coefficients = _conduction(machine, lumped, size)
+    films = tuple(f"film.{surface}" for film in spec.film for surface in film.surface)
     storage = _storage(machine, names, size)
     places = dict(named_places(machine, names, size))
     points = [probe for probe in spec.probe if probe.kind == "point"]
     rows = probe_matrix(operators, probe_positions(points), [p.part for p in points])
-    return AffineSystem(
-        tuple(coefficients),
-        tuple(coefficients.values()),
-        fluid_load,
-        cell_film,
-        cell_load,
-        cell_area,
-        tuple(storage),
-        tuple(storage.values()),
-        tuple(places),
-        sparse.vstack([sparse.csr_array(vector[None, :]) for vector in places.values()], format="csr"),
-        tuple(p.name for p in points),
-        _widened(rows, size),
-        _widened(probe_slopes(operators, points), size),
-        operators.n_unknowns,
-        len(names),
-        operators.prolongation,
+    channel = {} if machine.builder.cells is None else _channel(machine, size)
+    return MeshModel(
+        coefficient_names=tuple(coefficients),
+        operators=tuple(coefficients.values()),
+        fluid_names=films,
+        fluid_load=np.array([coefficients[name] @ np.ones(size) for name in films]).reshape(-1, size),
+        storage_names=tuple(storage),
+        storage=tuple(storage.values()),
+        place_names=tuple(places),
+        places=sparse.vstack([sparse.csr_array(row[None, :]) for row in places.values()], format="csr"),
+        probe_names=tuple(p.name for p in points),
+        probes=_widened(rows, size),
+        one=np.ones(size),
+        probe_gradients=_widened(probe_slopes(operators, points), size),
+        contacts=tuple(machine.mesh.joints),
+        gap_radii=gap_radii_of(spec, operators),
+        n_unknowns=operators.n_unknowns,
+        prolongation=operators.prolongation,
+        **channel,
     )
+
+
+def _conduction(
+    machine: PreparedMachine, lumped: Sequence[tuple[str, dict[str, Pieces]]], size: int
+) -> dict[str, sparse.csr_array]:
+    """Unit operator of every coefficient but the channel's film."""
+    spec, operators = machine.spec, machine.operators
+    found: dict[str, sparse.csr_array] = {}
+    materials = _materials(spec, operators.mesh.part_names)
+    for material in dict.fromkeys(materials.values()):
+        own = [operators.part_conduction(part) for part, kind in materials.items() if kind == material]
+        found[f"conductivity.{material}"] = _padded(sum(own[1:], own[0]), size)
+    for contact in operators.mesh.joints:
+        found[f"joint.{contact}"] = _padded(operators.joint_matrix(contact), size)
+    for film in spec.film:
+        for surface in film.surface:
+            found[f"film.{surface}"] = _padded(operators.film_matrix(surface), size)
+    for index, (_, connections) in enumerate(lumped):
+        for key, pieces in connections.items():
+            matrix = _exchange_matrix(machine, operators.n_unknowns + index, pieces, size)
+            found[key] = found[key] + matrix if key in found else matrix
+    return found
 
 
 def _materials(spec: MachineSpec, parts: tuple[str, ...]) -> dict[str, str]:
@@ -208,9 +147,6 @@ def _padded(matrix: sparse.csr_array, size: int) -> sparse.csr_array:
 def _widened(rows: sparse.csr_array, size: int) -> sparse.csr_array:
     """Rows over the mesh's unknowns extended over the lumped nodes."""
     return sparse.csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))
-
-
-Pieces = list[tuple[str, Array]]
 
 
 def _lumped_nodes(machine: PreparedMachine) -> list[tuple[str, dict[str, Pieces]]]:
@@ -275,13 +211,9 @@ def _exchange_matrix(machine: PreparedMachine, index: int, pieces: Pieces, size:
     return matrix
 
 
-def _channel(
-    machine: PreparedMachine, size: int
-) -> tuple[tuple[sparse.csr_array, ...], sparse.csr_array, Array]:
-    cells = machine.builder.cells
-    if cells is None:
-        return (), sparse.csr_array((0, size)), np.zeros((1, 0))
-    operators = machine.operators
+def _channel(machine: PreparedMachine, size: int) -> dict[str, object]:
+    """Fields of the model that describe the coolant's cells."""
+    operators, cells = machine.operators, machine.builder.cells
     films: list[sparse.csr_array] = []
     loads: list[sparse.csr_array] = []
     for cell in range(cells.cell_area.size):
@@ -295,10 +227,18 @@ def _channel(
             load[0, : operators.n_unknowns] += operators.facet_vector(inside, operators.surface_rows[surface])
         films.append(matrix)
         loads.append(sparse.csr_array(load))
-    return tuple(films), sparse.vstack(loads, format="csr"), cells.cell_area
+    return {
+        "cell_film": tuple(films),
+        "cell_load": sparse.vstack(loads, format="csr"),
+        "cell_area": cells.cell_area,
+        "cell_angle": cells.angle,
+        "cell_position": cells.position,
+        "cell_is_port": cells.is_port,
+    }
 
 
 def _storage(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> dict[str, sparse.csr_array]:
+    """Unit capacity of every material and ball row."""
     spec, operators = machine.spec, machine.operators
     found: dict[str, sparse.csr_array] = {}
     for part, material in _materials(spec, operators.mesh.part_names).items():
@@ -306,9 +246,7 @@ def _storage(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> di
         key = f"capacity.{material}"
         found[key] = found[key] + matrix if key in found else matrix
     for _, bearing in spec.bearings:
-        nodes = [
-            operators.n_unknowns + lumped.index(node) for node in machine.builder.ball_nodes(bearing.name)
-        ]
+        nodes = [operators.n_unknowns + lumped.index(n) for n in machine.builder.ball_nodes(bearing.name)]
         share = np.full(len(nodes), 1.0 / len(nodes))
         found[f"capacity.{bearing.name}.balls"] = sparse.coo_array(
             (share, (nodes, nodes)), shape=(size, size)

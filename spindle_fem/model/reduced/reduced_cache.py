@@ -1,0 +1,66 @@
+"""Where reduced models lie in the cache: hashes of what makes them, and families that share a geometry."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.cache import cache_directory, source_digest
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.model.thermal_model import FORMAT
+
+
+def reduced_digest(spec: MachineSpec, options: Mapping[str, float]) -> str:
+    """Hash of everything that a reduced model depends on: its family's, and that of its range."""
+    content = _content(spec)
+    own = _hash([content, dict(options)])
+    return f"{_hash(_without_coefficients(content))[:24]}-{own}"
+
+
+def reduced_path(digest: str) -> Path:
+    """File of a reduced model in the cache."""
+    return cache_directory() / f"reduced-{digest}.npz"
+
+
+def family_of(digest: str) -> list[Path]:
+    """Models in the cache of machines that differ in values of coefficients only, the newest first."""
+    family = digest.partition("-")[0]
+    found = cache_directory().glob(f"reduced-{family}-*.npz")
+    return sorted(found, key=lambda path: -path.stat().st_mtime)
+
+
+def _content(spec: MachineSpec) -> dict[str, Any]:
+    content = spec.model_dump(mode="json")
+    # The operating point and the words change nothing in the operators.
+    for key in ("operation", "name", "title", "description", "initial", "effects"):
+        content.pop(key, None)
+    return content
+
+
+def _without_coefficients(content: Mapping[str, Any]) -> dict[str, Any]:
+    """A definition without what the reduced model has as live coefficients, and without heat."""
+    rest = {key: value for key, value in content.items() if key not in ("factor", "heat", "grease")}
+    rest["heat_capacity_factor"] = rest["coolant"] = None
+    rest["joint"] = [
+        item | {"conductance": "perfect" if item.get("conductance") == "perfect" else None}
+        for item in content["joint"]
+    ]
+    rest["film"] = [item | {"coefficient": None, "factor": None} for item in content["film"]]
+    rest["gap"] = [item | {"factor": None} for item in content["gap"]]
+    rest["bearing_set"] = [
+        item | {"heat_factor": None, "ball_row": item["ball_row"] | {"conductance": None}}
+        for item in content["bearing_set"]
+    ]
+    return rest
+
+
+def _hash(content: Any) -> str:
+    text = json.dumps(
+        [FORMAT, source_digest("spindle_fem.model.reduced.build_reduced"), content],
+        sort_keys=True,
+        default=str,
+    )
+    return hashlib.sha256(text.encode()).hexdigest()

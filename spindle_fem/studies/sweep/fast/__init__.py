@@ -1,1 +1,0 @@
-"""Steady designs of one geometry by a projected model: thousands at once."""
