@@ -53,17 +53,17 @@ def test_its_own_check_is_within_what_was_asked(fast):
 
 
 def test_every_operator_conserves_heat(machine):
-    full = build_mesh_model(machine)
-    one = np.ones(full.size)
-    for name, matrix in zip(full.coefficient_names, full.operators, strict=True):
+    on_mesh = build_mesh_model(machine)
+    one = np.ones(on_mesh.size)
+    for name, matrix in zip(on_mesh.coefficient_names, on_mesh.operators, strict=True):
         leaving = matrix @ one
-        if name in full.fluid_load:
+        if name in on_mesh.fluid_names:
             surface = name.removeprefix("film.")
             area = machine.operators.surface_area(surface)
             assert leaving.sum() == pytest.approx(area, rel=1e-12), name
         else:
             assert np.abs(leaving).max() < 1e-12 * np.abs(matrix).max(), name
-    assert full.cell_load.sum() == pytest.approx(full.cell_area.sum(), rel=1e-12)
+    assert on_mesh.cell_load.sum() == pytest.approx(on_mesh.cell_area.sum(), rel=1e-12)
 
 
 def test_reduced_operators_are_positive_and_hold_the_uniform_field(fast):
@@ -110,20 +110,20 @@ def test_its_steady_state_is_that_of_the_coupled_full_model(machine, fast, speed
     ("seats", "factor"), [("F2", 0.26), ("F1", 0.05), ("R2", 4.0), ("F1 F2 F3", 0.1)], ids=lambda v: str(v)
 )
 def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(machine, fast, seats, factor):
-    full, model = build_mesh_model(machine), fast.model
+    on_mesh, model = build_mesh_model(machine), fast.model
     point = replace(OperatingPoint.of(machine.spec), speed=3000.0 * RPM)
     film = fast.channel_film(point, {})[0]
     raceways = [f"{name}.{side}_raceway" for name in fast.bearings for side in ("inner", "outer")]
-    loads = 80.0 * sum(full.place(name) for name in raceways)
+    loads = 80.0 * sum(on_mesh.place(name) for name in raceways)
     reduced_loads = 80.0 * sum(model.place(name) for name in raceways)
     scaled = {f"joint.{seat}.outer_ring|housing": factor for seat in seats.split()}
     read = []
     for factors in ({}, scaled):
         values = {name: value * factors.get(name, 1.0) for name, value in fast.table.base(point).items()}
-        full = spsolve(full.conduction(values, film).tocsc(), loads)
+        full = spsolve(on_mesh.conduction(values, film).tocsc(), loads)
         own = np.array([values[name] for name in model.coefficient_names])
         matrix = np.tensordot(own, model.operators, axes=1) + np.tensordot(film, model.cell_film, axes=1)
-        read.append((full.probes @ full, model.probes @ np.linalg.solve(matrix, reduced_loads)))
+        read.append((on_mesh.probes @ full, model.probes @ np.linalg.solve(matrix, reduced_loads)))
     change, reduced_change = (after - before for before, after in zip(*read, strict=True))
     assert np.abs(change).max() > 0.1
     assert np.abs(reduced_change - change).max() < 0.03 * np.abs(change).max()
@@ -131,20 +131,20 @@ def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(machin
 
 def test_ring_spot_and_sides_stand_for_heat_on_a_part_of_the_housing(machine, fast):
     """72° of the top, 60 mm long, above the probe: at rest and while the heat changes."""
-    full = build_mesh_model(machine)
+    on_mesh = build_mesh_model(machine)
     values = fast.table.base(point := OperatingPoint.of(machine.spec))
-    capacity = full.capacity(fast.table.capacities())
-    conduction = full.conduction(values, fast.channel_film(point, {})[0])
-    x, y, z = machine.operators.mesh.points[: full.n_unknowns].T
+    capacity = on_mesh.capacity(fast.table.capacities())
+    conduction = on_mesh.conduction(values, fast.channel_film(point, {})[0])
+    x, y, z = machine.operators.mesh.points[: on_mesh.n_unknowns].T
     on_top = (np.hypot(x, y) > 0.149) & (np.abs(np.arctan2(x, y)) < np.pi / 5) & (abs(z - 0.29) < 0.03)
-    heat = np.zeros(full.size)
-    heat[: full.n_unknowns] = on_top / on_top.sum()
+    heat = np.zeros(on_mesh.size)
+    heat[: on_mesh.n_unknowns] = on_top / on_top.sum()
     places = ("around.SP04", "near.SP04", f"{UP}housing.middle_body")
     wanted, offered = [], []
     for shift in (0.0, 3.0e-4, 1.0e-3):
         solve = splu((conduction + shift * capacity).tocsc()).solve
-        wanted.append(full.probes @ solve(heat))
-        offered.append(full.probes @ solve(np.column_stack([full.place(name) for name in places])))
+        wanted.append(on_mesh.probes @ solve(heat))
+        offered.append(on_mesh.probes @ solve(np.column_stack([on_mesh.place(name) for name in places])))
     wanted, offered = np.concatenate(wanted), np.concatenate(offered)
     left = {}
     for number in (1, 3):

@@ -118,7 +118,12 @@ def test_many_channels_are_what_each_is_alone(film_model, properties_at, pumping
         def __len__(self):
             return len(self.specs)
 
-    model = SimpleNamespace(cell_area=CELLS.cell_area, channel_cells=lambda: CELLS)
+    model = SimpleNamespace(
+        cell_area=CELLS.cell_area,
+        cell_angle=CELLS.angle,
+        cell_position=CELLS.position,
+        cell_is_port=CELLS.is_port,
+    )
     wall = inputs.inlet[:, None, None] + np.linspace(12.0, 3.0, 14)
     batch = ChannelBatch(model, Sized(**vars(inputs)))
     state = None
