@@ -8,7 +8,6 @@ from spindle_fem.commands.sweep_command import prepare_study, sweep_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import FaultsError
 from spindle_fem.model.reduced.build_for_designs import FIRST_TABLES
-from spindle_fem.model.reduced.design_inputs import refusal
 from spindle_fem.model.reduced.heat_tables import BearingTables
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.studies.sweep.designs import Design
@@ -21,6 +20,7 @@ from spindle_fem.studies.sweep.fast_backend import (
     model_of,
 )
 from spindle_fem.studies.sweep.results_table import RESULTS, read_results
+from spindle_fem.studies.sweep.structure import refusal
 
 QUICK = ("mesh.preset=coarse", "mesh.order=1")
 STUDY = """
