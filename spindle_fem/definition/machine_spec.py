@@ -46,6 +46,7 @@ from spindle_fem.definition.field_types import (
     Temperature,
     UncertainNumber,
     UncertainShare,
+    choice_field,
     quantity_field,
     raise_faults,
 )
@@ -63,6 +64,7 @@ from spindle_fem.units import Uncertain
 
 MACHINE_SCHEMA = "spindle-fem/machine/1"
 
+HeatModel = choice_field("spindle_fem.physics.bearings.heat_models")
 SizeFactor = quantity_field("", at_least=0.2, at_most=5.0)
 SigmaRel = quantity_field("", above=0.0, at_most=3.0)
 
@@ -121,8 +123,8 @@ class Heat(SpecModel):
     inner ring.
     """
 
-    model: Literal["table", "palmgren", "skf", "paper", "full"]
-    """`table`, an empirical friction model (palmgren, skf) or an analytical one (paper, full)."""
+    model: HeatModel
+    """A table, an empirical friction model or an analytical one."""
     ball_share: Fraction = 0.5
     """Share of the heat that enters the balls."""
     inner_share: UncertainShare = Uncertain(0.5)

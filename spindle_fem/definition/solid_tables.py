@@ -29,11 +29,13 @@ from spindle_fem.definition.field_types import (
     Temperature,
     UncertainConductance,
     UncertainNumber,
+    choice_field,
     quantity_field,
     raise_faults,
 )
 from spindle_fem.units import Uncertain
 
+BearingKind = choice_field("spindle_fem.physics.bearings.bearing_kinds")
 GrooveCurvature = quantity_field("", at_least=0.505, at_most=0.6)
 PoissonRatio = quantity_field("", at_least=0.0, at_most=0.5)
 PathFill = quantity_field("", at_least=0.0, at_most=0.3)
@@ -106,8 +108,10 @@ class Part(SpecModel):
 
 
 class BearingType(SpecModel):
-    """Catalogue dimensions of an angular-contact ball bearing."""
+    """Catalogue dimensions of a ball bearing."""
 
+    kind: BearingKind = "angular_contact_ball"
+    """Kind of bearing, for the empirical friction models."""
     bore_diameter: PositiveLength
     """Of the inner ring."""
     outer_diameter: PositiveLength

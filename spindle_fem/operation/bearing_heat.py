@@ -26,8 +26,9 @@ from spindle_fem.physics.bearings.bearing_set import solve_bearing_set, solve_st
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.contact_conduction import BallConductance, ball_conductance
 from spindle_fem.physics.bearings.fits import RingFits
-from spindle_fem.physics.bearings.friction_heat import HeatOptions
 from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.heat_model import HeatOptions
+from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.bearings.rings import SeatMaterial
 from spindle_fem.validity import CodedWarning
 
@@ -113,12 +114,9 @@ def table_heat(spec: MachineSpec, point: OperatingPoint) -> tuple[dict[str, floa
             f"{speeds[-1] * 30 / np.pi:.0f} rpm; its last segment was continued."
         )
         warnings = (CodedWarning("heat_table_extrapolated", text),)
-    segment = int(np.clip(np.searchsorted(speeds, point.speed, side="right") - 1, 0, len(speeds) - 2))
-    fraction = (point.speed - speeds[segment]) / (speeds[segment + 1] - speeds[segment])
     heat = {}
     for group, bearing in spec.bearings:
-        values = table.heat[bearing.name]
-        nominal = values[segment] + fraction * (values[segment + 1] - values[segment])
+        nominal = HEAT_MODELS["table"](point.speed, speeds, table.heat[bearing.name])
         slope = table.thrust_coefficient.get(bearing.name, 0.0)
         factor = 1.0 + slope * (point.thrust / table.reference_thrust - 1.0)
         heat[bearing.name] = max(0.0, nominal * factor) * group.heat_factor.value
@@ -315,8 +313,8 @@ def preload_runs_away(preload: Mapping[str, float], assembled: Mapping[str, floa
 
 
 def _control(options: HeatOptions) -> str:
-    """Only the paper's terms need friction to decide the attitude of the balls."""
-    return "equilibrium" if options.level in ("paper", "full") else "outer"
+    """What decides the attitude of the balls, as the heat model needs it."""
+    return HEAT_MODELS[options.level].ball_attitude
 
 
 def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
@@ -337,6 +335,7 @@ def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
         outer_diameter=kind.outer_diameter,
         width=kind.width,
         static_load_rating=kind.basic_static_load,
+        kind=kind.kind,
     )
     return mounting.BearingSet(
         bearings=tuple(

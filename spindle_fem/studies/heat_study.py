@@ -15,7 +15,7 @@ from spindle_fem.errors import NoEquilibriumError, SpecError
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings.bearing_state import BearingState
-from spindle_fem.physics.bearings.friction_heat import HEAT_LEVELS
+from spindle_fem.physics.bearings.heat_model import friction_model_names
 from spindle_fem.units import ZERO_CELSIUS_K
 from spindle_fem.validity import CodedWarning, fold_warnings
 
@@ -172,7 +172,7 @@ def _by_model(
 ) -> dict[str, Any]:
     """Heat of every bearing by every model, side by side."""
     heat: dict[str, dict[str, float]] = {}
-    for level in HEAT_LEVELS:
+    for level in friction_model_names():
         options = replace(mechanics.options, level=level)
         states = mechanics.states(point, temperatures, expand=False, options=options)
         heat[level] = {name: state.heat.total for name, state in states.items()}

@@ -21,9 +21,9 @@ from spindle_fem.physics.bearings.bearing_set import (
     solve_bearing_set,
     uniform_temperatures,
 )
-from spindle_fem.physics.bearings.catalogue_friction import palmgren_moment
-from spindle_fem.physics.bearings.friction_heat import HeatOptions
 from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.heat_model import HeatOptions
+from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
 from spindle_fem.physics.bearings.hertz import INNER, OUTER, bearing_contact_constants, contact_polynomials
 from spindle_fem.physics.bearings.preload import axial_state
 

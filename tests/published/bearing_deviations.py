@@ -13,9 +13,12 @@ import numpy as np
 
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_set import solve_bearing
-from spindle_fem.physics.bearings.catalogue_friction import palmgren_moment, skf_moment, static_load_rating
-from spindle_fem.physics.bearings.friction_heat import HeatOptions, rolling_resistance_houpert
+from spindle_fem.physics.bearings.catalogue_friction import static_load_rating
 from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.heat_model import HeatOptions
+from spindle_fem.physics.bearings.heat_models.full import rolling_resistance_houpert
+from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
+from spindle_fem.physics.bearings.heat_models.skf import skf_moment
 from spindle_fem.physics.bearings.hertz import jones_axial_constant, mean_load_constant
 from spindle_fem.physics.bearings.lubricant_film import film_central_hamrock_dowson, film_groups
 from spindle_fem.physics.bearings.preload import axial_state, unloading_thrust

@@ -18,11 +18,13 @@ from scipy.optimize import fsolve
 from spindle_fem.physics.bearings.ball_system import build_ball_rows, join_rows
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_set import solve_bearing
-from spindle_fem.physics.bearings.catalogue_friction import palmgren_moment, skf_moment
 from spindle_fem.physics.bearings.equilibrium import solve_equilibrium
 from spindle_fem.physics.bearings.friction_equilibrium import start_from_race_control
-from spindle_fem.physics.bearings.friction_heat import HeatOptions, rolling_resistance_houpert
 from spindle_fem.physics.bearings.grease import Lubricant, roelands_viscosity
+from spindle_fem.physics.bearings.heat_model import HeatOptions
+from spindle_fem.physics.bearings.heat_models.full import rolling_resistance_houpert
+from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
+from spindle_fem.physics.bearings.heat_models.skf import skf_moment
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
 from spindle_fem.physics.bearings.lubricant_film import (
     film_central_hamrock_dowson,

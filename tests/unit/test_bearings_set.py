@@ -26,8 +26,8 @@ from spindle_fem.physics.bearings.contact_conduction import (
     constriction_resistance,
     contact_resistance,
 )
-from spindle_fem.physics.bearings.friction_heat import CageGuidance, ContactSeal, HeatOptions
 from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.heat_model import CageGuidance, ContactSeal, HeatOptions
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
 from spindle_fem.physics.bearings.mounting import rotation_growth
 from spindle_fem.physics.bearings.preload import unloading_thrust

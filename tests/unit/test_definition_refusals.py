@@ -326,7 +326,7 @@ VALUES = {
     "heat table missing": (HEAT, 'model = "table"\n', SpecError, "heat.table", "is missing", "needs a [heat.table]"),
     # types and words
     "unknown word": ('hand = "left"', 'hand = "lefft"', SpecError, "channel.hand", '"lefft" is not allowed', 'Did you mean "left"', "right, left"),
-    "unknown heat model": ('model = "palmgren"', 'model = "harris"', SpecError, "heat.model", '"harris"', "table, palmgren, skf, paper, full"),
+    "unknown heat model": ('model = "palmgren"', 'model = "harris"', SpecError, "heat.model", '"harris"', "full, palmgren, paper, skf, table"),
     "unknown kind": ('kind = "rotating"', 'kind = "rotation"', SpecError, "film.nose.kind", '"rotation"', 'Did you mean "rotating"'),
     "fraction of a start": ("starts = 2", "starts = 1.5", SpecError, "channel.starts", "1.5", "a whole number from 1 to 4"),
     "text for a count": ("ball_count = 19", 'ball_count = "19"', SpecError, "bearing_types.7010_C.ball_count", '"19"', "a whole number"),

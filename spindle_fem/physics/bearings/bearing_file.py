@@ -30,8 +30,8 @@ from spindle_fem.physics.bearings.bearing_keys import (
 from spindle_fem.physics.bearings.bearing_report import report_of_states
 from spindle_fem.physics.bearings.bearing_set import solve_bearing_set
 from spindle_fem.physics.bearings.fits import RingFits, fit_faults
-from spindle_fem.physics.bearings.friction_heat import HeatOptions
 from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.mounting import (
     BearingSet,
     BearingTemperatures,

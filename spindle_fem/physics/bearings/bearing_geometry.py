@@ -1,4 +1,4 @@
-"""Geometry of one angular-contact ball bearing and the rows bearings are mounted in."""
+"""Geometry of one ball bearing and the rows bearings are mounted in."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 from spindle_fem.errors import GeometryError, SpecError, did_you_mean
+from spindle_fem.physics.bearings.bearing_kind import BearingKind
+from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 
 STEEL_YOUNG_MODULUS = 206.0e9
 STEEL_POISSON_RATIO = 0.3
 STEEL_DENSITY = 7800.0
 STEEL_EXPANSION = 12.5e-6
-# A shoulder of 0.29 ball diameters, higher than any groove is ground
-_LARGEST_FREE_ANGLE = math.radians(65.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +40,12 @@ class BearingGeometry:
         Boundary dimensions; only empirical heat, ring growth and set spacing need them.
     shoulder_angle : float or None, [rad]
         Contact angle at which the ellipse's centre reaches the edge of the
-        groove. None: unknown; free angles up to 65° and running ones up to
-        90° pass.
+        groove. None: unknown; free angles up to that of the kind and running
+        ones up to 90° pass.
     static_load_rating : float or None, [N]
         Catalogue C0; None: from the contact pressure of 4200 MPa (ISO 76).
+    kind : str
+        Kind of bearing, one of ``BEARING_KINDS``.
 
     Raises
     ------
@@ -72,12 +74,18 @@ class BearingGeometry:
     width: float | None = None
     shoulder_angle: float | None = None
     static_load_rating: float | None = None
+    kind: str = "angular_contact_ball"
 
     def __post_init__(self) -> None:
         faults = bearing_faults(self)
         if faults:
             key, what, how_to_fix = faults[0]
             raise GeometryError(key, what, how_to_fix)
+
+    @property
+    def catalogue(self) -> BearingKind:
+        """Catalogue constants of the bearing's kind."""
+        return BEARING_KINDS[self.kind]
 
     @property
     def total_curvature(self) -> float:
@@ -169,7 +177,9 @@ def bearing_faults(geometry: BearingGeometry) -> list[tuple[str, str, str]]:
                 (f"groove_curvature_{ring}", f"groove radius over ball diameter is {value:g}.",
                  "It must be above 0.5 (the ball must enter the groove) and at most 0.7.")
             )  # fmt: skip
-    limit = _LARGEST_FREE_ANGLE if geometry.shoulder_angle is None else geometry.shoulder_angle
+    limit = geometry.shoulder_angle
+    if limit is None:
+        limit = BEARING_KINDS[geometry.kind].largest_free_angle
     if not 0.0 < limit <= 0.5 * math.pi:
         faults.append(("shoulder_angle", f"it is {math.degrees(limit):g}°.", "Allowed: above 0 to 90°."))
     elif not 0.0 <= geometry.contact_angle < limit:

@@ -7,7 +7,8 @@ from typing import Any
 
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.physics.bearings.bearing_geometry import select_orientations
-from spindle_fem.physics.bearings.friction_heat import HEAT_LEVELS
+from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
+from spindle_fem.physics.bearings.heat_model import friction_model_names
 from spindle_fem.units import to_si
 
 Reader = Callable[[Any, str], Any]
@@ -17,10 +18,11 @@ def _quantity(unit: str, kind: str = "quantity") -> Reader:
     return lambda value, where: to_si(value, unit, where=where, kind=kind)
 
 
-def _text(*allowed: str) -> Reader:
+def _text(*allowed: str, names: Callable[[], tuple[str, ...]] | None = None) -> Reader:
     def read(value: Any, where: str) -> str:
-        if not isinstance(value, str) or (allowed and value not in allowed):
-            raise SpecError(where, f"{value!r} is not allowed.", did_you_mean(str(value), allowed))
+        known = names() if names is not None else allowed
+        if not isinstance(value, str) or (known and value not in known):
+            raise SpecError(where, f"{value!r} is not allowed.", did_you_mean(str(value), known))
         return value
 
     return read
@@ -59,6 +61,7 @@ GEOMETRY: dict[str, Reader] = {
     "width": _LENGTH,
     "shoulder_angle": _quantity("rad"),
     "static_load_rating": _FORCE,
+    "kind": _text(names=lambda: tuple(BEARING_KINDS)),
 }
 MOUNTING: dict[str, Reader] = {
     "arrangement": _row,
@@ -112,7 +115,7 @@ LUBRICANT: dict[str, Reader] = {
     "temperature_limit": _TEMPERATURE,
 }
 HEAT: dict[str, Reader] = {
-    "model": _text(*HEAT_LEVELS),
+    "model": _text(names=friction_model_names),
     "palmgren_f0": _NUMBER,
     "skf_mu_ehl": _NUMBER,
     "hysteresis_loss": _NUMBER,

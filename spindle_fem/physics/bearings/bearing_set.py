@@ -14,8 +14,8 @@ from spindle_fem.physics.bearings.ball_system import BallSystem
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.equilibrium import Equilibrium, RacewayControl, solve_equilibrium
-from spindle_fem.physics.bearings.friction_heat import HeatOptions
 from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.mounting import (
     BearingSet,
     BearingTemperatures,

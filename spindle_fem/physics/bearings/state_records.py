@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import NoEquilibriumError
 from spindle_fem.physics.bearings.ball_system import BallSystem, Contacts, ellipse_axes
-from spindle_fem.physics.bearings.bearing_state import BallStates, BearingState
+from spindle_fem.physics.bearings.bearing_state import BallStates, BearingHeat, BearingState
 from spindle_fem.physics.bearings.equilibrium import Equilibrium
-from spindle_fem.physics.bearings.friction_heat import BearingHeat, HeatInputs, HeatOptions, bearing_heat
 from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.heat_model import HeatInputs, HeatOptions, bearing_heat
+from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.bearings.hertz import INNER, OUTER, maximum_pressure
 from spindle_fem.physics.bearings.lubricant_film import (
     film_central_hamrock_dowson,
@@ -326,13 +327,14 @@ def _control_doubts(
 
 def _heat_warnings(name: str, geometry, heat: HeatOptions) -> list[CodedWarning]:
     warnings = []
-    if heat.level == "full" and heat.cage is None and heat.seal is None:
+    model = HEAT_MODELS[heat.level]
+    if model.counts_cage and heat.cage is None and heat.seal is None:
         warnings.append(
             CodedWarning(
                 "cage_seal_not_given", f"{name}: cage and seal friction count 0; give their dimensions."
             )
         )
-    if heat.level in ("full", "skf") and None in (geometry.bore_diameter, geometry.outer_diameter):
+    if model.needs_boundary and None in (geometry.bore_diameter, geometry.outer_diameter):
         text = f"{name}: bore or outer diameter assumed 1.75 ball diameters from the pitch circle."
         warnings.append(CodedWarning("boundary_dimensions_assumed", text))
     return warnings

@@ -1,0 +1,48 @@
+"""What tells one kind of ball bearing from another: catalogue constants of its friction and ratings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class BearingKind:
+    """Constants of the catalogue formulas for one kind of ball bearing.
+
+    Balls, contacts and films of every kind follow from the geometry alone.
+
+    Attributes
+    ----------
+    source : str
+    largest_free_angle : float, [rad]
+        Free contact angle that no bearing of the kind exceeds, where no shoulder angle is given.
+    static_radial_factor : float, [-]
+        X0 of the static equivalent load of a single bearing.
+    static_axial_factors : (contact angles [rad], Y0)
+        Linear between them.
+    palmgren_load_factors : (contact angles [rad], factors)
+        z of the factor z (P0/C0)^y of Palmgren's load moment.
+    palmgren_load_exponent : float, [-]
+        y of the same.
+    skf_rolling, skf_sliding : (float, float, float)
+        R1, R2, R3 and S1, S2, S3 of the SKF friction model, single row.
+    """
+
+    source: str
+    largest_free_angle: float
+    static_radial_factor: float
+    static_axial_factors: tuple[tuple[float, ...], tuple[float, ...]]
+    palmgren_load_factors: tuple[tuple[float, ...], tuple[float, ...]]
+    palmgren_load_exponent: float
+    skf_rolling: tuple[float, float, float]
+    skf_sliding: tuple[float, float, float]
+
+    def static_axial_factor(self, contact_angle: float) -> float:
+        """Y0 at a contact angle [rad]."""
+        return float(np.interp(contact_angle, *self.static_axial_factors))
+
+    def palmgren_load_factor(self, contact_angle: float) -> float:
+        """Z at a contact angle [rad]."""
+        return float(np.interp(contact_angle, *self.palmgren_load_factors))

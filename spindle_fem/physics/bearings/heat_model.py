@@ -1,0 +1,181 @@
+"""What a heat model of a bearing is asked and answers: inputs, options, and the models by name."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.physics.bearings.ball_system import BallSystem
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_state import BearingHeat
+from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
+from spindle_fem.physics.bearings.hertz import INNER, OUTER
+from spindle_fem.physics.bearings.traction import ContactPatch, LubricantState, TractionIntegrals
+
+FloatArray = NDArray[np.float64]
+BallAttitude = Literal["equilibrium", "outer"]
+
+
+@dataclass(frozen=True, slots=True)
+class CageGuidance:
+    """A cage that runs on a ring's land: Petroff shear of a film.
+
+    Attributes
+    ----------
+    land_diameter, land_width, clearance : float, [m]
+        ``clearance`` is radial.
+    land : {"inner", "outer"}
+        Ring that guides it.
+    """
+
+    land_diameter: float
+    land_width: float
+    clearance: float
+    land: Literal["inner", "outer"] = "outer"
+
+    def __post_init__(self) -> None:
+        for key in ("land_diameter", "land_width", "clearance"):
+            if not getattr(self, key) > 0.0:
+                raise SpecError(f"cage.{key}", f"it is {getattr(self, key):g} m.", "It must be above 0.")
+
+    def power(self, viscosity: float, speed: float, orbital: float) -> float:
+        """Heat of the guiding land, P = η π w d³ ω_rel²/(4c), W."""
+        relative = speed - orbital if self.land == "inner" else orbital
+        shear = viscosity * math.pi * self.land_width * self.land_diameter**3 * relative**2
+        return shear / (4.0 * self.clearance)
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSeal:
+    """A rubbing seal of constant friction moment (K_S1 d_s^β + K_S2 of a catalogue).
+
+    Attributes
+    ----------
+    moment : float, [N m]
+    """
+
+    moment: float
+
+    def __post_init__(self) -> None:
+        if not self.moment >= 0.0:
+            raise SpecError("seal.moment", f"it is {self.moment:g} N m.", "It must not be negative.")
+
+
+@dataclass(frozen=True, slots=True)
+class HeatOptions:
+    """Which heat model, and the numbers that only it needs.
+
+    Attributes
+    ----------
+    level : str
+        One of :func:`friction_model_names`.
+    rolling_surfaces : {2, 1}
+        Houpert's rolling force acts on both surfaces of a contact: power
+        2 F_R u. Some papers count one.
+    hysteresis_loss : float, [-]
+        Share of the elastic work lost in a load cycle of hard steel.
+    palmgren_f0, skf_friction_ehl, skf_friction_boundary : float
+    cage : CageGuidance or None
+    seal : ContactSeal or None
+    """
+
+    level: str = "full"
+    rolling_surfaces: int = 2
+    hysteresis_loss: float = 0.01
+    palmgren_f0: float = 2.0
+    skf_friction_ehl: float = 0.04
+    skf_friction_boundary: float = 0.15
+    cage: CageGuidance | None = None
+    seal: ContactSeal | None = None
+
+    def __post_init__(self) -> None:
+        known = friction_model_names()
+        if self.level not in known:
+            raise SpecError("heat.model", f"{self.level!r} is unknown.", did_you_mean(str(self.level), known))
+        if self.rolling_surfaces not in (1, 2):
+            raise SpecError("heat.rolling_surfaces", f"it is {self.rolling_surfaces}.", "Allowed: 1, 2.")
+        if not 0.0 <= self.hysteresis_loss <= 0.1:
+            raise SpecError("heat.hysteresis_loss", f"it is {self.hysteresis_loss:g}.", "Allowed: 0 to 0.1.")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeatInputs:
+    """What a bearing's equilibrium hands to the heat models.
+
+    ``system``, ``patch``, ``traction`` and ``lubricant`` hold this bearing's
+    balls only; ``orbital`` and ``drag`` are (n,).
+    """
+
+    geometry: BearingGeometry
+    system: BallSystem
+    patch: ContactPatch
+    traction: TractionIntegrals
+    lubricant: LubricantState
+    orbital: FloatArray
+    drag: FloatArray
+    speed: float
+    kinematic_viscosity: float
+    axial_force: float
+    radial_force: float
+
+
+class FrictionModel:
+    """A heat model that follows from a bearing's equilibrium.
+
+    Attributes
+    ----------
+    ball_attitude : {"equilibrium", "outer"}
+        What sets the axis about which a ball turns: its own friction, or outer race control.
+    needs_boundary : bool
+        Whether bore and outer diameter enter.
+    counts_cage : bool
+        Whether cage and seal enter.
+    """
+
+    def __init__(
+        self,
+        heat: Callable[[HeatInputs, HeatOptions], BearingHeat],
+        ball_attitude: BallAttitude,
+        needs_boundary: bool,
+        counts_cage: bool,
+    ) -> None:
+        functools.update_wrapper(self, heat)
+        self._heat, self.ball_attitude = heat, ball_attitude
+        self.needs_boundary, self.counts_cage = needs_boundary, counts_cage
+
+    def __call__(self, inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
+        """Heat of one bearing, term by term."""
+        return self._heat(inputs, options)
+
+
+def friction_model(
+    *, ball_attitude: BallAttitude = "outer", needs_boundary: bool = False, counts_cage: bool = False
+) -> Callable[[Callable[[HeatInputs, HeatOptions], BearingHeat]], FrictionModel]:
+    """Make a function of ``(inputs, options)`` a heat model, with the facts of :class:`FrictionModel`."""
+    return lambda heat: FrictionModel(heat, ball_attitude, needs_boundary, counts_cage)
+
+
+def friction_model_names() -> tuple[str, ...]:
+    """Heat models that follow from a bearing's equilibrium: all but ``table``."""
+    return tuple(name for name, model in HEAT_MODELS.items() if isinstance(model, FrictionModel))
+
+
+def bearing_heat(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
+    """Heat of one bearing by the model that ``options`` names; all terms are 0 at rest."""
+    return HEAT_MODELS[options.level](inputs, options)
+
+
+def ring_terms(inputs: HeatInputs, per_contact: Mapping[str, FloatArray]) -> dict[str, float]:
+    """Heat of all balls at each ring, W, from that of one ball at each contact, (n, 2) W."""
+    return {
+        f"{ring}_{label}": float(power[:, side] @ inputs.system.weight)
+        for label, power in per_contact.items()
+        for side, ring in ((INNER, "inner"), (OUTER, "outer"))
+    }

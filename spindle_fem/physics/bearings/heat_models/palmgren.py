@@ -1,0 +1,68 @@
+"""Palmgren's catalogue formula: a viscous and a load-dependent moment."""
+
+from __future__ import annotations
+
+import math
+
+from spindle_fem.errors import SpecError
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_state import BearingHeat
+from spindle_fem.physics.bearings.catalogue_friction import (
+    FrictionMoment,
+    static_equivalent_load,
+    static_load_rating,
+)
+from spindle_fem.physics.bearings.heat_model import HeatInputs, HeatOptions, friction_model
+from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
+
+
+@HEAT_MODELS.register
+@friction_model()
+def palmgren(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
+    """Heat of the moments M_0 (``viscous``) and M_1 (``load``), and of a contact seal."""
+    moment = palmgren_moment(
+        inputs.geometry,
+        inputs.speed,
+        inputs.kinematic_viscosity,
+        inputs.axial_force,
+        inputs.radial_force,
+        lubrication_factor=options.palmgren_f0,
+    )
+    return moment.heat("palmgren", inputs.speed, options)
+
+
+def palmgren_moment(
+    geometry: BearingGeometry,
+    speed: float,
+    kinematic_viscosity: float,
+    axial_load: float,
+    radial_load: float = 0.0,
+    *,
+    lubrication_factor: float = 2.0,
+) -> FrictionMoment:
+    """Friction moment after Palmgren: ``viscous`` (M_0) and ``load`` (M_1).
+
+    Parameters
+    ----------
+    speed : float, [rad/s]
+    kinematic_viscosity : float, [m²/s]
+    axial_load, radial_load : float, [N]
+    lubrication_factor : float
+        f_0: grease about 2 (fresh fill up to 4), oil-air about 1.7.
+
+    Source: Harris & Kotzalas, vol. 1; Palmgren (1959).
+    """
+    if not lubrication_factor > 0.0:
+        raise SpecError("palmgren_f0", f"it is {lubrication_factor:g}.", "It must be above 0.")
+    pitch = geometry.pitch_diameter * 1e3
+    product = kinematic_viscosity * 1e6 * abs(speed) * 30.0 / math.pi
+    rate = 1e-7 * product ** (2.0 / 3.0) if product >= 2000.0 else 160e-7
+    viscous = rate * lubrication_factor * pitch**3 if speed else 0.0
+    axial, radial = abs(axial_load), abs(radial_load)
+    ratio = static_equivalent_load(geometry, axial, radial) / static_load_rating(geometry)
+    tangent = math.tan(geometry.contact_angle)
+    driving = radial if tangent == 0.0 else max(0.9 * axial / tangent - 0.1 * radial, radial)
+    kind = geometry.catalogue
+    factor = kind.palmgren_load_factor(geometry.contact_angle)
+    load = factor * ratio**kind.palmgren_load_exponent * driving * pitch
+    return FrictionMoment({"viscous": viscous * 1e-3, "load": load * 1e-3})

@@ -1,0 +1,77 @@
+"""SKF's catalogue formula: a rolling and a sliding moment."""
+
+from __future__ import annotations
+
+import math
+
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_state import BearingHeat
+from spindle_fem.physics.bearings.catalogue_friction import FrictionMoment, boundary_diameters
+from spindle_fem.physics.bearings.heat_model import HeatInputs, HeatOptions, friction_model
+from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
+from spindle_fem.physics.bearings.lubricant_film import inlet_shear_factor, replenishment_factor
+
+
+@HEAT_MODELS.register
+@friction_model(needs_boundary=True)
+def skf(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
+    """Heat of the ``rolling`` and ``sliding`` moments, and of a contact seal."""
+    moment = skf_moment(
+        inputs.geometry,
+        inputs.speed,
+        inputs.kinematic_viscosity,
+        inputs.axial_force,
+        inputs.radial_force,
+        friction_ehl=options.skf_friction_ehl,
+        friction_boundary=options.skf_friction_boundary,
+    )
+    return moment.heat("skf", inputs.speed, options)
+
+
+def skf_moment(
+    geometry: BearingGeometry,
+    speed: float,
+    kinematic_viscosity: float,
+    axial_load: float,
+    radial_load: float = 0.0,
+    *,
+    friction_ehl: float = 0.04,
+    friction_boundary: float = 0.15,
+) -> FrictionMoment:
+    """Friction moment of the SKF model: ``rolling`` and ``sliding`` (no contact seal, no oil bath).
+
+    Parameters
+    ----------
+    speed : float, [rad/s]
+    kinematic_viscosity : float, [m²/s]
+    axial_load, radial_load : float, [N]
+    friction_ehl : float
+        Full-film friction coefficient: 0.05 mineral, 0.04 synthetic.
+    friction_boundary : float
+        0.12-0.15.
+
+    The constants are those of the bearing's kind.
+
+    Source: SKF rolling bearings catalogue (2013).
+    """
+    (r1, r2, r3), (s1, s2, s3) = geometry.catalogue.skf_rolling, geometry.catalogue.skf_sliding
+    bore, outer = boundary_diameters(geometry)
+    mean = 0.5 * (bore + outer) * 1e3
+    rpm = abs(speed) * 30.0 / math.pi
+    viscosity = kinematic_viscosity * 1e6
+    axial, radial = abs(axial_load), abs(radial_load)
+    inertia = mean**4 * rpm**2
+    rolling = r1 * mean**1.97 * (radial + r3 * inertia + r2 * axial) ** 0.54
+    reduction = float(inlet_shear_factor(speed, mean * 1e-3, kinematic_viscosity)) * float(
+        replenishment_factor(speed, bore, outer, kinematic_viscosity)
+    )
+    third = 4.0 / 3.0
+    sliding = s1 * mean**0.26 * ((radial + s3 * inertia) ** third + s2 * axial**third)
+    boundary = math.exp(-2.6e-8 * (rpm * viscosity) ** 1.4 * mean)
+    coefficient = boundary * friction_boundary + (1.0 - boundary) * friction_ehl
+    return FrictionMoment(
+        {
+            "rolling": reduction * rolling * (viscosity * rpm) ** 0.6 * 1e-3,
+            "sliding": coefficient * sliding * 1e-3,
+        }
+    )
