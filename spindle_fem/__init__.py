@@ -19,6 +19,17 @@ _PLACES = {
     "mesh_machine": "spindle_fem.commands.machine_commands",
     "heat_table": "spindle_fem.commands.machine_commands",
     "bearing_report": "spindle_fem.physics.bearings.bearing_file",
+    # Registries, to add things of one's own with ``add`` or ``register``, and what makes such things.
+    "BEARING_KINDS": "spindle_fem.physics.bearings.bearing_kinds",
+    "COOLANTS": "spindle_fem.physics.coolant.coolants",
+    "FILM_MODELS": "spindle_fem.physics.coolant.film_models",
+    "GAP_LAWS": "spindle_fem.physics.surroundings.gap_laws",
+    "HEAT_MODELS": "spindle_fem.physics.bearings.heat_models",
+    "NATURAL_FILMS": "spindle_fem.physics.surroundings.natural_films",
+    "ROTATING_FILMS": "spindle_fem.physics.surroundings.rotating_films",
+    "UserCoolant": "spindle_fem.physics.coolant.user_coolant",
+    "friction_model": "spindle_fem.physics.bearings.heat_model",
+    "nusselt_correlation": "spindle_fem.physics.coolant.film_correlation",
 }
 __all__ = ["__version__", *_PLACES]
 

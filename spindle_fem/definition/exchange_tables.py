@@ -34,6 +34,9 @@ LEAST_LAND = 3.0e-3
 
 Fluid = choice_field("spindle_fem.physics.coolant.coolants")
 FilmModel = choice_field("spindle_fem.physics.coolant.film_models")
+Orientation = choice_field("spindle_fem.physics.surroundings.natural_films")
+RotatingCorrelation = choice_field("spindle_fem.physics.surroundings.rotating_films")
+GapLaw = choice_field("spindle_fem.physics.surroundings.gap_laws")
 ReferenceSpeed = quantity_field("rad/s", above=0.0)
 
 
@@ -174,7 +177,7 @@ class NaturalFilm(SpecModel):
     """Names of surfaces; each surface takes one film or gap."""
     characteristic_length: PositiveLength
     """Diameter of the cylinder or height of the plate."""
-    orientation: Literal["horizontal_cylinder", "vertical_plate"] = "horizontal_cylinder"
+    orientation: Orientation = "horizontal_cylinder"
     """Which correlation of natural convection."""
     emissivity: Fraction = 0.9
     """Of the surface, in large grey surroundings."""
@@ -187,12 +190,14 @@ class NaturalFilm(SpecModel):
 
 
 class RotatingFilm(SpecModel):
-    """Film of a rotating surface in air (Becker), with a floor at rest."""
+    """Film of a rotating surface in air, with a floor at rest."""
 
     kind: Literal["rotating"]
     """Tells the films apart."""
     surface: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of surfaces; each surface takes one film or gap."""
+    correlation: RotatingCorrelation = "becker"
+    """How the coefficient follows from the speed."""
     diameter: PositiveLength
     """Of the Reynolds and Nusselt numbers."""
     minimum: FilmCoefficient
@@ -221,7 +226,7 @@ class Gap(SpecModel):
     """Name of the rotating surface."""
     standing: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of the standing surfaces that face it."""
-    kind: Literal["power_law", "becker_kaye"] = "power_law"
+    kind: GapLaw = "power_law"
     """How the coefficient follows from the speed."""
     at_rest: FilmCoefficient | None = None
     """With ``kind = "power_law"`` only."""
@@ -238,12 +243,12 @@ class Gap(SpecModel):
     def _check(self) -> Gap:
         if self.kind == "power_law" and self.at_rest is None:
             raise_faults([Fault("at_rest", "is missing.", 'kind = "power_law" needs it, in W/m**2/K.')])
-        if self.kind == "becker_kaye" and self.at_rest is not None:
+        if self.kind != "power_law" and self.at_rest is not None:
             raise_faults(
                 [
                     Fault(
                         "at_rest",
-                        'is given, but kind = "becker_kaye" computes it.',
+                        f'is given, but kind = "{self.kind}" computes it.',
                         'Set kind = "power_law".',
                     )
                 ]

@@ -132,7 +132,9 @@ def test_a_natural_film_carries_what_its_correlation_says(fast, spec):
     drive = drive_of(times, 3000.0, ambient=296.15)
     run = simulate_fast(natural, drive, 293.15)
     wall = natural.model.place("housing") @ run.states[-1]
-    coefficient = outside_coefficient(np.array([wall]), 296.15, 0.3, 0.9, shape="cylinder")[0]
+    coefficient = outside_coefficient(np.array([wall]), 296.15, 0.3, 0.9, orientation="horizontal_cylinder")[
+        0
+    ]
     point = drive.points[0]
     values = natural.coefficients(point, {}) | {"film.housing.outside": coefficient}
     out = sum(

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import OutOfValidityError
+from spindle_fem.physics.surroundings.natural_films import NATURAL_FILMS
+from spindle_fem.physics.surroundings.natural_films.horizontal_cylinder import nusselt_churchill_chu_cylinder
+from spindle_fem.physics.surroundings.natural_films.vertical_plate import nusselt_churchill_chu_plate
 from spindle_fem.physics.surroundings.still_air import (
     STEFAN_BOLTZMANN,
     air_properties,
-    natural_convection_cylinder,
-    natural_convection_plate,
-    nusselt_churchill_chu_cylinder,
-    nusselt_churchill_chu_plate,
+    natural_convection,
     outside_coefficient,
     radiation_coefficient,
     rayleigh_number,
@@ -57,12 +57,12 @@ def test_turbulent_limit_of_churchill_and_chu(correlation, offset, prandtl_const
     assert at_constant == pytest.approx((offset + 38.7 * 2.0 ** (-8.0 / 27.0)) ** 2, rel=1e-12)
 
 
-@pytest.mark.parametrize("coefficient", [natural_convection_cylinder, natural_convection_plate])
-def test_natural_convection_is_symmetric_and_grows_with_the_difference(coefficient):
+@pytest.mark.parametrize("orientation", NATURAL_FILMS)
+def test_natural_convection_is_symmetric_and_grows_with_the_difference(orientation):
     mean = 298.15
     difference = np.array([1.0, 5.0, 20.0])
-    warm = coefficient(mean + difference, mean - difference, 0.3)
-    cold = coefficient(mean - difference, mean + difference, 0.3)
+    warm = natural_convection(orientation, mean + difference, mean - difference, 0.3)
+    cold = natural_convection(orientation, mean - difference, mean + difference, 0.3)
     np.testing.assert_allclose(warm, cold, rtol=1e-13)
     assert (np.diff(warm) > 0.0).all()
 
@@ -78,11 +78,13 @@ def test_radiation_is_exact_without_linearisation_error():
 def test_outside_of_the_reference_spindle_is_about_ten():
     # The assumed 10 W/(m²K) with 30 % (1 sigma) is what both parts give for a painted housing.
     found = outside_coefficient(303.15, 290.75, 0.3, 0.9)
-    parts = natural_convection_cylinder(303.15, 290.75, 0.3) + radiation_coefficient(303.15, 290.75, 0.9)
+    parts = natural_convection("horizontal_cylinder", 303.15, 290.75, 0.3) + radiation_coefficient(
+        303.15, 290.75, 0.9
+    )
     assert float(found) == pytest.approx(float(parts), rel=1e-13)
     assert 7.0 < float(found) < 13.0
-    plate = outside_coefficient(303.15, 290.75, 0.3, 0.0, shape="plate")
-    assert float(plate) == pytest.approx(float(natural_convection_plate(303.15, 290.75, 0.3)))
+    plate = outside_coefficient(303.15, 290.75, 0.3, 0.0, orientation="vertical_plate")
+    assert float(plate) == pytest.approx(float(natural_convection("vertical_plate", 303.15, 290.75, 0.3)))
 
 
 @pytest.mark.parametrize(
@@ -95,7 +97,10 @@ def test_outside_of_the_reference_spindle_is_about_ten():
         (lambda: rayleigh_number(300.0, 290.0, 0.0), "length is 0, allowed above 0"),
         (lambda: radiation_coefficient(-1.0, 300.0, 0.5), "surface_temperature is -1"),
         (lambda: radiation_coefficient(300.0, 300.0, 1.02), "emissivity is 1.02, allowed 0 to 1"),
-        (lambda: outside_coefficient(300.0, 290.0, 0.3, 0.9, shape="plato"), 'Did you mean "plate"'),
+        (
+            lambda: outside_coefficient(300.0, 290.0, 0.3, 0.9, orientation="vertical_plato"),
+            'Did you mean "vertical_plate"',
+        ),
     ],
 )
 def test_refusals(call, message):

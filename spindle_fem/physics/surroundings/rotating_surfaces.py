@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.errors import OutOfValidityError, did_you_mean
+from spindle_fem.correlation import Array, Correlation, Range
+from spindle_fem.physics.surroundings.rotating_films import ROTATING_FILMS
 from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, CodedWarning, range_fault, require_range
 
-ROTATING_MODELS = ("becker", "dropkin_carmi", "mixed", "disc")
-
-RANGES: dict[str, tuple[float, float]] = {
-    "becker": (800.0, 1.0e5),
-    "dropkin_carmi": (8.0e3, 4.3e5),
-    "mixed": (0.0, 1.5e4),
-    "disc": (0.0, 5.0e6),
-}
-
-_DISC_TRANSITION = 2.4e5
 _HOW_TO_FIX = "Use another rotating-surface model, or extrapolate=True and say so."
 
 
@@ -59,160 +51,25 @@ def rotational_reynolds(
     return np.abs(np.asarray(angular_speed, float)) * diameter**2 / (2.0 * kinematic_viscosity)
 
 
-def nusselt_becker(
-    reynolds: ArrayLike, prandtl: ArrayLike = 0.71, *, extrapolate: bool = False
-) -> NDArray[np.float64]:
-    """Nusselt number of a horizontal cylinder that rotates in still fluid.
+class RotatingCorrelation(Correlation):
+    """A Nusselt number of a Reynolds and a Prandtl number of a rotating surface.
 
-    Parameters
+    Attributes
     ----------
-    reynolds : (n,) array_like, [-]
-        ω D²/(2 ν).
-    prandtl : (n,) array_like, [-]
-    extrapolate : bool
-        Compute outside Range too.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        On the diameter.
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range, unless ``extrapolate``.
-
-    Range: 800 <= Re <= 1e5.
-
-    Source: Becker (1963), Int. J. Heat Mass Transfer 6, 1053–1062.
-
-    >>> float(nusselt_becker(1.0e4, 0.71).round(2))
-    55.07
+    on_radius : bool
+        Whether both are on the radius, ω R²/ν, not on the diameter, ω D²/(2 ν).
     """
-    re, pr = np.broadcast_arrays(np.asarray(reynolds, float), np.asarray(prandtl, float))
-    if not extrapolate:
-        require_range("nusselt_becker", reynolds=(re, *RANGES["becker"]), how_to_fix=_HOW_TO_FIX)
-    return 0.133 * np.cbrt(re) ** 2 * np.cbrt(pr)
+
+    def __init__(self, function: Callable[..., Array], reynolds: Range, on_radius: bool) -> None:
+        super().__init__(function, {"reynolds": reynolds}, _HOW_TO_FIX)
+        self.on_radius = on_radius
 
 
-def nusselt_dropkin_carmi(reynolds: ArrayLike, *, extrapolate: bool = False) -> NDArray[np.float64]:
-    """Nusselt number of a horizontal cylinder that rotates fast in still air.
-
-    Parameters
-    ----------
-    reynolds : (n,) array_like, [-]
-        ω D²/(2 ν).
-    extrapolate : bool
-        Compute outside Range too.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        On the diameter.
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range, unless ``extrapolate``.
-
-    Range: 8000 <= Re <= 4.3e5, air; natural convection plays no part above 15 000.
-
-    Source: Dropkin & Carmi (1957), Trans. ASME 79, 741–749.
-
-    >>> float(nusselt_dropkin_carmi(1.0e5).round(1))
-    230.8
-    """
-    re = np.asarray(reynolds, float)
-    if not extrapolate:
-        require_range(
-            "nusselt_dropkin_carmi", reynolds=(re, *RANGES["dropkin_carmi"]), how_to_fix=_HOW_TO_FIX
-        )
-    return 0.073 * re**0.7
-
-
-def nusselt_rotating_mixed(
-    reynolds: ArrayLike, grashof: ArrayLike, prandtl: ArrayLike = 0.71, *, extrapolate: bool = False
-) -> NDArray[np.float64]:
-    """Nusselt number of a rotating cylinder where buoyancy and rotation both matter.
-
-    Parameters
-    ----------
-    reynolds : (n,) array_like, [-]
-        ω D²/(2 ν).
-    grashof : (n,) array_like, [-]
-        On the diameter.
-    prandtl : (n,) array_like, [-]
-    extrapolate : bool
-        Compute outside Range too.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        On the diameter.
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range, unless ``extrapolate``.
-
-    Range: Re <= 1.5e4, air.
-
-    Source: Etemad (1955), Trans. ASME 77, 1283–1289; Kays & Bjorklund (1958),
-    Trans. ASME 80, 70–78: 0.11 [(0.5 Re² + Gr) Pr]^0.35.
-
-    >>> float(nusselt_rotating_mixed(5.0e3, 1.0e7).round(1))
-    36.5
-    """
-    re, gr, pr = np.broadcast_arrays(
-        np.asarray(reynolds, float), np.asarray(grashof, float), np.asarray(prandtl, float)
-    )
-    if not extrapolate:
-        require_range(
-            "nusselt_rotating_mixed",
-            reynolds=(re, *RANGES["mixed"]),
-            grashof=(gr, *NOT_NEGATIVE),
-            how_to_fix=_HOW_TO_FIX,
-        )
-    return 0.11 * ((0.5 * re**2 + gr) * pr) ** 0.35
-
-
-def nusselt_rotating_disc(reynolds: ArrayLike, *, extrapolate: bool = False) -> NDArray[np.float64]:
-    """Mean Nusselt number of a disc that rotates in still air.
-
-    Laminar inside the radius where ω r²/ν = 2.4e5, turbulent outside it; the
-    mean over the area has no jump and tends to 0.015 Re^0.8.
-
-    Parameters
-    ----------
-    reynolds : (n,) array_like, [-]
-        ω R²/ν with the outer radius.
-    extrapolate : bool
-        Compute outside Range too.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        On the outer radius.
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range, unless ``extrapolate``.
-
-    Range: Re <= 5e6, air, isothermal disc.
-
-    Source: Cobb & Saunders (1956), Proc. R. Soc. A 236, 343–351; Dorfman (1963):
-    local 0.36 Re_r^0.5 laminar, mean 0.015 Re^0.8 of an all-turbulent disc.
-
-    >>> nusselt_rotating_disc([1.0e5, 2.4e5, 4.0e6]).round(1).tolist()
-    [113.8, 176.4, 2838.2]
-    """
-    re = np.asarray(reynolds, float)
-    if not extrapolate:
-        require_range("nusselt_rotating_disc", reynolds=(re, *RANGES["disc"]), how_to_fix=_HOW_TO_FIX)
-    # Share of the area that is laminar: (r_c/R)².
-    core = np.minimum(_DISC_TRANSITION / np.maximum(re, _DISC_TRANSITION), 1.0)
-    return 0.36 * np.sqrt(re) * core + 0.015 * re**0.8 * (1.0 - core**1.3)
+def rotating_correlation(
+    lowest_reynolds: float, highest_reynolds: float, *, on_radius: bool = False
+) -> Callable[[Callable[..., Array]], RotatingCorrelation]:
+    """Make a Nusselt number of (reynolds, prandtl) the film of a rotating surface within a range."""
+    return lambda function: RotatingCorrelation(function, (lowest_reynolds, highest_reynolds), on_radius)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +99,6 @@ def rotating_film(
     kinematic_viscosity: float = 1.55e-5,
     thermal_conductivity: float = 0.026,
     prandtl: float = 0.71,
-    grashof: ArrayLike = 0.0,
     minimum: float = 0.0,
 ) -> RotatingFilm:
     """Heat transfer coefficient of a rotating surface against speed.
@@ -252,15 +108,14 @@ def rotating_film(
 
     Parameters
     ----------
-    model : {"becker", "dropkin_carmi", "mixed", "disc"}
+    model : str
+        One of ``ROTATING_FILMS``.
     angular_speed : (n,) array_like or float, [rad/s]
     diameter : float, [m]
     kinematic_viscosity : float, [m²/s]
         Air at about 25 °C by default, like the next two.
     thermal_conductivity : float, [W/(m·K)]
     prandtl : float, [-]
-    grashof : (n,) array_like or float, [-]
-        On the diameter; ``"mixed"`` alone uses it.
     minimum : float, [W/(m²·K)]
         Natural convection and radiation at rest.
 
@@ -281,26 +136,17 @@ def rotating_film(
     >>> rotating_film("becker", 0.0, 0.11, minimum=10.0).value
     10.0
     """
-    if model not in ROTATING_MODELS:
-        raise OutOfValidityError(
-            "rotating film", f'"{model}" is not known.', did_you_mean(model, ROTATING_MODELS)
-        )
+    correlation = ROTATING_FILMS[model]
     require_range("rotating film", minimum=(minimum, *NOT_NEGATIVE), how_to_fix="Give it in W/(m²·K).")
     reynolds = rotational_reynolds(angular_speed, diameter, kinematic_viscosity)
     length = diameter
-    if model == "becker":
-        number = nusselt_becker(reynolds, prandtl, extrapolate=True)
-    elif model == "dropkin_carmi":
-        number = nusselt_dropkin_carmi(reynolds, extrapolate=True)
-    elif model == "mixed":
-        number = nusselt_rotating_mixed(reynolds, grashof, prandtl, extrapolate=True)
-    else:
+    if correlation.on_radius:
         # ω R²/ν is half of ω D²/(2 ν).
         reynolds, length = reynolds / 2.0, diameter / 2.0
-        number = nusselt_rotating_disc(reynolds, extrapolate=True)
+    number = correlation(reynolds, prandtl, extrapolate=True)
     computed = number * thermal_conductivity / length
     value = np.maximum(computed, minimum)
-    lowest, highest = RANGES[model]
+    lowest, highest = correlation.ranges["reynolds"]
     in_range = ((reynolds >= lowest) & (reynolds <= highest)) | (computed < minimum)
     warnings: tuple[CodedWarning, ...] = ()
     if not in_range.all():

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.errors import OutOfValidityError, did_you_mean
+from spindle_fem.physics.surroundings.natural_films import NATURAL_FILMS
 from spindle_fem.units import ZERO_CELSIUS_K
 from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
@@ -94,80 +93,6 @@ def air_properties(temperature: ArrayLike, pressure: float = ATMOSPHERIC_PRESSUR
     )
 
 
-def nusselt_churchill_chu_cylinder(rayleigh: ArrayLike, prandtl: ArrayLike) -> NDArray[np.float64]:
-    """Mean Nusselt number of natural convection around a horizontal cylinder.
-
-    Parameters
-    ----------
-    rayleigh : (n,) array_like, [-]
-        On the diameter.
-    prandtl : (n,) array_like, [-]
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        On the diameter.
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range.
-
-    Range: Ra <= 1e12 (0 is allowed: Nu = 0.36), every Prandtl number.
-
-    Source: Churchill & Chu (1975), Int. J. Heat Mass Transfer 18, 1049–1053.
-
-    >>> float(nusselt_churchill_chu_cylinder(1.0e7, 0.71).round(2))
-    28.26
-    """
-    ra, pr = np.broadcast_arrays(np.asarray(rayleigh, float), np.asarray(prandtl, float))
-    require_range(
-        "nusselt_churchill_chu_cylinder",
-        rayleigh=(ra, 0.0, 1.0e12),
-        prandtl=(pr, *POSITIVE),
-        how_to_fix="Check temperatures and diameter.",
-    )
-    prandtl_term = (1.0 + (0.559 / pr) ** (9.0 / 16.0)) ** (8.0 / 27.0)
-    return (0.60 + 0.387 * ra ** (1.0 / 6.0) / prandtl_term) ** 2
-
-
-def nusselt_churchill_chu_plate(rayleigh: ArrayLike, prandtl: ArrayLike) -> NDArray[np.float64]:
-    """Mean Nusselt number of natural convection on a vertical plate.
-
-    Parameters
-    ----------
-    rayleigh : (n,) array_like, [-]
-        On the height.
-    prandtl : (n,) array_like, [-]
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        On the height.
-
-    Raises
-    ------
-    OutOfValidityError
-        Outside Range.
-
-    Range: Ra <= 1e12, every Prandtl number.
-
-    Source: Churchill & Chu (1975), Int. J. Heat Mass Transfer 18, 1323–1329.
-
-    >>> float(nusselt_churchill_chu_plate(1.0e7, 0.71).round(2))
-    31.21
-    """
-    ra, pr = np.broadcast_arrays(np.asarray(rayleigh, float), np.asarray(prandtl, float))
-    require_range(
-        "nusselt_churchill_chu_plate",
-        rayleigh=(ra, 0.0, 1.0e12),
-        prandtl=(pr, *POSITIVE),
-        how_to_fix="Check temperatures and height.",
-    )
-    prandtl_term = (1.0 + (0.492 / pr) ** (9.0 / 16.0)) ** (8.0 / 27.0)
-    return (0.825 + 0.387 * ra ** (1.0 / 6.0) / prandtl_term) ** 2
-
-
 def rayleigh_number(
     surface_temperature: ArrayLike, ambient_temperature: ArrayLike, length: float
 ) -> NDArray[np.float64]:
@@ -204,15 +129,18 @@ def rayleigh_number(
     return grashof * air.prandtl
 
 
-def natural_convection_cylinder(
-    surface_temperature: ArrayLike, ambient_temperature: ArrayLike, diameter: float
+def natural_convection(
+    orientation: str, surface_temperature: ArrayLike, ambient_temperature: ArrayLike, length: float
 ) -> NDArray[np.float64]:
-    """Heat transfer coefficient of a horizontal cylinder in still air.
+    """Heat transfer coefficient of a surface in still air, properties at the film temperature.
 
     Parameters
     ----------
+    orientation : str
+        One of ``NATURAL_FILMS``.
     surface_temperature, ambient_temperature : (n,) array_like, [K]
-    diameter : float, [m]
+    length : float, [m]
+        Of the correlation: diameter of a cylinder, height of a plate.
 
     Returns
     -------
@@ -221,55 +149,18 @@ def natural_convection_cylinder(
     Raises
     ------
     OutOfValidityError
-        As ``rayleigh_number`` and ``nusselt_churchill_chu_cylinder``.
+        Unknown orientation; as ``rayleigh_number`` and the correlation.
 
-    Source: Churchill & Chu (1975), properties at the film temperature.
-
-    >>> float(natural_convection_cylinder(303.15, 293.15, 0.3).round(2))
+    >>> float(natural_convection("horizontal_cylinder", 303.15, 293.15, 0.3).round(2))
     3.28
-    """
-    return _natural_convection(
-        nusselt_churchill_chu_cylinder, surface_temperature, ambient_temperature, diameter
-    )
-
-
-def natural_convection_plate(
-    surface_temperature: ArrayLike, ambient_temperature: ArrayLike, height: float
-) -> NDArray[np.float64]:
-    """Heat transfer coefficient of a vertical face in still air.
-
-    Parameters
-    ----------
-    surface_temperature, ambient_temperature : (n,) array_like, [K]
-    height : float, [m]
-
-    Returns
-    -------
-    (n,) ndarray, [W/(m²·K)]
-
-    Raises
-    ------
-    OutOfValidityError
-        As ``rayleigh_number`` and ``nusselt_churchill_chu_plate``.
-
-    Source: Churchill & Chu (1975), properties at the film temperature.
-
-    >>> float(natural_convection_plate(303.15, 293.15, 0.3).round(2))
+    >>> float(natural_convection("vertical_plate", 303.15, 293.15, 0.3).round(2))
     3.59
     """
-    return _natural_convection(nusselt_churchill_chu_plate, surface_temperature, ambient_temperature, height)
-
-
-def _natural_convection(
-    correlation: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
-    surface_temperature: ArrayLike,
-    ambient_temperature: ArrayLike,
-    length: float,
-) -> NDArray[np.float64]:
+    nusselt = NATURAL_FILMS[orientation]
     rayleigh = rayleigh_number(surface_temperature, ambient_temperature, length)
     mean = 0.5 * (np.asarray(surface_temperature, float) + np.asarray(ambient_temperature, float))
     air = air_properties(mean)
-    return correlation(rayleigh, air.prandtl) * air.thermal_conductivity / length
+    return nusselt(rayleigh, air.prandtl) * air.thermal_conductivity / length
 
 
 def radiation_coefficient(
@@ -321,7 +212,7 @@ def outside_coefficient(
     length: float,
     emissivity: float,
     *,
-    shape: str = "cylinder",
+    orientation: str = "horizontal_cylinder",
 ) -> NDArray[np.float64]:
     """Natural convection and radiation of an outside face together.
 
@@ -331,7 +222,8 @@ def outside_coefficient(
     length : float, [m]
         Diameter of a cylinder, height of a plate.
     emissivity : float, [-]
-    shape : {"cylinder", "plate"}
+    orientation : str
+        One of ``NATURAL_FILMS``.
 
     Returns
     -------
@@ -340,16 +232,10 @@ def outside_coefficient(
     Raises
     ------
     OutOfValidityError
-        Unknown shape, or as the two parts.
+        Unknown orientation, or as the two parts.
 
     >>> float(outside_coefficient(303.15, 293.15, 0.3, 0.9).round(2))
     8.69
     """
-    convection = {"cylinder": natural_convection_cylinder, "plate": natural_convection_plate}
-    if shape not in convection:
-        raise OutOfValidityError(
-            "outside_coefficient", f'shape is "{shape}".', did_you_mean(shape, tuple(convection))
-        )
-    return convection[shape](surface_temperature, ambient_temperature, length) + radiation_coefficient(
-        surface_temperature, ambient_temperature, emissivity
-    )
+    convection = natural_convection(orientation, surface_temperature, ambient_temperature, length)
+    return convection + radiation_coefficient(surface_temperature, ambient_temperature, emissivity)
