@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate
-from spindle_fem.effects.framework.term import COOLANT_INLET, FLUID_PREFIX, Term, TermContext
+from spindle_fem.effects.framework.term import COOLANT_INLET, FLUID_PREFIX, Term
 from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.model.reduced.reduced_transient import TransientRun
-from spindle_fem.model.reduced.term_layout import Layout
-from spindle_fem.model.reduced.term_memory import Moves, moves_over, remembered
+from spindle_fem.operation.effect_terms import Derivatives, EffectTerms, Instants
+from spindle_fem.operation.term_memory import remembered
 
 Array = NDArray[np.float64]
 
@@ -144,81 +144,62 @@ class BaseRun:
             values = variant.values(variant.candidate.reference)
             for term in variant.candidate.terms:
                 if term.is_dynamic:
-                    own = term.values(values)
-                    memory = self._memory(term, own)
+                    terms = EffectTerms((term,), values)
+                    memory = self._memory(terms)
                     for loads, before in ((start, True), (end, False)):
-                        added, shift = self._load(term, own, memory, before)
+                        added, shift = self._load(terms, memory, before)
                         loads[:, :, position] += added
                         if shift is not None:
                             rows = slice(0, steps) if before else slice(steps, steps + 1)
                             inlet[rows, position] += shift if before else shift[-1:]
         return self.march(start, end, inlet if np.any(inlet) else None)
 
-    def _memory(self, term: Term, values: Mapping[str, float]) -> Array:
-        """State of a term during each step, (n_states, G + 1)."""
-        steps = len(self.drive.steps)
-        if not term.n_states:
-            return np.zeros((0, steps + 1))
-        reads = np.array([self.place_temperature(place) for place in term.reads]).reshape(-1, steps + 1)
-        n_reads = len(reads)
-        layout = Layout.of(term, values, slice(0, n_reads), slice(0, term.n_states), {})
-
-        def seen(layout: Layout, states: Array) -> TermContext:
-            times = self.drive.grid[:-1]
-            return layout.context_over(times, self.start_inputs, reads[:, :-1].T, states, slopes=False)
-
-        def tell(states: Array) -> Moves:
-            shape = (term.n_states, n_reads, 0)
-            return moves_over([(term, layout)], shape, seen, self.drive.steps, states)
-
-        return remembered(tell, term.initial_state(values), steps)[0].T
-
-    def _load(
-        self, term: Term, values: Mapping[str, float], memory: Array, before: bool
-    ) -> tuple[Array, Array | None]:
-        """Load that a term adds at one end of every step, (G, r), and its shift of the inlet."""
-        model, run = self.plant.fast.model, self.run
-        steps = len(self.drive.steps)
-        at = slice(0, steps) if before else slice(1, steps + 1)
-        inputs = self.start_inputs if before else self.end_inputs
-        states = self.states[at]
-        reads = np.array([states @ model.place(place) for place in term.reads]).reshape(-1, steps)
-        context = TermContext(
-            self.drive.grid[at],
-            inputs,
-            reads.astype(complex),
-            memory[:, at].astype(complex),
-            {name: np.full(steps, value, dtype=complex) for name, value in values.items()},
+    def _memory(self, terms: EffectTerms) -> Array:
+        """Memory of a term before every step and after the last, (G + 1, n_states)."""
+        drive, sensed = self.drive, self._sensed(terms)
+        memory, _ = remembered(
+            terms,
+            Instants(drive.grid[:-1], self.start_inputs),
+            drive.steps,
+            sensed[:-1],
+            Derivatives.STATE,
+            held=np.zeros(0, dtype=np.int64),
         )
+        return memory
+
+    def _sensed(self, terms: EffectTerms) -> Array:
+        """What a term reads at the grid, (G + 1, n_reads) K."""
+        reads = [self.place_temperature(place) for place in terms.reads]
+        return np.array(reads).reshape(-1, len(self.states)).T
+
+    def _load(self, terms: EffectTerms, memory: Array, before: bool) -> tuple[Array, Array | None]:
+        """Load that a term adds at one end of every step, (G, r), and its shift of the inlet."""
+        fast, run = self.plant.fast, self.run
+        model, steps = fast.model, len(self.drive.steps)
+        at = slice(0, steps) if before else slice(1, steps + 1)
+        instants = Instants(self.drive.grid[at], self.start_inputs if before else self.end_inputs)
+        answers = terms.at(instants, self._sensed(terms)[at], memory[at], Derivatives.NONE)
         added = np.zeros((steps, model.size))
         shift = None
-        if term.heat_places:
-            heat = np.asarray(term.heat(context)).real
-            for row, place in enumerate(term.heat_places):
-                if place == COOLANT_INLET:
-                    shift = heat[row] * np.ones(steps)
-                    loads = np.array(
-                        [operators.loads[:, self.plant.fast.inlet_column] for operators in run.operators]
-                    )
-                    added += shift[:, None] * loads[self.drive.step_class]
-                elif place.startswith(FLUID_PREFIX) and place not in model.place_names:
-                    film = self.plant.fast.fluid_places[place]
-                    strength = self._strength(film) * heat[row]
-                    added += strength[:, None] * model.fluid_load[model.fluid_names.index(film)]
-                else:
-                    added += (heat[row] * np.ones(steps))[:, None] * model.place(place)
-        if term.bearings:
-            factor = np.asarray(term.friction(context)).real
-            friction = run.friction_start if before else run.friction_end
-            for row, bearing in enumerate(term.bearings):
-                for position in self.plant.fast.heat_rows(bearing):
-                    heat = (factor[row] - 1.0) * friction[:, position]
-                    added += heat[:, None] * model.place(self.plant.fast.heat_places[position])
-        if term.coefficients:
-            factor = np.asarray(term.factor(context)).real
-            for row, coefficient in enumerate(term.coefficients):
-                excess = (factor[row] - 1.0) * self._strength(coefficient)
-                added -= excess[:, None] * self._flow(coefficient, before)
+        for place, heat in zip(terms.places, answers.heat.value.T, strict=True):
+            if place == COOLANT_INLET:
+                shift = heat
+                loads = np.array([operators.loads[:, fast.inlet_column] for operators in run.operators])
+                added += shift[:, None] * loads[self.drive.step_class]
+            elif place.startswith(FLUID_PREFIX) and place not in model.place_names:
+                film = fast.fluid_places[place]
+                strength = self._strength(film) * heat
+                added += strength[:, None] * model.fluid_load[model.fluid_names.index(film)]
+            else:
+                added += heat[:, None] * model.place(place)
+        friction = run.friction_start if before else run.friction_end
+        for bearing, factor in zip(terms.bearings, answers.friction.value.T, strict=True):
+            for position in fast.heat_rows(bearing):
+                heat = (factor - 1.0) * friction[:, position]
+                added += heat[:, None] * model.place(fast.heat_places[position])
+        for coefficient, factor in zip(terms.coefficients, answers.factor.value.T, strict=True):
+            excess = (factor - 1.0) * self._strength(coefficient)
+            added -= excess[:, None] * self._flow(coefficient, before)
         return added, shift
 
     def _strength(self, coefficient: str) -> Array:

@@ -21,8 +21,8 @@ from spindle_fem.definition.machine_spec import HeatTable, MachineSpec
 from spindle_fem.effects.framework.term import Operating, Term, TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.model.reduced.build_reduced import ReductionOptions
-from spindle_fem.model.reduced.term_layout import OneInstant
 from spindle_fem.operation.bearing_heat import BearingMechanics, FilmCurves
+from spindle_fem.operation.effect_terms import OneInstant
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
 

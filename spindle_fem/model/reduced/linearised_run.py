@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.operation.effect_terms import Quantities
 
 Array = NDArray[np.float64]
 
@@ -46,25 +48,20 @@ class Answers:
         return np.concatenate((forcing, np.matmul(self.sense, forcing)), axis=1)
 
 
-@dataclass(frozen=True, slots=True)
-class Lines:
-    """Derivatives of what terms add at the start and end of every step, and of what they remember.
+class Lines(NamedTuple):
+    """What terms add at the start and end of every step, and what they remember, with derivatives.
 
     Attributes
     ----------
-    start_by_sensed, end_by_sensed : (G, m, n_y) ndarray
-    start_by_state, end_by_state : (G, m, n_x) ndarray
-        To what is remembered before and after the step.
-    state_by_sensed, state_by_state : (G, n_x, n_y) and (G, n_x, n_x) ndarray
-        Of what is remembered after a step, to what was sensed and remembered before it.
+    begin, end : Quantities
+        Added, (G, m): by what is sensed there, and remembered before and after the step.
+    memory : Quantities
+        After a step, (G, n_x): by what was sensed and remembered before it.
     """
 
-    start_by_sensed: Array
-    start_by_state: Array
-    end_by_sensed: Array
-    end_by_state: Array
-    state_by_sensed: Array
-    state_by_state: Array
+    begin: Quantities
+    end: Quantities
+    memory: Quantities
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +101,7 @@ class Linearised:
         matrix = np.empty((len(answers.group_of_step), *answers.replies[0].shape[1:] * 2))
         for group, reply in enumerate(answers.replies):
             rows = np.flatnonzero(answers.group_of_step == group)
-            matrix[rows] = np.eye(reply.shape[1]) - lines.end_by_sensed[rows] @ reply[size:]
+            matrix[rows] = np.eye(reply.shape[1]) - lines.end.by_sensed[rows] @ reply[size:]
         try:
             self._solve = np.linalg.inv(matrix)
         except np.linalg.LinAlgError as error:
@@ -116,9 +113,9 @@ class Linearised:
     def _end_lines(self, columns: int) -> tuple[Array, Array]:
         """What is added at the end, by what is sensed and remembered: answered for many columns."""
         if columns > 1 and self._answered is None:
-            lines = self.lines
-            self._answered = self._solve @ lines.end_by_sensed, self._solve @ lines.end_by_state
-        return self._answered or (self.lines.end_by_sensed, self.lines.end_by_state)
+            end = self.lines.end
+            self._answered = self._solve @ end.by_sensed, self._solve @ end.by_state
+        return self._answered or (self.lines.end.by_sensed, self.lines.end.by_state)
 
     def follow(
         self,
@@ -144,7 +141,9 @@ class Linearised:
         answers, lines = self.answers, self.lines
         n_sensed, size = answers.sense.shape
         steps, _, number = forcing.shape
-        n_added, n_states = lines.end_by_state.shape[1:]
+        n_added, n_states = lines.end.value.shape[1], lines.end.n_states
+        start_by_sensed, start_by_state = lines.begin.by_sensed, lines.begin.by_state
+        memory_by_sensed, memory_by_state = lines.memory.by_sensed, lines.memory.by_state
         by_sensed, by_state = self._end_lines(number)
         # A single column is solved for as it comes.
         solved = self._answered is not None
@@ -160,9 +159,9 @@ class Linearised:
                 states[step] = start[answers.given[step]]
                 np.dot(answers.sense, states[step], out=sensed[step])
             added = added_start[step]
-            np.dot(lines.start_by_sensed[step], sensed[step], out=added)
+            np.dot(start_by_sensed[step], sensed[step], out=added)
             if n_states:
-                added += lines.start_by_state[step] @ memory
+                added += start_by_state[step] @ memory
             if begin is not None:
                 added += begin[step]
             if step + 1 in answers.given:
@@ -170,7 +169,7 @@ class Linearised:
                 added_end[step] = added
                 continue
             if n_states:
-                memory = lines.state_by_sensed[step] @ sensed[step] + lines.state_by_state[step] @ memory
+                memory = memory_by_sensed[step] @ sensed[step] + memory_by_state[step] @ memory
                 if remembered is not None:
                     memory += remembered[step]
             now[:size], now[size:] = states[step], added

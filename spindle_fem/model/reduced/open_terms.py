@@ -9,17 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.term import COOLANT_INLET, FLUID_PREFIX, Term, TermContext
-from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.effects.framework.term import COOLANT_INLET, FLUID_PREFIX, Term
+from spindle_fem.model.reduced.added_heat import require_terms
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.run_operators import RunOperators
-from spindle_fem.model.reduced.term_layout import COMPLEX_STEP, Layout
-from spindle_fem.model.reduced.term_memory import Moves, carried, moves_over, remembered
+from spindle_fem.operation.effect_terms import Derivatives, EffectTerms, Instants, Quantities, TermAnswers
+from spindle_fem.operation.term_memory import carried, remembered
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,21 @@ Array = NDArray[np.float64]
 def is_open(term: Term) -> bool:
     """Whether a term adds heat that follows no temperature."""
     return term.is_dynamic and not term.reads and not term.coefficients
+
+
+class MachineInputs(NamedTuple):
+    """Load inputs of the machine itself, at the start and the end of every step, and derivatives.
+
+    Attributes
+    ----------
+    start, end : (G, n_w) ndarray
+    start_by, end_by : mapping of parameter to (G, n_w) ndarray
+    """
+
+    start: Array
+    end: Array
+    start_by: Mapping[str, Array]
+    end_by: Mapping[str, Array]
 
 
 @dataclass(slots=True)
@@ -86,8 +102,7 @@ def with_open_terms(
     fast: FastModel,
     drive: Drive,
     built: RunOperators,
-    inputs: tuple[Array, Array],
-    inputs_by: tuple[Mapping[str, Array], Mapping[str, Array]],
+    machine: MachineInputs,
     terms: Sequence[Term],
     parameters: Mapping[str, float],
     derivatives: Sequence[str],
@@ -96,12 +111,11 @@ def with_open_terms(
 
     Parameters
     ----------
-    fast : FastModel or NetworkFastModel
+    fast : FastModel
     drive : Drive
     built : RunOperators
-    inputs : pair of (G, n_w) ndarray
-        The machine's own, at the start and end of each step.
-    inputs_by : pair of mapping of parameter to (G, <= n_w) ndarray
+    machine : MachineInputs
+        The machine's own.
     terms : sequence of Term
         Open ones.
     parameters : mapping of str to float
@@ -113,71 +127,79 @@ def with_open_terms(
     SpecError
         A place or bearing that the machine does not have.
     """
-    columns = _Columns(fast, built, derivatives)
-    for term in terms:
-        columns.take(term)
+    require_terms(fast, terms)
+    owned = {name for term in terms for name in term.names()}
+    open_terms = EffectTerms(terms, parameters, [name for name in derivatives if name in owned])
+    columns = _Columns(fast, built, derivatives, open_terms.places)
     width = len(fast.load_names) + len(columns.names)
-    found = [_widened(values, width) for values in inputs]
-    found_by = [{name: _widened(values, width) for name, values in by.items()} for by in inputs_by]
-    for term in terms:
-        names = term.names()
-        own = [name for name in derivatives if name in names]
-        values = term.values(parameters)
-        perturbed = _perturbed(term, values, own)
-        memory = _memory(term, values, perturbed, drive)
-        for end, (loads, by) in enumerate(zip(found, found_by, strict=True)):
-            context = _context(drive, perturbed, memory, at_end=bool(end))
-            shape = (-1, len(drive.steps), 1 + len(own))
-            if term.heat_places:
-                heat = np.asarray(term.heat(context), dtype=complex).reshape(shape)
-                for row, place in enumerate(term.heat_places):
-                    _add(loads, by, columns.of(place), heat[row], own)
-            if term.bearings:
-                factor = np.asarray(term.friction(context), dtype=complex).reshape(shape)
-                for row, bearing in enumerate(term.bearings):
-                    for position in fast.heat_rows(bearing):
-                        # The machine's own, times what terms before this one make of it.
-                        friction = loads[:, position].copy()
-                        slopes = {name: slope[:, position].copy() for name, slope in by.items()}
-                        _add(loads, by, position, (factor[row] - 1.0) * friction[:, None], own)
-                        excess = factor[row, :, 0].real - 1.0
-                        for name, slope in slopes.items():
-                            by[name][:, position] += excess * slope
+    found = [_widened(values, width) for values in (machine.start, machine.end)]
+    found_by = [
+        {name: _widened(values, width) for name, values in by.items()}
+        for by in (machine.start_by, machine.end_by)
+    ]
+    for loads, by, answers in zip(found, found_by, _at_both_ends(open_terms, drive), strict=True):
+        for name in open_terms.derivatives:
+            by.setdefault(name, np.zeros_like(loads))
+        for row, place in enumerate(open_terms.places):
+            column = columns.of(place)
+            loads[:, column] += answers.heat.value[:, row]
+            for target, name in enumerate(open_terms.derivatives):
+                by[name][:, column] += answers.heat.by[:, row, target]
+        for row, bearing in enumerate(open_terms.bearings):
+            factor, slopes = answers.friction.value[:, row], answers.friction.by[:, row]
+            for position in fast.heat_rows(bearing):
+                own = loads[:, position].copy()
+                loads[:, position] *= factor
+                for slope in by.values():
+                    slope[:, position] *= factor
+                for target, name in enumerate(open_terms.derivatives):
+                    by[name][:, position] += slopes[:, target] * own
     return OpenLoads(columns.loads(), columns.loads_by(), *found, *found_by, columns.fluids())
+
+
+def _at_both_ends(terms: EffectTerms, drive: Drive) -> list[TermAnswers]:
+    """What open terms do just after the start and just before the end of every step.
+
+    Derivatives are whole ones to the asked parameters, (G, q, p), what is remembered included.
+    """
+    steps = len(drive.steps)
+    inputs = [
+        {name: values[:, i] for i, name in enumerate(drive.names)} for values in (drive.start, drive.end)
+    ]
+    nothing = np.zeros((steps, 0))
+    begin, end = Instants(drive.grid[:-1], inputs[0]), Instants(drive.grid[1:], inputs[1])
+    memory, moves = remembered(
+        terms,
+        begin,
+        drive.steps,
+        nothing,
+        Derivatives.ALL,
+        held=np.array(drive.restarts, dtype=np.int64) - 1,
+    )
+    memory_by = carried(moves.by_state, moves.by_parameter)
+    found = []
+    for instants, at in ((begin, slice(0, steps)), (end, slice(1, steps + 1))):
+        answers = terms.at(instants, nothing, memory[at])
+        parts = (
+            Quantities(item.value, item.by_parameter + item.by_state @ memory_by[at], 0, 0)
+            for item in (answers.heat, answers.friction, answers.factor)
+        )
+        found.append(TermAnswers(*parts))
+    return found
 
 
 class _Columns:
     """Load columns that open terms need beside the machine's own."""
 
-    def __init__(self, fast: FastModel, built: RunOperators, derivatives: Sequence[str]) -> None:
+    def __init__(
+        self, fast: FastModel, built: RunOperators, derivatives: Sequence[str], places: Sequence[str]
+    ) -> None:
         self.fast, self.built, self.derivatives = fast, built, tuple(derivatives)
-        self.names: list[str] = []
-
-    def take(self, term: Term) -> None:
-        """Make room for a term's places."""
-        model, fluids = self.fast.model, self.fast.fluid_places
-        for place in term.heat_places:
-            if place == COOLANT_INLET and self.fast.inlet_column is not None:
-                continue
-            known = place in model.place_names or place in fluids
-            if not known:
-                allowed = [*model.place_names, *fluids]
-                raise SpecError(
-                    f"term {term.name}", f'puts heat into "{place}".', did_you_mean(place, allowed)
-                )
-            if place not in self.names:
-                self.names.append(place)
-        for bearing in term.bearings:
-            if bearing not in self.fast.bearings:
-                raise SpecError(
-                    f"term {term.name}",
-                    f'scales the friction of "{bearing}".',
-                    did_you_mean(bearing, self.fast.bearings),
-                )
+        self.names = [place for place in places if place != COOLANT_INLET]
 
     def of(self, place: str) -> int:
         """Column of a place."""
-        if place == COOLANT_INLET and self.fast.inlet_column is not None:
+        if place == COOLANT_INLET:
             return self.fast.inlet_column
         return len(self.fast.load_names) + self.names.index(place)
 
@@ -227,80 +249,3 @@ def _widened(values: Array, width: int) -> Array:
     found = np.zeros((len(values), width))
     found[:, : values.shape[1]] = values
     return found
-
-
-def _perturbed(term: Term, values: Mapping[str, float], own: Sequence[str]) -> dict[str, NDArray]:
-    """Parameters with one complex column for each derivative."""
-    found = {name: np.full(1 + len(own), value, dtype=complex) for name, value in values.items()}
-    names = term.names()
-    for column, outer in enumerate(own, 1):
-        item = names[outer]
-        found[item.name][column] += 1j * COMPLEX_STEP * (values[item.name] if item.logarithmic else 1.0)
-    return found
-
-
-def _memory(
-    term: Term, values: Mapping[str, float], perturbed: Mapping[str, NDArray], drive: Drive
-) -> NDArray:
-    """State before each step and after the last, (n_states, G + 1, columns)."""
-    steps = len(drive.steps)
-    width = len(next(iter(perturbed.values()))) if perturbed else 1
-    memory = np.zeros((term.n_states, steps + 1, width), dtype=complex)
-    if not term.n_states:
-        return memory
-    own = tuple(item.name for item in term.parameters if np.any(perturbed[item.name].imag))
-    layout = Layout.of(term, values, slice(0, 0), slice(0, term.n_states), _targets(perturbed, own))
-    inputs = {name: drive.start[:, i] for i, name in enumerate(drive.names)}
-    nothing = np.zeros((steps, 0))
-    gaps = np.array(drive.restarts, dtype=np.int64) - 1
-
-    def tell(states: Array) -> Moves:
-        moves = moves_over(
-            [(term, layout)],
-            (term.n_states, 0, width - 1),
-            lambda layout, states: layout.context_over(drive.grid[:-1], inputs, nothing, states, slopes=True),
-            drive.steps,
-            states,
-        )
-        moves.hold(gaps, states)
-        return moves
-
-    found, moves = remembered(tell, term.initial_state(values), steps)
-    memory += found.T[:, :, None]
-    slopes = carried(moves.by_state, moves.by_parameter)
-    memory[:, :, 1:] += 1j * COMPLEX_STEP * slopes.transpose(1, 0, 2)
-    return memory
-
-
-def _targets(perturbed: Mapping[str, NDArray], names: Sequence[str]) -> dict[str, int]:
-    """Derivative that each perturbed parameter belongs to."""
-    return {name: int(np.flatnonzero(perturbed[name].imag)[0]) - 1 for name in names}
-
-
-def _context(drive: Drive, perturbed: Mapping[str, NDArray], memory: NDArray, *, at_end: bool) -> TermContext:
-    """All instants and complex columns side by side."""
-    width, steps = memory.shape[2], len(drive.steps)
-    at = slice(1, steps + 1) if at_end else slice(0, steps)
-    inputs = drive.end if at_end else drive.start
-    return TermContext(
-        np.repeat(drive.grid[at], width),
-        {name: np.repeat(inputs[:, i], width) for i, name in enumerate(drive.names)},
-        np.zeros((0, steps * width), dtype=complex),
-        memory[:, at].reshape(len(memory), steps * width),
-        {name: np.tile(column, steps) for name, column in perturbed.items()},
-    )
-
-
-def _add(
-    loads: Array,
-    by: dict[str, Array],
-    column: int,
-    values: NDArray,
-    own: Sequence[str],
-) -> None:
-    """Add values (G, 1 + derivatives) to a load input and its derivatives."""
-    loads[:, column] += values[:, 0].real
-    for position, name in enumerate(own, 1):
-        if name not in by:
-            by[name] = np.zeros_like(loads)
-        by[name][:, column] += values[:, position].imag / COMPLEX_STEP

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.errors import SpecError
+from spindle_fem.model.reduced.added_heat import AddedHeat
 from spindle_fem.model.reduced.drive import Drive, with_walls
-from spindle_fem.model.reduced.dynamic_terms import DynamicTerms
 from spindle_fem.model.reduced.exponential_step import ExactPropagator
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.linearised_run import Answers
-from spindle_fem.model.reduced.open_terms import is_open, with_open_terms
+from spindle_fem.model.reduced.open_terms import MachineInputs, is_open, with_open_terms
 from spindle_fem.model.reduced.run_operators import RunOperators, run_operators
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.model.reduced.term_march import TermMarch, Tracks
@@ -158,20 +158,12 @@ class TransientRun:
         for number, rows in enumerate(self.groups.values()):
             self.group_of_step[rows] = number
         self._given = (0, *drive.restarts)
-        self.start, self.start_by = self._load_inputs(drive.start)
-        self.end, self.end_by = self._load_inputs(drive.end)
+        start, start_by = self._load_inputs(drive.start)
+        end, end_by = self._load_inputs(drive.end)
         self._n_heat = len(fast.heat_places)
         known = [term for term in terms if open_loop and is_open(term)]
-        opened = with_open_terms(
-            fast,
-            drive,
-            self.built,
-            (self.start, self.end),
-            (self.start_by, self.end_by),
-            known,
-            parameters,
-            derivatives,
-        )
+        own = MachineInputs(start, end, start_by, end_by)
+        opened = with_open_terms(fast, drive, self.built, own, known, parameters, derivatives)
         self.loads, self.loads_by = opened.loads, opened.loads_by
         self.start, self.end = opened.start, opened.end
         self.start_by, self.end_by = opened.start_by, opened.end_by
@@ -180,7 +172,7 @@ class TransientRun:
         self._friction_start_by = self._friction_derivatives(self.start_by)
         self._friction_end_by = self._friction_derivatives(self.end_by)
         dynamic = [term for term in terms if term.is_dynamic and term not in known]
-        self.dynamic = DynamicTerms(fast, drive, dynamic, parameters, derivatives) if dynamic else None
+        self.dynamic = AddedHeat(fast, dynamic, parameters, derivatives) if dynamic else None
         scaled = {name for term in dynamic for name in term.coefficients}
         self._shifts = opened.shifts(scaled, derivatives)
 

@@ -9,23 +9,25 @@ three rounds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.model.reduced.added_heat import (
+    TEMPERATURE_TOLERANCE,
+    AddedHeat,
+    RunInstants,
+    solve_added,
+)
 from spindle_fem.model.reduced.drive import Drive
-from spindle_fem.model.reduced.dynamic_terms import TEMPERATURE_TOLERANCE, DynamicTerms, solve_added
 from spindle_fem.model.reduced.linearised_run import Answers, Followed, Linearised, Lines
 from spindle_fem.model.reduced.run_operators import RunOperators
 from spindle_fem.model.reduced.run_start import Start
-from spindle_fem.model.reduced.term_layout import Evaluation, Layout, OneInstant
-from spindle_fem.model.reduced.term_memory import Moves, moves_over, remembered
-from spindle_fem.model.reduced.terms_over_time import EvaluationOver, Instants, evaluate_over
+from spindle_fem.operation.effect_terms import Derivatives, Instants, Quantities
+from spindle_fem.operation.term_memory import hold, remembered
 
 Array = NDArray[np.float64]
 
@@ -97,7 +99,7 @@ class TermMarch:
     ----------
     drive : Drive
     built : RunOperators
-    dynamic : DynamicTerms
+    dynamic : AddedHeat
     columns : list of (r, m) ndarray
         As :class:`Tracks` has them.
     answers : Answers
@@ -113,7 +115,7 @@ class TermMarch:
 
     drive: Drive
     built: RunOperators
-    dynamic: DynamicTerms
+    dynamic: AddedHeat
     columns: list[Array]
     answers: Answers
     response: Array
@@ -136,7 +138,7 @@ class TermMarch:
             The terms run away.
         """
         found = None
-        if not any(isinstance(term, OneInstant) for term in self.dynamic.terms):
+        if not self.dynamic.terms.one_instant_only:
             # What runs away on the way, in Newton's first rounds, may have a state all the same.
             with np.errstate(all="ignore"):
                 found = self._at_once(near)
@@ -153,24 +155,28 @@ class TermMarch:
         return same
 
     # ------------------------------------------------------------------ the whole run at once
-    def _instants(self, *, at_end: bool) -> Instants:
-        drive, dynamic = self.drive, self.dynamic
-        steps = len(drive.step_class)
-        wanted = {item.coefficient for items in dynamic.moved for item in items}
-        wanted |= {film for items in dynamic.shifted for _, film in items}
+    def _instants(self, *, at_end: bool) -> RunInstants:
+        drive = self.drive
         coefficients = {
             name: np.array([found[name] for found in self.built.coefficients])[drive.step_class]
-            for name in wanted
+            for name in self.dynamic.wanted_coefficients
         }
         inputs = drive.end if at_end else drive.start
-        return Instants(
-            drive.grid[1:] if at_end else drive.grid[:-1],
-            {name: inputs[:steps, i] for i, name in enumerate(drive.names)},
+        return RunInstants(
+            Instants(
+                drive.grid[1:] if at_end else drive.grid[:-1],
+                {name: inputs[:, i] for i, name in enumerate(drive.names)},
+            ),
             coefficients,
             self.friction[at_end],
             self.friction_by[at_end],
             self.shifts[at_end],
         )
+
+    @property
+    def _gaps(self) -> NDArray[np.int64]:
+        """Steps that bridge a gap."""
+        return np.array([point - 1 for point in self.answers.given if point], dtype=np.int64)
 
     def _at_once(self, near: Array | None) -> tuple[Array, Tracks] | None:
         """None where Newton's method does not end soon."""
@@ -192,7 +198,8 @@ class TermMarch:
         for _ in range(MOST_ROUNDS):
             if not np.all(np.isfinite(sensed)):
                 return None
-            told = self._told(before, after, begins, sensed, memory, slopes=slopes)
+            asked = Derivatives.ALL if slopes else Derivatives.STATE
+            told = self._told((before, after), begins, sensed, memory, asked)
             memory = told.memory
             try:
                 linearised = Linearised(answers, told.lines)
@@ -208,101 +215,59 @@ class TermMarch:
             before_that = moved
             if moved <= TEMPERATURE_TOLERANCE or left <= CERTAIN * TEMPERATURE_TOLERANCE:
                 if self.dynamic.derivatives and not slopes:
-                    told = self._told(before, after, begins, sensed, memory, slopes=True)
+                    told = self._told((before, after), begins, sensed, memory, Derivatives.ALL)
                 return found.states[:, :, 0], self._tracks(found, linearised, told)
             slopes = False
         return None
 
     def _tracks(self, found: Followed, linearised: Linearised, told: _Told) -> Tracks:
+        begin, end, memory = told.lines
         return Tracks(
             self.columns,
             found.added_start[:, :, 0],
             found.added_end[:, :, 0],
             linearised,
-            told.begin.by_parameter,
-            told.end.by_parameter,
-            told.state_by_parameter,
+            begin.by_parameter,
+            end.by_parameter,
+            memory.by_parameter,
         )
 
     def _told(
         self,
-        before: Instants,
-        after: Instants,
+        instants: tuple[RunInstants, RunInstants],
         begins: NDArray[np.int64],
         sensed: Array,
         guess: Array | None,
-        *,
-        slopes: bool,
+        derivatives: Derivatives,
     ) -> _Told:
-        """What the terms tell along sensed temperatures (G + 1, n_y); ``guess`` is of what they remember."""
-        dynamic, touched = self.dynamic, self.built.touched
-        memory, moves = self._remembered(before, sensed, guess, slopes=slopes)
-        end = evaluate_over(dynamic, after, touched, sensed[1:], memory[1:], slopes=slopes)
-        jumps = evaluate_over(
-            dynamic, before.at(begins), touched, sensed[begins], memory[begins], slopes=slopes
+        """What the terms tell along sensed temperatures (G + 1, n_y); ``guess`` is of what they remember.
+
+        ``instants`` are those just after the start and just before the end of every step.
+        """
+        dynamic, touched, (before, after) = self.dynamic, self.built.touched, instants
+        memory, moves = remembered(
+            dynamic.terms,
+            before.instants,
+            self.drive.steps,
+            sensed[:-1],
+            derivatives,
+            held=self._gaps,
+            guess=guess,
         )
+        end = dynamic.at(after, touched, sensed[1:], memory[1:], derivatives)
+        jumps = dynamic.at(before.at(begins), touched, sensed[begins], memory[begins], derivatives)
         # Where nothing jumps between steps, what holds at the end of one holds at the start of the next.
-        begin = EvaluationOver(*(np.roll(getattr(end, name), 1, axis=0) for name in EvaluationOver.__slots__))
-        begin.put(begins, jumps)
-        lines = Lines(
-            begin.by_sensed, begin.by_state, end.by_sensed, end.by_state, moves.by_sensed, moves.by_state
+        begin = Quantities(
+            np.roll(end.value, 1, axis=0), np.roll(end.by, 1, axis=0), end.n_sensed, end.n_states
         )
-        return _Told(begin, end, lines, moves.by_parameter, memory)
-
-    def _remembered(
-        self, before: Instants, sensed: Array, guess: Array | None, *, slopes: bool
-    ) -> tuple[Array, Moves]:
-        """What terms remember before each step and after the last (G + 1, n_x), and its derivatives."""
-        dynamic, drive, steps = self.dynamic, self.drive, len(self.drive.step_class)
-        asked = len(dynamic.derivatives) if slopes else 0
-        terms = [
-            (term, layout)
-            for term, layout in zip(dynamic.terms, dynamic.layouts, strict=True)
-            if term.n_states
-        ]
-        gaps = np.array([point - 1 for point in self.answers.given if point], dtype=np.int64)
-
-        def seen(layout: Layout, states: Array) -> TermContext:
-            return layout.context_over(before.times, before.inputs, sensed[:-1], states, slopes=slopes)
-
-        def tell(states: Array) -> Moves:
-            shape = (dynamic.n_states, len(dynamic.sense), asked)
-            moves = moves_over(terms, shape, seen, drive.steps, states)
-            moves.hold(gaps, states)
-            return moves
-
-        return remembered(tell, dynamic.initial_states(), steps, guess)
-
-    def _unmoved(self, memory: Array) -> tuple[Array, Array, Array, Array]:
-        """Memory over a gap: as it was."""
-        number = len(memory)
-        nothing = (np.zeros((number, width)) for width in (len(self.dynamic.sense), number))
-        return memory, *nothing, np.zeros((number, len(self.dynamic.derivatives)))
-
-    def _stacked(self, moved: Sequence[tuple[Array, Array, Array, Array]]) -> list[Array]:
-        """Derivatives of what terms remember, (G, n_x, ...)."""
-        dynamic, steps = self.dynamic, len(self.drive.step_class)
-        widths = (len(dynamic.sense), dynamic.n_states, len(dynamic.derivatives))
-        if not dynamic.n_states:
-            return [np.zeros((steps, 0, width)) for width in widths]
-        return [np.array([item[position] for item in moved]) for position in (1, 2, 3)]
+        begin.value[begins], begin.by[begins] = jumps.value, jumps.by
+        return _Told(Lines(begin, end, moves), memory)
 
     # ------------------------------------------------------------------ step by step
-    def _evaluator(self, step: int, *, at_end: bool, memory: Array) -> Callable[[Array], Evaluation]:
-        """Added quantities at one end of a step as a function of the sensed temperatures."""
-        drive = self.drive
-        inputs = (drive.end if at_end else drive.start)[step].tolist()
-        return partial(
-            self.dynamic.evaluate,
-            float(drive.grid[step + at_end]),
-            dict(zip(drive.names, inputs, strict=True)),
-            self.built.coefficients[drive.step_class[step]],
-            self.built.touched,
-            states=memory,
-            friction=self.friction[at_end][step],
-            friction_by=self.friction_by[at_end][step],
-            shifts={film: (float(k[step]), by[step]) for film, (k, by) in self.shifts[at_end].items()},
-        )
+    def _evaluator(self, where: RunInstants, step: int, memory: Array) -> Callable[[Array], Quantities]:
+        """Added quantities at one end of a step as a function of the sensed temperatures (1, n_y)."""
+        one, touched = where.one(step), self.built.touched
+        return lambda sensed: self.dynamic.at(one, touched, sensed, memory)
 
     def _step_by_step(self) -> tuple[Array, Tracks]:
         dynamic, drive, answers, start = self.dynamic, self.drive, self.answers, self.start
@@ -311,63 +276,65 @@ class TermMarch:
         states = np.empty((steps + 1, size))
         added_start, added_end = np.zeros((2, steps, dynamic.n_added))
         known = answers.with_sensed(self.response[:, :, None])[:, :, 0]
-        begins: list[Evaluation] = []
-        ends: list[Evaluation] = []
-        moved: list[tuple[Array, Array, Array, Array]] = []
+        before, after = self._instants(at_end=False), self._instants(at_end=True)
+        begins: list[Quantities] = []
+        ends: list[Quantities] = []
+        moves: list[Quantities] = []
         now = np.empty(size + dynamic.n_added)
-        memory = dynamic.initial_states()
+        memory = dynamic.terms.initial_states()[None]
         for step, group in enumerate(answers.group_of_step.tolist()):
             if step in given:
                 states[step] = start.states[given[step]]
-            sensed = dynamic.sense @ states[step]
+            sensed = (dynamic.sense @ states[step])[None]
             if goes_on[step]:
                 # Nothing jumps between the steps: what held at the end of the last still does.
                 begin, first = ends[-1], added_end[step - 1]
                 guess = 2.0 * first - added_start[step - 1]
             else:
-                begin = self._evaluator(step, at_end=False, memory=memory)(sensed)
-                guess = first = begin.value
+                begin = self._evaluator(before, step, memory)(sensed)
+                guess = first = begin.value[0]
             begins.append(begin)
+            moved = dynamic.terms.advance(
+                before.one(step).instants, float(self.drive.steps[step]), sensed, memory
+            )
             if step + 1 in given:
                 # A gap: nothing is known of it, and what comes after it is given.
+                hold(moved, slice(None), memory)
+                moves.append(moved)
                 ends.append(begin)
                 added_start[step] = added_end[step] = first
-                moved.append(self._unmoved(memory))
                 continue
-            if dynamic.n_states:
-                inputs = dict(zip(drive.names, drive.start[step].tolist(), strict=True))
-                time, length = float(drive.grid[step]), float(drive.steps[step])
-                moved.append(dynamic.advance(time, length, inputs, sensed, memory))
-                memory = moved[-1][0]
+            moves.append(moved)
+            memory = moved.value
             now[:size], now[size:] = states[step], first
             base = answers.follows[group] @ now
             base += known[step]
-            evaluator = self._evaluator(step, at_end=True, memory=memory)
+            evaluator = self._evaluator(after, step, memory)
             answer = answers.replies[group][size:]
             added, end = solve_added(evaluator, base[size:], answer, guess, float(drive.grid[step + 1]))
             ends.append(end)
             added_start[step], added_end[step] = first, added
             states[step + 1] = base[:size] + answers.replies[group][:size] @ added
-        by = [
-            np.array([getattr(item, name) for item in items])
-            for items in (begins, ends)
-            for name in ("by_sensed", "by_state", "by_parameter")
-        ]
-        state_by = self._stacked(moved)
-        lines = Lines(by[0], by[1], by[3], by[4], state_by[0], state_by[1])
-        return states, Tracks(
-            self.columns, added_start, added_end, Linearised(answers, lines), by[2], by[5], state_by[2]
-        )
+        lines = Lines(*(_joined(items) for items in (begins, ends, moves)))
+        by_parameter = (item.by_parameter for item in lines)
+        return states, Tracks(self.columns, added_start, added_end, Linearised(answers, lines), *by_parameter)
+
+
+def _joined(items: list[Quantities]) -> Quantities:
+    """Single instants, one after the other."""
+    return Quantities(
+        np.concatenate([item.value for item in items]),
+        np.concatenate([item.by for item in items]),
+        items[0].n_sensed,
+        items[0].n_states,
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _Told:
-    """What terms tell at both ends of every step, and what they remember."""
+    """What terms tell at both ends of every step, and what they remember, (G + 1, n_x)."""
 
-    begin: EvaluationOver
-    end: EvaluationOver
     lines: Lines
-    state_by_parameter: Array
     memory: Array
 
     def constants(self, sensed: Array) -> tuple[Array, Array, Array]:
@@ -375,9 +342,10 @@ class _Told:
 
         Memories are followed as departures from what they are along these temperatures.
         """
+        begin, end, memory = self.lines
         before, after = sensed[:-1, :, None], sensed[1:, :, None]
         return (
-            self.begin.value[:, :, None] - self.begin.by_sensed @ before,
-            self.end.value[:, :, None] - self.end.by_sensed @ after,
-            -self.lines.state_by_sensed @ before,
+            begin.value[:, :, None] - begin.by_sensed @ before,
+            end.value[:, :, None] - end.by_sensed @ after,
+            -memory.by_sensed @ before,
         )

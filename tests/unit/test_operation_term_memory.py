@@ -8,9 +8,9 @@ import pytest
 from spindle_fem.effects.catalogue.gap_closure import GapClosureTerm
 from spindle_fem.effects.catalogue.starvation import StarvationTerm
 from spindle_fem.effects.catalogue.thermal_preload import ThermalPreloadTerm
-from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
-from spindle_fem.model.reduced.term_layout import Layout
-from spindle_fem.model.reduced.term_memory import carried, moves_over, remembered
+from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.operation.effect_terms import Derivatives, EffectTerms, Instants
+from spindle_fem.operation.term_memory import carried, remembered
 
 STEPS = 80
 GAP = 33
@@ -54,41 +54,25 @@ def inputs():
     return times[:-1], lengths, {"speed": speed}, sensed
 
 
-def both(term, inputs, derivatives=True):
-    """Memories and derivatives to them, to what is sensed and to parameters: at once, and one by one."""
+def both(term, inputs):
+    """Memories and derivatives to what is sensed, to them and to parameters: at once, and one by one."""
     times, lengths, given, sensed = inputs
-    values = term.values({})
-    own = {item.name: i for i, item in enumerate(term.parameters)} if derivatives else {}
-    n_reads = len(term.reads)
-    layout = Layout.of(term, values, slice(0, n_reads), slice(0, term.n_states), own)
-    shape = (term.n_states, sensed.shape[1], len(own))
-
-    def tell(states):
-        moves = moves_over(
-            [(term, layout)],
-            shape,
-            lambda layout, states: layout.context_over(times, given, sensed, states, slopes=True),
-            lengths,
-            states,
-        )
-        moves.hold(np.array([GAP]), states)
-        return moves
-
-    memory, moves = remembered(tell, term.initial_state(values), STEPS)
+    sensed = sensed[:, : len(term.reads)]
+    terms = EffectTerms((term,), {}, tuple(term.names()))
+    held = np.array([GAP])
+    memory, moves = remembered(terms, Instants(times, given), lengths, sensed, Derivatives.ALL, held=held)
     expected = np.zeros((STEPS + 1, term.n_states))
-    expected[0] = term.initial_state(values)
-    slopes = [np.zeros((STEPS, term.n_states, width)) for width in (sensed.shape[1], term.n_states, len(own))]
+    expected[0] = term.initial_state(term.values({}))
+    slopes = np.zeros((STEPS, term.n_states, moves.by.shape[2]))
     for step in range(STEPS):
         if step == GAP:
             expected[step + 1] = expected[step]
-            slopes[1][step] = np.eye(term.n_states)
+            slopes[step, :, terms.n_sensed : terms.n_sensed + terms.n_states] = np.eye(term.n_states)
             continue
-        at = {name: float(column[step]) for name, column in given.items()}
-        context: TermContext = layout.context(times[step], at, sensed[step], expected[step])
-        answer = np.asarray(term.advance(context, float(lengths[step])), dtype=complex)
-        expected[step + 1] = answer[:, 0].real
-        layout.spread(answer, slice(0, term.n_states), 1.0, tuple(item[step] for item in slopes))
-    return (memory, *moves[1:]), (expected, *slopes)
+        at = Instants(float(times[step]), {name: float(column[step]) for name, column in given.items()})
+        one = terms.advance(at, float(lengths[step]), sensed[[step]], expected[[step]])
+        expected[step + 1], slopes[step] = one.value[0], one.by[0]
+    return (memory, moves.by), (expected, slopes)
 
 
 @pytest.mark.parametrize("name", TERMS)
