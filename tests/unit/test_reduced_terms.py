@@ -5,12 +5,11 @@ import pytest
 
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import ConvergenceError, SpecError
-from spindle_fem.model.reduced import added_heat
-from spindle_fem.model.reduced import term_march
+from spindle_fem.model.reduced import added_heat, term_march
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
-from spindle_fem.operation.effect_terms import Derivatives, OneInstant
 from spindle_fem.model.reduced.term_march import TermMarch
+from spindle_fem.operation.effect_terms import Derivatives, OneInstant
 from tests.support.lumped_spindle import drive_of
 from tests.support.sample_terms import FRICTIONS, SHIFTED, TERMS, Feedback
 
