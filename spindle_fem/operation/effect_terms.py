@@ -127,10 +127,13 @@ class _Target:
     positions : slice or (k,) int ndarray
     fresh : bool
         Whether no earlier term has these quantities.
+    repeated : bool
+        Whether the term names one of them more than once.
     """
 
     positions: Positions
     fresh: bool
+    repeated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +231,7 @@ class EffectTerms:
     Raises
     ------
     SpecError
-        Two terms of one name, or one that names the same thing twice.
+        Two terms of one name, or one that scales the same thing twice.
     """
 
     def __init__(
@@ -350,8 +353,13 @@ class EffectTerms:
     def _add(self, found: Quantities, target: _Target, layout: _Layout, answers: NDArray) -> None:
         """Add a term's complex answers (k, n · columns) to some quantities, in place."""
         value, slopes = _split(answers, len(found.value))
-        found.value[:, target.positions] += value
-        self._spread(found, target.positions, layout, slopes)
+        if not target.repeated:
+            found.value[:, target.positions] += value
+            self._spread(found, target.positions, layout, slopes)
+            return
+        for row, position in enumerate(target.positions):
+            found.value[:, position] += value[:, row]
+            self._spread(found, slice(position, position + 1), layout, slopes[:, row : row + 1])
 
     def _multiply(self, found: Quantities, target: _Target, layout: _Layout, answers: NDArray) -> None:
         """Multiply some quantities by a term's complex answers, in place."""
@@ -396,14 +404,15 @@ def _targets(terms: Sequence[Term], kind: str) -> tuple[tuple[str, ...], list[_T
     found = []
     for term in terms:
         names = getattr(term, kind)
-        if len(set(names)) != len(names):
+        repeated = len(set(names)) != len(names)
+        if repeated and kind != "heat_places":
             raise SpecError(f"term {term.name}", f"names one of its {kind} twice.", "Name each once.")
         fresh = not any(name in known for name in names)
         at = np.array([known.setdefault(name, len(known)) for name in names], dtype=np.int64)
         if at.size and np.array_equal(at, np.arange(at[0], at[0] + at.size)):
             found.append(_Target(slice(int(at[0]), int(at[0]) + at.size), fresh))
         else:
-            found.append(_Target(at, fresh))
+            found.append(_Target(at, fresh, repeated))
     return tuple(known), found
 
 
