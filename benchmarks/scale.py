@@ -23,10 +23,10 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from spindle_fem.commands.sweep_command import PreparedStudy, prepare_study
 from spindle_fem.parallel import WorkerPool
 from spindle_fem.studies.sweep import run_tasks as runner
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, evaluate_tasks
+from spindle_fem.studies.sweep.prepared_study import PreparedStudy, prepare_study
 from spindle_fem.studies.sweep.results_table import ResultTable, Row
 
 MILLION = 1_000_000

@@ -22,9 +22,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from spindle_fem.commands.sweep_command import prepare_study, sweep_machine
+from spindle_fem.commands.sweep_command import sweep_machine
 from spindle_fem.studies.sweep.evaluate_design import evaluate
 from spindle_fem.studies.sweep.fast_backend import GroupTask, answer_tasks, model_of
+from spindle_fem.studies.sweep.prepared_study import prepare_study
 from spindle_fem.studies.sweep.results_table import read_results
 
 STUDY = """

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.commands.sweep_command import prepare_study
 from spindle_fem.definition.load import find_machine, load_machine, read_definition
 from spindle_fem.errors import FaultsError, MeshQualityError
 from spindle_fem.machine.geometry.assembly import build_assembly
@@ -20,6 +19,7 @@ from spindle_fem.studies.sweep import morphing
 from spindle_fem.studies.sweep.designs import Design
 from spindle_fem.studies.sweep.evaluate_design import Question, TaskBuilder
 from spindle_fem.studies.sweep.morphing import move_mesh
+from spindle_fem.studies.sweep.prepared_study import prepare_study
 from spindle_fem.studies.sweep.run_tasks import run_tasks
 
 MACHINE = "small_two_start"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.cache import CACHE_VARIABLE
-from spindle_fem.commands.sweep_command import prepare_study, sweep_machine
+from spindle_fem.commands.sweep_command import sweep_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import FaultsError
 from spindle_fem.model.reduced.build_for_designs import FIRST_TABLES
@@ -19,6 +19,7 @@ from spindle_fem.studies.sweep.fast_backend import (
     answer_tasks,
     model_of,
 )
+from spindle_fem.studies.sweep.prepared_study import prepare_study
 from spindle_fem.studies.sweep.results_table import RESULTS, read_results
 from spindle_fem.studies.sweep.structure import refusal
 

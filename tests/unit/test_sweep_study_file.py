@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spindle_fem.commands.sweep_command import prepare_study
 from spindle_fem.definition.load import find_machine, read_definition
 from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.studies.sweep.designs import build_axes, plan_designs, sample_points
+from spindle_fem.studies.sweep.prepared_study import prepare_study
 from spindle_fem.studies.sweep.study_file import load_study
 
 HEAD = 'schema = "spindle-fem/study/1"\n'

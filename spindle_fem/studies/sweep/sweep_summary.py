@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.studies.sweep.file_names import SWEEP_SCHEMA
 from spindle_fem.studies.sweep.judge_designs import Ranking, rank
 from spindle_fem.studies.sweep.outputs import unit_of
+from spindle_fem.studies.sweep.prepared_study import PreparedStudy
 from spindle_fem.studies.sweep.results_table import FAILED, FULL, IMPOSSIBLE, MOVED, NEW, OK, REDUCED, Row
 from spindle_fem.studies.sweep.sensitivity import neighbours, sensitivities
-
-if TYPE_CHECKING:
-    from spindle_fem.commands.sweep_command import PreparedStudy
 
 # Neighbours told of the best design, for each parameter.
 NEIGHBOURS = 2
