@@ -16,7 +16,7 @@ from spindle_fem.model.reduced.drive import Drive, drive_of_recording, inputs_at
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import FastTransient, simulate_fast
-from spindle_fem.operation.coefficients import INNER_SHARE
+from spindle_fem.operation.coefficient_table import INNER_SHARE
 from spindle_fem.recordings.align import Recording
 from spindle_fem.studies.simulate_network import initial_parameters, simulate_on_recording
 

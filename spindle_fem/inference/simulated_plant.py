@@ -26,7 +26,7 @@ from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import FastTransient, TransientRun, grid_weights
 from spindle_fem.model.reduced.run_start import Start
-from spindle_fem.operation.coefficients import INNER_SHARE
+from spindle_fem.operation.coefficient_table import INNER_SHARE
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]

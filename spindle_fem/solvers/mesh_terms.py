@@ -20,7 +20,7 @@ from scipy import sparse
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.framework.term import COOLANT_INLET, FLOW, FLUID_PREFIX, Term, TermContext
 from spindle_fem.errors import SpecError, did_you_mean
-from spindle_fem.operation.coefficients import CoefficientTable, build_coefficient_table, gap_radii_of
+from spindle_fem.operation.coefficient_table import CoefficientTable, build_coefficient_table, gap_radii_of
 from spindle_fem.operation.loads import LoadChange
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint

@@ -13,7 +13,7 @@ from spindle_fem.model.reduced.mesh_model import build_mesh_model
 from spindle_fem.model.reduced.reduced_cache import reduced_digest
 from spindle_fem.model.reduced.snapshots import SnapshotSpace, orthonormalise
 from spindle_fem.model.reduced.unit_loads import helix_profiles
-from spindle_fem.operation.coefficients import build_coefficient_table
+from spindle_fem.operation.coefficient_table import build_coefficient_table
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.surroundings.rotating_surfaces import rotating_film
 

@@ -15,7 +15,7 @@ from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.thermal_model import ThermalModel
-from spindle_fem.operation.coefficients import free_parameters
+from spindle_fem.operation.coefficient_table import free_parameters
 from spindle_fem.physics.surroundings.still_air import outside_coefficient
 from tests.support.lumped_spindle import drive_of
 

@@ -23,7 +23,7 @@ from spindle_fem.model.reduced.snapshots import (
 )
 from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads, friction_loads
 from spindle_fem.model.thermal_model import ThermalModel, project
-from spindle_fem.operation.coefficients import (
+from spindle_fem.operation.coefficient_table import (
     CoefficientTable,
     build_coefficient_table,
     free_parameters,

@@ -22,7 +22,7 @@ from spindle_fem.model.reduced.natural_films import natural_film_terms
 from spindle_fem.model.reduced.trbdf2_matrices import build_propagator
 from spindle_fem.model.thermal_model import ThermalModel, project
 from spindle_fem.operation.channel_cells import cells_of_model
-from spindle_fem.operation.coefficients import (
+from spindle_fem.operation.coefficient_table import (
     INNER_SHARE,
     CoefficientTable,
     build_coefficient_table,

@@ -19,7 +19,7 @@ from spindle_fem.errors import SpecError
 from spindle_fem.model.mesh.equations import ThermalSystem
 from spindle_fem.model.mesh.evaluate import probe_matrix
 from spindle_fem.model.thermal_model import ThermalModel
-from spindle_fem.operation.coefficients import gap_radii_of
+from spindle_fem.operation.coefficient_table import gap_radii_of
 from spindle_fem.operation.machine_loads import FieldState
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint

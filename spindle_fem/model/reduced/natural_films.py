@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.term import Term, TermContext
-from spindle_fem.operation.coefficients import natural_reference
+from spindle_fem.operation.coefficient_table import natural_reference
 from spindle_fem.operation.effect_terms import OneInstant
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.outside_films import film_coefficient
