@@ -1,4 +1,4 @@
-"""The finite elements alone: a hollow cylinder between two films, by the package's own weak forms and scikit-fem.
+"""The finite elements alone: a hollow cylinder between two films, by the package's forms and scikit-fem.
 
 Nothing but the forms is taken from the package: mesh, basis, assembly and solution are scikit-fem's. The
 temperature is held against the exact one, which falls with the logarithm of the radius.

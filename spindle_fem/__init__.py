@@ -18,6 +18,9 @@ _PLACES = {
     "check_machine": "spindle_fem.commands.machine_commands",
     "mesh_machine": "spindle_fem.commands.machine_commands",
     "heat_table": "spindle_fem.commands.machine_commands",
+    "sweep_machine": "spindle_fem.commands.sweep_command",
+    "simulate_machine": "spindle_fem.commands.simulate_command",
+    "diagnose": "spindle_fem.commands.diagnose_command",
     "bearing_report": "spindle_fem.physics.bearings.bearing_file",
     # Registries, to add things of one's own with ``add`` or ``register``, and what makes such things.
     "BEARING_KINDS": "spindle_fem.physics.bearings.bearing_kinds",

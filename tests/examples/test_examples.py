@@ -1,0 +1,35 @@
+"""Every script of ``examples/`` runs from top to bottom, is short, and stands in the README."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SCRIPTS = sorted((ROOT / "examples").glob("*.py"))
+LONGEST = 60
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_an_example_runs(script, tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    process = subprocess.run(
+        [sys.executable, script, tmp_path / "out"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env=environment,
+        check=False,
+    )
+    assert process.returncode == 0, process.stdout + process.stderr
+    assert process.stdout
+
+
+def test_examples_are_short_and_listed():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert SCRIPTS
+    for script in SCRIPTS:
+        assert len(script.read_text(encoding="utf-8").splitlines()) <= LONGEST, script.name
+        assert f"examples/{script.name}" in readme, script.name
