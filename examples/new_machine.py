@@ -44,7 +44,9 @@ machine = {
         "contacts": ["B*.inner_ring|shaft", "B*.outer_ring|housing"],
     }],
     "surface": [{"name": "housing.outside", "part": "housing", "where": [{"facing": "outward"}]}],
-    "film": [{"name": "air", "kind": "constant", "surface": ["housing.outside"], "coefficient": "30 W/m**2/K"}],
+    "film": [
+        {"name": "air", "kind": "constant", "surface": ["housing.outside"], "coefficient": "30 W/m**2/K"},
+    ],
     "probe": [{"name": "SKIN", "part": "housing", "r": "75 mm", "z": "58 mm", "marks": "A"}],
     "mesh": {"preset": "coarse", "order": 1},
 }  # fmt: skip

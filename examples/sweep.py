@@ -1,4 +1,4 @@
-"""Two questions of design in one study: how much oil, and how cold? Every design, the best ones, the report."""
+"""Two questions of design in one study: how much oil, and how cold? Each design, the best ones, a report."""
 
 import csv
 import sys
