@@ -28,10 +28,12 @@ _PLACES = {
     "FILM_MODELS": "spindle_fem.physics.coolant.film_models",
     "GAP_LAWS": "spindle_fem.physics.surroundings.gap_laws",
     "HEAT_MODELS": "spindle_fem.physics.bearings.heat_models",
+    "JOINT_LAWS": "spindle_fem.physics.surroundings.joint_laws",
     "NATURAL_FILMS": "spindle_fem.physics.surroundings.natural_films",
     "ROTATING_FILMS": "spindle_fem.physics.surroundings.rotating_films",
     "UserCoolant": "spindle_fem.physics.coolant.user_coolant",
     "friction_model": "spindle_fem.physics.bearings.heat_model",
+    "joint_law": "spindle_fem.physics.surroundings.joint_law",
     "nusselt_correlation": "spindle_fem.physics.coolant.film_correlation",
 }
 __all__ = ["__version__", *_PLACES]

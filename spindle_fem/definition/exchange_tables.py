@@ -123,7 +123,7 @@ class JointGroup(SpecModel):
     name: Name
     """Shared factors and overrides use it."""
     conductance: FilmOrPerfect
-    """Heat-transfer coefficient of the joint, or ``"perfect"``."""
+    """Heat-transfer coefficient of the joint, ``"perfect"``, or a law with its quantities."""
     contacts: Annotated[tuple[str, ...], Field(min_length=1)]
     """Names, with `*` for any text."""
 

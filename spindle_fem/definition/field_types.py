@@ -68,6 +68,8 @@ class QuantityRule:
         Texts that stand for a value, such as ``"ambient"``.
     uncertain : bool
         Whether a prior may be given.
+    laws : Registry or None
+        Laws that may give the value, ``{law = NAME, quantity = ..., ...}``.
     """
 
     unit: str
@@ -77,6 +79,7 @@ class QuantityRule:
     at_most: float | None = None
     words: tuple[str, ...] = ()
     uncertain: bool = False
+    laws: Registry | None = None
 
     def allowed(self) -> str:
         """The limits in words, ``""`` where there are none."""
@@ -106,6 +109,8 @@ class QuantityRule:
         if self.words and isinstance(value, str) and re.fullmatch(r"[A-Za-z_]+", value.strip()):
             _refuse(f'"{value}" is not known.', did_you_mean(value, self.words) + " Or a quantity.")
         try:
+            if self.laws is not None and isinstance(value, dict) and "law" in value:
+                return self._read_law(value)
             if self.uncertain:
                 return self._read_uncertain(value)
             # Conversion leaves "410 mm" at 0.41000000000000003 m; 13 digits make equal texts equal.
@@ -120,6 +125,23 @@ class QuantityRule:
         result = Uncertain(_rounded(read.value), _rounded(read.sigma_log))
         self._require_limits(result.value, value)
         return result
+
+    def _read_law(self, value: dict[str, Any]) -> Uncertain:
+        """Value of a law at the quantities given, with ``sigma_rel`` of its logarithm."""
+        name = ChoiceRule(self.laws).read(value["law"])
+        law, given = self.laws[name], {key: item for key, item in value.items() if key != "law"}
+        sigma = to_si(given.pop("sigma_rel", 0.0), "", where="sigma_rel")
+        faults = [
+            Fault(key, "is unknown.", did_you_mean(key, [*law.units, "sigma_rel"]), "UnknownKeyError")
+            for key in given
+            if key not in law.units
+        ]
+        faults += [
+            Fault(key, "is missing.", f'law = "{name}" needs it.') for key in law.required if key not in given
+        ]
+        raise_faults(faults)
+        quantities = {key: to_si(item, law.units[key], where=key) for key, item in given.items()}
+        return Uncertain(_rounded(float(law(**quantities))), _rounded(sigma))
 
     def _require_limits(self, result: float, value: Any) -> None:
         if not self.holds(result):
@@ -173,9 +195,11 @@ def uncertain_field(
     at_least: float | None = None,
     at_most: float | None = None,
     words: tuple[str, ...] = (),
+    laws: str = "",
 ) -> Any:
-    """Annotated :class:`Uncertain`: a quantity, or one with a prior."""
-    rule = QuantityRule(unit, "quantity", above, at_least, at_most, words, uncertain=True)
+    """Annotated :class:`Uncertain`: a quantity, one with a prior, or one by a law of a package."""
+    known = registry(laws) if laws else None
+    rule = QuantityRule(unit, "quantity", above, at_least, at_most, words, uncertain=True, laws=known)
     return _field(Uncertain | str if words else Uncertain, rule)
 
 
@@ -207,7 +231,8 @@ FilmCoefficient = quantity_field("W/m**2/K", at_least=0.0)
 UncertainNumber = uncertain_field("", above=0.0)
 UncertainShare = uncertain_field("", at_least=0.0, at_most=1.0)
 UncertainFilm = uncertain_field("W/m**2/K", at_least=0.0)
-FilmOrPerfect = uncertain_field("W/m**2/K", at_least=0.0, words=("perfect",))
+JOINT_LAWS = "spindle_fem.physics.surroundings.joint_laws"
+FilmOrPerfect = uncertain_field("W/m**2/K", at_least=0.0, words=("perfect",), laws=JOINT_LAWS)
 UncertainConductance = uncertain_field("W/K", above=0.0)
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.]{0,63}")

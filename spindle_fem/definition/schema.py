@@ -74,6 +74,8 @@ def value_text(annotation: Any) -> str:
     if rule is not None:
         text = f"a quantity such as {quantity_example(rule.unit, rule.kind)}" if rule.unit else "a number"
         text = f"{text}, {rule.allowed()}" if rule.allowed() else text
+        if rule.laws is not None:
+            text += f", or {{law = NAME, ...}} of {', '.join(rule.laws)}"
         return " or ".join([*(f'"{word}"' for word in rule.words), text])
     values = literal_values(annotation)
     if values:

@@ -23,7 +23,6 @@ from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.mounting import rotation_growth
 from spindle_fem.physics.bearings.preload import axial_state
 from spindle_fem.physics.bearings.rings import Annulus, SeatMaterial
-from spindle_fem.physics.surroundings.joint_conductance_laws import interference_fit
 
 BEARING = BearingGeometry(
     14.2875e-3, 30, 165e-3, math.radians(15.0), 0.52, 0.52,
@@ -74,16 +73,33 @@ def test_compliances_of_the_71928_by_hand() -> None:
     assert -np.diff([law.growth(0.0), law.growth(1.0)])[0] == pytest.approx(outer_loose + inner_tight)
 
 
-def test_fit_pressure_is_that_of_the_joint_law() -> None:
-    """Two ways to the pressure of a ring on a hollow shaft, cold and hot and turning."""
+def lame_pressure(interference, bore, seat, outside, young_modulus, poisson_ratio):
+    """Fit pressure from the radial displacement of each cylinder under pressure alone, Pa."""
+    inner, middle, outer = bore / 2, seat / 2, outside / 2
+    ring = middle / young_modulus * ((outer**2 + middle**2) / (outer**2 - middle**2) + poisson_ratio)
+    shaft = middle / young_modulus * ((middle**2 + inner**2) / (middle**2 - inner**2) - poisson_ratio)
+    return interference / 2 / (ring + shaft)
+
+
+def disc_growth(radius, inner, outer, speed, density=7800.0, young=206e9, nu=0.3):
+    """Radial growth of a turning annulus at ``radius``, plane stress."""
+    factor = density * speed**2 * (3 + nu) / 8
+    radial = factor * (inner**2 + outer**2 - (inner * outer / radius) ** 2 - radius**2)
+    hoop = factor * (
+        inner**2 + outer**2 + (inner * outer / radius) ** 2 - (1 + 3 * nu) / (3 + nu) * radius**2
+    )
+    return radius / young * (hoop - nu * radial)
+
+
+def test_fit_pressure_is_that_of_lame_cylinders() -> None:
+    """Another way to the pressure of a ring on a hollow shaft, cold and hot and turning."""
     one_steel = replace(FITS, ring_density=7800.0)
     for rise, speed in ((COLD, 0.0), (FitTemperatures(3.0, 0.0, 1.5), turn(3000))):
-        joint = interference_fit(
-            8e-6, 0.060, 0.140, 0.158, young_modulus=206e9, shaft_rise=rise.shaft,
-            ring_rise=rise.inner_ring, expansion_coefficient=12.5e-6, angular_speed=speed, density=7800.0,
-        )  # fmt: skip
+        overlap = 8e-6 + 12.5e-6 * 0.140 * (rise.shaft - rise.inner_ring)
+        overlap -= 2.0 * (disc_growth(0.070, 0.070, 0.079, speed) - disc_growth(0.070, 0.030, 0.070, speed))
         state = seated_rings(BEARING, one_steel).state(0.0, rise, speed)
-        assert state.inner_pressure == pytest.approx(float(joint.pressure), rel=1e-12)
+        expected = lame_pressure(overlap, 0.060, 0.140, 0.158, 206e9, 0.3)
+        assert state.inner_pressure == pytest.approx(expected, rel=1e-9)
         assert state.inner_pressure > 0.0
 
 

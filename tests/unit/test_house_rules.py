@@ -38,7 +38,6 @@ BUSY_FUNCTIONS = {
     "spindle_fem/physics/bearings/equilibrium.py:solve_equilibrium",
     "spindle_fem/physics/bearings/state_records.py:build_states",
     "spindle_fem/physics/coolant/march.py:march_channel",
-    "spindle_fem/physics/surroundings/joint_conductance_laws.py:interference_fit",
     "spindle_fem/solvers/machine_transient.py:simulate_full",
     "spindle_fem/studies/simulate.py:_simulation",
 }
