@@ -56,13 +56,6 @@ PROGRAMS = (
     Program(
         f"{OURS}, 1 thread", "run_spindle_fem.py", "spindle_fem", environment={"SPINDLE_FEM_THREADS": "1"}
     ),
-    Program(
-        f"{OURS}, without numba",
-        "run_spindle_fem.py",
-        "spindle_fem",
-        environment={"SPINDLE_FEM_COMPILED": "0"},
-        largest=300_000,
-    ),
     Program("DOLFINx, GAMG, 2 processes", "run_dolfinx.py", "dolfinx", launcher=_TWO_RANKS),
     Program("DOLFINx, GAMG, 1 process", "run_dolfinx.py", "dolfinx"),
     Program("DOLFINx, hypre, 2 processes", "run_dolfinx.py", "dolfinx", ("--hypre",), _TWO_RANKS),

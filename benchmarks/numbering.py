@@ -15,8 +15,6 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from spindle_fem.errors import SpecError
 from spindle_fem.machine.meshing.tagged_mesh import Joint, TaggedMesh
-from spindle_fem.model.mesh.huge_pages import room
-from spindle_fem.model.mesh.threads import fill_rows, unsigned, use_compiled
 
 # Rows in which neighbours in the order may change places.
 NUMBERED_TOGETHER = 512
@@ -71,22 +69,6 @@ def numbered(mesh: TaggedMesh) -> tuple[TaggedMesh, NDArray[np.int32]]:
 
 def _graph(tetrahedra: NDArray[np.int64], n: int) -> sparse.csr_matrix:
     """Which nodes share an element, themselves included."""
-    if use_compiled(n):
-        return _compiled_graph(tetrahedra, n)
     pairs = [(tetrahedra[:, i], tetrahedra[:, j]) for i in range(4) for j in range(4)]
     rows, columns = (np.concatenate(side) for side in zip(*pairs, strict=True))
     return sparse.csr_matrix((np.ones(len(rows), dtype=np.int32), (rows, columns)), shape=(n, n))
-
-
-def _compiled_graph(tetrahedra: NDArray[np.int64], n: int) -> sparse.csr_matrix:
-    from spindle_fem.model.mesh.kernels import assembly_loops as compiled
-
-    nodes = np.ascontiguousarray(tetrahedra, dtype=np.int32).view(np.uint32)
-    around = room(nodes.size, np.int32)
-    members = unsigned(compiled.elements_of_nodes(nodes, n, around), around)
-    none = unsigned(np.zeros(n + 1, dtype=np.int32), np.empty(0, dtype=np.int32))
-    upper = unsigned(*fill_rows(compiled.fill_upper, n, (nodes, *members, *none), 9.0, (np.int32,)))
-    starts = compiled.full_starts(*upper)
-    columns, slots = room(int(starts[-1]), np.int32), room(int(starts[-1]), np.int32)
-    compiled.expand_upper(0, n, *upper, starts, columns, slots)
-    return sparse.csr_matrix((slots, columns, starts), shape=(n, n))

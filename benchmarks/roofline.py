@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from spindle_fem.model.mesh import threads
+from spindle_fem.model.mesh.kernels.multigrid_loops import multiply
 
 HERE = Path(__file__).resolve().parent
 REPEATS = 20
@@ -59,23 +60,14 @@ def measure(case: Path) -> dict:
         "stream_GB_s": {str(k): stream_bandwidth(k) / 1e9 for k in (1, 2)},
         "product_s": {"scipy": fastest(lambda: matrix @ vector)},
     }
-    if threads.has_compiled():
-        from spindle_fem.model.mesh.kernels import solver_loops as compiled_solver
-
-        for count in (1, 2):
-            bounds = np.linspace(0, n, count + 1).astype(np.int64)
-            for name, dtype in (("", np.float64), (", single", np.float32)):
-                given = (
-                    *threads.unsigned(matrix.indptr, matrix.indices),
-                    matrix.data.astype(dtype),
-                    vector.astype(dtype),
-                    out.astype(dtype),
-                )
-                answer["product_s"][f"{count} threads{name}"] = fastest(
-                    lambda given=given, bounds=bounds: threads.run_blocks(
-                        compiled_solver.multiply, bounds, *given
-                    )
-                )
+    for count in (1, 2):
+        bounds = np.linspace(0, n, count + 1).astype(np.int64)
+        for name, dtype in (("", np.float64), (", single", np.float32)):
+            rows = (*threads.unsigned(matrix.indptr, matrix.indices), matrix.data.astype(dtype))
+            given = (multiply, bounds, *rows, vector.astype(dtype), out.astype(dtype))
+            answer["product_s"][f"{count} threads{name}"] = fastest(
+                lambda given=given: threads.run_blocks(*given)
+            )
     best = max(answer["stream_GB_s"].values())
     answer["product_at_stream_s"] = bytes_read / (best * 1e9)
     return answer

@@ -13,13 +13,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from case import STEP_S, divided, merged_nodes, read_case
 from numbering import numbered
+from solved_space import SolvedSpace
 
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.machine.meshing.tagged_mesh import Joint, TaggedMesh
-from spindle_fem.model.mesh import threads
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film
 from spindle_fem.model.mesh.equations import assemble_capacity, assemble_load, assemble_system
-from spindle_fem.model.mesh.first_guesses import SolvedSpace
 from spindle_fem.model.mesh.linear_solvers import build_preconditioner, multiply, solve_linear
 from spindle_fem.model.mesh.linear_system import ThermalSystem, merged
 from spindle_fem.model.mesh.mesh_operators import build_operators
@@ -65,7 +64,6 @@ def run(folder: Path, steps: int, record: protocol.Record) -> tuple[np.ndarray, 
     first = number[first]
     start = case["start_temperature"]
     record.notes["threads"] = thread_count()
-    record.notes["compiled"] = threads.has_compiled()
     record.notes["mesh_kB"] = protocol.resident_kilobytes()
 
     with record.stage("assembly"):
@@ -112,8 +110,6 @@ def _load(problem: ConductionProblem, reference: float, heat_factor: float) -> n
 
 def warm_up() -> None:
     """Load what is compiled, by a small problem, before clocks and memory are read."""
-    least = threads.COMPILED_ABOVE
-    threads.COMPILED_ABOVE = 0
     mesh = divided(build_joined_tubes((1.0, 1.5, 2.0), 1.0, ((2, 2), 8, 2)))
     # arrays as read_case gives them: compiled code is made for each kind
     small = {"surfaces": {name: facets.astype(np.int32) for name, facets in mesh.surfaces.items()}}
@@ -138,7 +134,6 @@ def warm_up() -> None:
     known = SolvedSpace(tied.matrix)
     known.add(solve_linear(tied.matrix, ones, preconditioner, ones).unknowns)
     known.add(multiply(tied.matrix, ones), known.guess(ones))
-    threads.COMPILED_ABOVE = least
 
 
 if __name__ == "__main__":

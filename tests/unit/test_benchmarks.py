@@ -5,11 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from spindle_fem.errors import SpecError
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+RNG = np.random.default_rng(0)
+
+
+def positive(size):
+    root = RNG.normal(size=(size, size))
+    return sparse.csr_array(root @ root.T + np.eye(size))
 
 
 @pytest.fixture(autouse=True)
@@ -17,7 +24,7 @@ def on_path(monkeypatch):
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     monkeypatch.syspath_prepend(str(BENCHMARKS / "peers"))
     yield
-    for name in ("case", "comparison", "stages", "scale", "protocol", "numbering"):
+    for name in ("case", "comparison", "stages", "scale", "protocol", "numbering", "solved_space"):
         sys.modules.pop(name, None)
 
 
@@ -173,19 +180,14 @@ def test_a_million_designs_on_paper():
     assert paper["workers_carried"] == pytest.approx(180.0)
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_another_numbering_changes_no_temperature(monkeypatch, compiled):
+def test_another_numbering_changes_no_temperature():
     import case
     from numbering import numbered
 
-    from spindle_fem.model.mesh import threads
     from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film
     from spindle_fem.model.mesh.mesh_operators import build_operators
     from spindle_fem.model.mesh.steady_conduction import solve_steady
 
-    if compiled:
-        pytest.importorskip("numba")
-        monkeypatch.setattr(threads, "COMPILED_ABOVE", 0)
     tubes = build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((2, 2), 12, 3))
     mesh = case.divided(tubes)
     changed, number = numbered(mesh)
@@ -208,3 +210,30 @@ def test_another_numbering_changes_no_temperature(monkeypatch, compiled):
     assert np.abs(np.diff(changed.tetrahedra, axis=1)).mean() < 0.4 * spread
     with pytest.raises(SpecError, match="10 nodes an element"):
         numbered(tubes)
+
+
+def test_solutions_of_one_matrix_are_found_again_and_the_oldest_is_forgotten():
+    from solved_space import SolvedSpace
+
+    matrix = positive(20)
+    space = SolvedSpace(matrix, 4)
+    assert not space.guess(np.ones(20)).any()
+    solutions = RNG.normal(size=(6, 20))
+    for solution in solutions:
+        space.add(solution)
+        # single precision
+        assert space.guess(matrix @ solution) == pytest.approx(solution, abs=1e-5)
+    assert np.abs(space.guess(matrix @ solutions[0]) - solutions[0]).max() > 1e-3
+
+
+def test_a_guess_from_solutions_leaves_nothing_along_them():
+    from solved_space import SolvedSpace
+
+    matrix = positive(20)
+    space = SolvedSpace(matrix)
+    solutions = RNG.normal(size=(5, 20)) * np.logspace(-4.0, 0.0, 5)[:, None]
+    for solution in [*solutions, solutions[0]]:
+        space.add(solution)
+    load = RNG.normal(size=20)
+    left = solutions @ (load - matrix @ space.guess(load))
+    assert np.abs(left / np.linalg.norm(solutions, axis=1)).max() < 1e-4 * np.linalg.norm(load)

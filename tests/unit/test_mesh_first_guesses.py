@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from spindle_fem.model.mesh.first_guesses import CORRECTIONS, RecentCorrections, SolvedSpace, mixed
+from spindle_fem.model.mesh.first_guesses import CORRECTIONS, RecentCorrections, mixed
 
 RNG = np.random.default_rng(0)
 
@@ -76,26 +76,3 @@ def test_mixing_solves_a_linear_map_of_two_modes_in_three_answers():
 def test_one_answer_alone_is_taken_as_it_is():
     answer = RNG.normal(size=5)
     assert mixed([(answer, np.ones(5))]) is answer
-
-
-def test_solutions_of_one_matrix_are_found_again_and_the_oldest_is_forgotten():
-    matrix = STORAGE + CONDUCTION
-    space = SolvedSpace(matrix, 4)
-    assert not space.guess(np.ones(20)).any()
-    solutions = RNG.normal(size=(6, 20))
-    for solution in solutions:
-        space.add(solution)
-        # single precision
-        assert space.guess(matrix @ solution) == pytest.approx(solution, abs=1e-5)
-    assert np.abs(space.guess(matrix @ solutions[0]) - solutions[0]).max() > 1e-3
-
-
-def test_a_guess_from_solutions_leaves_nothing_along_them():
-    matrix = STORAGE + 0.3 * CONDUCTION
-    space = SolvedSpace(matrix)
-    solutions = RNG.normal(size=(5, 20)) * np.logspace(-4.0, 0.0, 5)[:, None]
-    for solution in [*solutions, solutions[0]]:
-        space.add(solution)
-    load = RNG.normal(size=20)
-    left = solutions @ (load - matrix @ space.guess(load))
-    assert np.abs(left / np.linalg.norm(solutions, axis=1)).max() < 1e-4 * np.linalg.norm(load)

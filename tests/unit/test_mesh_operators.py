@@ -6,37 +6,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import sparse
+from skfem import asm
 
 from spindle_fem import parallel
 from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError, UnknownSurfaceError
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes, build_tube
-from spindle_fem.model.mesh import forms, threads
+from spindle_fem.model.mesh import element_integrals, forms, threads
 from spindle_fem.model.mesh.mesh_operators import build_operators, spread
 from spindle_fem.model.mesh.skfem_mesh import load_into_skfem
 
 
-@pytest.fixture(autouse=True, params=["numpy", "compiled"])
-def loops(request, monkeypatch):
-    """Every test holds in numpy and in compiled loops, these by two threads."""
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-        monkeypatch.setattr(threads, "has_compiled", lambda: True)
+@pytest.fixture(autouse=True, params=["scikit-fem", "kernels"])
+def door(request, monkeypatch):
+    """Every test holds by scikit-fem and by kernels, these in two threads."""
+    if request.param == "kernels":
+        monkeypatch.setattr(element_integrals, "MANY_ELEMENTS", 0)
         monkeypatch.setattr(parallel, "_thread_count", lambda: 2)
-        monkeypatch.setattr(threads, "COMPILED_ABOVE", 0)
         monkeypatch.setattr(threads, "LEAST_ROWS", 50)
-    else:
-        monkeypatch.setattr(threads, "has_compiled", lambda: False)
 
 
 MESH = build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((2, 1), 12, 2))
 ROUND_OFF = 1e-13
-
-
-def _in_our_order(matrix, loaded):
-    entries = matrix.tocoo()
-    place = loaded.unknown_of_dof
-    return sparse.csr_array((entries.data, (place[entries.row], place[entries.col])), shape=matrix.shape)
 
 
 def _largest_difference(one, other):
@@ -45,14 +35,10 @@ def _largest_difference(one, other):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_volume_operators_equal_scikit_fem(order):
-    operators = build_operators(MESH, order, circumferential_parts=("inner", "outer"))
+    operators = build_operators(MESH, order)
     loaded = load_into_skfem(MESH, order)
-    for form, unit in (
-        (forms.conduction, operators.conduction),
-        (forms.storage, operators.storage),
-        (forms.circumferential_conduction, operators.circumferential),
-    ):
-        expected = _in_our_order(form.assemble(loaded.basis), loaded)
+    for form, unit in ((forms.conduction, operators.conduction), (forms.capacity, operators.storage)):
+        expected = loaded.in_our_order(form.assemble(loaded.basis))
         assert _largest_difference(operators.matrix(unit), expected) < ROUND_OFF
     load = np.empty(operators.n_unknowns)
     load[loaded.unknown_of_dof] = forms.source.assemble(loaded.basis)
@@ -65,7 +51,7 @@ def test_film_operators_equal_scikit_fem(order, surface):
     operators = build_operators(MESH, order)
     loaded = load_into_skfem(MESH, order)
     basis = loaded.facet_basis(MESH.surfaces[surface])
-    expected = _in_our_order(forms.film.assemble(basis), loaded)
+    expected = loaded.in_our_order(forms.film.assemble(basis))
     assert _largest_difference(operators.film_matrix(surface), expected) < ROUND_OFF
     load = np.empty(operators.n_unknowns)
     load[loaded.unknown_of_dof] = forms.source.assemble(basis)
@@ -78,7 +64,7 @@ def test_straight_elements_equal_scikit_fem():
     mesh = build_box((0.1, 0.2, 0.3), (2, 2, 2))
     operators = build_operators(mesh, 2)
     loaded = load_into_skfem(mesh, 2)
-    expected = _in_our_order(forms.conduction.assemble(loaded.basis), loaded)
+    expected = loaded.in_our_order(forms.conduction.assemble(loaded.basis))
     assert _largest_difference(operators.matrix(operators.conduction), expected) < ROUND_OFF
 
 
@@ -95,6 +81,16 @@ def test_films_of_varying_coefficient_sum_on_the_common_pattern(order):
     upper = np.zeros(operators.pattern.n_upper)
     operators.add_films(upper, coefficient)
     assert _largest_difference(operators.matrix(upper), expected) < ROUND_OFF
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_joint_operators_equal_scikit_fem(order):
+    operators = build_operators(MESH, order)
+    loaded = load_into_skfem(MESH, order)
+    joint = MESH.joints["inner|outer"]
+    sides = [loaded.facet_basis(facets) for facets in (joint.facets_a, joint.facets_b)]
+    expected = loaded.in_our_order(asm(forms.joint, sides, sides))
+    assert _largest_difference(operators.joint_matrix("inner|outer"), expected) < ROUND_OFF
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -183,8 +179,6 @@ def test_unknown_names_and_orders():
         operators.joint_matrix("inner|outter")
     with pytest.raises(UnknownSurfaceError, match='names part "shaft"'):
         operators.part_conduction("shaft")
-    with pytest.raises(UnknownSurfaceError, match='circumferential_parts: names "shaft"'):
-        build_operators(MESH, 1, circumferential_parts=("shaft",))
     with pytest.raises(SpecError, match=r"order: 3\. Allowed: 1 or 2"):
         build_operators(MESH, 3)
 

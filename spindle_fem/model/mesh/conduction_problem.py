@@ -145,9 +145,6 @@ class ConductionProblem:
     lumped_links : tuple of LumpedLink
     volumetric_capacity : mapping of str to float, [J/(m³·K)]
         Needed for transients only.
-    circumferential_factor : mapping of str to float, [-]
-        Conductivity around the axis relative to the other directions; 1 when
-        absent. Only for parts that the operators were built with.
     film_laws : tuple of FilmLaw
         Films that depend on temperature.
     adiabatic : collection of str, or "rest"
@@ -166,7 +163,6 @@ class ConductionProblem:
     lumped_nodes: tuple[LumpedNode, ...] = ()
     lumped_links: tuple[LumpedLink, ...] = ()
     volumetric_capacity: Mapping[str, float] = field(default_factory=dict)
-    circumferential_factor: Mapping[str, float] = field(default_factory=dict)
     film_laws: tuple[FilmLaw, ...] = ()
     adiabatic: Collection[str] | Literal["rest"] = ()
 
@@ -221,15 +217,6 @@ def require_sound(problem: ConductionProblem) -> None:
         )
     for part, capacity in problem.volumetric_capacity.items():
         _require(capacity > 0.0, f'volumetric capacity of "{part}"', capacity, "above 0")
-    for part, factor in problem.circumferential_factor.items():
-        operators.part_index(part, "circumferential_factor")
-        _require(factor > 0.0, f'circumferential factor of "{part}"', factor, "above 0")
-        if factor != 1.0 and part not in operators.circumferential_parts:
-            raise SpecError(
-                "circumferential_factor",
-                f'part "{part}" has no circumferential conduction in these operators.',
-                "Name it in build_operators(circumferential_parts=...).",
-            )
     _require_films(problem)
     _require_joints(problem)
     _require_lumped(problem)

@@ -1,9 +1,9 @@
-"""Element and facet integrals in bulk.
+"""Element and facet integrals of the forms: by scikit-fem, or on many elements by kernels that give the same.
 
-Shape functions and quadrature are scikit-fem's. Each integral of a form over
-all elements is one matrix product: geometry factors at the quadrature points
-times a table that depends on the reference element alone. Only the upper
-triangle of each symmetric element matrix is kept.
+:mod:`spindle_fem.model.mesh.forms` says what is integrated; shape functions and quadrature are
+scikit-fem's everywhere. scikit-fem takes some ten times as long as a kernel, which is seconds on a
+machine's mesh and nothing on a small one. Only the upper triangle of each symmetric element matrix
+is kept.
 """
 
 from __future__ import annotations
@@ -18,14 +18,20 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
 
 from spindle_fem.errors import MeshQualityError
-from spindle_fem.model.mesh.skfem_mesh import ELEMENT_QUADRATURE_DEGREE, FACET_QUADRATURE_DEGREE
-from spindle_fem.model.mesh.threads import use_compiled
+from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.model.mesh import forms
+from spindle_fem.model.mesh.kernels.assembly_loops import integrate_tetrahedra
+from spindle_fem.model.mesh.skfem_mesh import (
+    ELEMENT_QUADRATURE_DEGREE,
+    FACET_QUADRATURE_DEGREE,
+    SkfemMesh,
+    load_into_skfem,
+)
+from spindle_fem.model.mesh.threads import row_blocks, run_blocks, unsigned
 
-CHUNK = 16384
-# Edge middles this close to the chord, relative to the edge, count as straight.
-STRAIGHT_TOLERANCE = 1e-10
+# From here on kernels integrate; scikit-fem takes about 0.1 s on so many elements.
+MANY_ELEMENTS = 3_000
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
-_METRIC_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,66 +79,6 @@ def upper_pairs(n_nodes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.triu_indices(n_nodes)
 
 
-@cache
-def _metric_table(order: int) -> NDArray[np.float64]:
-    """(n_points, 6, n_upper): weight · (∂N_i/∂a ∂N_j/∂b), symmetrised."""
-    table = tetrahedron_table(order)
-    rows, columns = upper_pairs(table.values.shape[1])
-    slices = []
-    for a, b in _METRIC_PAIRS:
-        product = table.gradients[:, rows, a] * table.gradients[:, columns, b]
-        if a != b:
-            product = product + table.gradients[:, rows, b] * table.gradients[:, columns, a]
-        slices.append(table.weights[:, None] * product)
-    return np.stack(slices, axis=1)
-
-
-def product_table(table: ReferenceTable) -> NDArray[np.float64]:
-    """(n_points, n_upper): weight · N_i N_j."""
-    rows, columns = upper_pairs(table.values.shape[1])
-    return table.weights[:, None] * table.values[:, rows] * table.values[:, columns]
-
-
-def is_straight(points: NDArray[np.float64], tetrahedra: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which tetrahedra are linear or have every edge middle on its chord, (n_elements,)."""
-    if tetrahedra.shape[1] == 4:
-        return np.ones(len(tetrahedra), dtype=bool)
-    ends = points[tetrahedra[:, EDGES]]
-    bow = np.abs(points[tetrahedra[:, 4:]] - 0.5 * (ends[:, :, 0] + ends[:, :, 1])).max(axis=(1, 2))
-    return bow <= STRAIGHT_TOLERANCE * np.abs(ends[:, :, 1] - ends[:, :, 0]).max(axis=(1, 2))
-
-
-def _cofactors(jacobian: list[list[NDArray]]) -> tuple[list[list[NDArray]], NDArray]:
-    """Cofactor arrays and determinant of 3 x 3 arrays ``jacobian[physical][reference]``."""
-    j = jacobian
-    cofactor = [
-        [
-            j[(i + 1) % 3][(k + 1) % 3] * j[(i + 2) % 3][(k + 2) % 3]
-            - j[(i + 1) % 3][(k + 2) % 3] * j[(i + 2) % 3][(k + 1) % 3]
-            for k in range(3)
-        ]
-        for i in range(3)
-    ]
-    determinant = j[0][0] * cofactor[0][0] + j[0][1] * cofactor[0][1] + j[0][2] * cofactor[0][2]
-    return cofactor, determinant
-
-
-def _geometry(
-    nodes: NDArray[np.float64], geometry_gradients: NDArray[np.float64]
-) -> tuple[list[list[NDArray]], NDArray]:
-    """Cofactors and determinant at places, each (n_elements, n_places); nodes (n_elements, n, 3)."""
-    jacobian = [[nodes[:, :, i] @ geometry_gradients[:, :, k].T for k in range(3)] for i in range(3)]
-    return _cofactors(jacobian)
-
-
-def _require_positive(determinant: NDArray[np.float64]) -> None:
-    bad = int(np.sum(np.any(determinant <= 0.0, axis=1)))
-    if bad:
-        raise MeshQualityError(
-            "mesh", f"{bad} elements are inverted at a quadrature point.", "Refine or optimise the mesh."
-        )
-
-
 @dataclass(frozen=True, slots=True)
 class ElementIntegrals:
     """Upper element matrices and integrals of every element.
@@ -148,91 +94,6 @@ class ElementIntegrals:
     storage: NDArray[np.float64]
     load: NDArray[np.float64]
     volume: NDArray[np.float64]
-
-
-def integrate_elements(
-    points: NDArray[np.float64], tetrahedra: NDArray[np.int64], order: int
-) -> ElementIntegrals:
-    """Conduction and storage matrices with unit coefficients on curved elements.
-
-    Parameters
-    ----------
-    points : (n_nodes, 3) ndarray, [m]
-    tetrahedra : (n_elements, 10) or (n_elements, 4) int ndarray
-        Quadratic, or linear: straight.
-    order : int
-        Of the temperature, 1 or 2.
-
-    Raises
-    ------
-    MeshQualityError
-        An element that is inverted at a quadrature point.
-    """
-    table = tetrahedron_table(order)
-    metric, product = _metric_table(order), product_table(table)
-    load_table = table.weights[:, None] * table.values
-    n_nodes, n_upper = table.values.shape[1], metric.shape[2]
-    n = len(tetrahedra)
-    result = ElementIntegrals(
-        np.empty((n, n_upper)), np.empty((n, n_upper)), np.empty((n, n_nodes)), np.empty(n)
-    )
-    straight = is_straight(points, tetrahedra)
-    curved_gradients = tetrahedron_table(2).gradients
-    straight_gradients = tetrahedron_table(1).gradients[:1]
-    for chosen, is_curved in ((np.flatnonzero(straight), False), (np.flatnonzero(~straight), True)):
-        gradients = curved_gradients if is_curved else straight_gradients
-        table_metric = metric if is_curved else metric.sum(axis=0, keepdims=True)
-        flat_metric = table_metric.reshape(-1, n_upper)
-        for start in range(0, len(chosen), CHUNK):
-            index = chosen[start : start + CHUNK]
-            nodes = points[tetrahedra[index, : 10 if is_curved else 4]]
-            cofactor, determinant = _geometry(nodes, gradients)
-            _require_positive(determinant)
-            weights = np.stack(
-                [
-                    (
-                        cofactor[0][a] * cofactor[0][b]
-                        + cofactor[1][a] * cofactor[1][b]
-                        + cofactor[2][a] * cofactor[2][b]
-                    )
-                    / determinant
-                    for a, b in _METRIC_PAIRS
-                ],
-                axis=2,
-            )
-            result.conduction[index] = weights.reshape(len(index), -1) @ flat_metric
-            if is_curved:
-                result.storage[index] = determinant @ product
-                result.load[index] = determinant @ load_table
-                result.volume[index] = determinant @ table.weights
-            else:
-                result.storage[index] = determinant * product.sum(axis=0)
-                result.load[index] = determinant * load_table.sum(axis=0)
-                result.volume[index] = determinant[:, 0] * table.weights.sum()
-    return result
-
-
-def integrate_circumferential(
-    points: NDArray[np.float64], tetrahedra: NDArray[np.int64], order: int
-) -> NDArray[np.float64]:
-    """Upper matrices of ``∫ (∂u/∂s)(∂v/∂s) dV`` with s around the z axis, (n_elements, n_upper) [m]."""
-    metric = _metric_table(order)
-    flat_metric = metric.reshape(-1, metric.shape[2])
-    geometry = tetrahedron_table(1 if tetrahedra.shape[1] == 4 else 2)
-    out = np.empty((len(tetrahedra), metric.shape[2]))
-    for start in range(0, len(tetrahedra), CHUNK):
-        nodes = points[tetrahedra[start : start + CHUNK]]
-        cofactor, determinant = _geometry(nodes, geometry.gradients)
-        x, y = nodes[:, :, 0] @ geometry.values.T, nodes[:, :, 1] @ geometry.values.T
-        radius = np.hypot(x, y)
-        if np.any(radius < 1e-12):
-            raise MeshQualityError(
-                "mesh", "a quadrature point lies on the axis, where no circumferential direction exists."
-            )
-        along = [(-y * cofactor[0][a] + x * cofactor[1][a]) / radius for a in range(3)]
-        weights = np.stack([along[a] * along[b] / determinant for a, b in _METRIC_PAIRS], axis=2)
-        out[start : start + CHUNK] = weights.reshape(len(nodes), -1) @ flat_metric
-    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,33 +112,101 @@ class FacetIntegrals:
     area: NDArray[np.float64]
 
 
-def integrate_facets(points: NDArray[np.float64], facets: NDArray[np.int64], order: int) -> FacetIntegrals:
-    """Film matrices with unit coefficient on facets, (n_facets, 6) curved or (n_facets, 3) straight."""
-    is_flat = facets.shape[1] == 3
-    if is_flat and order == 1 and use_compiled(len(points)):
-        return _flat_facets(points, facets)
-    table = triangle_table(order)
-    geometry = triangle_table(1).gradients[:1] if is_flat else triangle_table(2).gradients
-    nodes = points[facets]
-    tangents = [[nodes[:, :, i] @ geometry[:, :, k].T for i in range(3)] for k in range(2)]
-    first, second = tangents
-    area_element = np.sqrt(
-        sum(
-            (first[(i + 1) % 3] * second[(i + 2) % 3] - first[(i + 2) % 3] * second[(i + 1) % 3]) ** 2
-            for i in range(3)
-        )
+def integrate_elements(mesh: TaggedMesh, order: int, chosen: slice) -> ElementIntegrals:
+    """Conduction, storage and source with unit coefficients on a range of curved elements.
+
+    Parameters
+    ----------
+    mesh : TaggedMesh
+    order : int
+        Of the temperature, 1 or 2.
+    chosen : slice
+        Elements; all of a small mesh.
+
+    Raises
+    ------
+    MeshQualityError
+        An element that is inverted at a quadrature point.
+    """
+    if len(mesh.tetrahedra) < MANY_ELEMENTS:
+        return elements_by_forms(load_into_skfem(mesh, order))
+    return elements_by_kernel(mesh.points, mesh.tetrahedra[chosen], order)
+
+
+def elements_by_forms(loaded: SkfemMesh) -> ElementIntegrals:
+    """The integrals of all elements, assembled by scikit-fem; see :func:`integrate_elements`."""
+    _require_upright(int(np.sum(np.any(loaded.basis.mapping.detDF(loaded.basis.X) <= 0.0, axis=1))))
+    rows, columns = upper_pairs(loaded.basis.Nbfun)
+    load = forms.source.elemental(loaded.basis).tolocal()
+    return ElementIntegrals(
+        forms.conduction.elemental(loaded.basis).tolocal()[:, rows, columns],
+        forms.capacity.elemental(loaded.basis).tolocal()[:, rows, columns],
+        load,
+        # shape functions sum to one
+        load.sum(axis=1),
     )
-    tables = (product_table(table), table.weights[:, None] * table.values, table.weights[:, None])
-    if is_flat:
-        tables = tuple(each.sum(axis=0, keepdims=True) for each in tables)
-    film, load, area = (area_element @ each for each in tables)
-    return FacetIntegrals(film, load, area[:, 0])
 
 
-def _flat_facets(points: NDArray[np.float64], facets: NDArray[np.int64]) -> FacetIntegrals:
-    from spindle_fem.model.mesh.kernels.facet_loops import integrate_flat_facets
+def elements_by_kernel(
+    points: NDArray[np.float64], tetrahedra: NDArray[np.int64], order: int
+) -> ElementIntegrals:
+    """The same integrals by a kernel, on quadratic tetrahedra (n, 10)."""
+    table, mapping = tetrahedron_table(order), tetrahedron_table(2)
+    n, n_nodes = len(tetrahedra), table.values.shape[1]
+    shape = n, len(upper_pairs(n_nodes)[0])
+    found = ElementIntegrals(np.empty(shape), np.empty(shape), np.empty((n, n_nodes)), np.empty(n))
+    # copies: of one type for the kernel, whether or not the mesh may be written to
+    given = (np.array(points), unsigned(np.ascontiguousarray(tetrahedra))[0], mapping.gradients)
+    tables = (table.gradients, table.values, table.weights)
+    results = (found.conduction, found.storage, found.load, found.volume)
+    _require_upright(sum(run_blocks(integrate_tetrahedra, row_blocks(n), *given, *tables, *results)))
+    return found
 
-    n = len(facets)
-    answer = FacetIntegrals(np.empty((n, 6)), np.empty((n, 3)), np.empty(n))
-    integrate_flat_facets(0, n, points, facets, answer.film, answer.load, answer.area)
-    return answer
+
+def _require_upright(inverted: int) -> None:
+    if inverted:
+        raise MeshQualityError(
+            "mesh",
+            f"{inverted} elements are inverted at a quadrature point.",
+            "Refine or optimise the mesh.",
+        )
+
+
+def integrate_facets(mesh: TaggedMesh, facets: NDArray[np.int64], order: int) -> FacetIntegrals:
+    """Film and source with unit coefficients on facets, (n_facets, 6) curved or (n_facets, 3) straight."""
+    if mesh.tetrahedra.shape[1] == 10 and len(mesh.tetrahedra) < MANY_ELEMENTS:
+        return facets_by_forms(load_into_skfem(mesh, order), facets)
+    return facets_in_bulk(mesh.points, facets, order)
+
+
+def facets_by_forms(loaded: SkfemMesh, facets: NDArray[np.int64]) -> FacetIntegrals:
+    """The integrals of facets (n, 6), assembled by scikit-fem; see :func:`integrate_facets`."""
+    basis = loaded.facet_basis(facets)
+    unknowns = loaded.unknown_of_dof[basis.element_dofs].T
+    own = facets[:, : 3 if basis.Nbfun == 4 else 6]
+    # where the facet's nodes stand among those of its element
+    place = np.argmax(unknowns[:, None, :] == own[:, :, None], axis=2)
+    rows, columns = upper_pairs(own.shape[1])
+    element = np.arange(len(facets))[:, None]
+    load = forms.source.elemental(basis).tolocal()
+    return FacetIntegrals(
+        forms.film.elemental(basis).tolocal()[element, place[:, rows], place[:, columns]],
+        load[element, place],
+        load.sum(axis=1),
+    )
+
+
+def facets_in_bulk(points: NDArray[np.float64], facets: NDArray[np.int64], order: int) -> FacetIntegrals:
+    """The same integrals in a few array operations.
+
+    Each integral over all facets is one matrix product: area elements at the quadrature points times
+    what the form is of the reference triangle's shape functions.
+    """
+    table = triangle_table(order)
+    rows, columns = upper_pairs(table.values.shape[1])
+    nodes, gradients = points[facets], triangle_table(1 if facets.shape[1] == 3 else 2).gradients
+    first, second = ((nodes.transpose(0, 2, 1) @ gradients[:, :, k].T) for k in range(2))
+    area_element = np.linalg.norm(np.cross(first, second, axis=1), axis=1)
+    products = table.values[:, rows] * table.values[:, columns]
+    weighted = area_element * table.weights
+    return FacetIntegrals(weighted @ products, weighted @ table.values, weighted.sum(axis=1))

@@ -16,7 +16,6 @@ from spindle_fem.model.mesh.conduction_problem import (
 )
 from spindle_fem.model.mesh.linear_system import ThermalSystem
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, spread
-from spindle_fem.model.mesh.threads import use_compiled
 
 
 def assemble_system(problem: ConductionProblem, reference: float | None = None) -> ThermalSystem:
@@ -37,7 +36,7 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
     if problem.film_laws:
         raise SpecError("problem", "film laws must be linearised before assembly.", "Use linearise_films.")
     operators = problem.operators
-    upper = operators.sum_conduction(conductivity_of_parts(problem), _factors(problem))
+    upper = operators.sum_conduction(conductivity_of_parts(problem))
     coefficient = np.zeros(len(operators.facet_area))
     for film in problem.films:
         coefficient[operators.surface_rows[film.surface]] += np.asarray(film.coefficient)
@@ -140,15 +139,6 @@ def assemble_capacity(problem: ConductionProblem) -> tuple[sparse.csr_array, NDA
     return matrix, np.array([node.capacity for node in problem.lumped_nodes])
 
 
-def _factors(problem: ConductionProblem) -> NDArray[np.float64] | None:
-    if not problem.circumferential_factor:
-        return None
-    return np.array(
-        [problem.circumferential_factor.get(part, 1.0) for part in problem.operators.mesh.part_names],
-        dtype=float,
-    )
-
-
 def _lumped_matrix(problem: ConductionProblem, diagonal: list[float]) -> NDArray[np.float64]:
     names = problem.lumped_names
     matrix = np.diag(np.array(diagonal, dtype=float)) if diagonal else np.zeros((0, 0))
@@ -170,12 +160,7 @@ def _tie_matrix(operators: ThermalOperators, joints: list[str]) -> sparse.csr_ar
     nodes_a = np.concatenate([operators.facet_nodes[a].ravel() for a, _ in sides])
     nodes_b = np.concatenate([operators.facet_nodes[b].ravel() for _, b in sides])
     n = operators.n_unknowns
-    if use_compiled(n):
-        from spindle_fem.model.mesh.kernels.facet_loops import label_tied
-
-        label, count = label_tied(nodes_a, nodes_b, n)
-    else:
-        graph = sparse.coo_array((np.ones(len(nodes_a)), (nodes_a, nodes_b)), shape=(n, n))
-        count, label = connected_components(graph, directed=False)
+    graph = sparse.coo_array((np.ones(len(nodes_a)), (nodes_a, nodes_b)), shape=(n, n))
+    count, label = connected_components(graph, directed=False)
     starts = np.arange(n + 1, dtype=np.int32)
     return sparse.csr_array((np.ones(n), label.astype(np.int32, copy=False), starts), shape=(n, count))

@@ -244,7 +244,6 @@ def heat_flux_at_nodes(
     operators: ThermalOperators,
     temperature: NDArray[np.float64],
     conductivity: NDArray[np.float64],
-    circumferential_factor: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Heat flux vector at every node of the mesh, averaged over its elements, (n_nodes, 3) [W/m²].
 
@@ -253,7 +252,6 @@ def heat_flux_at_nodes(
     operators : ThermalOperators
     temperature : (n_unknowns,) ndarray, [K]
     conductivity : (n_parts,) ndarray, [W/(m·K)]
-    circumferential_factor : (n_parts,) ndarray, optional, [-]
     """
     mesh = operators.mesh
     places = ElementTetP2().doflocs
@@ -269,8 +267,6 @@ def heat_flux_at_nodes(
         jacobian = np.einsum("enx,nk->exk", mesh.points[mesh.tetrahedra], geometry[local])
         slope = temperature[mesh.tetrahedra[:, :n_local]] @ gradients[local]
         gradient = np.linalg.solve(jacobian.transpose(0, 2, 1), slope[:, :, None])[:, :, 0]
-        if circumferential_factor is not None:
-            gradient = _turned(gradient, mesh.points[nodes], circumferential_factor[mesh.part_of_element])
         volume = np.linalg.det(jacobian)
         for axis in range(3):
             flux[:, axis] += np.bincount(
@@ -280,14 +276,3 @@ def heat_flux_at_nodes(
     if np.any(weight <= 0.0):
         raise ConvergenceError("heat flux", "an element is inverted at a node.", "Optimise the mesh.")
     return flux / weight[:, None]
-
-
-def _turned(
-    gradient: NDArray[np.float64], points: NDArray[np.float64], factor: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    radius = np.maximum(np.hypot(points[:, 0], points[:, 1]), np.finfo(float).tiny)
-    along = np.stack((-points[:, 1] / radius, points[:, 0] / radius), axis=1)
-    extra = (factor - 1.0) * np.einsum("ex,ex->e", gradient[:, :2], along)
-    turned = gradient.copy()
-    turned[:, :2] += extra[:, None] * along
-    return turned

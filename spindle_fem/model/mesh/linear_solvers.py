@@ -13,16 +13,11 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
 
 from spindle_fem.errors import ConvergenceError, SpecError
+from spindle_fem.model.mesh.kernels import multigrid_loops
+from spindle_fem.model.mesh.kernels.team_loops import conjugate_step
 from spindle_fem.model.mesh.linear_system import ThermalSystem
 from spindle_fem.model.mesh.multigrid import build_hierarchy
-from spindle_fem.model.mesh.threads import (
-    chunk_bounds,
-    row_blocks,
-    run_blocks,
-    run_team,
-    unsigned,
-    use_compiled,
-)
+from spindle_fem.model.mesh.threads import chunk_bounds, row_blocks, run_blocks, run_team, unsigned
 
 DIRECT_BELOW = 20_000
 RELATIVE_TOLERANCE = 1e-11
@@ -119,22 +114,16 @@ def with_lumped_nodes(system: ThermalSystem, cycle: Operator) -> Operator:
 
 
 def multiply(matrix: sparse.csr_array, vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """``A x``; by threads in compiled loops where they are worth it.
+    """``A x``, shared by threads.
 
     Parameters
     ----------
     matrix : (n, n) csr_array
     vector : (n,) ndarray
     """
-    if not use_compiled(len(vector)) or matrix.data.dtype != np.float64:
-        return matrix @ vector
-    from spindle_fem.model.mesh.kernels import solver_loops as compiled_solver
-
     answer = np.empty(matrix.shape[0])
     rows = (*unsigned(matrix.indptr, matrix.indices), matrix.data)
-    run_blocks(
-        compiled_solver.multiply, row_blocks(len(answer)), *rows, np.asarray(vector, dtype=float), answer
-    )
+    run_blocks(multigrid_loops.multiply, row_blocks(len(answer)), *rows, vector, answer)
     return answer
 
 
@@ -341,7 +330,7 @@ def _to_error(
     limit: int,
 ) -> tuple[NDArray[np.float64], int, float]:
     """Correction whose estimated error is nowhere above what is wanted, iterations, and that error."""
-    state = _iterate(matrix, residual)
+    state = _Iteration(matrix, residual)
     preconditioned = first
     for iteration in range(1, limit + 1):
         state.advance(preconditioned)
@@ -356,10 +345,22 @@ def _to_error(
 class _Iteration:
     """Conjugate gradients between two applications of the preconditioner."""
 
-    __slots__ = ("_energy", "_image", "_matrix", "_step", "direction", "residual", "unknowns")
+    __slots__ = (
+        "_bounds",
+        "_energy",
+        "_image",
+        "_rows",
+        "_shares",
+        "_step",
+        "direction",
+        "residual",
+        "unknowns",
+    )
 
     def __init__(self, matrix: sparse.csr_array, residual: NDArray[np.float64]) -> None:
-        self._matrix = matrix
+        self._rows = (*unsigned(matrix.indptr, matrix.indices), matrix.data)
+        self._bounds = chunk_bounds(matrix.indptr)
+        self._shares = np.empty((4, len(self._bounds) - 1))
         self.unknowns = np.zeros_like(residual)
         self.residual = residual
         self.direction = np.zeros_like(residual)
@@ -368,50 +369,15 @@ class _Iteration:
 
     def advance(self, preconditioned: NDArray[np.float64]) -> float:
         """Turn, go as far along the new direction as helps; returns the residual's norm."""
-        if self._energy > 0.0:
-            # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
-            self.direction *= -self._step * float(preconditioned @ self._image) / self._energy
-        self.direction += preconditioned
-        self._energy = float(self.residual @ preconditioned)
-        self._image = self._matrix @ self.direction
-        self._step = self._length(float(self.direction @ self._image))
-        self.unknowns += self._step * self.direction
-        self.residual -= self._step * self._image
-        return float(np.linalg.norm(self.residual))
-
-    def _length(self, curvature: float) -> float:
-        if not curvature > 0.0 or not np.isfinite(self._energy):
-            raise ConvergenceError("linear solver", f"the matrix is not positive definite ({curvature:.3g}).")
-        return self._energy / curvature
-
-
-class _CompiledIteration(_Iteration):
-    """The same in one compiled call that threads share."""
-
-    __slots__ = ("_bounds", "_rows", "_run", "_shares")
-
-    def __init__(self, matrix: sparse.csr_array, residual: NDArray[np.float64]) -> None:
-        from spindle_fem.model.mesh.kernels.team_loops import conjugate_step
-
-        super().__init__(matrix, residual)
-        self._run = conjugate_step
-        self._rows = (*unsigned(matrix.indptr, matrix.indices), matrix.data)
-        self._bounds = chunk_bounds(matrix.indptr)
-        self._shares = np.empty((4, len(self._bounds) - 1))
-
-    def advance(self, preconditioned: NDArray[np.float64]) -> float:
         run_team(
-            self._run, len(self._bounds) - 1, self._bounds, *self._rows, preconditioned, self.residual,
+            conjugate_step, len(self._bounds) - 1, self._bounds, *self._rows, preconditioned, self.residual,
             self._image, self.direction, self.unknowns, self._step, self._energy, self._shares,
         )  # fmt: skip
         _, self._energy, curvature, square = self._shares.sum(axis=1).tolist()
-        self._step = self._length(curvature)
+        if not curvature > 0.0 or not np.isfinite(self._energy):
+            raise ConvergenceError("linear solver", f"the matrix is not positive definite ({curvature:.3g}).")
+        self._step = self._energy / curvature
         return float(np.sqrt(square))
-
-
-def _iterate(matrix: sparse.csr_array, residual: NDArray[np.float64]) -> _Iteration:
-    kind = _CompiledIteration if use_compiled(len(residual)) else _Iteration
-    return kind(matrix, residual)
 
 
 def _conjugate_gradients(
@@ -421,7 +387,7 @@ def _conjugate_gradients(
     target: float,
     limit: int,
 ) -> tuple[NDArray[np.float64], int]:
-    state = _iterate(matrix, load.copy())
+    state = _Iteration(matrix, load.copy())
     for iteration in range(1, limit + 1):
         if state.advance(precondition(state.residual).astype(float, copy=False)) <= target:
             return state.unknowns, iteration

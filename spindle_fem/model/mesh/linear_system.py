@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from spindle_fem.model.mesh.huge_pages import room
-from spindle_fem.model.mesh.threads import fill_rows, row_blocks, run_blocks, unsigned, use_compiled
+from spindle_fem.model.mesh.kernels.assembly_loops import join_rows, merge_rows
+from spindle_fem.model.mesh.sparsity_pattern import grouped
+from spindle_fem.model.mesh.threads import fill_rows, row_blocks, run_blocks, unsigned
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,20 +94,8 @@ def _bordered(
     indptr = np.concatenate((ends, ends[-1] + below.indptr[1:])).astype(np.int32)
     indices, data = room(int(indptr[-1]), np.int32), room(int(indptr[-1]))
     indices[ends[-1] :], data[ends[-1] :] = below.indices, below.data
-    if use_compiled(n):
-        from spindle_fem.model.mesh.kernels.assembly_loops import border_rows
-
-        given = [
-            (*unsigned(part.indptr, part.indices), part.data) for part in (matrix, sparse.csr_array(border))
-        ]
-        run_blocks(border_rows, row_blocks(n), *given[0], *given[1], *unsigned(indptr, indices), data)
-    else:
-        # what the border adds stands at the end of each row
-        added = np.arange(border.nnz) + np.repeat(matrix.indptr[1:], np.diff(border.indptr))
-        own = np.ones(ends[-1], dtype=bool)
-        own[added] = False
-        indices[added], data[added] = border.indices + n, border.data
-        indices[: ends[-1]][own], data[: ends[-1]][own] = matrix.indices, matrix.data
+    rows = [(*unsigned(part.indptr, part.indices), part.data) for part in (matrix, border)]
+    run_blocks(join_rows, row_blocks(n), *rows[0], *rows[1], 0, n, *unsigned(indptr, indices), data)
     return sparse.csr_array((data, indices, indptr), shape=(n + m, n + m))
 
 
@@ -117,13 +107,14 @@ def merged(matrix: sparse.csr_array, tie: sparse.csr_array) -> sparse.csr_array:
     matrix : (n, n) csr_array
     tie : (n, n_tied) csr_array
     """
-    if not use_compiled(matrix.shape[0]):
-        return (tie.T @ matrix @ tie).tocsr()
-    from spindle_fem.model.mesh.kernels.assembly_loops import group, merge_rows
-
     size = tie.shape[1]
     (label,) = unsigned(tie.indices)
-    given = (*unsigned(*group(label, size)), label, *unsigned(matrix.indptr, matrix.indices), matrix.data)
+    given = (
+        *unsigned(*grouped(tie.indices, size)),
+        label,
+        *unsigned(matrix.indptr, matrix.indices),
+        matrix.data,
+    )
     indptr, columns, values = fill_rows(merge_rows, size, given, matrix.nnz / size)
     answer = sparse.csr_array((values, columns, indptr), shape=(size, size))
     answer.has_canonical_format = True

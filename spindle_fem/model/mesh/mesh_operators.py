@@ -7,18 +7,17 @@ films and joints only re-sum them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from spindle_fem.errors import MeshTagError, SpecError, UnknownSurfaceError, did_you_mean
+from spindle_fem.errors import MeshTagError, SpecError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.element_integrals import EDGES, integrate_facets
 from spindle_fem.model.mesh.integration import integrate_mesh
 from spindle_fem.model.mesh.thermal_operators import AREA_TOLERANCE, ThermalOperators, spread
-from spindle_fem.model.mesh.threads import use_compiled
 
 __all__ = ["ThermalOperators", "build_operators", "prolongation_from_corners", "spread"]
 
@@ -29,7 +28,6 @@ def build_operators(
     mesh: TaggedMesh,
     order: int = 2,
     *,
-    circumferential_parts: Collection[str] = (),
     area_tolerance: float = AREA_TOLERANCE,
 ) -> ThermalOperators:
     """Integrate everything that conduction problems on a mesh share.
@@ -41,8 +39,6 @@ def build_operators(
     order : int
         Of the temperature: 1 (corner nodes) or 2 (all nodes). The geometry is
         the mesh's in both.
-    circumferential_parts : collection of str
-        Parts that may get another conductivity around the axis.
     area_tolerance : float, [-]
         Largest deviation of an area or volume from the solid model.
 
@@ -62,16 +58,9 @@ def build_operators(
     n_unknowns = mesh.n_corners if order == 1 else len(mesh.points)
     surface_rows, joint_rows, facets = _stack_facets(mesh)
     _require_joint_match(mesh, joint_rows, facets)
-    facet_integrals = integrate_facets(mesh.points, facets, order)
     facet_nodes = np.ascontiguousarray(facets[:, : 3 if order == 1 else 6]).astype(np.int64)
-    integrals = integrate_mesh(
-        mesh,
-        order,
-        n_unknowns,
-        facet_nodes,
-        list(joint_rows.values()),
-        [_require_part(mesh, part) for part in circumferential_parts],
-    )
+    integrals = integrate_mesh(mesh, order, n_unknowns, facet_nodes, list(joint_rows.values()))
+    facet_integrals = integrate_facets(mesh, facets, order)
     distinct, inverse = _distinct(integrals.facet_slots, integrals.pattern.n_upper)
     operators = ThermalOperators(
         mesh=mesh,
@@ -82,8 +71,6 @@ def build_operators(
         part_of_unknown=integrals.part_of_unknown,
         conduction=integrals.conduction,
         storage=integrals.storage,
-        circumferential=integrals.circumferential,
-        circumferential_parts=frozenset(circumferential_parts),
         part_load=integrals.load,
         part_volume=dict(zip(mesh.part_names, integrals.part_volume.tolist(), strict=True)),
         facet_nodes=facet_nodes,
@@ -118,23 +105,11 @@ def prolongation_from_corners(mesh: TaggedMesh) -> sparse.csr_array:
 
 def _distinct(slots: NDArray[np.int32], size: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Distinct values below ``size``, rising, and the place of each value among them."""
-    if use_compiled(size):
-        from spindle_fem.model.mesh.kernels.facet_loops import distinct
-
-        return distinct(slots, size)
     used = np.zeros(size, dtype=bool)
     used[slots] = True
     place = np.cumsum(used, dtype=np.int32)
     place -= 1
     return np.flatnonzero(used), place[slots]
-
-
-def _require_part(mesh: TaggedMesh, part: str) -> int:
-    if part not in mesh.part_names:
-        raise UnknownSurfaceError(
-            "circumferential_parts", f'names "{part}".', did_you_mean(part, mesh.part_names)
-        )
-    return mesh.part_names.index(part)
 
 
 def _stack_facets(

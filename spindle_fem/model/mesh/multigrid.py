@@ -1,68 +1,126 @@
-"""A symmetric multigrid cycle for conduction matrices, in single precision.
+"""Multigrid in single precision, the preconditioner of conjugate gradients on large meshes.
 
-Quadratic temperatures are first restricted to the corner nodes, where the
-linear elements of the same mesh are (p-multigrid); from there smoothed
-aggregation (pyamg) makes the coarser levels. Chebyshev polynomials of the
-Jacobi-scaled matrix smooth: they are symmetric, need only matrix products, and
-single precision halves the memory that each product reads. The cycle only
-preconditions conjugate gradients in double precision.
+The cycle is symmetric. Quadratic temperatures are first restricted to the corner nodes, where the linear
+elements of the same mesh are (p-multigrid); from there smoothed aggregation makes
+the coarser levels. Two steps of Chebyshev's polynomials of the fourth kind, with
+Lottes' weights, smooth before and after each coarser correction: they need
+products alone, which threads share and which give the same digits whatever their
+number. Rows whose sizes add up to more than twice the diagonal are damped, so
+that no eigenvalue has to be estimated. Prolongations keep four entries in every
+row: as many iterations as with all, and loops of fixed length.
 
-Sources: Adams, Brezina, Hu & Tuminaro (2003), J. Comput. Phys. 188, 593-610
-(polynomial smoothing); Vanek, Mandel & Brezina (1996), Computing 56, 179-196
-(smoothed aggregation).
+Sources: Lottes (2023), Numer. Linear Algebra Appl. 30, e2518 (polynomial);
+Vanek, Mandel & Brezina (1996), Computing 56, 179-196 (smoothed aggregation);
+De Sterck, Falgout, Nolting & Yang (2008), Numer. Linear Algebra Appl. 15,
+115-139 (truncated prolongation).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
-from spindle_fem.model.mesh.threads import use_compiled
+from spindle_fem.errors import SpecError
+from spindle_fem.model.mesh.huge_pages import room
+from spindle_fem.model.mesh.kernels import multigrid_loops as loops
+from spindle_fem.model.mesh.kernels import team_loops as teams
+from spindle_fem.model.mesh.threads import (
+    chunk_bounds,
+    fill_rows,
+    row_blocks,
+    run_blocks,
+    run_team,
+    unsigned,
+)
 
-if TYPE_CHECKING:
-    from spindle_fem.model.mesh.multigrid_compiled import CompiledHierarchy
-
-SMOOTHING_DEGREE = 2
-# The smoother damps eigenvalues from the largest down to this fraction of it.
-SMOOTHED_FRACTION = 1.0 / 8.0
-LANCZOS_STEPS = 12
-EIGENVALUE_MARGIN = 1.08
 COARSEST_SIZE = 400
+MAXIMUM_LEVELS = 12
+# Damping of the step that smooths the aggregates' constants.
+DAMPING = 0.8
 PRECISION = np.float32
+# First guesses of how long rows are; wrong ones only cost time.
+ENTRIES_OF_PRODUCT = 9.0
+ENTRIES_OF_COARSE = 45.0
+# Elements of single precision on a cache line.
+LINE = 16
+
+Rows = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray]
+FixedRows = tuple[NDArray[np.uint32], NDArray]
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One level of the hierarchy.
+    """One level, its arrays in the order in which the kernels take them.
 
     Attributes
     ----------
-    matrix : csr_array
-    inverse_diagonal : (n,) ndarray
-    largest : float
-        Bound of the largest eigenvalue of the scaled matrix.
-    prolongation, restriction : csr_array
-        From and to the next coarser level.
+    matrix : compressed rows
+    inverse : (n,) ndarray
+        Scale of smoothing: inverse of the diagonal, less where couplings are positive.
+    prolongation : (n, 4) columns and values
+    restriction : compressed rows
     """
 
-    matrix: sparse.csr_array
-    inverse_diagonal: NDArray
-    largest: float
-    prolongation: sparse.csr_array
-    restriction: sparse.csr_array
+    matrix: Rows
+    inverse: NDArray
+    prolongation: FixedRows
+    restriction: Rows
+
+    @property
+    def arrays(self) -> tuple[NDArray, ...]:
+        """The nine arrays."""
+        return (*self.matrix, self.inverse, *self.prolongation, *self.restriction)
+
+    @classmethod
+    def of_arrays(cls, arrays: list[NDArray]) -> Level:
+        """A level of what :attr:`arrays` gives."""
+        return cls(tuple(arrays[:3]), arrays[3], tuple(arrays[4:6]), tuple(arrays[6:]))
+
+
+@dataclass(frozen=True, slots=True)
+class CyclePlan:
+    """What a cycle goes through, and where: see :func:`spindle_fem.model.mesh.kernels.team_loops.cycle`.
+
+    Attributes
+    ----------
+    passes : (n_passes + 1, 3) int64 ndarray
+        Kind, level and first chunk; the last row has the number of chunks.
+    bounds : (n_levels + 1, n) int64 ndarray
+        Rows of each level's chunks.
+    layout : (n_levels + 1, 11) int64 ndarray
+        Rows of each level, where its vectors begin, and where its nine arrays begin in ``coarse``.
+    fine : tuple of ndarray
+        The nine arrays of the finest level.
+    coarse : tuple of ndarray
+        The same of all coarser levels, one after the other.
+    coarsest : (n, n) ndarray
+        Inverse of the coarsest matrix.
+    size : int
+        Unknowns of all levels together.
+    """
+
+    passes: NDArray[np.int64]
+    bounds: NDArray[np.int64]
+    layout: NDArray[np.int64]
+    fine: tuple[NDArray, ...]
+    coarse: tuple[NDArray, ...]
+    coarsest: NDArray[np.float64]
+    size: int
 
 
 @dataclass(frozen=True, slots=True)
 class Hierarchy:
-    """Levels from fine to coarse and the factor of the coarsest matrix."""
+    """Levels from fine to coarse, the factor of the coarsest matrix, and the plan of a cycle."""
 
     levels: tuple[Level, ...]
     coarsest: tuple[NDArray[np.float64], bool]
+    plan: CyclePlan | None
+    # vectors of all levels, for the next cycle: fresh memory would be touched anew in each
+    _spare: list[NDArray] = field(default_factory=list)
 
     def cycle(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
         """One V-cycle: approximate solution of ``K x = residual``.
@@ -73,27 +131,53 @@ class Hierarchy:
             Several columns cost far less than one after the other: each matrix
             is read once for all of them.
         """
-        scale = np.abs(residual).max(axis=0, initial=0.0)
-        scale = np.where(scale > 0.0, scale, 1.0)
+        if self.plan is None:
+            return cho_solve(self.coarsest, residual)
         # scaled, so that small residuals stay inside the range of single precision
-        return scale * self._descend(0, (residual / scale).astype(PRECISION)).astype(np.float64)
+        if residual.ndim == 2:
+            scales = np.abs(residual).max(axis=0, initial=0.0)
+            scales[scales == 0.0] = 1.0
+            return scales * self._descend_many(0, (residual / scales).astype(PRECISION, order="C"))
+        scale = float(np.linalg.norm(residual)) / np.sqrt(len(residual)) or 1.0
+        plan = self.plan
+        # calls from several threads find vectors of their own
+        work = self._spare.pop() if self._spare else room(teams.N_VECTORS * plan.size, PRECISION)
+        answer = np.empty(len(residual))
+        run_team(
+            teams.cycle, plan.bounds.shape[1] - 1, plan.passes, plan.bounds, plan.layout, plan.fine,
+            plan.coarse, plan.coarsest, work, np.ascontiguousarray(residual), scale, answer,
+        )  # fmt: skip
+        self._spare.append(work)
+        return answer
 
-    def _descend(self, depth: int, residual: NDArray) -> NDArray:
+    def _descend_many(self, depth: int, right: NDArray) -> NDArray:
+        """The cycle for several columns, from a level on."""
         if depth == len(self.levels):
-            return cho_solve(self.coarsest, residual.astype(np.float64)).astype(PRECISION)
+            return cho_solve(self.coarsest, right.astype(np.float64)).astype(PRECISION)
         level = self.levels[depth]
-        unknowns = _smooth(level, residual)
-        unknowns += level.prolongation @ self._descend(
-            depth + 1, level.restriction @ (residual - level.matrix @ unknowns)
-        )
-        unknowns += _smooth(level, residual - level.matrix @ unknowns)
+        blocks = row_blocks(len(right))
+        left, following = np.empty_like(right), np.empty_like(right)
+        direction = right * (teams.FIRST_STEP * level.inverse[:, None])
+        unknowns = teams.FIRST_WEIGHT * direction
+        smooth = (loops.smooth_many, blocks, *level.matrix, level.inverse)
+        run_blocks(*smooth, right, direction, teams.KEEP, teams.SECOND_STEP, left, following)
+        unknowns += teams.SECOND_WEIGHT * following
+        run_blocks(*smooth, right, unknowns, teams.NOTHING, teams.FIRST_STEP, left, direction)
+        coarse = np.empty((len(level.restriction[0]) - 1, right.shape[1]), dtype=PRECISION)
+        # rows of the restriction are long
+        coarse_blocks = np.linspace(0, len(coarse), len(blocks)).astype(np.int64)
+        run_blocks(loops.multiply_many, coarse_blocks, *level.restriction, left, coarse)
+        correction = np.ascontiguousarray(self._descend_many(depth + 1, coarse))
+        run_blocks(loops.add_prolonged_many, blocks, *level.prolongation, correction, unknowns)
+        run_blocks(*smooth, right, unknowns, teams.NOTHING, teams.FIRST_STEP, left, direction)
+        unknowns += teams.FIRST_WEIGHT * direction
+        run_blocks(*smooth, left, direction, teams.KEEP, teams.SECOND_STEP, right, following)
+        unknowns += teams.SECOND_WEIGHT * following
         return unknowns
 
 
-def build_hierarchy(
-    matrix: sparse.csr_array, prolongation: sparse.csr_array | None
-) -> Hierarchy | CompiledHierarchy:
-    """Hierarchy of a symmetric positive definite matrix; in compiled loops where they are worth it.
+def build_hierarchy(matrix: sparse.csr_array, prolongation: sparse.csr_array | None) -> Hierarchy:
+    """Hierarchy of a symmetric positive definite matrix.
 
     Parameters
     ----------
@@ -101,78 +185,128 @@ def build_hierarchy(
     prolongation : (n, n_corners) csr_array or None
         From linear to quadratic temperatures; None when they are linear.
     """
-    if use_compiled(matrix.shape[0]):
-        from spindle_fem.model.mesh.multigrid_compiled import build_compiled_hierarchy
-
-        return build_compiled_hierarchy(matrix, prolongation)
-    import pyamg
-
-    levels = []
-    if prolongation is not None:
-        levels.append(_make_level(matrix, prolongation))
-        matrix = sparse.csr_array(prolongation.T @ (matrix @ prolongation))
-    aggregated = pyamg.smoothed_aggregation_solver(
-        sparse.csr_matrix(matrix),
-        strength=("symmetric", {"theta": 0.0}),
-        improve_candidates=None,
-        max_coarse=COARSEST_SIZE,
-        max_levels=12,
-    )
-    for level in aggregated.levels[:-1]:
-        levels.append(_make_level(sparse.csr_array(level.A), sparse.csr_array(level.P)))
-    return Hierarchy(tuple(levels), cho_factor(aggregated.levels[-1].A.toarray()))
-
-
-def _make_level(matrix: sparse.csr_array, prolongation: sparse.csr_array) -> Level:
-    diagonal = matrix.diagonal()
-    return Level(
-        matrix.astype(PRECISION),
-        (1.0 / diagonal).astype(PRECISION),
-        EIGENVALUE_MARGIN * largest_eigenvalue(matrix, diagonal),
-        prolongation.astype(PRECISION),
-        sparse.csr_array(prolongation.T).astype(PRECISION),
-    )
-
-
-def largest_eigenvalue(matrix: sparse.csr_array, diagonal: NDArray[np.float64]) -> float:
-    """Largest eigenvalue of ``D^(-1/2) A D^(-1/2)`` by a few Lanczos steps, from below."""
-    root = 1.0 / np.sqrt(diagonal)
-    vector = np.random.default_rng(0).standard_normal(len(root))
-    vector /= np.linalg.norm(vector)
-    previous = np.zeros_like(vector)
-    alphas, betas = [], []
-    beta = 0.0
-    for _ in range(min(LANCZOS_STEPS, len(root))):
-        image = root * (matrix @ (root * vector)) - beta * previous
-        alpha = float(vector @ image)
-        image -= alpha * vector
-        alphas.append(alpha)
-        beta = float(np.linalg.norm(image))
-        if beta < 1e-12 * abs(alpha):
+    levels: list[Level] = []
+    while matrix.shape[0] > COARSEST_SIZE and len(levels) < MAXIMUM_LEVELS:
+        n = matrix.shape[0]
+        fine = (*unsigned(matrix.indptr, matrix.indices), matrix.data)
+        inverse, smoothing = scales_of_smoothing(matrix)
+        if prolongation is None:
+            label, size = loops.aggregate(*fine)
+            rows = room((n, loops.WIDTH), np.uint32), room((n, loops.WIDTH), PRECISION)
+            given = (*fine, inverse, label.view(np.uint32), DAMPING, size, *rows)
+            run_blocks(loops.smoothed_prolongation, row_blocks(n), *given)
+        else:
+            rows, size = _fixed_rows(prolongation), prolongation.shape[1]
+            prolongation = None
+        if size >= n or size == 0:
             break
-        betas.append(beta)
-        previous, vector = vector, image / beta
-    steps = len(alphas)
-    off = np.array(betas[: steps - 1])
-    return float(np.linalg.eigvalsh(np.diag(alphas) + np.diag(off, 1) + np.diag(off, -1))[-1])
+        matrix, restriction = _galerkin(fine, rows, size)
+        # after the product, which takes as much memory for a while
+        single = room(len(fine[2]), PRECISION)
+        single[:] = fine[2]
+        levels.append(Level((*fine[:2], single), smoothing.astype(PRECISION), rows, restriction))
+    coarsest = cho_factor(matrix.toarray())
+    if not levels:
+        return Hierarchy((), coarsest, None)
+    plan = _plan(levels, coarsest)
+    # coarser levels for several columns look at the arrays of the plan
+    kept = [levels[0]]
+    for index, level in enumerate(levels[1:], start=1):
+        begins = plan.layout[index, teams.ARRAYS :]
+        kept.append(
+            Level.of_arrays(
+                [
+                    flat[begin : begin + len(own)]
+                    for flat, begin, own in zip(plan.coarse, begins, level.arrays, strict=True)
+                ]
+            )
+        )
+    return Hierarchy(tuple(kept), coarsest, plan)
 
 
-def _smooth(level: Level, residual: NDArray) -> NDArray:
-    """Chebyshev polynomial of the Jacobi-scaled matrix, applied to a residual."""
-    high = level.largest
-    low = high * SMOOTHED_FRACTION
-    centre, half = 0.5 * (high + low), 0.5 * (high - low)
-    ratio = centre / half
-    rho = 1.0 / ratio
-    inverse_diagonal = level.inverse_diagonal if residual.ndim == 1 else level.inverse_diagonal[:, None]
-    step = inverse_diagonal * residual
-    step *= PRECISION(1.0 / centre)
-    unknowns = step.copy()
-    for _ in range(SMOOTHING_DEGREE - 1):
-        residual = residual - level.matrix @ step
-        following = 1.0 / (2.0 * ratio - rho)
-        step *= PRECISION(following * rho)
-        step += PRECISION(2.0 * following / half) * (inverse_diagonal * residual)
-        rho = following
-        unknowns += step
-    return unknowns
+def scales_of_smoothing(matrix: sparse.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Inverse of each row's diagonal, and the one that smoothing scales by, (n,) each.
+
+    That is smaller where the row's sizes add up to more than twice the diagonal: no
+    eigenvalue of the scaled matrix is then above two (Gershgorin).
+    """
+    inverse = 1.0 / matrix.diagonal()
+    sizes = abs(matrix) @ np.ones(matrix.shape[0])
+    return inverse, np.minimum(inverse, teams.LARGEST / sizes)
+
+
+def _plan(levels: list[Level], coarsest: tuple[NDArray[np.float64], bool]) -> CyclePlan:
+    """Plan of a cycle, the arrays of the coarser levels lying one after the other."""
+    count, size = len(levels), len(coarsest[0])
+    rows = np.array([*(len(level.inverse) for level in levels), size])
+    # each level's vectors begin on a cache line of their own
+    padded = -(-rows // LINE) * LINE
+    fine, coarse = levels[0].arrays, [level.arrays for level in levels[1:]]
+    layout = np.zeros((count + 1, teams.ARRAYS + len(fine)), dtype=np.int64)
+    layout[:, teams.ROWS] = rows
+    layout[1:, teams.WORK] = np.cumsum(padded)[:-1]
+    for k in range(len(fine)):
+        layout[2:, teams.ARRAYS + k] = np.cumsum([len(arrays[k]) for arrays in coarse])
+    bounds = [*(chunk_bounds(level.matrix[0]) for level in levels), np.array([0, size])]
+    table = np.zeros((count + 1, max(len(each) for each in bounds)), dtype=np.int64)
+    for level, each in enumerate(bounds):
+        table[level, : len(each)] = each
+    passes, first = [], 0
+    for kind, level in _order(count):
+        passes.append((kind, level, first))
+        first += len(bounds[level]) - 1
+    inverse = cho_solve(coarsest, np.eye(size))
+    return CyclePlan(
+        np.array([*passes, (-1, -1, first)], dtype=np.int64),
+        table,
+        layout,
+        fine,
+        tuple(np.concatenate([arrays[k] for arrays in coarse] or [fine[k][:0]]) for k in range(len(fine))),
+        # symmetric to the last digit, as what it preconditions
+        0.5 * (inverse + inverse.T),
+        int(padded.sum()),
+    )
+
+
+def _order(count: int) -> list[tuple[int, int]]:
+    """Kind and level of each pass of a V-cycle with so many levels above the coarsest."""
+    order = [(teams.BEGIN, 0)]
+    for level in range(count):
+        order += [(teams.SMOOTH, level), (teams.RESIDUAL, level), (teams.RESTRICT, level + 1)]
+    order.append((teams.COARSEST, count))
+    for level in reversed(range(count)):
+        order += [(teams.PROLONG, level), (teams.AGAIN, level), (teams.END, level)]
+    return order
+
+
+def _fixed_rows(matrix: sparse.csr_array) -> FixedRows:
+    """Columns and values of rows with at most four entries."""
+    counts = np.diff(matrix.indptr)
+    if counts.max(initial=0) > loops.WIDTH:
+        raise SpecError("prolongation", f"{counts.max()} entries in a row.", f"Allowed: {loops.WIDTH}.")
+    shape = (len(counts), loops.WIDTH)
+    columns, values = room(shape, np.uint32), room(shape, PRECISION)
+    # fillers name what the row has anyway: products get no entries from them
+    columns[:] = matrix.indices[np.minimum(matrix.indptr[:-1], matrix.nnz - 1), None]
+    values[:] = 0.0
+    inside = np.arange(loops.WIDTH) < counts[:, None]
+    columns[inside], values[inside] = matrix.indices, matrix.data
+    return columns, values
+
+
+def _galerkin(fine: Rows, rows: FixedRows, size: int) -> tuple[sparse.csr_array, Rows]:
+    """``Pᵀ A P``, rows not sorted, and ``Pᵀ``."""
+    n = len(rows[0])
+    starts = np.arange(0, rows[0].size + 1, loops.WIDTH, dtype=np.int32)
+    prolongation = sparse.csr_array(
+        (rows[1].ravel(), rows[0].ravel().view(np.int32), starts), shape=(n, size)
+    )
+    transposed = prolongation.tocsc()
+    transposed.eliminate_zeros()
+    restriction = (*unsigned(transposed.indptr, transposed.indices), transposed.data)
+    starts, columns, values = fill_rows(loops.times_fixed, n, (*fine, *rows, size), ENTRIES_OF_PRODUCT)
+    product = (*unsigned(starts, columns), values)
+    starts, columns, values = fill_rows(
+        loops.product_rows, size, (*restriction, *product, size), ENTRIES_OF_COARSE
+    )
+    return sparse.csr_array((values, columns, starts), shape=(size, size), copy=False), restriction

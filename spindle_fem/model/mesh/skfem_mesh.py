@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 from skfem import Basis, ElementTetP1, ElementTetP2, FacetBasis, MeshTet2
 
 from spindle_fem.errors import MeshTagError
@@ -28,17 +30,19 @@ class SkfemMesh:
     basis : skfem.CellBasis
     unknown_of_dof : (n_unknowns,) int64 ndarray
         Node of the tagged mesh for each degree of freedom of ``basis``.
-    order : int
-        1 or 2.
+    vertex_of_corner : (n_corners,) int64 ndarray
+        scikit-fem's number of each corner node of the tagged mesh.
     """
 
     mesh: MeshTet2
     basis: Basis
     unknown_of_dof: NDArray[np.int64]
-    order: int
+    vertex_of_corner: NDArray[np.int64]
 
     def facet_basis(self, facets: NDArray[np.int64]) -> FacetBasis:
         """scikit-fem's basis on tagged facets, for facet forms.
+
+        Both sides of a joint have their quadrature points at the same places.
 
         Parameters
         ----------
@@ -58,7 +62,7 @@ class SkfemMesh:
         """Indices of scikit-fem facets with the same three corners."""
         n = np.int64(self.mesh.nvertices)
         known = np.sort(self.mesh.facets, axis=0).astype(np.int64)
-        asked = np.sort(facets[:, :3], axis=1).T.astype(np.int64)
+        asked = np.sort(self.vertex_of_corner[facets[:, :3]], axis=1).T
         known_keys = (known[0] * n + known[1]) * n + known[2]
         asked_keys = (asked[0] * n + asked[1]) * n + asked[2]
         order = np.argsort(known_keys)
@@ -68,6 +72,12 @@ class SkfemMesh:
         if missing:
             raise MeshTagError("facets", f"{missing} tagged triangles are no facets of the mesh.")
         return found
+
+    def in_our_order(self, matrix: sparse.sparray) -> sparse.csr_array:
+        """A matrix that scikit-fem assembled, its rows and columns numbered as the tagged mesh's nodes."""
+        entries = matrix.tocoo()
+        place = self.unknown_of_dof
+        return sparse.csr_array((entries.data, (place[entries.row], place[entries.col])), shape=matrix.shape)
 
 
 def load_into_skfem(mesh: TaggedMesh, order: int) -> SkfemMesh:
@@ -79,7 +89,11 @@ def load_into_skfem(mesh: TaggedMesh, order: int) -> SkfemMesh:
     order : int
         1 or 2.
     """
-    loaded = MeshTet2(np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.tetrahedra.T))
+    number = _numbers(mesh)
+    points = np.empty_like(mesh.points)
+    points[number] = mesh.points
+    tetrahedra = number[mesh.tetrahedra]
+    loaded = MeshTet2(np.ascontiguousarray(points.T), np.ascontiguousarray(tetrahedra.T))
     element = ElementTetP1() if order == 1 else ElementTetP2()
     basis = Basis(loaded, element, intorder=ELEMENT_QUADRATURE_DEGREE)
     local_nodes = 4 if order == 1 else 10
@@ -87,4 +101,20 @@ def load_into_skfem(mesh: TaggedMesh, order: int) -> SkfemMesh:
     unknown_of_dof[basis.element_dofs.ravel()] = mesh.tetrahedra[:, :local_nodes].T.ravel()
     if not np.array_equal(np.sort(unknown_of_dof), np.arange(basis.N)):
         raise MeshTagError("mesh", "corner nodes are not numbered first, or a node belongs to no element.")
-    return SkfemMesh(loaded, basis, unknown_of_dof, order)
+    return SkfemMesh(loaded, basis, unknown_of_dof, number[: mesh.n_corners])
+
+
+def _numbers(mesh: TaggedMesh) -> NDArray[np.int64]:
+    """New number of each node: both sides of a joint have theirs in the same order.
+
+    scikit-fem turns each facet so that its nodes' numbers rise; sides whose numbers rise alike then
+    have quadrature points that coincide.
+    """
+    n = len(mesh.points)
+    pairs = [np.array([joint.facets_a.ravel(), joint.facets_b.ravel()]) for joint in mesh.joints.values()]
+    one, other = np.hstack(pairs) if pairs else np.empty((2, 0), dtype=np.int64)
+    _, leader = connected_components(sparse.coo_array((np.ones(len(one)), (one, other)), shape=(n, n)))
+    is_midside = np.arange(n) >= mesh.n_corners
+    number = np.empty(n, dtype=np.int64)
+    number[np.lexsort((leader, is_midside))] = np.arange(n)
+    return number

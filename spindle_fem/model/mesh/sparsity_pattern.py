@@ -7,7 +7,6 @@ passes over memory and no sorting.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from spindle_fem.model.mesh.huge_pages import room
-from spindle_fem.model.mesh.threads import row_blocks, run_blocks, use_compiled
+from spindle_fem.model.mesh.kernels.assembly_loops import join_rows
+from spindle_fem.model.mesh.threads import row_blocks, run_blocks, unsigned
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,62 +46,37 @@ class SymmetricPattern:
         ----------
         upper : (n_upper,) ndarray
         """
-        if use_compiled(self.size):
-            from spindle_fem.model.mesh.kernels.assembly_loops import gather
-
-            data = room(len(self.indices))
-            run_blocks(gather, row_blocks(len(data)), upper, self.upper_of_full, data)
-        else:
-            data = upper[self.upper_of_full]
+        data = room(len(self.indices))
+        np.take(upper, self.upper_of_full, out=data, mode="clip")
         matrix = sparse.csr_array((data, self.indices, self.indptr), shape=(self.size, self.size), copy=False)
         matrix.has_canonical_format = True
         return matrix
 
 
-def build_pattern(
-    size: int, groups: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
-) -> tuple[SymmetricPattern, list[NDArray[np.int32]]]:
-    """Pattern that holds every (row, column) of all groups.
+def expand_pattern(indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> SymmetricPattern:
+    """Full pattern of compressed rows of an upper triangle, each from its diagonal on and sorted.
 
-    Parameters
-    ----------
-    size : int
-    groups : sequence of (rows, columns)
-        Arrays of equal shape; (i, j) and (j, i) are the same entry.
-
-    Returns
-    -------
-    pattern : SymmetricPattern
-    slots : list of int32 ndarray
-        For each group, the upper entry of each of its pairs, in its shape.
+    A full row is a column of the upper triangle, down to the diagonal, and then the rest of its row.
     """
-    keys = np.concatenate(
-        [
-            (np.minimum(rows, columns) * np.int64(size) + np.maximum(rows, columns)).ravel()
-            for rows, columns in groups
-        ]
-    )
-    order = np.argsort(keys)
-    ordered = keys[order]
-    is_new = np.empty(len(keys), dtype=bool)
-    is_new[:1] = True
-    np.not_equal(ordered[1:], ordered[:-1], out=is_new[1:])
-    slot = np.empty(len(keys), dtype=np.int32)
-    slot[order] = np.cumsum(is_new, dtype=np.int32) - 1
-    unique = ordered[is_new]
-    rows, columns = np.divmod(unique, size)
-    numbers = np.arange(1, len(unique) + 1, dtype=np.int32)
-    indptr = np.searchsorted(rows, np.arange(size + 1)).astype(np.int32)
-    upper = sparse.csr_array((numbers, columns.astype(np.int32), indptr), shape=(size, size))
-    full = (upper + sparse.triu(upper, k=1, format="csr").T.tocsr()).tocsr()
-    full.sort_indices()
-    pattern = SymmetricPattern(
-        size,
-        len(unique),
-        full.indptr.astype(np.int32, copy=False),
-        full.indices.astype(np.int32, copy=False),
-        full.data - 1,
-    )
-    bounds = np.cumsum([rows.size for rows, _ in groups])[:-1]
-    slots = [part.reshape(rows.shape) for part, (rows, _) in zip(np.split(slot, bounds), groups, strict=True)]
-    return pattern, slots
+    size, n_upper = len(indptr) - 1, len(indices)
+    numbers = np.arange(n_upper, dtype=np.int32)
+    left = sparse.csr_array((numbers, indices, indptr), shape=(size, size)).tocsc()
+    starts = (left.indptr + indptr - np.arange(size + 1)).astype(np.int32)
+    columns, slots = room(int(starts[-1]), np.int32), room(int(starts[-1]), np.int32)
+    rows = (*unsigned(left.indptr, left.indices), left.data, *unsigned(indptr, indices), numbers)
+    run_blocks(join_rows, row_blocks(size), *rows, 1, 0, *unsigned(starts, columns), slots)
+    return SymmetricPattern(size, n_upper, starts, columns, slots)
+
+
+def grouped(labels: NDArray[np.integer], size: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Which places hold each label below ``size``: where each label's begin, (size + 1,), and the places.
+
+    >>> starts, places = grouped(np.array([2, 0, 2]), 3)
+    >>> starts.tolist(), places.tolist()
+    ([0, 1, 1, 3], [1, 0, 2])
+    """
+    count = labels.size
+    ones, starts = np.ones(count, dtype=np.int8), np.arange(count + 1, dtype=np.int32)
+    labels = labels.ravel().astype(np.int32, copy=False)
+    columns = sparse.csr_array((ones, labels, starts), shape=(count, size)).tocsc()
+    return columns.indptr, columns.indices

@@ -12,9 +12,7 @@ from scipy import sparse
 from spindle_fem.errors import MeshQualityError, SpecError, UnknownSurfaceError, did_you_mean
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.element_integrals import upper_pairs
-from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.model.mesh.sparsity_pattern import SymmetricPattern
-from spindle_fem.model.mesh.threads import row_blocks, run_blocks, use_compiled
 
 AREA_TOLERANCE = 1e-3
 
@@ -39,9 +37,6 @@ class ThermalOperators:
     part_of_unknown : (n_unknowns,) int32 ndarray
     conduction, storage : (n_upper,) ndarray, [m], [m³]
         Unit conductivity and unit volumetric capacity.
-    circumferential : (n_upper,) ndarray or None, [m]
-        Unit conduction around the axis, where it was asked for.
-    circumferential_parts : frozenset of str
     part_load : (n_unknowns,) ndarray, [m³]
         ``∫ N dV`` over the part that owns the unknown.
     part_volume : mapping of str to float, [m³]
@@ -71,8 +66,6 @@ class ThermalOperators:
     part_of_unknown: NDArray[np.int32]
     conduction: NDArray[np.float64]
     storage: NDArray[np.float64]
-    circumferential: NDArray[np.float64] | None
-    circumferential_parts: frozenset[str]
     part_load: NDArray[np.float64]
     part_volume: Mapping[str, float]
     facet_nodes: NDArray[np.int64]
@@ -164,52 +157,21 @@ class ThermalOperators:
         return spread(value, rows.stop - rows.start, where)
 
     # ------------------------------------------------------------ operators
-    def sum_conduction(
-        self, conductivity: NDArray[np.float64], circumferential_factor: NDArray[np.float64] | None = None
-    ) -> NDArray[np.float64]:
-        """Upper entries of ``Σ k_p K_p``.
-
-        Parameters
-        ----------
-        conductivity : (n_parts,) ndarray, [W/(m·K)]
-        circumferential_factor : (n_parts,) ndarray, optional, [-]
-            Conductivity around the axis relative to the other directions.
-        """
-        upper = self._scaled(self.conduction, conductivity)
-        if circumferential_factor is not None and np.any(circumferential_factor != 1.0):
-            if self.circumferential is None:
-                raise SpecError(
-                    "circumferential_factor", "these operators hold no circumferential conduction."
-                )
-            extra = np.append(conductivity * (circumferential_factor - 1.0), 0.0)
-            upper += self.circumferential * extra[self.part_of_slot]
-        return upper
+    def sum_conduction(self, conductivity: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Upper entries of ``Σ k_p K_p``; (n_parts,) [W/(m·K)] in."""
+        return self._scaled(self.conduction, conductivity)
 
     def sum_storage(self, volumetric_capacity: NDArray[np.float64]) -> NDArray[np.float64]:
         """Upper entries of the capacity matrix; (n_parts,) [J/(m³·K)] in."""
         return self._scaled(self.storage, volumetric_capacity)
 
     def _scaled(self, unit: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Each upper entry times the factor of its part."""
-        if not use_compiled(self.n_unknowns):
-            return unit * np.append(factors, 0.0)[self.part_of_slot]
-        from spindle_fem.model.mesh.kernels.assembly_loops import scale_by_part
-
-        out = room(len(unit))
-        given = (self.part_of_slot, np.asarray(factors, dtype=float), unit, out)
-        run_blocks(scale_by_part, row_blocks(len(unit)), *given)
-        return out
+        """Each upper entry times the factor of its part; 0 where only a joint couples (part -1, the last)."""
+        return unit * np.append(factors, 0.0)[self.part_of_slot]
 
     def add_films(self, upper: NDArray[np.float64], coefficient: NDArray[np.float64]) -> None:
         """Add ``Σ h_f R_f`` in place; ``coefficient`` (n_facets,) [W/(m²·K)] over all facets."""
         active = np.flatnonzero(coefficient)
-        if use_compiled(self.n_unknowns):
-            from spindle_fem.model.mesh.kernels.facet_loops import add_films
-
-            summed = np.zeros(len(self.facet_slots))
-            add_films(active, coefficient, self.facet_film, self.facet_inverse, summed)
-            upper[self.facet_slots] += summed
-            return
         weights = (coefficient[active, None] * self.facet_film[active]).ravel()
         summed = np.bincount(
             self.facet_inverse[active].ravel(), weights=weights, minlength=len(self.facet_slots)

@@ -1,12 +1,10 @@
-"""Whether compiled loops are there, and the threads that share their rows."""
+"""Ranges of rows and chunks of work that threads share in compiled loops."""
 
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable
-from functools import cache, partial
-from importlib.util import find_spec
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +12,6 @@ from numpy.typing import NDArray
 from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.parallel import hand_over, in_threads, thread_count
 
-# Loading compiled code takes as long as it saves on so many unknowns.
-COMPILED_ABOVE = 40_000
 # A block of fewer rows costs more to hand over than it saves.
 LEAST_ROWS = 15_000
 # A chunk of work for a team: few hand-overs against some 20 µs of work, and all threads end together.
@@ -23,17 +19,6 @@ ENTRIES_A_CHUNK = 30_000
 MOST_CHUNKS = 32
 # Room for the two counters of a team, on cache lines of their own.
 N_COUNTERS = 32
-
-
-@cache
-def has_compiled() -> bool:
-    """Whether numba is installed and ``SPINDLE_FEM_COMPILED`` does not forbid it (``0``)."""
-    return os.environ.get("SPINDLE_FEM_COMPILED", "1") != "0" and find_spec("numba") is not None
-
-
-def use_compiled(n_unknowns: int) -> bool:
-    """Whether a problem of this size is worth compiled loops, and they are there."""
-    return n_unknowns >= COMPILED_ABOVE and has_compiled()
 
 
 def row_blocks(n_rows: int) -> NDArray[np.int64]:
@@ -57,9 +42,10 @@ def chunk_bounds(starts: NDArray) -> NDArray[np.int64]:
 def run_team(function: Callable, n_chunks: int, *arguments: object) -> None:
     """Call ``function(is_first, counters, *arguments)`` in as many threads as are worth it.
 
-    For loops whose members claim chunks from the counters (``compiled_teams``): the
-    calling thread is the first and returns when all is done, whoever did it. Others
-    join when they come; one that finds nothing left to claim leaves again.
+    For loops whose members claim chunks from the counters
+    (:mod:`spindle_fem.model.mesh.kernels.team_loops`): the calling thread is the first and
+    returns when all is done, whoever did it. Others join when they come; one that finds
+    nothing left to claim leaves again.
     """
     counters = np.zeros(N_COUNTERS, dtype=np.int64)
     count = min(thread_count(), n_chunks)

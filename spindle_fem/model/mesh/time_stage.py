@@ -386,8 +386,7 @@ def same_coefficients(one: ConductionProblem, other: ConductionProblem) -> bool:
     """Whether two problems have the same matrix: all but heat and surrounding temperatures equal."""
     if one is other:
         return True
-    plain = ("conductivity", "circumferential_factor")
-    if any(dict(getattr(one, name)) != dict(getattr(other, name)) for name in plain):
+    if dict(one.conductivity) != dict(other.conductivity):
         return False
     joints, others = one.joint_conductance, other.joint_conductance
     if joints.keys() != others.keys() or any(

@@ -1,11 +1,10 @@
-"""Compiled loops that threads go through together, pass after pass; imported only where numba is installed.
+"""Kernels that threads go through together: a multigrid cycle, a step of conjugate gradients.
 
 A pass is divided into chunks of rows, more than there are threads. Whoever is
 free claims the next chunk, and a pass begins when every chunk of the one before
 is done: no thread waits for another that has not come yet or that the system
-has put aside, and what is computed does not depend on who computes it. Threads
-are handed over to once for a whole cycle or step of conjugate gradients; while
-they wait within it they look for some microseconds, then sleep.
+has put aside, and what is computed does not depend on who computes it. While
+threads wait within a call they look for some microseconds, then sleep.
 """
 
 from __future__ import annotations
@@ -18,11 +17,9 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from spindle_fem.model.mesh.kernels import solver_loops as loops
+from spindle_fem.model.mesh.kernels import FAST
+from spindle_fem.model.mesh.kernels.multigrid_loops import add_prolonged, multiply, smooth
 
-_FAST = {
-    "cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}
-}  # fmt: skip
 # Places of the two counters, on cache lines of their own.
 CLAIMED, DONE = 0, 16
 # Looks before a waiting thread sleeps: its core is then free for the thread that it waits for.
@@ -33,10 +30,11 @@ if os.name == "nt":
 else:
     _rest = types.ExternalFunction("usleep", types.intc(types.uint32))
     REST = 20
+
 # Kinds of passes of a cycle.
-BEGIN, GO_ON, END_FROM_ZERO, RESTRICT, COARSEST, PROLONG, BEGIN_AGAIN, END = range(8)
-# Columns of the layout of coarse levels, and the vectors of each level.
-ROWS, ROW, START, ENTRY, TO_START, TO_ENTRY, WORK = range(7)
+BEGIN, SMOOTH, RESIDUAL, RESTRICT, COARSEST, PROLONG, AGAIN, END = range(8)
+# Columns of the layout: rows of a level, where its vectors begin, where each of its nine arrays begins.
+ROWS, WORK, ARRAYS = range(3)
 # Right-hand side, direction, what is left, next direction (at last the level's answer), unknowns.
 N_VECTORS = 5
 # Weights of the two steps: Lottes (2023), table of optimal fourth-kind weights.
@@ -47,9 +45,10 @@ LARGEST = 2.0
 FIRST_STEP = np.float32(4.0 / (3.0 * LARGEST))
 KEEP = np.float32(1.0 / 5.0)
 SECOND_STEP = np.float32(12.0 / (5.0 * LARGEST))
-_ONE = np.float32(1.0)
+NOTHING = np.float32(0.0)
 
 
+# ------------------------------------------------------------------- counters
 def _place(context, builder, signature, args):
     kind = signature.args[0]
     array = context.make_array(kind)(context, builder, args[0])
@@ -57,7 +56,7 @@ def _place(context, builder, signature, args):
 
 
 @intrinsic
-def _count(typingctx, counters, place):
+def count_up(typingctx, counters, place):
     """Add one to a counter, and return what it was: one thread at a time."""
 
     def generate(context, builder, signature, args):
@@ -77,8 +76,9 @@ def _look(typingctx, counters, place):
     return types.int64(counters, types.intp), generate
 
 
-@njit(**_FAST)
-def _wait(counters, wanted):
+@njit(**FAST)
+def wait(counters, wanted):
+    """Return when so many chunks are done."""
     looks = 0
     while _look(counters, DONE) < wanted:
         looks += 1
@@ -86,122 +86,106 @@ def _wait(counters, wanted):
             _rest(REST)
 
 
-# ----------------------------------------------------------------------- cycle
-@njit(**_FAST)
+# ---------------------------------------------------------------------- cycle
+@njit(**FAST)
 def cycle(is_first, counters, passes, bounds, layout, fine, coarse, coarsest, work, residual, scale, answer):
     """A V-cycle: ``answer`` gets the approximate solution for a residual.
 
     ``passes`` tells kind, level and first chunk of each pass, ``bounds`` the rows of
-    each level's chunks; ``coarse`` holds the arrays of all coarser levels one after
-    the other, ``layout`` where each level's begin, and ``coarsest`` the inverse of
-    the last one's matrix.
+    each level's chunks; ``fine`` has the arrays of the finest level, ``coarse`` those of
+    all coarser levels one after the other, ``layout`` where each level's begin, and
+    ``coarsest`` the inverse of the last one's matrix.
     """
     total = passes[passes.shape[0] - 1, 2]
     at = 0
     while True:
-        chunk = _count(counters, CLAIMED)
+        chunk = count_up(counters, CLAIMED)
         if chunk >= total:
             break
         while chunk >= passes[at + 1, 2]:
             at += 1
         kind, level, begin = passes[at, 0], passes[at, 1], passes[at, 2]
-        _wait(counters, begin)
+        wait(counters, begin)
         low, high = bounds[level, chunk - begin], bounds[level, chunk - begin + 1]
-        if level == 0:
-            _do_fine(kind, low, high, layout, fine, work, residual, scale, answer)
-        else:
-            _do_coarse(kind, level, low, high, layout, fine[3], coarse, coarsest, work)
-        _count(counters, DONE)
+        vectors = _vectors(level, layout, work)
+        if kind == BEGIN:
+            for i in range(low, high):
+                vectors[0][i] = residual[i] / scale
+        elif kind == COARSEST:
+            _multiply_dense(low, high, coarsest, vectors[0], vectors[3])
+        elif kind == RESTRICT:
+            above = _arrays(level - 1, layout, fine, coarse)
+            left = _vectors(level - 1, layout, work)[2]
+            multiply(low, high, above[6], above[7], above[8], left, vectors[0])
+        elif kind == PROLONG:
+            own = _arrays(level, layout, fine, coarse)
+            correction = _vectors(level + 1, layout, work)[3]
+            add_prolonged(low, high, own[4], own[5], correction, vectors[4])
+        if kind != COARSEST and level < layout.shape[0] - 1:
+            _smooth_level(kind, low, high, _arrays(level, layout, fine, coarse), vectors)
+        if kind == END and level == 0:
+            for i in range(low, high):
+                answer[i] = scale * vectors[3][i]
+        count_up(counters, DONE)
     if is_first:
-        _wait(counters, total)
+        wait(counters, total)
 
 
-@njit(**_FAST)
-def _vector(which, level, layout, work):
-    place = which * (work.size // N_VECTORS) + layout[level, WORK]
-    return work[place : place + layout[level, ROWS]]
+@njit(**FAST)
+def _arrays(level, layout, fine, coarse):
+    """Matrix, scale of smoothing, prolongation and restriction of a level."""
+    if level == 0:
+        return fine
+    at = layout[level, ARRAYS:]
+    return (
+        coarse[0][at[0] :], coarse[1][at[1] :], coarse[2][at[2] :], coarse[3][at[3] :], coarse[4][at[4] :],
+        coarse[5][at[5] :], coarse[6][at[6] :], coarse[7][at[7] :], coarse[8][at[8] :],
+    )  # fmt: skip
 
 
-@njit(**_FAST)
-def _do_fine(kind, low, high, layout, fine, work, residual, scale, answer):
-    """One chunk of a pass on the finest level."""
-    matrix, inverse, prolongation = fine[0], fine[1], fine[2]
-    right, direction = _vector(0, 0, layout, work), _vector(1, 0, layout, work)
-    if kind == BEGIN:
-        loops.begin_scaled(low, high, 1.0 / scale, FIRST_STEP, inverse, residual, right, direction)
+@njit(**FAST)
+def _vectors(level, layout, work):
+    """Right-hand side, direction, what is left, next direction and unknowns of a level."""
+    size, at = work.size // N_VECTORS, layout[level, WORK]
+    return (
+        work[at:],
+        work[size + at :],
+        work[2 * size + at :],
+        work[3 * size + at :],
+        work[4 * size + at :],
+    )
+
+
+@njit(**FAST)
+def _smooth_level(kind, low, high, arrays, vectors):
+    """What a pass computes on the rows of a chunk, from what earlier passes left in the vectors."""
+    starts, columns, values, inverse = arrays[0], arrays[1], arrays[2], arrays[3]
+    right, direction, left, following, unknowns = vectors
+    if kind in (BEGIN, RESTRICT):
+        for i in range(low, high):
+            direction[i] = FIRST_STEP * inverse[i] * right[i]
+        return
+    if kind == PROLONG:
+        return
+    keep, add = KEEP, SECOND_STEP
+    if kind in (RESIDUAL, AGAIN):
+        known, vector, rest, out = right, unknowns, left, direction
+        keep, add = NOTHING, FIRST_STEP
+    elif kind == SMOOTH:
+        known, vector, rest, out = right, direction, left, following
+    else:
+        known, vector, rest, out = left, direction, right, following
+    smooth(low, high, starts, columns, values, inverse, known, vector, keep, add, rest, out)
+    if kind == SMOOTH:
+        for i in range(low, high):
+            unknowns[i] = FIRST_WEIGHT * direction[i] + SECOND_WEIGHT * following[i]
     elif kind == END:
-        loops.end(
-            low, high, matrix[0], matrix[1], matrix[2], inverse, _vector(2, 0, layout, work), direction,
-            FIRST_WEIGHT, SECOND_WEIGHT, KEEP, SECOND_STEP, _vector(4, 0, layout, work), scale, answer,
-        )  # fmt: skip
-    else:
-        _do_any(kind, low, high, 0, layout, matrix, inverse, prolongation, work)
+        for i in range(low, high):
+            following[i] = unknowns[i] + FIRST_WEIGHT * direction[i] + SECOND_WEIGHT * following[i]
 
 
-@njit(**_FAST)
-def _do_coarse(kind, level, low, high, layout, restriction, coarse, coarsest, work):
-    """One chunk of a pass on a coarser level."""
-    starts, columns, values, inverses, to, weights, to_starts, members, shares = coarse
-    n, row = layout[level, ROWS], layout[level, ROW]
-    right = _vector(0, level, layout, work)
-    following = _vector(3, level, layout, work)
-    if kind == COARSEST:
-        multiply_dense(low, high, coarsest, right, following)
-        return
-    inverse = inverses[row : row + n]
-    if kind == RESTRICT:
-        left = _vector(2, level - 1, layout, work)
-        if level == 1:
-            loops.multiply(low, high, restriction[0], restriction[1], restriction[2], left, right)
-        else:
-            at, entry = layout[level - 1, TO_START], layout[level - 1, TO_ENTRY]
-            loops.multiply(
-                low, high, to_starts[at : at + n + 1], members[entry:], shares[entry:], left, right
-            )
-        if level < layout.shape[0] - 1:
-            loops.begin(low, high, FIRST_STEP, inverse, right, _vector(1, level, layout, work))
-        return
-    start, entry = layout[level, START], layout[level, ENTRY]
-    matrix = (starts[start : start + n + 1], columns[entry:], values[entry:])
-    if kind == END:
-        loops.end(
-            low, high, matrix[0], matrix[1], matrix[2], inverse, _vector(2, level, layout, work),
-            _vector(1, level, layout, work), FIRST_WEIGHT, SECOND_WEIGHT, KEEP, SECOND_STEP,
-            _vector(4, level, layout, work), _ONE, following,
-        )  # fmt: skip
-    else:
-        prolongation = (to[row : row + n], weights[row : row + n])
-        _do_any(kind, low, high, level, layout, matrix, inverse, prolongation, work)
-
-
-@njit(**_FAST)
-def _do_any(kind, low, high, level, layout, matrix, inverse, prolongation, work):
-    """One chunk of a pass that all levels have."""
-    starts, columns, values = matrix
-    right, direction = _vector(0, level, layout, work), _vector(1, level, layout, work)
-    left, following = _vector(2, level, layout, work), _vector(3, level, layout, work)
-    unknowns = _vector(4, level, layout, work)
-    if kind == GO_ON:
-        loops.go_on(
-            low, high, starts, columns, values, inverse, right, direction, KEEP, SECOND_STEP, left, following
-        )
-    elif kind == END_FROM_ZERO:
-        # the residual after both steps takes the place of the one between, row by row
-        loops.end_from_zero(
-            low, high, starts, columns, values, right, left, direction, following,
-            FIRST_WEIGHT, SECOND_WEIGHT, unknowns, left,
-        )  # fmt: skip
-    elif kind == PROLONG:
-        correction = _vector(3, level + 1, layout, work)
-        loops.add_prolonged(low, high, prolongation[0], prolongation[1], correction, unknowns)
-    else:
-        loops.begin_again(
-            low, high, starts, columns, values, inverse, right, unknowns, FIRST_STEP, left, direction
-        )
-
-
-@njit(**_FAST)
-def multiply_dense(low, high, matrix, vector, out):
+@njit(**FAST)
+def _multiply_dense(low, high, matrix, vector, out):
     """``out = A vector`` on a range of rows of a dense matrix."""
     for i in range(low, high):
         total = 0.0
@@ -211,7 +195,7 @@ def multiply_dense(low, high, matrix, vector, out):
 
 
 # --------------------------------------------------------- conjugate gradients
-@njit(**_FAST)
+@njit(**FAST)
 def conjugate_step(
     is_first, counters, bounds, starts, columns, values, preconditioned, residual, image, direction, unknowns,
     step, energy, shares,
@@ -223,72 +207,44 @@ def conjugate_step(
     """
     count = bounds.size - 1
     while True:
-        ticket = _count(counters, CLAIMED)
+        ticket = count_up(counters, CLAIMED)
         if ticket >= 4 * count:
             break
         number, chunk = ticket // count, ticket % count
-        _wait(counters, number * count)
+        wait(counters, number * count)
         low, high = bounds[chunk], bounds[chunk + 1]
+        one = other = 0.0
         if number == 0:
-            shares[0, chunk], shares[1, chunk] = loops.two_dots(low, high, preconditioned, image, residual)
+            for i in range(low, high):
+                one += preconditioned[i] * image[i]
+                other += preconditioned[i] * residual[i]
+            shares[0, chunk], shares[1, chunk] = one, other
         elif number == 1:
             # Polak-Ribière: stays conjugate although single precision makes the cycle slightly nonlinear
-            factor = -step * shares[0].sum() / energy if energy > 0.0 else 0.0
-            loops.turn(low, high, factor, direction, preconditioned)
+            factor = -step * _total(shares[0]) / energy if energy > 0.0 else 0.0
+            for i in range(low, high):
+                direction[i] = preconditioned[i] + factor * direction[i]
         elif number == 2:
-            shares[2, chunk] = loops.multiply_and_dot(low, high, starts, columns, values, direction, image)
+            multiply(low, high, starts, columns, values, direction, image)
+            for i in range(low, high):
+                one += direction[i] * image[i]
+            shares[2, chunk] = one
         else:
-            length = shares[1].sum() / shares[2].sum()
-            shares[3, chunk] = loops.advance(low, high, length, direction, image, unknowns, residual)
-        _count(counters, DONE)
+            length = _total(shares[1]) / _total(shares[2])
+            for i in range(low, high):
+                unknowns[i] += length * direction[i]
+                left = residual[i] - length * image[i]
+                residual[i] = left
+                one += left * left
+            shares[3, chunk] = one
+        count_up(counters, DONE)
     if is_first:
-        _wait(counters, 4 * count)
+        wait(counters, 4 * count)
 
 
-# ---------------------------------------------------------- spaces of solutions
-@njit(**_FAST)
-def project(is_first, counters, bounds, basis, count, vector, factor, parts, out):
-    """``out += factor Σ (v · x) v`` over the first rows v of a basis (size, n), in single precision.
-
-    ``parts``, (n_chunks, size), gets what each chunk adds to ``v · x``.
-    """
-    n_chunks = bounds.size - 1
-    while True:
-        ticket = _count(counters, CLAIMED)
-        if ticket >= 2 * n_chunks:
-            break
-        number, chunk = ticket // n_chunks, ticket % n_chunks
-        _wait(counters, number * n_chunks)
-        low, high = bounds[chunk], bounds[chunk + 1]
-        if number == 0:
-            _dots_with_rows(low, high, basis, count, vector, parts[chunk])
-        else:
-            _add_rows(low, high, basis, count, factor, parts, out)
-        _count(counters, DONE)
-    if is_first:
-        _wait(counters, 2 * n_chunks)
-
-
-@njit(**_FAST)
-def _dots_with_rows(low, high, basis, count, vector, parts):
-    own = np.empty(high - low, dtype=basis.dtype)
-    for i in range(low, high):
-        own[i - low] = vector[i]
-    for k in range(count):
-        total = basis.dtype.type(0.0)
-        row = basis[k, low:high]
-        for i in range(own.size):
-            total += row[i] * own[i]
-        parts[k] = total
-
-
-@njit(**_FAST)
-def _add_rows(low, high, basis, count, factor, parts, out):
-    own = np.zeros(high - low, dtype=basis.dtype)
-    for k in range(count):
-        share = basis.dtype.type(factor * parts[:, k].sum())
-        row = basis[k, low:high]
-        for i in range(own.size):
-            own[i] += share * row[i]
-    for i in range(low, high):
-        out[i] += own[i - low]
+@njit(**FAST)
+def _total(values):
+    total = 0.0
+    for value in values:
+        total += value
+    return total

@@ -1,157 +1,39 @@
-"""Compiled loops of multigrid and conjugate gradients; imported only where numba is installed.
-
-Every function works on a range of rows ``[low, high)`` and writes to these rows
-alone, so that ranges run in threads (``threads.run_blocks``) and the result
-depends on the ranges, never on timing. Compiled code is kept on disk beside the
-module or, where that is not writable, in the user's cache. Indices are passed
-unsigned: signed ones are tested for "from the end" at every access.
-"""
+"""Kernels of multigrid: sparse products, polynomial smoothing and smoothed aggregation."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+from spindle_fem.model.mesh.kernels import FAST, OPTIONS
+
 # Entries in every row of a prolongation.
 WIDTH = 4
-_FAST = {**_OPTIONS, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 
 
-# ------------------------------------------------------------------ products
-@njit(**_FAST)
-def multiply(low, high, indptr, indices, data, vector, out):
+# ----------------------------------------------------- products and smoothing
+@njit(**FAST)
+def multiply(low, high, starts, columns, values, vector, out):
     """``out = A vector`` on a range of rows."""
-    for i in range(low, high):
-        total = data.dtype.type(0.0)
-        for place in range(indptr[i], indptr[i + 1]):
-            total += data[place] * vector[indices[place]]
-        out[i] = total
-
-
-@njit(**_FAST)
-def multiply_and_dot(low, high, indptr, indices, data, vector, out):
-    """``out = A vector`` on a range of rows; returns the range's share of ``vector · out``."""
-    dot = 0.0
-    for i in range(low, high):
-        total = 0.0
-        for place in range(indptr[i], indptr[i + 1]):
-            total += data[place] * vector[indices[place]]
-        out[i] = total
-        dot += total * vector[i]
-    return dot
-
-
-@njit(**_FAST)
-def advance(low, high, step, direction, image, unknowns, residual):
-    """``x += step p``, ``r -= step q`` on a range; returns its share of ``r · r``."""
-    square = 0.0
-    for i in range(low, high):
-        unknowns[i] += step * direction[i]
-        left = residual[i] - step * image[i]
-        residual[i] = left
-        square += left * left
-    return square
-
-
-@njit(**_FAST)
-def two_dots(low, high, vector, one, other):
-    """``vector · one`` and ``vector · other`` of a range."""
-    first = second = 0.0
-    for i in range(low, high):
-        first += vector[i] * one[i]
-        second += vector[i] * other[i]
-    return first, second
-
-
-@njit(**_FAST)
-def turn(low, high, factor, direction, preconditioned):
-    """``p = z + factor p`` on a range."""
-    for i in range(low, high):
-        direction[i] = preconditioned[i] + factor * direction[i]
-
-
-# ------------------------------------------------------ polynomial smoothing
-# Every pass is one product with what belongs to it: d is a direction, r a residual, x the unknowns.
-@njit(**_FAST)
-def begin_scaled(low, high, scale, factor, inverse, residual, right, direction):
-    """``b = scale r`` in the precision of b, and ``d = factor D⁻¹ b``."""
-    for i in range(low, high):
-        value = right.dtype.type(scale * residual[i])
-        right[i] = value
-        direction[i] = factor * inverse[i] * value
-
-
-@njit(**_FAST)
-def begin(low, high, factor, inverse, right, direction):
-    """``d = factor D⁻¹ b``."""
-    for i in range(low, high):
-        direction[i] = factor * inverse[i] * right[i]
-
-
-@njit(**_FAST)
-def go_on(low, high, starts, columns, values, inverse, right, direction, keep, add, left, following):
-    """``r = b − A d`` and the next direction ``keep d + add D⁻¹ r``."""
-    for i in range(low, high):
-        total = right[i]
-        for place in range(starts[i], starts[i + 1]):
-            total -= values[place] * direction[columns[place]]
-        left[i] = total
-        following[i] = keep * direction[i] + add * inverse[i] * total
-
-
-@njit(**_FAST)
-def end_from_zero(
-    low, high, starts, columns, values, right, left, first, second, weight, other, unknowns, rest
-):
-    """``x = weight d₁ + other d₂`` and ``b − A x`` where ``r = b − A d₁`` is known."""
     for i in range(low, high):
         total = values.dtype.type(0.0)
         for place in range(starts[i], starts[i + 1]):
-            total += values[place] * second[columns[place]]
-        rest[i] = right[i] - weight * (right[i] - left[i]) - other * total
-        unknowns[i] = weight * first[i] + other * second[i]
+            total += values[place] * vector[columns[place]]
+        out[i] = total
 
 
-@njit(**_FAST)
-def begin_again(low, high, starts, columns, values, inverse, right, unknowns, factor, left, direction):
-    """``r = b − A x`` and ``d = factor D⁻¹ r``."""
+@njit(**FAST)
+def smooth(low, high, starts, columns, values, inverse, right, vector, keep, add, left, following):
+    """``r = b − A v``, and the next direction ``keep v + add D⁻¹ r``."""
     for i in range(low, high):
         total = right[i]
         for place in range(starts[i], starts[i + 1]):
-            total -= values[place] * unknowns[columns[place]]
+            total -= values[place] * vector[columns[place]]
         left[i] = total
-        direction[i] = factor * inverse[i] * total
+        following[i] = keep * vector[i] + add * inverse[i] * total
 
 
-@njit(**_FAST)
-def end(
-    low,
-    high,
-    starts,
-    columns,
-    values,
-    inverse,
-    left,
-    direction,
-    weight,
-    other,
-    keep,
-    add,
-    unknowns,
-    scale,
-    out,
-):
-    """``out = scale (x + weight d + other (keep d + add D⁻¹ (r − A d)))``."""
-    for i in range(low, high):
-        total = left[i]
-        for place in range(starts[i], starts[i + 1]):
-            total -= values[place] * direction[columns[place]]
-        following = keep * direction[i] + add * inverse[i] * total
-        out[i] = scale * (unknowns[i] + weight * direction[i] + other * following)
-
-
-@njit(**_FAST)
+@njit(**FAST)
 def add_prolonged(low, high, columns, values, vector, out):
     """``out += P vector`` with as many entries in every row, (n, WIDTH)."""
     for i in range(low, high):
@@ -162,7 +44,7 @@ def add_prolonged(low, high, columns, values, vector, out):
 
 
 # The same for several columns (n, m) at once: each entry of the matrix is read once for all.
-@njit(**_FAST)
+@njit(**FAST)
 def multiply_many(low, high, starts, columns, values, vectors, out):
     """``out = A vectors`` on a range of rows."""
     m = out.shape[1]
@@ -175,9 +57,9 @@ def multiply_many(low, high, starts, columns, values, vectors, out):
                 out[i, c] += value * vectors[j, c]
 
 
-@njit(**_FAST)
-def step_many(low, high, starts, columns, values, inverse, right, vectors, keep, add, left, following):
-    """``r = b − A d`` and ``keep d + add D⁻¹ r`` on a range of rows."""
+@njit(**FAST)
+def smooth_many(low, high, starts, columns, values, inverse, right, vectors, keep, add, left, following):
+    """What :func:`smooth` does, on columns."""
     m = right.shape[1]
     for i in range(low, high):
         for c in range(m):
@@ -191,9 +73,9 @@ def step_many(low, high, starts, columns, values, inverse, right, vectors, keep,
             following[i, c] = keep * vectors[i, c] + factor * left[i, c]
 
 
-@njit(**_FAST)
+@njit(**FAST)
 def add_prolonged_many(low, high, columns, values, vectors, out):
-    """``out += P vectors`` on a range of rows, P as in :func:`add_prolonged`."""
+    """What :func:`add_prolonged` does, on columns."""
     for i in range(low, high):
         for k in range(WIDTH):
             j, value = columns[i, k], values[i, k]
@@ -201,25 +83,8 @@ def add_prolonged_many(low, high, columns, values, vectors, out):
                 out[i, c] += value * vectors[j, c]
 
 
-@njit(**_OPTIONS)
-def invert_diagonal(low, high, starts, columns, values, largest, inverse, smoothing):
-    """Inverse of each row's diagonal, and the one that smoothing scales by.
-
-    That is smaller where the row's sizes add up to more than ``largest`` times the
-    diagonal: no eigenvalue of the scaled matrix is then above it (Gershgorin).
-    """
-    for i in range(low, high):
-        diagonal = size = 0.0
-        for place in range(starts[i], starts[i + 1]):
-            value = values[place]
-            size += abs(value)
-            diagonal = value if columns[place] == i else diagonal
-        inverse[i] = 1.0 / diagonal
-        smoothing[i] = min(1.0 / diagonal, largest / size)
-
-
 # -------------------------------------------------------- smoothed aggregation
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def aggregate(indptr, indices, data):
     """Aggregate of each row, and their number, which is also that of rows coupled with nothing.
 
@@ -274,7 +139,7 @@ def aggregate(indptr, indices, data):
     return label, count
 
 
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def smoothed_prolongation(
     low, high, starts, columns, values, inverse, label, damping, size, new_columns, new_values
 ):
@@ -322,29 +187,7 @@ def smoothed_prolongation(
             sums[found[k]] = 0.0
 
 
-@njit(**_OPTIONS)
-def transpose_fixed(columns, values, n_columns):
-    """Compressed rows of the transpose of (n, WIDTH) rows, without their zeros."""
-    starts = np.zeros(n_columns + 1, dtype=np.int32)
-    for i in range(columns.shape[0]):
-        for k in range(WIDTH):
-            starts[columns[i, k] + np.uint32(1)] += values[i, k] != 0.0
-    for i in range(n_columns):
-        starts[i + 1] += starts[i]
-    place_of = starts[:-1].copy()
-    rows = np.empty(starts[n_columns], dtype=np.int32)
-    weights = np.empty(starts[n_columns], dtype=values.dtype)
-    for i in range(columns.shape[0]):
-        for k in range(WIDTH):
-            if values[i, k] != 0.0:
-                place = place_of[columns[i, k]]
-                rows[place] = i
-                weights[place] = values[i, k]
-                place_of[columns[i, k]] += 1
-    return starts, rows, weights
-
-
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def times_fixed(
     low, high, starts, columns, values, fixed_columns, fixed_values, size, counts, new_columns, new_values
 ):
@@ -371,7 +214,7 @@ def times_fixed(
     return np.int64(end)
 
 
-@njit(**_OPTIONS)
+@njit(**OPTIONS)
 def product_rows(
     low, high, one_starts, one_columns, one_values, two_starts, two_columns, two_values, size,
     counts, columns, values,
