@@ -164,7 +164,9 @@ def test_foreign_guess_and_preconditioner_are_refused():
         solve_steady(PROBLEM, preconditioner=solution.preconditioner)
 
 
-def test_solver_reports_failure():
+def test_solver_reports_failure(monkeypatch):
+    # small problems would have no coarser level
+    monkeypatch.setattr("spindle_fem.model.mesh.multigrid.COARSEST_SIZE", 20)
     system = assemble_system(PROBLEM)
     preconditioner = build_preconditioner(system, "multigrid")
     with pytest.raises(ConvergenceError, match="after 1 iterations"):
