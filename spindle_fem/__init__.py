@@ -17,7 +17,7 @@ _PLACES = {
     "run_machine": "spindle_fem.commands.machine_commands",
     "check_machine": "spindle_fem.commands.machine_commands",
     "mesh_machine": "spindle_fem.commands.machine_commands",
-    "heat_table": "spindle_fem.commands.machine_commands",
+    "heat_table": "spindle_fem.commands.heat_command",
     "sweep_machine": "spindle_fem.commands.sweep_command",
     "simulate_machine": "spindle_fem.commands.simulate_command",
     "diagnose": "spindle_fem.commands.diagnose_command",

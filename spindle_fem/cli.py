@@ -119,7 +119,7 @@ def heat(
 ) -> None:
     """Bearing loads, angles, films and heat term by term over speed."""
     from spindle_fem.commands.console import print_heat
-    from spindle_fem.commands.machine_commands import heat_table
+    from spindle_fem.commands.heat_command import heat_table
 
     content = heat_table(
         machine,
@@ -148,9 +148,8 @@ def bearing(
 @app.command()
 def crosscheck(machine: Machine, output: Folder, set_: Overrides = None, as_json: AsJson = False) -> None:
     """Lumped network beside the FEM, node by node, and why they differ."""
-    from spindle_fem.commands.console import print_crosscheck
+    from spindle_fem.commands.console import print_crosscheck, stages
     from spindle_fem.commands.crosscheck_command import crosscheck_machine
-    from spindle_fem.commands.machine_commands import stages
 
     with stages(not as_json) as tell:
         content = crosscheck_machine(machine, output, overrides=set_ or (), progress=tell)
@@ -195,8 +194,7 @@ def transient(
     as_json: AsJson = False,
 ) -> None:
     """Heat-up, step test or cool-down by the full finite-element model."""
-    from spindle_fem.commands.console import print_transient
-    from spindle_fem.commands.machine_commands import stages
+    from spindle_fem.commands.console import print_transient, stages
     from spindle_fem.commands.transient_command import run_transient_study
 
     with stages(not as_json) as tell:
@@ -223,8 +221,7 @@ def simulate(
     as_json: AsJson = False,
 ) -> None:
     """What every channel of a recording should have read, beside what it read."""
-    from spindle_fem.commands.console import print_simulation
-    from spindle_fem.commands.machine_commands import stages
+    from spindle_fem.commands.console import print_simulation, stages
     from spindle_fem.commands.simulate_command import simulate_machine
 
     with stages(not as_json) as tell:
@@ -271,9 +268,8 @@ def diagnose(
     as_json: AsJson = False,
 ) -> None:
     """Where a recording and the model differ, which physics was left out, and how the fit improves."""
-    from spindle_fem.commands.console import print_diagnosis
+    from spindle_fem.commands.console import print_diagnosis, stages
     from spindle_fem.commands.diagnose_command import diagnose as diagnose_machine
-    from spindle_fem.commands.machine_commands import stages
 
     with stages(not as_json) as tell:
         content = diagnose_machine(
@@ -294,7 +290,7 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier command.")],
 ) -> None:
     """Rebuild the report of an output folder."""
-    from spindle_fem.commands.machine_commands import rebuild
+    from spindle_fem.commands.report_command import rebuild
 
     typer.echo(f"wrote {rebuild(folder)}")
 

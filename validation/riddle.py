@@ -190,17 +190,16 @@ def errors_by_speed(inputs: FilePath, simulated: FilePath) -> list[dict[str, Any
 
 def diagnose_riddle(folder: FilePath, result: FilePath, mesh: str, *, report: bool) -> dict[str, Any]:
     """Diagnose from the inputs alone."""
-    from spindle_fem.commands.diagnose_command import diagnose
+    from spindle_fem.commands.diagnose_command import diagnose, diagnose_without_report
 
     inputs = folder / "inputs" / NAME
     calibration = inputs / "calibration.toml"
-    return diagnose(
+    return (diagnose if report else diagnose_without_report)(
         "recorded_spindle",
         [inputs / "recording.toml"],
         result,
         calibrate=[calibration] if calibration.exists() else [],
         overrides=(f"mesh.preset={mesh}",),
-        report=report,
     )
 
 

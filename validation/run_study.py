@@ -19,20 +19,19 @@ MACHINE = "recorded_spindle"
 
 def diagnose_case(inputs: Path, result: Path, machine: str, overrides: tuple[str, ...], report: bool) -> str:
     """Diagnose one case, in this process; returns the verdict or what went wrong."""
-    from spindle_fem.commands.diagnose_command import diagnose
+    from spindle_fem.commands.diagnose_command import diagnose, diagnose_without_report
 
     result.mkdir(parents=True, exist_ok=True)
     calibration = inputs / "calibration.toml"
     began, cpu = time.perf_counter(), time.process_time()
     try:
-        found = diagnose(
+        found = (diagnose if report else diagnose_without_report)(
             machine,
             [inputs / "recording.toml"],
             result,
             calibrate=[calibration] if calibration.exists() else [],
             overrides=overrides,
             full_model="off",
-            report=report,
         )
     except Exception as error:  # noqa: BLE001 - a study goes on and counts its failures
         text = {"error": type(error).__name__, "message": str(error), "trace": traceback.format_exc()}

@@ -1,7 +1,9 @@
-"""Tables on the terminal, through rich."""
+"""What the terminal shows: tables of results, the stage or the number of designs done."""
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -258,3 +260,42 @@ def print_transient(content: dict[str, Any], folder: Path) -> None:
         f"{sum(phase['cpu_seconds'] for phase in phases):.0f} s of processor"
     )
     console.print(f"Report: {folder / 'report.html'}")
+
+
+@contextlib.contextmanager
+def stages(show: bool) -> Iterator[Any]:
+    """Stage names on the terminal while they run."""
+    if not show:
+        yield lambda stage: None
+        return
+    console = Console(stderr=True)
+    with console.status("starting") as status:
+        yield lambda stage: status.update(f"{stage} ...")
+
+
+@contextlib.contextmanager
+def designs_done(show: bool, total: int) -> Iterator[Callable[[int], None]]:
+    """Rows done and time left on the terminal; the callable takes how many more are done."""
+    if not show:
+        yield lambda done: None
+        return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("designs"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(elapsed_when_finished=False),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("designs", total=total)
+        yield lambda done: bar.advance(task, done)

@@ -1,4 +1,4 @@
-"""Diagnose recordings and write what came of it: the function behind ``spindle-fem diagnose``."""
+"""The function behind ``spindle-fem diagnose``."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import csv
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,18 +14,10 @@ from typing import Any
 import numpy as np
 
 from spindle_fem.inference.diagnosis import MOST_WORKERS, Diagnosis, diagnose_recordings
-from spindle_fem.inference.findings import (
-    channel_errors,
-    findings_of,
-    noise_level,
-    predictions_at_stamps,
-    rmse,
-    states_of,
-)
+from spindle_fem.inference.diagnosis_content import diagnosis_content, plain_data, unexplained_content
+from spindle_fem.inference.findings import predictions_at_stamps, states_of
 from spindle_fem.inference.full_model_check import AUTO, OFF, full_model_errors, nothing_run, require_choice
 from spindle_fem.inference.improved_machine import improved_machine
-from spindle_fem.inference.mismatch_place import where_of
-from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.next_measurement import next_measurement
 from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine
 from spindle_fem.inference.sufficiency import says_too_little
@@ -33,12 +26,23 @@ from spindle_fem.parallel import thread_count
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.results.output_folder import output_folder, replace_text
-from spindle_fem.results.run_summary import package_versions
 
 Progress = Callable[[str], None]
-
-SCHEMA = "spindle-fem/diagnosis/1"
 STATE_COLUMNS = ("start", "end", "effect", "component", "value", "unit")
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What :func:`diagnose` is asked."""
+
+    machine: str | Path
+    recordings: Iterable[str | Path]
+    folder: str | Path
+    calibrate: Iterable[str | Path] = ()
+    overrides: Iterable[str] = ()
+    heldout: str = "blocks"
+    full_model: str = AUTO
+    progress: Progress | None = None
 
 
 def diagnose(
@@ -50,7 +54,6 @@ def diagnose(
     *,
     heldout: str = "blocks",
     full_model: str = AUTO,
-    report: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Say where recordings and a machine differ, what was left out, and how well it fits with it.
@@ -75,8 +78,6 @@ def diagnose(
     full_model : {"auto", "off", "coarse", "own"}
         Mesh on which both fits are run again by the full model; ``auto`` is
         the coarse one unless that would take very many time steps.
-    report : bool
-        Whether to write figures and the report too.
     progress : callable, optional
 
     Returns
@@ -88,34 +89,48 @@ def diagnose(
     ------
     SpindleFemError
     """
+    asked = _Asked(machine, recordings, folder, calibrate, overrides, heldout, full_model, progress)
+    return _diagnose(asked, report=True)
+
+
+def diagnose_without_report(
+    machine: str | Path, recordings: Iterable[str | Path], folder: str | Path, *others: Any, **choices: Any
+) -> dict[str, Any]:
+    """As :func:`diagnose`, which has the same parameters, without ``diagnosis.nc``, figures and report."""
+    return _diagnose(_Asked(machine, recordings, folder, *others, **choices), report=False)
+
+
+def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
     started = time.perf_counter()
-    require_choice(full_model)
-    tell = progress or (lambda stage: None)
+    require_choice(asked.full_model)
+    tell = asked.progress or (lambda stage: None)
     tell("reading")
-    read = [read_recording(path) for path in recordings]
-    earlier = [read_recording(path) for path in calibrate]
-    opened = open_machine(machine, tuple(overrides), read, earlier, heldout=heldout, progress=tell)
-    with output_folder(folder) as place:
+    read = [read_recording(path) for path in asked.recordings]
+    earlier = [read_recording(path) for path in asked.calibrate]
+    opened = open_machine(
+        asked.machine, tuple(asked.overrides), read, earlier, heldout=asked.heldout, progress=tell
+    )
+    with output_folder(asked.folder) as place:
         drawn = None
         reason = says_too_little(opened)
         if reason:
-            content = _unexplained(opened, reason)
+            content = unexplained_content(opened, reason)
             content["fit"]["full_model"] = nothing_run(
-                OFF if full_model == AUTO else full_model, "Nothing was fitted."
+                OFF if asked.full_model == AUTO else asked.full_model, "Nothing was fitted."
             )
         else:
             workers = Workers(min(thread_count(), MOST_WORKERS))
             workers.wake()
-            diagnosis = diagnose_recordings(opened, heldout=heldout, progress=tell, workers=workers)
+            diagnosis = diagnose_recordings(opened, heldout=asked.heldout, progress=tell, workers=workers)
             tell("writing")
             proposed = workers.ahead(partial(next_measurement, diagnosis))
-            content = _write(diagnosis, opened, place, report=report, progress=tell)
+            content = _write(diagnosis, opened, place, report=report)
             if report:
-                drawn = workers.ahead(partial(_draw, place, json.loads(json.dumps(_plain(content)))))
+                drawn = workers.ahead(partial(_draw, place, json.loads(json.dumps(plain_data(content)))))
             content["fit"]["full_model"] = full_model_errors(
                 diagnosis,
                 opened,
-                mesh=full_model,
+                mesh=asked.full_model,
                 keep=lambda name, predicted: _write_predictions(
                     diagnosis, place, f"{name}_full_model", predicted
                 ),
@@ -123,7 +138,7 @@ def diagnose(
             )
             content["next_measurement"] = proposed()
         content["wall_time_s"] = time.perf_counter() - started
-        replace_text(place / "diagnosis.json", json.dumps(_plain(content), indent=1) + "\n")
+        replace_text(place / "diagnosis.json", json.dumps(plain_data(content), indent=1) + "\n")
         if report:
             from spindle_fem.report.diagnosis_report import write_diagnosis_report
 
@@ -139,63 +154,14 @@ def _draw(place: Path, content: Mapping[str, Any]) -> Mapping[str, list[Any]]:
     return draw_figures(place, content)
 
 
-def _write(
-    diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, report: bool, progress: Progress
-) -> dict[str, Any]:
-    judgement, plant = diagnosis.judgement, diagnosis.plant
-    before, after = (predictions_at_stamps(plant, fit) for fit in (diagnosis.null, diagnosis.final))
+def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, report: bool) -> dict[str, Any]:
+    """Write predictions, states, the improved machine and the data of the report; the content so far."""
+    before, after = (predictions_at_stamps(diagnosis.plant, fit) for fit in (diagnosis.null, diagnosis.final))
     _write_predictions(diagnosis, place, "before", before)
     _write_predictions(diagnosis, place, "after", after)
-    findings = findings_of(diagnosis, judgement.chosen, split=True)
-    alternatives = [
-        {"findings": findings_of(diagnosis, item, split=False), "probability": item.probability}
-        for item in judgement.alternatives
-    ]
-    where = where_of(diagnosis)
-    content = {
-        "schema": SCHEMA,
-        "machine": opened.name,
-        "recordings": [recording.name for recording in plant.recordings],
-        "verdict": judgement.verdict,
-        "reason": judgement.reason,
-        "mismatch": {
-            "detected": judgement.verdict != "consistent",
-            "p_value": judgement.p_value,
-            "channels": channel_errors(plant, before),
-            **where.to_json(),
-        },
-        "findings": findings,
-        "set_probability": judgement.chosen.probability,
-        "alternatives": alternatives,
-        "something_else_probability": judgement.other,
-        "evidence": {
-            "probability": judgement.evidence,
-            "share_of_last": judgement.share_of_last,
-            "gain_of_more": judgement.gain_of_more,
-        },
-        "fit": {
-            "before": _errors(diagnosis, before),
-            "after": _errors(diagnosis, after),
-            "noise_K": noise_level(plant),
-            "heldout": diagnosis.heldout,
-            "heldout_s": [
-                [list(ends) for ends in stretches(~use, recording.times)]
-                for recording, use in zip(plant.recordings, plant.use, strict=True)
-            ],
-            "channels_after": channel_errors(plant, after),
-        },
-        "improved_model": "improved_machine.toml",
-        "machine_parameters": _machine_parameters(diagnosis),
-        "slow_error": {"sigma_K": diagnosis.final.slow.sigma, "time_s": diagnosis.final.slow.time},
-        "candidates_tried": diagnosis.candidates_tried,
-        "hypotheses_fitted": len(diagnosis.hypotheses),
-        "seconds": dict(diagnosis.seconds),
-        "notes": [*opened.notes, *dict.fromkeys(note for drive in plant.drives for note in drive.notes)],
-        "defects": [recording.defects.to_json() for recording in plant.recordings],
-        "versions": package_versions(),
-    }
+    content = diagnosis_content(diagnosis, opened, before, after)
     replace_text(place / "improved_machine.toml", improved_machine(diagnosis, opened))
-    rows = states_of(findings)
+    rows = states_of(content["findings"])
     if rows:
         with (place / "states.csv").open("w", newline="", encoding="utf-8") as stream:
             columns = (
@@ -217,83 +183,3 @@ def _write_predictions(diagnosis: Diagnosis, place: Path, name: str, predicted: 
     for number, recording in enumerate(recordings):
         label = f"_{number + 1}" if len(recordings) > 1 else ""
         write_simulated(place / f"{name}{label}.csv", recording, predicted[number])
-
-
-def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, float]:
-    return {
-        "train_rmse_K": rmse(diagnosis.plant, predicted, heldout=False),
-        "heldout_rmse_K": rmse(diagnosis.plant, predicted, heldout=True),
-    }
-
-
-def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The machine's own parameters before and after."""
-    rows = []
-    for coordinate in diagnosis.plant_coordinates:
-        low, high = diagnosis.final.interval(coordinate.name, 1.645)
-        rows.append(
-            {
-                "name": coordinate.name,
-                "prior": coordinate.value,
-                "prior_sigma": coordinate.sigma,
-                "logarithmic": coordinate.logarithmic,
-                "value": diagnosis.final.values[coordinate.name],
-                "low": low,
-                "high": high,
-                "unit": coordinate.unit,
-            }
-        )
-    return rows
-
-
-def _unexplained(opened: DiagnosedMachine, reason: str) -> dict[str, Any]:
-    """A recording that is sound but says too little."""
-    channels = [
-        {"channel": name, "rmse_K": None, "noise_K": float(sigma), "max_K": None}
-        for recording in opened.recordings
-        for name, sigma in zip(recording.temperature_names, recording.sigma, strict=True)
-    ]
-    nothing = {"train_rmse_K": None, "heldout_rmse_K": None}
-    return {
-        "schema": SCHEMA,
-        "machine": opened.name,
-        "recordings": [recording.name for recording in opened.recordings],
-        "verdict": "unexplained",
-        "reason": reason,
-        "mismatch": {
-            "detected": False,
-            "p_value": 1.0,
-            "channels": channels,
-            "where": {"component": None, "r_mm": None, "z_mm": None, "credible": []},
-            "when": [],
-            "missing_heat_W": {},
-        },
-        "findings": [],
-        "set_probability": 0.0,
-        "alternatives": [],
-        "something_else_probability": 1.0,
-        "fit": {"before": nothing, "after": dict(nothing), "noise_K": None, "heldout": "nothing was fitted"},
-        "next_measurement": {
-            "where": "all channels",
-            "quantity": "temperature",
-            "condition": "a speed step from standstill, held until the temperatures settle, then a cool-down",
-            "why": reason,
-        },
-        "improved_model": None,
-        "versions": package_versions(),
-    }
-
-
-def _plain(value: Any) -> Any:
-    """Numbers as JSON knows them; what is not finite becomes null."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, (np.floating, float)):
-        return float(value) if np.isfinite(value) else None
-    if isinstance(value, np.integer):
-        return int(value)
-    if isinstance(value, np.bool_):
-        return bool(value)
-    return value

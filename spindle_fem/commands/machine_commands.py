@@ -1,22 +1,19 @@
-"""One function behind each command; everything the command line does is here to call."""
+"""The functions behind ``spindle-fem run``, ``check`` and ``mesh``."""
 
 from __future__ import annotations
 
-import contextlib
-import re
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from spindle_fem.definition.load import load_machine
-from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
-from spindle_fem.units import ZERO_CELSIUS_K, to_si
+from spindle_fem.commands.checked_machine import load_buildable, load_network
+from spindle_fem.commands.console import stages
+from spindle_fem.errors import SpecError
+from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     from spindle_fem.definition.effect_entries import EffectEntry
-    from spindle_fem.definition.machine_spec import MachineSpec
-    from spindle_fem.definition.network_tables import NetworkMachineSpec
     from spindle_fem.units import Uncertain
 
 
@@ -58,7 +55,7 @@ def run_machine(
     from spindle_fem.results.output_folder import output_folder
 
     started = time.perf_counter()
-    spec = _load_buildable(machine, overrides)
+    spec = load_buildable(machine, overrides)
     with output_folder(folder) as place, stages(progress) as tell, OutputHelpers() as helpers:
         # loaded after the helpers start, which load their own at the same time
         from spindle_fem.report.run_report import read_summary
@@ -101,7 +98,7 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
 
     if is_network_machine(read_definition(find_machine(machine))):
         return _check_network(machine, overrides)
-    spec = _load_buildable(machine, overrides)
+    spec = load_buildable(machine, overrides)
     assembly = build_assembly(spec)
     groups = group_of_contacts(spec, assembly.joint_names)
 
@@ -143,7 +140,7 @@ def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = 
         raise SpecError(
             str(file), f'"{file.suffix}" is no format of the mesh.', f"Allowed: {', '.join(endings)}."
         )
-    spec = _load_buildable(machine, overrides)
+    spec = load_buildable(machine, overrides)
     assembly = build_assembly(spec)
     if file.suffix == ".step":
         from spindle_fem.machine.geometry.step_file import export_step
@@ -165,117 +162,9 @@ def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = 
     }
 
 
-def heat_table(
-    machine: str | Path,
-    *,
-    speeds: Iterable[str] = (),
-    temperature: str = "40 degC",
-    coupled: bool = False,
-    folder: Path | None = None,
-    overrides: Iterable[str] = (),
-) -> dict[str, Any]:
-    """Bearing loads, angles, films and heat term by term over speed.
-
-    Parameters
-    ----------
-    speeds : iterable of str
-        With units; 500 to 4500 rpm in steps of 500 when empty.
-    temperature : str
-        Of rings, balls and grease.
-    coupled : bool
-        Solve the machine at every speed and take its temperatures.
-    folder : Path, optional
-        For ``heat.json``, ``heat.csv`` and charts.
-    """
-    from spindle_fem.studies.heat_study import heat_study, write_heat_study
-
-    spec = load_machine(machine, overrides)
-    chosen = [to_si(text, "rad/s", where="--speed") for text in speeds]
-    kelvin = to_si(temperature, "K", where="--temperature", kind="temperature")
-    content = heat_study(spec, chosen, kelvin, coupled=coupled)
-    if folder is not None:
-        write_heat_study(content, folder)
-    return content
-
-
-def rebuild(folder: Path) -> Path:
-    """Rebuild the report of an output folder, of whichever command, from its files.
-
-    Raises
-    ------
-    BadInputError
-        The folder holds no results, or is marked incomplete.
-    """
-    from spindle_fem.results.output_folder import require_complete
-
-    place = require_complete(folder)
-    if (place / "crosscheck.json").is_file():
-        from spindle_fem.report.crosscheck_report import write_report
-
-        return write_report(place)
-    if (place / "diagnosis.json").is_file():
-        from spindle_fem.report.diagnosis_report import write_diagnosis_report
-
-        return write_diagnosis_report(place)
-    if (place / "simulation.json").is_file():
-        from spindle_fem.report.simulation_report import write_simulation_report
-
-        return write_simulation_report(place)
-    if (place / "sweep.json").is_file():
-        from spindle_fem.report.sweep_report import rebuild_sweep_report
-
-        return rebuild_sweep_report(place)
-    from spindle_fem.report.run_report import rebuild_report
-
-    return rebuild_report(place)
-
-
-def _load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:
-    """Machine whose parts fit together; faults of its tables, geometry and effects at once."""
-    from spindle_fem.definition.load import examine_machine
-    from spindle_fem.machine.geometry.assembly import build_assembly
-    from spindle_fem.machine.geometry.joint_groups import group_of_contacts
-    from spindle_fem.model.reduced.defined_effects import check_effects, require_known_effects
-
-    overrides = tuple(overrides)
-
-    def fits_together(spec: MachineSpec) -> None:
-        group_of_contacts(spec, build_assembly(spec).joint_names)
-
-    def has_possible_effects(spec: MachineSpec) -> None:
-        if not spec.effects:
-            return
-        examination = examine_machine(machine, overrides)
-        entries = _by_number(spec.effects, [fault.where for fault in examination.faults])
-        others = [fault for fault in examination.faults if not _ENTRY.search(fault.where)]
-        try:
-            fits_together(spec)
-        except BadInputError as error:
-            others.append(error)
-        # Where they act needs the rest of the machine; that they exist does not.
-        if others:
-            require_known_effects(entries)
-        else:
-            check_effects(entries, spec)
-
-    return load_machine(machine, overrides, checks=(fits_together, has_possible_effects))
-
-
-_ENTRY = re.compile(r"(?:^|: )effect\[(\d+)\]")
-
-
-def _by_number(entries: Sequence[EffectEntry], faulty: Iterable[str]) -> list[EffectEntry | None]:
-    """Sound entries at their places in the file, None at those of faulty ones."""
-    refused = {int(match[1]) for where in faulty if (match := _ENTRY.search(where))}
-    sound = iter(entries)
-    return [
-        None if number in refused else next(sound) for number in range(1, len(entries) + len(refused) + 1)
-    ]
-
-
 def _check_network(machine: str | Path, overrides: Iterable[str]) -> dict[str, Any]:
     """Contents of a sound ``[network]`` machine; every fault at once."""
-    spec = _load_network(machine, overrides)
+    spec = load_network(machine, overrides)
     tables = spec.network
     return {
         "machine": spec.name,
@@ -299,64 +188,6 @@ def _check_network(machine: str | Path, overrides: Iterable[str]) -> dict[str, A
     }
 
 
-def _load_network(machine: str | Path, overrides: Iterable[str]) -> NetworkMachineSpec:
-    """A sound ``[network]`` machine; faults of its keys, its network and its effects at once."""
-    from pydantic import ValidationError
-
-    from spindle_fem.definition.effect_entries import EffectEntry
-    from spindle_fem.definition.inherit import apply_overrides
-    from spindle_fem.definition.load import find_machine, read_toml
-    from spindle_fem.definition.network_faults import network_faults
-    from spindle_fem.definition.network_tables import (
-        NetworkMachineSpec,
-        NetworkSpec,
-        validate_network_machine,
-    )
-    from spindle_fem.model.lumped.written_network import build_network
-    from spindle_fem.model.reduced.defined_effects import check_network_effects, require_known_effects
-
-    path = find_machine(machine)
-    content = read_toml(path)
-    faults: list[SpindleFemError] = []
-    for override in overrides:
-        try:
-            content = apply_overrides(content, [override], NetworkMachineSpec)
-        except SpecError as error:
-            faults.append(error)
-    spec, network = None, None
-    try:
-        spec = validate_network_machine(content, path.name)
-        network = spec.network
-    except FaultsError as error:
-        faults += error.faults
-        with contextlib.suppress(ValidationError):
-            network = NetworkSpec.model_validate(content["network"])
-    known = {str(fault) for fault in faults}
-
-    def add(found: Iterable[SpindleFemError]) -> None:
-        located = [type(f)(f"{path.name}: {f.where}", f.what, f.how_to_fix) for f in found]
-        faults.extend(fault for fault in located if str(fault) not in known)
-
-    between = [] if network is None else network_faults(network)
-    add(between)
-    written = content.get("effect", ())
-    entries: list[EffectEntry | None] = []
-    for item in written if isinstance(written, (list, tuple)) else ():
-        entries.append(None)
-        with contextlib.suppress(ValidationError):
-            entries[-1] = EffectEntry.model_validate(item)
-    try:
-        if network is None or between:
-            require_known_effects(entries)
-        else:
-            check_network_effects(entries, build_network(network))
-    except FaultsError as error:
-        add(error.faults)
-    if faults or spec is None:
-        raise FaultsError(path.name, faults)
-    return spec
-
-
 def _amount(value: Uncertain, unit: str, zero: float = 0.0) -> str:
     text = f"{value.value - zero:g} {unit}".rstrip()
     return text if value.is_fixed else f"{text}, uncertain"
@@ -364,16 +195,3 @@ def _amount(value: Uncertain, unit: str, zero: float = 0.0) -> str:
 
 def _effect_rows(entries: Sequence[EffectEntry]) -> list[dict[str, str]]:
     return [{"name": entry.effect, "detail": f"{entry.component} {entry.form}".rstrip()} for entry in entries]
-
-
-@contextlib.contextmanager
-def stages(show: bool) -> Iterator[Any]:
-    """Stage names on the terminal while they run."""
-    if not show:
-        yield lambda stage: None
-        return
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    with console.status("starting") as status:
-        yield lambda stage: status.update(f"{stage} ...")

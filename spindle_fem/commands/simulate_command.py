@@ -15,7 +15,7 @@ from scipy.stats import norm
 from spindle_fem.inference.least_squares import LEVEL, Calibration
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import ALL, Comparison, simulation_summary, write_simulated
-from spindle_fem.report.simulation_pictures import draw_channels
+from spindle_fem.report.read_against_predicted import draw_channels
 from spindle_fem.report.simulation_report import write_simulation_report
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_summary import package_versions

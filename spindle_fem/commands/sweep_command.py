@@ -1,30 +1,25 @@
-"""A study from its files to its table and report: the function behind ``spindle-fem sweep``."""
+"""The function behind ``spindle-fem sweep``."""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.definition.load import (
-    write_machine,
-)
-from spindle_fem.errors import BadInputError
+from spindle_fem.commands.console import designs_done
+from spindle_fem.definition.load import write_machine
 from spindle_fem.report.sweep_report import BEST_PICTURE, FIGURE_FOLDER, write_sweep_report
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.thermal_result import ThermalResult
-from spindle_fem.studies.sweep.designs import Design
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, solve_task
 from spindle_fem.studies.sweep.file_names import MACHINE_FILE, STUDY_FILE, SUMMARY_FILE
-from spindle_fem.studies.sweep.judge_designs import judged
-from spindle_fem.studies.sweep.optimise import search_designs
-from spindle_fem.studies.sweep.prepared_study import PreparedStudy, prepare_study
-from spindle_fem.studies.sweep.results_table import RESULTS, ResultTable, Row
-from spindle_fem.studies.sweep.run_tasks import run_tasks
+from spindle_fem.studies.sweep.prepared_study import prepare_study
+from spindle_fem.studies.sweep.results_table import ResultTable
 from spindle_fem.studies.sweep.study_lock import folder_lock
+from spindle_fem.studies.sweep.sweep_study import require_own_table, solve_study
 from spindle_fem.studies.sweep.sweep_summary import summarise
 
 
@@ -73,35 +68,17 @@ def sweep_machine(
     """
     started = time.perf_counter()
     prepared = prepare_study(machine, study, overrides)
-    _require_own_table(Path(folder), prepared.columns)
+    require_own_table(Path(folder), prepared.columns)
     with (
         folder_lock(folder),
         output_folder(folder) as place,
-        _progress(progress, prepared.size) as tell,
+        designs_done(progress, prepared.size) as tell,
     ):
         replace_text(place / MACHINE_FILE, write_machine(prepared.spec))
         replace_text(place / STUDY_FILE, Path(study).read_text(encoding="utf-8"))
         table = ResultTable(place, prepared.columns)
         before = set(table.rows)
-        tasks = list(prepared.tasks)
-
-        def solve(batch: Sequence[DesignTask]) -> list[Row]:
-            _solve_missing(batch, prepared, table, tell, jobs=jobs, scheduler=scheduler)
-            return [
-                table.rows[task.key] | head
-                for task, head in zip(batch, _heads(table, batch, prepared), strict=True)
-            ]
-
-        rows = solve(tasks)
-        if prepared.study.search is not None:
-
-            def attempt(designs: Sequence[Design]) -> list[Row]:
-                batch = [prepared.builder.task(design) for design in designs]
-                tasks.extend(batch)
-                return solve(batch)
-
-            search_designs(prepared.study, prepared.axes, prepared.limits, rows, attempt)
-        rows = table.finish(_heads(table, tasks, prepared))
+        tasks, rows = solve_study(prepared, table, tell, jobs=jobs, scheduler=scheduler)
         reused = len({task.key for task in tasks} & before)
         summary = summarise(prepared, rows, reused=reused)
         results = _pictured(place, summary, tasks, solved_now=len(table.rows) > len(before))
@@ -111,46 +88,6 @@ def sweep_machine(
         )
         write_sweep_report(place, summary, rows, prepared.spec, results)
     return summary
-
-
-def _require_own_table(folder: Path, columns: Sequence[str]) -> None:
-    """Refuse the folder of another study before it is touched."""
-    path = folder / RESULTS
-    if not path.is_file() or path.stat().st_size == 0:
-        return
-    with path.open(encoding="utf-8", newline="") as stream:
-        heading = stream.readline()
-    if heading.endswith("\n") and heading.strip() != ",".join(columns):
-        raise BadInputError(
-            str(path),
-            "is the table of another study.",
-            "Give a new folder, or the study that the folder belongs to.",
-        )
-
-
-def _solve_missing(
-    tasks: Sequence[DesignTask],
-    prepared: PreparedStudy,
-    table: ResultTable,
-    tell: Callable[[int], None],
-    *,
-    jobs: int,
-    scheduler: str | None,
-) -> None:
-    """Solve the tasks that have no row yet, each machine once."""
-    missing: dict[str, DesignTask] = {}
-    for task in tasks:
-        if task.key not in table:
-            missing.setdefault(task.key, task)
-    tell(len(tasks) - len(missing))
-
-    def land(row: Row) -> None:
-        table.append({**row, **judged(row, prepared.limits)})
-        tell(1)
-
-    run_tasks(
-        list(missing.values()), prepared.question, land, plan=prepared.tasks, jobs=jobs, scheduler=scheduler
-    )
 
 
 def _pictured(
@@ -164,45 +101,3 @@ def _pictured(
             if json.loads(old.read_text(encoding="utf-8")).get("pictured") == summary["pictured"]:
                 return {}
     return {number: solve_task(tasks[number - 1]) for number in summary["pictured"]}
-
-
-def _heads(table: ResultTable, tasks: Sequence[DesignTask], prepared: PreparedStudy) -> list[Row]:
-    """What each row gets from the study as it is now: its place, its design, the verdict of the limits."""
-    return [
-        {
-            "design": task.design.number,
-            **task.design.values,
-            "key": task.key,
-            **judged(table.rows[task.key], prepared.limits),
-        }
-        for task in tasks
-    ]
-
-
-@contextlib.contextmanager
-def _progress(show: bool, total: int) -> Iterator[Callable[[int], None]]:
-    """Rows done and time left on the terminal; the callable takes how many more are done."""
-    if not show:
-        yield lambda done: None
-        return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (
-        TextColumn("designs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(elapsed_when_finished=False),
-    )
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("designs", total=total)
-        yield lambda done: bar.advance(task, done)

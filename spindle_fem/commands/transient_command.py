@@ -1,18 +1,24 @@
-"""A transient study from its file to its folder."""
+"""The function behind ``spindle-fem transient``."""
 
 from __future__ import annotations
 
+import csv
+import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.definition.load import load_machine
+import numpy as np
+
+from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.model.reduced.defined_effects import physics_of
-from spindle_fem.report.transient_report import write_transient
-from spindle_fem.results.output_folder import output_folder
+from spindle_fem.report.transient_report import write_transient_report
+from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.solvers.coupled_steady import prepare_machine
-from spindle_fem.solvers.saved_state import load_state
-from spindle_fem.studies.transient_study import load_study, run_study
+from spindle_fem.solvers.saved_state import load_state, save_state
+from spindle_fem.studies.transient_study import StudyResult, load_study, run_study
+from spindle_fem.studies.transient_summary import summarise
+from spindle_fem.units import ZERO_CELSIUS_K
 
 
 def run_transient_study(
@@ -54,4 +60,26 @@ def run_transient_study(
         prepared = prepare_machine(spec, progress=progress)
         physics = physics_of(prepared)
         result = run_study(prepared, asked, start=start, memory=memory, physics=physics, progress=progress)
-        return write_transient(prepared, result, place)
+        summary = summarise(prepared, result)
+        _write_table(result, place / "transient.csv")
+        save_state(place / "state.npz", result.state, result.memory)
+        replace_text(place / "machine.toml", write_machine(prepared.spec))
+        replace_text(place / "transient.json", json.dumps(summary, indent=1) + "\n")
+        write_transient_report(summary, result, place)
+        return summary
+
+
+def _write_table(result: StudyResult, path: Path) -> None:
+    first = result.phases[0].transient
+    header = [
+        "time_s",
+        *(f"{name}_degC" for name in first.probes),
+        *(f"{name}_{part}_degC" for name in first.bearings for part in ("inner", "outer", "balls")),
+    ]
+    parts = np.stack([result.joined(name) for name in ("inner", "outer", "balls")], axis=2)
+    temperatures = np.hstack((result.joined("readings"), parts.reshape(len(parts), -1))) - ZERO_CELSIUS_K
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(header)
+        for time, row in zip(result.joined("times"), temperatures, strict=True):
+            writer.writerow([f"{time:.6g}", *(f"{value:.4f}" for value in row)])

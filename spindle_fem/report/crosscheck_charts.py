@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.report.figure_style import CYCLE, INK, MUTED, TEMPERATURE_MAP, new_figure, save_png, styled
-from spindle_fem.studies.crosscheck.causes import CauseStudy
+from spindle_fem.studies.crosscheck.causes import CAUSES, CauseStudy
+from spindle_fem.studies.crosscheck.crosscheck_study import Crosscheck
 from spindle_fem.studies.crosscheck.node_comparison import Comparison
 
 Array = NDArray[np.float64]
@@ -182,7 +183,16 @@ def convergence_chart(rows: list[Mapping[str, float]]) -> Figure:
     return figure
 
 
-def write_pictures(figures: Mapping[str, Figure], folder: Path) -> dict[str, Path]:
-    """Save every figure as PNG."""
-    folder.mkdir(exist_ok=True)
-    return {name: save_png(figure, folder / f"{name}.png") for name, figure in figures.items()}
+def write_crosscheck_figures(folder: Path, found: Crosscheck) -> None:
+    """Draw ``figures/*.png`` of a cross-check."""
+    figures = {
+        "difference": difference_map(found.comparison),
+        "temperatures": temperature_map(found.comparison),
+        "causes": causes_chart(found.comparison, found.study, CAUSES),
+        "speeds": speed_chart(found.content["matched"]["speeds"]),
+        "convergence": convergence_chart(found.content["convergence"]["rows"]),
+    }
+    place = folder / "figures"
+    place.mkdir(exist_ok=True)
+    for name, figure in figures.items():
+        save_png(figure, place / f"{name}.png")

@@ -25,7 +25,7 @@ from spindle_fem.studies.crosscheck.causes import CAUSES, CHECKS
 _SHOWN_LINKS = 20
 
 
-def write_report(folder: str | Path) -> Path:
+def write_crosscheck_report(folder: str | Path) -> Path:
     """``report.html`` of a folder that holds ``crosscheck.json`` and ``figures``.
 
     Raises

@@ -1,4 +1,4 @@
-"""Charts of a diagnosis over time and condition: before and after, residual map, missing heat."""
+"""Charts of a diagnosis: residuals by channel and condition, missing heat over time."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from spindle_fem.report.figure_style import (
@@ -25,155 +23,14 @@ from spindle_fem.report.figure_style import (
     set_title,
     styled,
 )
+from spindle_fem.report.read_against_predicted import MOST_CHANNELS, channel_order, of_recording, time_scale
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
 
-READ, BEFORE, AFTER, HELD = "#8a8f94", CYCLE[1], CYCLE[0], "#eceff2"
-MOST_CHANNELS = 12
-MOST_POINTS = 1500
-BINS = 240
 NORMAL_90 = 1.645
-# As recordings are divided: a longer pause than so many usual steps.
-LONG_GAP_STEPS = 60.0
-LONG_SECONDS = 3.0 * 86400.0
-
-
-def time_scale(seconds: float) -> tuple[float, str]:
-    """Divisor and unit in which a span of time reads well.
-
-    >>> time_scale(5400.0), time_scale(1e7)[1]
-    ((3600.0, 'h'), 'd')
-    """
-    if seconds >= LONG_SECONDS:
-        return 86400.0, "d"
-    return (3600.0, "h") if seconds >= 3600.0 else (60.0, "min")
-
-
-def of_recording(data: xr.Dataset, number: int) -> xr.Dataset:
-    """Stamps of one recording."""
-    return data.isel(stamp=np.flatnonzero(data["recording_index"].values == number))
-
-
-def channel_order(data: xr.Dataset) -> list[str]:
-    """Channels that were read, those with the largest error before first."""
-    error = (data["before"] - data["measured"]).where(data["usable"] == 1)
-    size = np.sqrt((error**2).mean("stamp", skipna=True)).values
-    names = [str(name) for name in data["channel"].values]
-    return [names[i] for i in np.argsort(-np.nan_to_num(size, nan=-1.0)) if np.isfinite(size[i])]
-
-
-@styled
-def before_after(data: xr.Dataset, number: int) -> Figure:
-    """Every channel of a recording over time, predictions before and after, residuals beneath.
-
-    Parameters
-    ----------
-    data : Dataset
-        As ``diagnosis.nc`` has it.
-    number : int
-        Recording.
-    """
-    own = of_recording(data, number)
-    names = [str(n) for n in own["channel"].values if n in channel_order(own)]
-    if len(names) > MOST_CHANNELS:
-        names = channel_order(own)[:MOST_CHANNELS]
-    scale, unit = time_scale(float(own["time"].values[-1] - own["time"].values[0]))
-    rows = math.ceil(len(names) / 2)
-    top, cell, foot = 178.0, 470.0, 50.0
-    figure = new_figure(top + rows * cell + foot)
-    for position, name in enumerate(names):
-        row, column = divmod(position, 2)
-        left = 115.0 + 795.0 * column
-        upper = pixel_axes(figure, left, top + row * cell, 655.0, 235.0)
-        lower = pixel_axes(figure, left, top + row * cell + 260.0, 655.0, 130.0, sharex=upper)
-        _draw_channel(upper, lower, own, number, name, scale)
-        upper.set_ylabel("°C")
-        lower.set_ylabel("residual / K")
-        for axes in (upper, lower):
-            # Beyond the widest tick label, in every row alike.
-            axes.yaxis.set_label_coords(-0.128, 0.5)
-        if row == rows - 1 or position + 2 >= len(names):
-            lower.set_xlabel(f"time / {unit}")
-    width, height = figure.get_size_inches() * figure.dpi
-    handles = [
-        Line2D([], [], color=READ, linestyle="none", marker=".", markersize=6),
-        Line2D([], [], color=BEFORE, linestyle="--"),
-        Line2D([], [], color=AFTER),
-        Rectangle((0, 0), 1, 1, color=HELD),
-        Rectangle((0, 0), 1, 1, color="#c9d3dc"),
-    ]
-    texts = ["read", "model before", "model after", "held out: not fitted", "noise, ± 2 σ of a reading"]
-    figure.legend(
-        handles, texts, ncols=5, loc="upper left", bbox_to_anchor=(15.0 / width, 1.0 - 82.0 / height)
-    )
-    set_title(
-        figure,
-        f"{data['recording'].values[number]}: before and after",
-        "Temperature above, residual (read − model, means over short times) beneath.",
-    )
-    return figure
-
-
-def _draw_channel(upper: Axes, lower: Axes, own: xr.Dataset, number: int, name: str, scale: float) -> None:
-    item = own.sel(channel=name)
-    times = item["time"].values / scale
-    good = item["usable"].values == 1
-    for start, end in runs(item["held_out"].values == 1):
-        for axes in (upper, lower):
-            axes.axvspan(times[start], times[end], color=HELD, linewidth=0.0, zorder=0)
-    chosen = np.flatnonzero(good)
-    chosen = chosen[:: max(1, len(chosen) // MOST_POINTS)]
-    upper.plot(times[chosen], item["measured"].values[chosen], ".", color=READ, markersize=2.6, zorder=2)
-    sigma = float(item["noise"].values[number])
-    lower.axhspan(-2.0 * sigma, 2.0 * sigma, color="#c9d3dc", alpha=0.8, linewidth=0.0, zorder=1)
-    lower.axhline(0.0, color=MUTED, linewidth=0.8, zorder=1)
-    for key, colour, style in (("before", BEFORE, "--"), ("after", AFTER, "-")):
-        thin = slice(None, None, max(1, len(times) // (3 * MOST_POINTS)))
-        upper.plot(
-            times[thin],
-            _broken(times, item[key].values)[thin],
-            color=colour,
-            linestyle=style,
-            linewidth=1.5,
-            zorder=3,
-        )
-        at, mean = _bin_means(times[good], (item["measured"] - item[key]).values[good])
-        lower.plot(at, mean, color=colour, linewidth=1.3, linestyle=style, zorder=3)
-    upper.set_title(name)
-    upper.tick_params(labelbottom=False)
-    upper.margins(x=0.01)
-
-
-def _broken(times: Array, values: Array) -> Array:
-    """Values with NaN where a long gap follows, so that no line crosses it."""
-    gaps = np.diff(times, append=times[-1])
-    return np.where(gaps > max(LONG_GAP_STEPS * float(np.median(gaps)), 1e-9), np.nan, values)
-
-
-def _bin_means(times: Array, values: Array) -> tuple[Array, Array]:
-    """Means over equal stretches of time; NaN between two where nothing was read for long."""
-    if times.size <= BINS:
-        return times, values
-    owner = np.minimum((BINS * (times - times[0]) / (times[-1] - times[0])).astype(int), BINS - 1)
-    count = np.bincount(owner, minlength=BINS)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return (
-            times[0] + (np.arange(BINS) + 0.5) * (times[-1] - times[0]) / BINS,
-            np.bincount(owner, weights=values, minlength=BINS) / count,
-        )
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of every run of true entries.
-
-    >>> runs(np.array([True, False, True, True]))
-    [(0, 0), (2, 3)]
-    """
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def residual_table(data: xr.Dataset, key: str) -> tuple[list[str], list[str], Array]:

@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from spindle_fem.report.diagnosis_charts import HELD, NORMAL_90
+from spindle_fem.report.diagnosis_charts import NORMAL_90
 from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, pixel_axes, set_title, styled
+from spindle_fem.report.read_against_predicted import HELD
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -21,7 +21,7 @@ from spindle_fem.report.block_page import (
     illustration_of,
     render_document,
 )
-from spindle_fem.report.diagnosis_charts import before_after, missing_heat, residual_map
+from spindle_fem.report.diagnosis_charts import missing_heat, residual_map
 from spindle_fem.report.diagnosis_data import DATA_SCHEMA
 from spindle_fem.report.diagnosis_drawing import located_on_machine, located_on_network
 from spindle_fem.report.diagnosis_full_model import full_model_sections
@@ -43,6 +43,7 @@ from spindle_fem.report.diagnosis_words import (
     verdict_sentence,
 )
 from spindle_fem.report.figure_style import save_png
+from spindle_fem.report.read_against_predicted import before_after
 from spindle_fem.results.output_folder import replace_text
 
 if TYPE_CHECKING:

@@ -115,7 +115,8 @@ def _condition_table(content: Mapping[str, Any]) -> Table:
 def _picture(folder: Path, name: str) -> Any:
     title = Path(name).stem.removeprefix("residual_").replace("_", " ")
     return illustration_of(
-        folder / name, f"{title}: read and predicted; below, their difference and its 90 % interval."
+        folder / name,
+        f"{title}: read and predicted; below, read less predicted, and the 90 % interval of a reading.",
     )
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -204,32 +202,3 @@ def _thrust_sweep(
             }
         )
     return rows
-
-
-def write_heat_study(content: dict[str, Any], folder: str | Path) -> None:
-    """Write ``heat.json``, ``heat.csv`` and the charts of a heat study.
-
-    Parameters
-    ----------
-    content : dict
-        As :func:`heat_study` returns it.
-    folder : str or Path
-        Made when missing; complete, or marked incomplete.
-    """
-    import pandas
-
-    from spindle_fem.report.heat_charts import write_heat_charts
-    from spindle_fem.results.output_folder import output_folder
-
-    rows = []
-    for name, entries in content["bearings"].items():
-        for entry in entries:
-            flat = {key: value for key, value in entry.items() if not isinstance(value, dict)}
-            flat |= {f"{term}_W": value for term, value in entry["terms_W"].items()}
-            for side, contact in entry["contacts"].items():
-                flat |= {f"{side}_{key}": value for key, value in contact.items()}
-            rows.append({"bearing": name, **flat})
-    with output_folder(folder) as place:
-        (place / "heat.json").write_text(json.dumps(content, indent=2, ensure_ascii=False), encoding="utf-8")
-        pandas.DataFrame(rows).to_csv(place / "heat.csv", index=False)
-        write_heat_charts(content, place / "figures")

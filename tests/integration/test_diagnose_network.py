@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
-from spindle_fem import parallel
-from spindle_fem.commands.diagnose_command import diagnose
+from spindle_fem.commands.diagnose_command import diagnose, diagnose_without_report
 from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.effects.registry import candidates_for
 from spindle_fem.errors import BadInputError, ConvergenceError
@@ -23,6 +22,7 @@ from spindle_fem.inference.prepared_problem import all_stamps, calibrate
 from spindle_fem.inference.screening import screen
 from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.inference.worker_processes import FitOrder, Workers, fit_order
+from spindle_fem.parallel import worker_pool
 from spindle_fem.recordings.align import read_recording
 
 MACHINE = """
@@ -182,7 +182,7 @@ def require_probabilities(content):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_machine_within_its_priors_is_consistent(machine, tmp_path, seed):
-    content = diagnose(machine, [record(tmp_path / "run", seed)], tmp_path / "out", report=False)
+    content = diagnose_without_report(machine, [record(tmp_path / "run", seed)], tmp_path / "out")
     assert content["verdict"] == "consistent"
     assert not content["mismatch"]["detected"]
     assert content["mismatch"]["p_value"] > 0.01
@@ -196,7 +196,7 @@ def test_a_link_beyond_what_the_calibration_told_is_a_parameter(machine, tmp_pat
     built = as_built(4)
     earlier = record(tmp_path / "earlier", 4, built=built)
     loose = record(tmp_path / "loose", 5, built=built | {"body|ambient": 0.55 * built["body|ambient"]})
-    content = diagnose(machine, [loose], tmp_path / "out", [earlier], report=False)
+    content = diagnose_without_report(machine, [loose], tmp_path / "out", [earlier])
     assert content["verdict"] == "parameter"
     assert effects(content) == {("joint_conductance", "body|ambient")}
     factor = content["findings"][0]["parameters"]["factor"]
@@ -212,7 +212,7 @@ def test_a_sensor_that_reads_high_is_the_sensor(machine, tmp_path):
 
     earlier = record(tmp_path / "earlier", 6)
     run = record(tmp_path / "run", 16, built=as_built(6), reading=high)
-    content = diagnose(machine, [run], tmp_path / "out", [earlier], report=False)
+    content = diagnose_without_report(machine, [run], tmp_path / "out", [earlier])
     assert content["verdict"] == "sensor"
     (finding,) = content["findings"]
     assert finding["effect"] == "sensor_offset"
@@ -233,7 +233,7 @@ def test_a_sensor_that_lags_is_the_sensor(machine, tmp_path):
 
     earlier = record(tmp_path / "earlier", 7)
     run = record(tmp_path / "run", 17, built=as_built(7), reading=slow)
-    content = diagnose(machine, [run], tmp_path / "out", [earlier], report=False)
+    content = diagnose_without_report(machine, [run], tmp_path / "out", [earlier])
     assert content["verdict"] == "sensor"
     (finding,) = content["findings"]
     assert finding["effect"] == "sensor_lag"
@@ -246,7 +246,7 @@ def heated(machine, tmp_path_factory):
     """Two intervals of heat that nobody wrote down."""
     folder = tmp_path_factory.mktemp("heated")
     run = record(folder / "run", 8, extra=hot)
-    return run, folder / "out", diagnose(machine, [run], folder / "out", report=False)
+    return run, folder / "out", diagnose_without_report(machine, [run], folder / "out")
 
 
 def test_heat_that_nobody_recorded_is_found_with_its_intervals(heated):
@@ -283,7 +283,7 @@ def loaded(machine, tmp_path_factory):
     """Heat that grows with something that was recorded and drives nothing in the model."""
     folder = tmp_path_factory.mktemp("loaded")
     run = record(folder / "run", 9, extra=lambda time: HEAT * (load(time) / 100.0) ** 1.3, beside=load)
-    return run, folder / "out", diagnose(machine, [run], folder / "out", report=False)
+    return run, folder / "out", diagnose_without_report(machine, [run], folder / "out")
 
 
 def test_heat_that_follows_a_covariate_comes_out_as_its_law(loaded):
@@ -328,7 +328,7 @@ def test_what_is_held_out_does_not_touch_the_findings(machine, heated, tmp_path)
     copy.mkdir()
     frame.to_csv(copy / "data.csv", index=False)
     (copy / "recording.toml").write_text((run / "recording.toml").read_text())
-    again = diagnose(machine, [copy], tmp_path / "out", report=False)
+    again = diagnose_without_report(machine, [copy], tmp_path / "out")
     assert again["verdict"] == content["verdict"]
     assert again["findings"] == content["findings"]
     assert again["machine_parameters"] == content["machine_parameters"]
@@ -405,14 +405,14 @@ def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine
     offsets = [c for c in candidates_for(opened.view) if c.effect == "sensor_offset"][:2]
     orders = [FitOrder((candidate,), {}, iterations=1) for candidate in offsets]
     sent, here = [], []
-    plain_dumps, plain_fit = parallel._dumps, abreast.fit_order
+    plain_dumps, plain_fit = worker_pool._dumps, abreast.fit_order
 
     def dumps(item):
         if isinstance(item, Problem):
             sent.append(item)
         return plain_dumps(item)
 
-    monkeypatch.setattr(parallel, "_dumps", dumps)
+    monkeypatch.setattr(worker_pool, "_dumps", dumps)
     monkeypatch.setattr(
         abreast, "fit_order", lambda problem, order: here.append(problem) or plain_fit(problem, order)
     )
@@ -457,7 +457,7 @@ def test_two_things_at_once_are_both_named(machine, tmp_path):
 
     earlier = record(tmp_path / "earlier", 9)
     run = record(tmp_path / "run", 19, built=as_built(9), extra=hot, reading=high)
-    content = diagnose(machine, [run], tmp_path / "out", [earlier], report=False)
+    content = diagnose_without_report(machine, [run], tmp_path / "out", [earlier])
     # Physics before sensors.
     assert content["verdict"] == "missing_physics"
     found = {item["effect"]: item for item in content["findings"]}

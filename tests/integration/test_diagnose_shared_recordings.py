@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from spindle_fem.commands.diagnose_command import diagnose
+from spindle_fem.commands.diagnose_command import diagnose_without_report
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "spindle_examples"
 CASES = sorted(path.name for path in EXAMPLES.glob("example_*") if path.is_dir())
@@ -21,14 +21,13 @@ pytestmark = [
 def diagnosed(name, folder):
     case = EXAMPLES / name
     earlier = case / "calibration.toml"
-    return diagnose(
+    return diagnose_without_report(
         "recorded_spindle",
         [case / "recording.toml"],
         folder,
         [earlier] if earlier.exists() else (),
         ("mesh.preset=coarse",),
         full_model="off",
-        report=False,
     )
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from spindle_fem.commands.console import print_simulation
-from spindle_fem.commands.machine_commands import rebuild
+from spindle_fem.commands.report_command import rebuild
 from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.errors import BadInputError, RecordingError
 

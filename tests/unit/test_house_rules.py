@@ -27,7 +27,6 @@ LONG_FILES = {
     "validation/laws.py",
 }
 BUSY_FUNCTIONS = {
-    "spindle_fem/commands/diagnose_command.py:diagnose",
     "spindle_fem/effects/framework/effect.py:candidate",
     "spindle_fem/model/lumped/network_transient.py:simulate_transient",
     "spindle_fem/model/mesh/time_stepper.py:integrate",

@@ -52,7 +52,6 @@ MAY_LOAD_PYVISTA = {"report", "cli"}
 OPEN: set[tuple[str, str]] = {
     ("inference", "studies"),
     ("model.reduced", "studies"),
-    ("studies", "report"),
 }
 # Imports between files that close a circle: left to mend.
 OPEN_CIRCLES: tuple[tuple[str, str], ...] = (

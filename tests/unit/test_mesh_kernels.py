@@ -7,7 +7,6 @@ import pytest
 from scipy import sparse
 from skfem import Basis, ElementTetP1, MeshTet
 
-from spindle_fem import parallel
 from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes
 from spindle_fem.machine.meshing.tagged_mesh import Joint
@@ -23,6 +22,7 @@ from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.multigrid import build_hierarchy, scales_of_smoothing
 from spindle_fem.model.mesh.skfem_mesh import ELEMENT_QUADRATURE_DEGREE
 from spindle_fem.model.mesh.steady_conduction import solve_steady
+from spindle_fem.parallel import worker_threads as parallel
 
 ROUND_OFF = 1e-13
 TUBES = build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((3, 3), 24, 5))

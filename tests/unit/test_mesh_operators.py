@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from skfem import asm
 
-from spindle_fem import parallel
 from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError, UnknownSurfaceError
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes, build_tube
 from spindle_fem.model.mesh import element_integrals, forms, threads
 from spindle_fem.model.mesh.mesh_operators import build_operators, spread
 from spindle_fem.model.mesh.skfem_mesh import load_into_skfem
+from spindle_fem.parallel import worker_threads as parallel
 
 
 @pytest.fixture(autouse=True, params=["scikit-fem", "kernels"])

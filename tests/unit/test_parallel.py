@@ -15,7 +15,7 @@ import pytest
 import spindle_fem
 from spindle_fem import parallel
 from spindle_fem.errors import BadInputError, WorkerDiedError
-from spindle_fem.parallel import BackgroundProcess, Shared, WorkerPool
+from spindle_fem.parallel import BackgroundProcess, Shared, WorkerPool, worker_pool
 
 SEVERAL_CORES = parallel.core_count() > 1
 
@@ -79,7 +79,7 @@ def test_alone_nothing_is_sent():
 def test_other_processes_are_woken_where_there_are_any(monkeypatch):
     started = []
     idle = types.SimpleNamespace(submit=lambda job: None)
-    monkeypatch.setattr(parallel, "_executor", lambda number: started.append(number) or idle)
+    monkeypatch.setattr(worker_pool, "_executor", lambda number: started.append(number) or idle)
     WorkerPool(1).wake()
     assert started == []
     WorkerPool(3).wake()
@@ -227,4 +227,8 @@ def test_nothing_else_starts_threads_or_processes():
         for path in folder.rglob("*.py")
         if starts.search(path.read_text(encoding="utf-8"))
     }
-    assert found == {"parallel.py"}
+    assert found == {
+        "parallel/background_process.py",
+        "parallel/worker_pool.py",
+        "parallel/worker_threads.py",
+    }

@@ -1,156 +1,27 @@
-"""Work in parallel: threads, worker processes, one background process. Nothing else starts any.
-
-A job is a callable without arguments. :func:`in_threads` runs jobs that leave the
-interpreter lock alone (compiled loops, compression); a :class:`WorkerPool` runs jobs in
-other processes of this machine or behind a Dask scheduler; a :class:`BackgroundProcess`
-keeps one object in a copy of this process and answers calls of its methods in their order.
-
-``SPINDLE_FEM_THREADS`` limits all of them; with 1 everything happens in this process, one
-thing after the other. Workers compute with one thread each.
-"""
+"""Jobs in other processes of this machine or behind a Dask scheduler."""
 
 from __future__ import annotations
 
 import atexit
 import contextlib
 import itertools
-import os
 import pickle
-import queue
-import sys
-import threading
-import types
-import warnings
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextvars import ContextVar
-from functools import cache, lru_cache, partial
-from multiprocessing.reduction import ForkingPickler
+from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Generic, TypeVar
 
-from spindle_fem.errors import BadInputError, SpindleFemError, WorkerDiedError
+from spindle_fem.errors import BadInputError, WorkerDiedError
+from spindle_fem.parallel.worker_threads import MORE_ROOM, ONE_THREAD, Job, worker_count
 
 # Worker processes end when idle for so long, s.
 IDLE_S = 300
-# A background process that has not answered for so long is taken for dead, s.
-PATIENCE_S = 600.0
-ONE_THREAD = dict.fromkeys(
-    (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-        "SPINDLE_FEM_THREADS",
-    ),
-    "1",
-)
-MORE_ROOM = "Free memory, or set SPINDLE_FEM_THREADS=1 to work in one process."
-
-Job = Callable[[], Any]
 Value = TypeVar("Value")
-_ONE: ContextVar[bool] = ContextVar("one_thread", default=False)
 
 
-def _read_only(content: dict) -> types.MappingProxyType:
-    return types.MappingProxyType(content)
-
-
-# Stages are full of read-only mappings.
-ForkingPickler.register(types.MappingProxyType, lambda item: (_read_only, (dict(item),)))
-
-
-# ------------------------------------------------------------------ how many
-@cache
-def core_count() -> int:
-    """Cores that this process may use; at most ``SPINDLE_FEM_THREADS``."""
-    return _asked("SPINDLE_FEM_THREADS") or _given_cores()
-
-
-@cache
-def _thread_count() -> int:
-    return _asked("SPINDLE_FEM_THREADS") or _asked("OMP_NUM_THREADS") or _given_cores()
-
-
-def thread_count() -> int:
-    """Threads of compiled loops: one within :func:`one_thread`, else as the environment or the cores say."""
-    return 1 if _ONE.get() else _thread_count()
-
-
-def worker_count(asked: int) -> int:
-    """Worker processes: as many as asked for, or one a core below 1."""
-    return asked if asked >= 1 else core_count()
-
-
-@contextlib.contextmanager
-def one_thread() -> Iterator[None]:
-    """Compiled loops with one thread: the order of sums, and so the last digits, depend on their number."""
-    token = _ONE.set(True)
-    try:
-        yield
-    finally:
-        _ONE.reset(token)
-
-
-def _asked(name: str) -> int:
-    given = os.environ.get(name, "")
-    return int(given) if given.isdigit() else 0
-
-
-def _given_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-# ------------------------------------------------------------------- threads
-@cache
-def _waiting_threads(count: int, process: int) -> queue.SimpleQueue:
-    """Queue that ``count`` threads of a process wait at; handing over to a pool takes five times as long."""
-    jobs: queue.SimpleQueue = queue.SimpleQueue()
-
-    def serve() -> None:
-        while True:
-            jobs.get()()
-
-    for index in range(count):
-        threading.Thread(target=serve, name=f"spindle-fem-{index}", daemon=True).start()
-    return jobs
-
-
-def hand_over(count: int, job: Job) -> None:
-    """Have a job called by ``count`` other threads, once each, without waiting for them."""
-    jobs = _waiting_threads(count, os.getpid())
-    for _ in range(count):
-        jobs.put(job)
-
-
-def in_threads(jobs: Sequence[Job]) -> list:
-    """Answers of jobs in their order, each run by whatever thread is free; the calling one takes part."""
-    answers: list = [None] * len(jobs)
-    places, done = iter(range(len(jobs))), queue.SimpleQueue()
-
-    def work() -> None:
-        # taking the next of a range is one step of the interpreter
-        for place in places:
-            try:
-                answers[place] = jobs[place]()
-                done.put(None)
-            except Exception as error:  # noqa: BLE001 - the caller raises it
-                done.put(error)
-
-    count = min(thread_count(), len(jobs))
-    if count > 1:
-        hand_over(count - 1, work)
-    work()
-    errors = [done.get() for _ in jobs]
-    for error in errors:
-        if error is not None:
-            raise error
-    return answers
-
-
-# ---------------------------------------------------------- worker processes
 class Shared(Generic[Value]):
     """An object that many jobs use: pickled to a file when the first of them is sent, read once a worker.
 
@@ -420,145 +291,3 @@ def _client(address: str) -> Iterator[Any]:
         ) from error
     with client:
         yield client
-
-
-# ------------------------------------------------------- a background process
-class BackgroundProcess:
-    """One object in a copy of this process, made before there is work for it.
-
-    What the object loads and prepares when it is made, and what it is asked for while this
-    process computes, costs no waiting time later. Calls are answered in their order. On one
-    core, or where processes cannot be copied, the object is made here and answers when an
-    answer is waited for. Errors of the object are raised where the answer is waited for.
-
-    Parameters
-    ----------
-    make : callable
-        Makes the object; its methods are what can be asked for. Arguments and answers are pickled.
-    beside : bool
-        False to have it made here in any case.
-
-    >>> with BackgroundProcess(list) as process:
-    ...     _ = process.ask("append", 3)
-    ...     count = process.ask("__len__")
-    ...     count()
-    1
-    """
-
-    def __init__(self, make: Callable[[], Any], *, beside: bool = True) -> None:
-        self._make = make
-        self._asked: list[tuple[str, tuple]] = []
-        self._answers: list[tuple[bool, Any]] = []
-        self._here: Any = None
-        self._connection: Any = None
-        if beside and core_count() > 1 and sys.platform.startswith("linux"):
-            self._connection, self._process = _copy_of_this_process(make)
-
-    def __enter__(self) -> BackgroundProcess:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def ask(self, method: str, *arguments: Any) -> Job:
-        """Hand a call over; the returned function waits for its answer.
-
-        Raises
-        ------
-        WorkerDiedError
-            From the returned function: the process ended before its time, or does not answer.
-        """
-        number = len(self._asked)
-        self._asked.append((method, arguments if self._connection is None else ()))
-        if self._connection is not None:
-            with contextlib.suppress(OSError):  # said when the answer is waited for
-                self._connection.send((method, arguments))
-        return lambda: self._answer_of(number)
-
-    def close(self) -> None:
-        """End the process; what was not waited for may be left undone."""
-        if self._connection is not None:
-            self._connection.close()
-            self._process.kill()
-            self._process.join()
-
-    def _answer_of(self, number: int) -> Any:
-        while len(self._answers) <= number:
-            method, arguments = self._asked[len(self._answers)]
-            if self._connection is not None:
-                self._answers.append(self._receive(method))
-            else:
-                self._here = self._make() if self._here is None else self._here
-                self._answers.append((True, getattr(self._here, method)(*arguments)))
-        done, answer = self._answers[number]
-        if not done:
-            raise answer
-        return answer
-
-    def _receive(self, method: str) -> tuple[bool, Any]:
-        name = f"{getattr(self._make, '__name__', 'background process')}, {method}"
-        try:
-            if self._connection.poll(PATIENCE_S):
-                return self._connection.recv()
-            what = f"no answer within {PATIENCE_S:.0f} s."
-        except (EOFError, OSError):
-            what = "its process ended before its time."
-        return False, WorkerDiedError(name, what, MORE_ROOM)
-
-
-def _copy_of_this_process(make: Callable[[], Any]) -> tuple[Any, Any]:
-    """Connection and process of an object that is made in a fork."""
-    import multiprocessing
-
-    mine, theirs = multiprocessing.Pipe()
-    process = multiprocessing.get_context("fork").Process(
-        target=_serve, args=(make, theirs, mine), daemon=True
-    )
-    with warnings.catch_warnings():
-        # Later Pythons warn of threads; the copy uses none of them and never returns to the caller.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        process.start()
-    theirs.close()
-    return mine, process
-
-
-def _serve(make: Callable[[], Any], connection: Any, other_end: Any) -> None:
-    """Answer calls until the other end closes; never returns."""
-    from threadpoolctl import threadpool_limits
-
-    other_end.close()
-    os.environ.update(ONE_THREAD)
-    _thread_count.cache_clear()
-    asked: queue.SimpleQueue = queue.SimpleQueue()
-
-    def read() -> None:
-        try:
-            while True:
-                asked.put(connection.recv())
-        except (EOFError, OSError):
-            asked.put(None)
-
-    try:
-        # read at once, so that nobody who only hands over waits for the object
-        threading.Thread(target=read, daemon=True).start()
-        made = None
-        with threadpool_limits(1):
-            while (call := asked.get()) is not None:
-                method, arguments = call
-                try:
-                    made = make() if made is None else made
-                    answer = True, getattr(made, method)(*arguments)
-                except Exception as error:  # noqa: BLE001 - the other end raises it
-                    answer = False, _that_can_be_sent(error, method)
-                connection.send(answer)
-    finally:
-        # No clean-up of the copied interpreter: files and windows belong to the original.
-        os._exit(0)
-
-
-def _that_can_be_sent(error: Exception, method: str) -> Exception:
-    try:
-        pickle.loads(pickle.dumps(error))
-    except Exception:  # noqa: BLE001 - whatever its pickling raises
-        return SpindleFemError(method, f"{type(error).__name__}: {error}")
-    return error

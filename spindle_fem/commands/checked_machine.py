@@ -1,0 +1,118 @@
+"""A machine with every fault of its tables, its geometry or network and its effects found at once."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from spindle_fem.definition.load import load_machine
+from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
+
+if TYPE_CHECKING:
+    from spindle_fem.definition.effect_entries import EffectEntry
+    from spindle_fem.definition.machine_spec import MachineSpec
+    from spindle_fem.definition.network_tables import NetworkMachineSpec
+
+
+def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:
+    """Machine whose parts fit together; faults of its tables, geometry and effects at once."""
+    from spindle_fem.definition.load import examine_machine
+    from spindle_fem.machine.geometry.assembly import build_assembly
+    from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+    from spindle_fem.model.reduced.defined_effects import check_effects, require_known_effects
+
+    overrides = tuple(overrides)
+
+    def fits_together(spec: MachineSpec) -> None:
+        group_of_contacts(spec, build_assembly(spec).joint_names)
+
+    def has_possible_effects(spec: MachineSpec) -> None:
+        if not spec.effects:
+            return
+        examination = examine_machine(machine, overrides)
+        entries = _by_number(spec.effects, [fault.where for fault in examination.faults])
+        others = [fault for fault in examination.faults if not _ENTRY.search(fault.where)]
+        try:
+            fits_together(spec)
+        except BadInputError as error:
+            others.append(error)
+        # Where they act needs the rest of the machine; that they exist does not.
+        if others:
+            require_known_effects(entries)
+        else:
+            check_effects(entries, spec)
+
+    return load_machine(machine, overrides, checks=(fits_together, has_possible_effects))
+
+
+_ENTRY = re.compile(r"(?:^|: )effect\[(\d+)\]")
+
+
+def _by_number(entries: Sequence[EffectEntry], faulty: Iterable[str]) -> list[EffectEntry | None]:
+    """Sound entries at their places in the file, None at those of faulty ones."""
+    refused = {int(match[1]) for where in faulty if (match := _ENTRY.search(where))}
+    sound = iter(entries)
+    return [
+        None if number in refused else next(sound) for number in range(1, len(entries) + len(refused) + 1)
+    ]
+
+
+def load_network(machine: str | Path, overrides: Iterable[str]) -> NetworkMachineSpec:
+    """A sound ``[network]`` machine; faults of its keys, its network and its effects at once."""
+    from pydantic import ValidationError
+
+    from spindle_fem.definition.effect_entries import EffectEntry
+    from spindle_fem.definition.inherit import apply_overrides
+    from spindle_fem.definition.load import find_machine, read_toml
+    from spindle_fem.definition.network_faults import network_faults
+    from spindle_fem.definition.network_tables import (
+        NetworkMachineSpec,
+        NetworkSpec,
+        validate_network_machine,
+    )
+    from spindle_fem.model.lumped.written_network import build_network
+    from spindle_fem.model.reduced.defined_effects import check_network_effects, require_known_effects
+
+    path = find_machine(machine)
+    content = read_toml(path)
+    faults: list[SpindleFemError] = []
+    for override in overrides:
+        try:
+            content = apply_overrides(content, [override], NetworkMachineSpec)
+        except SpecError as error:
+            faults.append(error)
+    spec, network = None, None
+    try:
+        spec = validate_network_machine(content, path.name)
+        network = spec.network
+    except FaultsError as error:
+        faults += error.faults
+        with contextlib.suppress(ValidationError):
+            network = NetworkSpec.model_validate(content["network"])
+    known = {str(fault) for fault in faults}
+
+    def add(found: Iterable[SpindleFemError]) -> None:
+        located = [type(f)(f"{path.name}: {f.where}", f.what, f.how_to_fix) for f in found]
+        faults.extend(fault for fault in located if str(fault) not in known)
+
+    between = [] if network is None else network_faults(network)
+    add(between)
+    written = content.get("effect", ())
+    entries: list[EffectEntry | None] = []
+    for item in written if isinstance(written, (list, tuple)) else ():
+        entries.append(None)
+        with contextlib.suppress(ValidationError):
+            entries[-1] = EffectEntry.model_validate(item)
+    try:
+        if network is None or between:
+            require_known_effects(entries)
+        else:
+            check_network_effects(entries, build_network(network))
+    except FaultsError as error:
+        add(error.faults)
+    if faults or spec is None:
+        raise FaultsError(path.name, faults)
+    return spec

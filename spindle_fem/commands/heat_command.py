@@ -1,0 +1,64 @@
+"""The function behind ``spindle-fem heat``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.definition.load import load_machine
+from spindle_fem.results.output_folder import output_folder, replace_text
+from spindle_fem.studies.heat_study import heat_study
+from spindle_fem.units import to_si
+
+
+def heat_table(
+    machine: str | Path,
+    *,
+    speeds: Iterable[str] = (),
+    temperature: str = "40 degC",
+    coupled: bool = False,
+    folder: Path | None = None,
+    overrides: Iterable[str] = (),
+) -> dict[str, Any]:
+    """Bearing loads, angles, films and heat term by term over speed.
+
+    Parameters
+    ----------
+    speeds : iterable of str
+        With units; 500 to 4500 rpm in steps of 500 when empty.
+    temperature : str
+        Of rings, balls and grease.
+    coupled : bool
+        Solve the machine at every speed and take its temperatures.
+    folder : Path, optional
+        For ``heat.json``, ``heat.csv`` and charts.
+    """
+    spec = load_machine(machine, overrides)
+    chosen = [to_si(text, "rad/s", where="--speed") for text in speeds]
+    kelvin = to_si(temperature, "K", where="--temperature", kind="temperature")
+    content = heat_study(spec, chosen, kelvin, coupled=coupled)
+    if folder is not None:
+        with output_folder(folder) as place:
+            _write(content, place)
+    return content
+
+
+def _write(content: dict[str, Any], place: Path) -> None:
+    """Write ``heat.json``, ``heat.csv`` (a row for each bearing and speed) and the charts."""
+    import pandas
+
+    from spindle_fem.report.heat_charts import write_heat_charts
+
+    rows = []
+    for name, entries in content["bearings"].items():
+        for entry in entries:
+            flat = {key: value for key, value in entry.items() if not isinstance(value, dict)}
+            flat |= {f"{term}_W": value for term, value in entry["terms_W"].items()}
+            for side, contact in entry["contacts"].items():
+                flat |= {f"{side}_{key}": value for key, value in contact.items()}
+            rows.append({"bearing": name, **flat})
+    replace_text(place / "heat.json", json.dumps(content, indent=2, ensure_ascii=False))
+    pandas.DataFrame(rows).to_csv(place / "heat.csv", index=False)
+    write_heat_charts(content, place / "figures")

@@ -1,0 +1,160 @@
+"""``diagnosis.json``: a diagnosis as plain data with units in the keys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from spindle_fem.inference.diagnosis import Diagnosis
+from spindle_fem.inference.findings import channel_errors, findings_of, noise_level, rmse
+from spindle_fem.inference.mismatch_place import where_of
+from spindle_fem.inference.missing_heat import stretches
+from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.results.run_summary import package_versions
+
+SCHEMA = "spindle-fem/diagnosis/1"
+
+
+def diagnosis_content(
+    diagnosis: Diagnosis, opened: DiagnosedMachine, before: Sequence[np.ndarray], after: Sequence[np.ndarray]
+) -> dict[str, Any]:
+    """Everything that a diagnosis found, but the full model's answer and the next measurement.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    opened : DiagnosedMachine
+    before, after : sequence of (N, c) ndarray, [K]
+        Predictions of both fits at the stamps of every recording.
+    """
+    judgement, plant = diagnosis.judgement, diagnosis.plant
+    findings = findings_of(diagnosis, judgement.chosen, split=True)
+    alternatives = [
+        {"findings": findings_of(diagnosis, item, split=False), "probability": item.probability}
+        for item in judgement.alternatives
+    ]
+    where = where_of(diagnosis)
+    return {
+        "schema": SCHEMA,
+        "machine": opened.name,
+        "recordings": [recording.name for recording in plant.recordings],
+        "verdict": judgement.verdict,
+        "reason": judgement.reason,
+        "mismatch": {
+            "detected": judgement.verdict != "consistent",
+            "p_value": judgement.p_value,
+            "channels": channel_errors(plant, before),
+            **where.to_json(),
+        },
+        "findings": findings,
+        "set_probability": judgement.chosen.probability,
+        "alternatives": alternatives,
+        "something_else_probability": judgement.other,
+        "evidence": {
+            "probability": judgement.evidence,
+            "share_of_last": judgement.share_of_last,
+            "gain_of_more": judgement.gain_of_more,
+        },
+        "fit": {
+            "before": _errors(diagnosis, before),
+            "after": _errors(diagnosis, after),
+            "noise_K": noise_level(plant),
+            "heldout": diagnosis.heldout,
+            "heldout_s": [
+                [list(ends) for ends in stretches(~use, recording.times)]
+                for recording, use in zip(plant.recordings, plant.use, strict=True)
+            ],
+            "channels_after": channel_errors(plant, after),
+        },
+        "improved_model": "improved_machine.toml",
+        "machine_parameters": _machine_parameters(diagnosis),
+        "slow_error": {"sigma_K": diagnosis.final.slow.sigma, "time_s": diagnosis.final.slow.time},
+        "candidates_tried": diagnosis.candidates_tried,
+        "hypotheses_fitted": len(diagnosis.hypotheses),
+        "seconds": dict(diagnosis.seconds),
+        "notes": [*opened.notes, *dict.fromkeys(note for drive in plant.drives for note in drive.notes)],
+        "defects": [recording.defects.to_json() for recording in plant.recordings],
+        "versions": package_versions(),
+    }
+
+
+def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, float]:
+    return {
+        "train_rmse_K": rmse(diagnosis.plant, predicted, heldout=False),
+        "heldout_rmse_K": rmse(diagnosis.plant, predicted, heldout=True),
+    }
+
+
+def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """The machine's own parameters before and after."""
+    rows = []
+    for coordinate in diagnosis.plant_coordinates:
+        low, high = diagnosis.final.interval(coordinate.name, 1.645)
+        rows.append(
+            {
+                "name": coordinate.name,
+                "prior": coordinate.value,
+                "prior_sigma": coordinate.sigma,
+                "logarithmic": coordinate.logarithmic,
+                "value": diagnosis.final.values[coordinate.name],
+                "low": low,
+                "high": high,
+                "unit": coordinate.unit,
+            }
+        )
+    return rows
+
+
+def unexplained_content(opened: DiagnosedMachine, reason: str) -> dict[str, Any]:
+    """A recording that is sound but says too little."""
+    channels = [
+        {"channel": name, "rmse_K": None, "noise_K": float(sigma), "max_K": None}
+        for recording in opened.recordings
+        for name, sigma in zip(recording.temperature_names, recording.sigma, strict=True)
+    ]
+    nothing = {"train_rmse_K": None, "heldout_rmse_K": None}
+    return {
+        "schema": SCHEMA,
+        "machine": opened.name,
+        "recordings": [recording.name for recording in opened.recordings],
+        "verdict": "unexplained",
+        "reason": reason,
+        "mismatch": {
+            "detected": False,
+            "p_value": 1.0,
+            "channels": channels,
+            "where": {"component": None, "r_mm": None, "z_mm": None, "credible": []},
+            "when": [],
+            "missing_heat_W": {},
+        },
+        "findings": [],
+        "set_probability": 0.0,
+        "alternatives": [],
+        "something_else_probability": 1.0,
+        "fit": {"before": nothing, "after": dict(nothing), "noise_K": None, "heldout": "nothing was fitted"},
+        "next_measurement": {
+            "where": "all channels",
+            "quantity": "temperature",
+            "condition": "a speed step from standstill, held until the temperatures settle, then a cool-down",
+            "why": reason,
+        },
+        "improved_model": None,
+        "versions": package_versions(),
+    }
+
+
+def plain_data(value: Any) -> Any:
+    """Numbers as JSON knows them; what is not finite becomes null."""
+    if isinstance(value, dict):
+        return {key: plain_data(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain_data(item) for item in value]
+    if isinstance(value, (np.floating, float)):
+        return float(value) if np.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.bool_):
+        return bool(value)
+    return value

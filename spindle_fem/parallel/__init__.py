@@ -1,0 +1,35 @@
+"""Work in parallel: threads, worker processes, one background process. Nothing else starts any.
+
+A job is a callable without arguments. :func:`in_threads` runs jobs that leave the
+interpreter lock alone (compiled loops, compression); a :class:`WorkerPool` runs jobs in
+other processes of this machine or behind a Dask scheduler; a :class:`BackgroundProcess`
+keeps one object in a copy of this process and answers calls of its methods in their order.
+
+``SPINDLE_FEM_THREADS`` limits all of them; with 1 everything happens in this process, one
+thing after the other. Workers compute with one thread each.
+"""
+
+from __future__ import annotations
+
+from spindle_fem.parallel.background_process import BackgroundProcess
+from spindle_fem.parallel.worker_pool import Shared, WorkerPool
+from spindle_fem.parallel.worker_threads import (
+    core_count,
+    hand_over,
+    in_threads,
+    one_thread,
+    thread_count,
+    worker_count,
+)
+
+__all__ = [
+    "BackgroundProcess",
+    "Shared",
+    "WorkerPool",
+    "core_count",
+    "hand_over",
+    "in_threads",
+    "one_thread",
+    "thread_count",
+    "worker_count",
+]

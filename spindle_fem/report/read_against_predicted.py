@@ -1,0 +1,285 @@
+"""Temperature channels over time: what was read, what a model says, and what is left between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from spindle_fem.report.figure_style import (
+    CYCLE,
+    MUTED,
+    new_figure,
+    pixel_axes,
+    save_png,
+    set_title,
+    styled,
+)
+from spindle_fem.units import ZERO_CELSIUS_K
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+READ, HELD, BAND = "#8a8f94", "#eceff2", "#c9d3dc"
+# Colour and line of each prediction, the last one the model that counts.
+LINES = {
+    "predicted": (CYCLE[0], "-"),
+    "model before": (CYCLE[1], "--"),
+    "model after": (CYCLE[0], "-"),
+}
+MOST_CHANNELS = 12
+MOST_POINTS = 1500
+BINS = 240
+# As recordings are divided: a longer pause than so many usual steps.
+LONG_GAP_STEPS = 60.0
+LONG_SECONDS = 3.0 * 86400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """One channel over time.
+
+    Attributes
+    ----------
+    name : str
+    times : (N,) ndarray, [s]
+    read : (N,) ndarray, [degC]
+        NaN where the reading is of no use.
+    predictions : mapping of str to (N,) ndarray, [degC]
+        By a key of ``LINES``.
+    band : float or (N,) ndarray, [K]
+        Half width of the shaded band about no residual.
+    held_out : (N,) ndarray of bool
+        Stamps that no fit saw; shaded.
+    """
+
+    name: str
+    times: Array
+    read: Array
+    predictions: Mapping[str, Array]
+    band: float | Array
+    held_out: NDArray[np.bool_]
+
+
+def time_scale(seconds: float) -> tuple[float, str]:
+    """Divisor and unit in which a span of time reads well.
+
+    >>> time_scale(5400.0), time_scale(1e7)[1]
+    ((3600.0, 'h'), 'd')
+    """
+    if seconds >= LONG_SECONDS:
+        return 86400.0, "d"
+    return (3600.0, "h") if seconds >= 3600.0 else (60.0, "min")
+
+
+def draw_course(upper: Axes, lower: Axes, course: Course, scale: float) -> None:
+    """Readings and predictions above; beneath, means of read less predicted over short times.
+
+    ``scale`` divides the times, as :func:`time_scale` gives it.
+    """
+    times = course.times / scale
+    usable = np.isfinite(course.read)
+    for start, end in runs(course.held_out):
+        for axes in (upper, lower):
+            axes.axvspan(times[start], times[end], color=HELD, linewidth=0.0, zorder=0)
+    chosen = np.flatnonzero(usable)
+    chosen = chosen[:: max(1, len(chosen) // MOST_POINTS)]
+    upper.plot(times[chosen], course.read[chosen], ".", color=READ, markersize=2.6, zorder=2)
+    thin = slice(None, None, max(1, len(times) // (3 * MOST_POINTS)))
+    band = np.broadcast_to(course.band, times.shape)[thin]
+    lower.fill_between(times[thin], -band, band, color=BAND, alpha=0.8, linewidth=0.0, zorder=1)
+    lower.axhline(0.0, color=MUTED, linewidth=0.8, zorder=1)
+    for key, values in course.predictions.items():
+        colour, style = LINES[key]
+        drawn = _broken(times, values)[thin]
+        upper.plot(times[thin], drawn, color=colour, linestyle=style, linewidth=1.5, zorder=3)
+        at, mean = _bin_means(times[usable], (course.read - values)[usable])
+        lower.plot(at, mean, color=colour, linewidth=1.3, linestyle=style, zorder=3)
+    upper.set_title(course.name)
+    upper.tick_params(labelbottom=False)
+    upper.margins(x=0.01)
+    upper.set_ylabel("°C")
+    lower.set_ylabel("residual / K")
+
+
+def draw_legend(figure: Figure, predictions: Mapping[str, Array], band: str, *, held_out: bool) -> None:
+    """One row under the title: readings, each prediction, what is shaded."""
+    entries: dict[str, Line2D | Rectangle] = {
+        "read": Line2D([], [], color=READ, linestyle="none", marker=".", markersize=6)
+    }
+    for key in predictions:
+        colour, style = LINES[key]
+        entries[key] = Line2D([], [], color=colour, linestyle=style)
+    if held_out:
+        entries["held out: not fitted"] = Rectangle((0, 0), 1, 1, color=HELD)
+    entries[band] = Rectangle((0, 0), 1, 1, color=BAND)
+    width, height = figure.get_size_inches() * figure.dpi
+    figure.legend(
+        list(entries.values()),
+        list(entries),
+        ncols=len(entries),
+        loc="upper left",
+        bbox_to_anchor=(15.0 / width, 1.0 - 82.0 / height),
+    )
+
+
+@styled
+def courses_figure(courses: list[Course], title: str, notes: str, band: str) -> Figure:
+    """Channels two in a row, each with its residual beneath; one alone takes the whole width.
+
+    Parameters
+    ----------
+    courses : list of Course
+        With the same predictions and times.
+    title, notes : str
+    band : str
+        What the shaded band is.
+    """
+    first = courses[0]
+    scale, unit = time_scale(float(first.times[-1] - first.times[0]))
+    columns = min(2, len(courses))
+    rows = math.ceil(len(courses) / columns)
+    top, cell, foot = 178.0, 470.0, 50.0
+    width = 655.0 if columns == 2 else 1450.0
+    figure = new_figure(top + rows * cell + foot)
+    for position, course in enumerate(courses):
+        row, column = divmod(position, columns)
+        left = 115.0 + 795.0 * column
+        upper = pixel_axes(figure, left, top + row * cell, width, 235.0)
+        lower = pixel_axes(figure, left, top + row * cell + 260.0, width, 130.0, sharex=upper)
+        draw_course(upper, lower, course, scale)
+        for axes in (upper, lower):
+            # Beyond the widest tick label, in every row alike.
+            axes.yaxis.set_label_coords(-84.0 / width, 0.5)
+        if position + columns >= len(courses):
+            lower.set_xlabel(f"time / {unit}")
+    draw_legend(figure, first.predictions, band, held_out=any(item.held_out.any() for item in courses))
+    set_title(figure, title, notes)
+    return figure
+
+
+def draw_channels(folder: Path, recording: Recording, predicted: Array, half_width: Array) -> list[Path]:
+    """``residual_<channel>.png`` of each temperature channel of a simulated recording.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when missing.
+    recording : Recording
+    predicted : (N, c) ndarray, [K]
+    half_width : (N, c) ndarray, [K]
+        Of the interval that should hold nine readings in ten.
+
+    Returns
+    -------
+    list of Path
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    nothing = np.zeros(recording.times.size, dtype=bool)
+    written = []
+    for column, name in enumerate(recording.temperature_names):
+        read = np.where(recording.usable[:, column], recording.temperature[:, column], np.nan)
+        course = Course(
+            name,
+            recording.times,
+            read - ZERO_CELSIUS_K,
+            {"predicted": predicted[:, column] - ZERO_CELSIUS_K},
+            half_width[:, column],
+            nothing,
+        )
+        notes = "Temperature above, residual (read − predicted, means over short times) beneath."
+        figure = courses_figure([course], f"{recording.name}: {name}", notes, "90 % interval of a reading")
+        written.append(save_png(figure, folder / f"residual_{_safe(name)}.png", colours=128))
+    return written
+
+
+def _safe(name: str) -> str:
+    return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)
+
+
+def before_after(data: xr.Dataset, number: int) -> Figure:
+    """Every channel of a diagnosed recording with the predictions before and after.
+
+    Parameters
+    ----------
+    data : Dataset
+        As ``diagnosis.nc`` has it.
+    number : int
+        Recording.
+    """
+    own = of_recording(data, number)
+    order = channel_order(own)
+    names = [str(name) for name in own["channel"].values if name in order or not order]
+    if len(names) > MOST_CHANNELS:
+        names = order[:MOST_CHANNELS]
+    courses = []
+    for name in names:
+        item = own.sel(channel=name)
+        courses.append(
+            Course(
+                name,
+                item["time"].values,
+                np.where(item["usable"].values == 1, item["measured"].values, np.nan),
+                {"model before": item["before"].values, "model after": item["after"].values},
+                2.0 * float(item["noise"].values[number]),
+                item["held_out"].values == 1,
+            )
+        )
+    title = f"{data['recording'].values[number]}: before and after"
+    notes = "Temperature above, residual (read − model, means over short times) beneath."
+    return courses_figure(courses, title, notes, "noise, ± 2 σ of a reading")
+
+
+def of_recording(data: xr.Dataset, number: int) -> xr.Dataset:
+    """Stamps of one recording."""
+    return data.isel(stamp=np.flatnonzero(data["recording_index"].values == number))
+
+
+def channel_order(data: xr.Dataset) -> list[str]:
+    """Channels that were read, those with the largest error before first."""
+    error = (data["before"] - data["measured"]).where(data["usable"] == 1)
+    size = np.sqrt((error**2).mean("stamp", skipna=True)).values
+    names = [str(name) for name in data["channel"].values]
+    return [names[i] for i in np.argsort(-np.nan_to_num(size, nan=-1.0)) if np.isfinite(size[i])]
+
+
+def _broken(times: Array, values: Array) -> Array:
+    """Values with NaN where a long gap follows, so that no line crosses it."""
+    gaps = np.diff(times, append=times[-1])
+    return np.where(gaps > max(LONG_GAP_STEPS * float(np.median(gaps)), 1e-9), np.nan, values)
+
+
+def _bin_means(times: Array, values: Array) -> tuple[Array, Array]:
+    """Means over equal stretches of time; NaN between two where nothing was read for long."""
+    if times.size <= BINS:
+        return times, values
+    owner = np.minimum((BINS * (times - times[0]) / (times[-1] - times[0])).astype(int), BINS - 1)
+    count = np.bincount(owner, minlength=BINS)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (
+            times[0] + (np.arange(BINS) + 0.5) * (times[-1] - times[0]) / BINS,
+            np.bincount(owner, weights=values, minlength=BINS) / count,
+        )
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of every run of true entries.
+
+    >>> runs(np.array([True, False, True, True]))
+    [(0, 0), (2, 3)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

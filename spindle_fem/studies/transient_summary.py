@@ -1,0 +1,98 @@
+"""What a transient study found, as plain data: phases, energy, steps, approach to the steady state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from spindle_fem.errors import NoSteadyStateError
+from spindle_fem.results.run_summary import package_versions
+from spindle_fem.solvers.coupled_steady import PreparedMachine
+from spindle_fem.studies.solve_machine import solve_prepared
+from spindle_fem.studies.transient_study import StudyResult, time_to_stay_within
+from spindle_fem.units import ZERO_CELSIUS_K
+
+SCHEMA = "spindle-fem/transient-result/1"
+# Bands around the steady readings for which the time of arrival is given, K.
+BANDS = (1.0, 0.5, 0.1)
+
+
+def summarise(machine: PreparedMachine, result: StudyResult) -> dict[str, Any]:
+    """Phases, energy, steps and approach to the steady state, as plain data with units in the keys."""
+    phases = []
+    for phase in result.phases:
+        run = phase.transient
+        phases.append(
+            {
+                "name": phase.name,
+                "speed_rpm": phase.point.speed * 30.0 / np.pi,
+                "thrust_N": phase.point.thrust,
+                "start_s": phase.start,
+                "end_s": phase.end,
+                "settled": phase.settled,
+                "probes_degC": dict(
+                    zip(run.probes, (run.readings[-1] - ZERO_CELSIUS_K).tolist(), strict=True)
+                ),
+                "hottest_degC": float(run.steps.hottest[-1]) - ZERO_CELSIUS_K,
+                "heat_W": float(run.steps.bearing_heat[-1].sum()),
+                "coolant_heat_W": float(run.steps.coolant_heat[-1]),
+                "energy": {
+                    "heat_in_J": float(run.energy.heat_in),
+                    "heat_out_J": {name: float(heat) for name, heat in run.energy.heat_out.items()},
+                    "stored_J": float(run.energy.stored),
+                    "imbalance_relative": float(run.energy.imbalance_relative),
+                },
+                "steps": len(run.steps.times),
+                "largest_error_K": float(run.steps.errors.max()),
+                "counts": dict(run.counts),
+                "cpu_seconds": run.cpu_seconds,
+            }
+        )
+    return {
+        "schema": SCHEMA,
+        "study": result.study.name,
+        "machine": machine.spec.name,
+        "unknowns": machine.operators.n_unknowns,
+        "mesh_preset": machine.spec.mesh.preset,
+        "phases": phases,
+        "equilibrium": equilibrium_of(machine, result),
+        "versions": package_versions(),
+    }
+
+
+def equilibrium_of(machine: PreparedMachine, result: StudyResult) -> dict[str, Any]:
+    """The steady state that the last phase tends to, how far off it is and when it came near.
+
+    ``shares_s`` are the times at which every probe had covered that share of
+    its way from the start of the phase; ``bands_s`` those after which all stay
+    within so many kelvin. Both count from the start of the phase.
+    """
+    phase = result.phases[-1]
+    run = phase.transient
+    try:
+        steady = solve_prepared(machine, phase.point)
+    except NoSteadyStateError as error:
+        return {"exists": False, "reason": str(error)}
+    final = np.array([steady.probes[name] for name in run.probes])
+    way = np.abs(final - run.readings[0])
+    moved = way > 0.5
+    shares = {}
+    for share in (0.95, 0.99):
+        left = np.abs(run.readings - final)[:, moved] / way[moved]
+        shares[f"{share:g}"] = _finite(
+            time_to_stay_within(run.times, left, np.zeros(left.shape[1]), 1.0 - share)
+        )
+    return {
+        "exists": True,
+        "steady_degC": {name: float(value) - ZERO_CELSIUS_K for name, value in steady.probes.items()},
+        "left_K": float(np.abs(run.readings[-1] - final).max()),
+        "shares_s": shares,
+        "bands_s": {
+            f"{band:g}": _finite(time_to_stay_within(run.times, run.readings, final, band)) for band in BANDS
+        },
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
