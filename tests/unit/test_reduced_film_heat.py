@@ -11,15 +11,10 @@ from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.model.reduced.drive import heat_of_table, with_walls
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.film_heat import (
-    FilmHeat,
-    operators_machine,
-    tabulate_friction,
-    tabulated_machine,
-    thrusts_between,
-)
+from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.bearing_heat import BearingMechanics
+from spindle_fem.operation.friction_map import CONDUCTANCES, MOMENT, tabulate_friction, thrusts_between
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import Uncertain
 from tests.support.lumped_spindle import drive_of, lumped_model
@@ -65,7 +60,7 @@ def test_the_map_is_the_heat_model_between_its_points(spec, friction, speed, cel
     exact = BearingMechanics(spec).over_film_temperature(point, [celsius + 273.15])
     kelvin = np.full(len(friction.bearings), celsius + 273.15)
     found = friction.heat(point.speed, thrust, kelvin)
-    conductance = np.exp(friction.log_conductance(point.speed, thrust, kelvin[:, None]))[:, :, 0]
+    conductance = np.exp(friction.at(point.speed, thrust).at(kelvin[:, None], CONDUCTANCES))[:, :, 0]
     for row, name in enumerate(friction.bearings):
         assert found[row] == pytest.approx(exact[name].heat[0], rel=2e-3)
         assert conductance[row, 0] == pytest.approx(exact[name].conductance_inner[0], rel=1e-3)
@@ -80,8 +75,8 @@ def test_balls_lose_their_lubricant_as_the_spindle_stops(spec, friction, rpm, wi
         replace(given, speed=rpm * RPM, thrust=1500.0), [celsius + 273.15]
     )
     kelvin = np.full((len(friction.bearings), 1), celsius + 273.15)
-    found = np.exp(friction.log_conductance(rpm * RPM, 1500.0, kelvin))[:, :, 0]
-    turning = np.exp(friction.log_conductance(90.0 * RPM, 1500.0, kelvin))[:, :, 0]
+    found = np.exp(friction.at(rpm * RPM, 1500.0).at(kelvin, CONDUCTANCES))[:, :, 0]
+    turning = np.exp(friction.at(90.0 * RPM, 1500.0).at(kelvin, CONDUCTANCES))[:, :, 0]
     for row, name in enumerate(friction.bearings):
         assert found[row, 0] == pytest.approx(exact[name].conductance_inner[0], rel=within)
         assert found[row, 1] == pytest.approx(exact[name].conductance_outer[0], rel=within)
@@ -114,7 +109,7 @@ def test_ball_rows_conduct_as_the_map_says_and_keep_their_heat(spec, friction, t
     more = term.heat(context(term, uneven, speed=speed)).reshape(-1, 3).real
     assert more.sum(axis=1) == pytest.approx(0.0, abs=1e-12)
     factors = term.operating_factor(SimpleNamespace(speed=speed, thrust=thrust), {})
-    exact = np.exp(friction.log_conductance(speed, thrust, film))[:, :, 0]
+    exact = np.exp(friction.at(speed, thrust).at(film, CONDUCTANCES))[:, :, 0]
     for row, (name, (group, _)) in enumerate(zip(friction.bearings, table.bearings, strict=True)):
         for side, (word, raceway) in enumerate((("inner", 320.0), ("outer", 316.0))):
             linear = group.ball_row.conductance.value * factors[f"balls.{name}.{word}"] * (330.0 - raceway)
@@ -139,7 +134,7 @@ def test_the_map_goes_on_without_a_jump_at_its_ends(friction):
         kelvin = np.full((len(friction.bearings), 2), end)
         kelvin[:, 0] -= 1e-6
         kelvin[:, 1] += 1e-6
-        low, high = friction.log_moment(300.0, 1750.0, kelvin).T
+        low, high = friction.at(300.0, 1750.0).at(kelvin, MOMENT)[:, 0].T
         assert low == pytest.approx(high, abs=1e-6)
 
 
@@ -214,7 +209,7 @@ def test_the_range_of_the_ball_rows_holds_what_the_map_gives(spec, friction, tab
         for speed in (0.0, 1000.0 * RPM, 4500.0 * RPM):
             for thrust in THRUSTS:
                 film = np.full((len(friction.bearings), 1), 320.0)
-                values = np.exp(friction.log_conductance(speed, thrust, film))[row]
+                values = np.exp(friction.at(speed, thrust).at(film, CONDUCTANCES))[row]
                 assert values.min() > prior.value / reach
                 assert values.max() < prior.value * reach
 

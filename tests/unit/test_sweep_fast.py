@@ -8,29 +8,40 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spindle_fem.definition.load import load_machine
+from spindle_fem.errors import OutOfValidityError
 from spindle_fem.model.reduced.coolant_batch import ChannelBatch, pressure_drops
 from spindle_fem.model.reduced.heat_tables import (
     QUANTITIES,
     BearingTables,
-    chebyshev_points,
-    chebyshev_weights,
-    grease_temperature,
     is_constant,
     mechanical_keys,
 )
 from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of
 from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.coolant_loop import CoolantLoop
+from spindle_fem.operation.friction_map import FilmSeries, chebyshev_nodes, film_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.studies.sweep.fast_outputs import extreme_temperatures
 
 
 @given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.floats(280.0, 340.0))
 def test_tables_are_exact_for_polynomials(coefficients, place):
-    nodes = chebyshev_points(280.0, 340.0, 6)
+    nodes = chebyshev_nodes(280.0, 340.0, 6, ends=True)
     polynomial = np.polynomial.Polynomial(coefficients, domain=(280.0, 340.0))
-    found = chebyshev_weights(nodes, np.array([place])) @ polynomial(nodes)
-    assert found[0] == pytest.approx(polynomial(place), abs=1e-9)
+    series = FilmSeries.through(nodes, polynomial(nodes)[None, None], 280.0, 340.0)
+    film = np.array([[place]])
+    assert series.at(film)[0, 0, 0] == pytest.approx(polynomial(place), abs=1e-9)
+    assert series.slope(film)[0, 0, 0] == pytest.approx(polynomial.deriv()(place), abs=1e-9)
+    by_complex_step = series.at(film + 1e-30j).imag / 1e-30
+    assert by_complex_step[0, 0, 0] == pytest.approx(polynomial.deriv()(place), abs=1e-9)
+
+
+def test_a_film_outside_its_series_is_refused_where_asked():
+    series = FilmSeries.through(np.array([300.0]), np.ones((1, 1, 1)), 280.0, 320.0)
+    series.require([280.0, 320.0])
+    assert series.at(np.array([[300.0, 310.0]])).tolist() == [[[1.0, 1.0]]]
+    with pytest.raises(OutOfValidityError, match="film temperature: 270 to 300 K is outside 280 to 320 K"):
+        series.require([270.0, 300.0])
 
 
 @pytest.mark.parametrize("model", ["palmgren", "full", "table"])
@@ -53,7 +64,7 @@ def test_a_table_answers_as_the_heat_model_does(model):
             for name, *row in zip(names, inner, outer, ball, inner, outer, strict=True)
         },
     )
-    found = table.at(grease_temperature(inner, outer, ball)[None])[0]
+    found = table.at(film_temperature(inner, outer, ball)[None])[0]
     for name, row in zip(names, found, strict=True):
         assert row[QUANTITIES.index("total")] == pytest.approx(exact[name].total, rel=2e-3)
         conductance = row[QUANTITIES.index("conductance_inner")]

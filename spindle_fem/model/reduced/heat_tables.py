@@ -1,4 +1,4 @@
-"""Bearing heat of many designs: tables over the grease's temperature, from the machine's own heat model."""
+"""Bearing heat of many designs: tables over the film's temperature, from the machine's own heat model."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of, table_heat
+from spindle_fem.operation.friction_map import FilmSeries, chebyshev_nodes
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.physics.bearings import mounting
 
 Array = NDArray[np.float64]
 
 TABLE_POINTS = 9
-# Grease temperatures beyond which no table goes, K; a design there is left to the full solve.
+# Film temperatures beyond which no table goes, K; a design there is left to the full solve.
 COLDEST, HOTTEST = 243.15, 473.15
 MARGIN = 6.0
 # Tables of a definition that heat and contacts depend on.
@@ -39,68 +39,36 @@ QUANTITIES = (
 )
 
 
-def grease_temperature(inner: Array, outer: Array, ball: Array) -> Array:
-    """Temperature at which the viscosity is taken, K."""
-    return mounting.BearingTemperatures(inner, outer, ball).film
-
-
 @dataclass(frozen=True, slots=True)
 class HeatTable:
-    """What the bearings of one mechanical state do over the grease's temperature.
+    """What the bearings of one mechanical state do over the temperature of their films.
 
-    Polynomials through Chebyshev points. The bearings of a set feel one
-    another's grease only through the loads, which hardly change: every
-    bearing has its own temperature in a table made with all at the same.
+    The bearings of a set feel one another's films only through the loads,
+    which hardly change: every bearing has its own temperature in a table made
+    with all at the same.
 
     Attributes
     ----------
-    nodes : (m,) ndarray, [K]
-    values : (m, n_bearings, n_q) ndarray
-        ``QUANTITIES``, then the terms of the heat.
+    series : FilmSeries
+        ``QUANTITIES``, then the terms of the heat; nan for what the heat model does not have.
     terms : tuple of str
     """
 
-    nodes: Array
-    values: Array
+    series: FilmSeries
     terms: tuple[str, ...]
 
     @property
-    def low(self) -> float:
-        """Lowest temperature, K."""
-        return float(self.nodes.min())
+    def number(self) -> int:
+        """Quantities, terms included."""
+        return self.series.coefficients.shape[1]
 
-    @property
-    def high(self) -> float:
-        """Highest temperature, K."""
-        return float(self.nodes.max())
+    def at(self, film: Array) -> Array:
+        """Quantities at the film temperature of each bearing, (n, n_bearings) K to (n, n_bearings, n_q)."""
+        return self.series.at(film.T).transpose(2, 0, 1)
 
-    def at(self, temperature: Array) -> Array:
-        """Quantities at the temperature of each bearing, (n, n_bearings) K to (n, n_bearings, n_q)."""
-        return np.einsum("nbm,mbq->nbq", chebyshev_weights(self.nodes, temperature), self.values)
-
-
-def chebyshev_points(low: float, high: float, number: int) -> Array:
-    """Chebyshev points of the second kind, ends included."""
-    return 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(number) / (number - 1))
-
-
-def chebyshev_weights(nodes: Array, places: Array) -> Array:
-    """Share of each node's value in the polynomial at some places, (..., m).
-
-    Source: Berrut & Trefethen (2004), SIAM Review 46, 501-517 (barycentric form).
-
-    >>> nodes = chebyshev_points(0.0, 2.0, 5)
-    >>> shares = chebyshev_weights(nodes, np.array([0.3, 2.0]))
-    >>> (shares @ nodes**4).round(12).tolist()
-    [0.0081, 16.0]
-    """
-    sign = (-1.0) ** np.arange(len(nodes))
-    sign[[0, -1]] *= 0.5
-    distance = np.asarray(places)[..., None] - nodes
-    exact = np.abs(distance) < 1e-12 * max(1.0, float(np.abs(nodes).max()))
-    terms = sign / np.where(exact, 1.0, distance)
-    found = terms / terms.sum(axis=-1, keepdims=True)
-    return np.where(exact.any(axis=-1, keepdims=True), exact, found)
+    def heat_slope(self, film: Array) -> Array:
+        """Derivative of each bearing's heat to its film's temperature, (n, n_bearings) [W/K]."""
+        return self.series.slope(film.T, slice(0, 1))[:, 0].T
 
 
 @dataclass(slots=True)
@@ -176,7 +144,7 @@ def _make_table(spec: MachineSpec, point: OperatingPoint, low: float, high: floa
         nodes = np.array([0.5 * (low + high)])
     else:
         model = heat_model_of(spec)
-        nodes = chebyshev_points(low, high, TABLE_POINTS)
+        nodes = chebyshev_nodes(low, high, TABLE_POINTS, ends=True)
         names = [bearing.name for _, bearing in spec.bearings]
         states = [
             model(point, {name: BearingTemperatures(*(float(node),) * 5) for name in names})[0]
@@ -184,7 +152,7 @@ def _make_table(spec: MachineSpec, point: OperatingPoint, low: float, high: floa
         ]
     terms = tuple(dict.fromkeys(term for state in states for item in state.values() for term in item.terms))
     values = np.array([[_row(state[name], terms) for name in state] for state in states])
-    return HeatTable(nodes, values, terms)
+    return HeatTable(FilmSeries.through(nodes, values.transpose(1, 2, 0), low, high), terms)
 
 
 def _row(heat: BearingHeat, terms: Sequence[str]) -> list[float]:

@@ -10,14 +10,8 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.model.reduced.build_reduced import ReductionOptions, reduced_model_of
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.film_heat import (
-    FilmHeat,
-    needs_map,
-    operators_machine,
-    tabulate_friction,
-    tabulated_machine,
-    thrusts_between,
-)
+from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
+from spindle_fem.operation.friction_map import needs_map, tabulate_friction, thrusts_between
 from spindle_fem.recordings.align import Recording
 
 Progress = Callable[[str], None]

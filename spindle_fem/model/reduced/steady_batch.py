@@ -14,9 +14,9 @@ from spindle_fem.model.reduced.heat_tables import (
     QUANTITIES,
     BearingTables,
     HeatTable,
-    grease_temperature,
 )
 from spindle_fem.model.thermal_model import ThermalModel
+from spindle_fem.operation.friction_map import film_temperature
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,6 @@ MOST_ITERATIONS = 60
 # The matrix is made anew at the films of the moment where it does not settle by then.
 RENEWED_AFTER = 8
 FIRST_RISE = 15.0
-SLOPE_STEP = 1.0
 # Share of the basis, the leading vectors, that the estimate compares with.
 COARSE_SHARE = 2.0 / 3.0
 _TOTAL, _INNER, _OUTER = (QUANTITIES.index(n) for n in ("total", "conductance_inner", "conductance_outer"))
@@ -119,13 +118,13 @@ class SteadySolver:
             A correlation does not reach some design of the batch.
         """
         while True:
-            found, grease = _Run(self, inputs, band).settle()
-            read = grease[found.settled]
+            found, film = _Run(self, inputs, band).settle()
+            read = film[found.settled]
             if not read.size or not self.tables.widen(float(read.min()), float(read.max())):
-                return replace(found, settled=found.settled & self._within_tables(grease))
+                return replace(found, settled=found.settled & self._within_tables(film))
 
-    def _within_tables(self, grease: Array) -> NDArray[np.bool_]:
-        return np.all((grease >= self.tables.low) & (grease <= self.tables.high), axis=1)
+    def _within_tables(self, film: Array) -> NDArray[np.bool_]:
+        return np.all((film >= self.tables.low) & (film <= self.tables.high), axis=1)
 
 
 class _Run:
@@ -148,14 +147,14 @@ class _Run:
             self._tables.append((table, np.array(rows)))
 
     # ------------------------------------------------------------- what follows the field
-    def _quantities(self, grease: Array) -> Array:
-        """Heat and paths of every bearing at its grease's temperature, (n, n_bearings, n_q)."""
+    def _quantities(self, film: Array) -> Array:
+        """Heat and paths of every bearing at its film's temperature, (n, n_bearings, n_q)."""
         tables = self.solver.tables
-        grease = np.clip(grease, tables.low, tables.high)  # the caller widens tables that were left
-        most = max(table.values.shape[-1] for table, _ in self._tables)
-        found = np.full((*grease.shape, most), np.nan)
+        film = np.clip(film, tables.low, tables.high)  # the caller widens tables that were left
+        most = max(table.number for table, _ in self._tables)
+        found = np.full((*film.shape, most), np.nan)
         for table, rows in self._tables:
-            found[rows, :, : table.values.shape[-1]] = table.at(grease[rows])
+            found[rows, :, : table.number] = table.at(film[rows])
         return found
 
     def _moving(self, quantities: Array) -> Array:
@@ -178,11 +177,11 @@ class _Run:
         return (unknowns @ self.solver.cell_mean.T).reshape(self.number, *self.model.cell_area.shape)
 
     def _follow(self, unknowns: Array) -> tuple[Array, Array]:
-        """Bearings and coolant at a field: quantities of the bearings, their grease's temperature."""
-        grease = grease_temperature(*np.moveaxis(self.temperatures(unknowns), -1, 0))
+        """Bearings and coolant at a field: quantities of the bearings, the temperature of their films."""
+        film = film_temperature(*np.moveaxis(self.temperatures(unknowns), -1, 0))
         if self.channel is not None:
             self.field = self.channel.at(self._wall(unknowns), self.field)
-        return self._quantities(grease), grease
+        return self._quantities(film), film
 
     # ------------------------------------------------------------- solving
     def _system(self, quantities: Array) -> tuple[Array, Array]:
@@ -213,36 +212,36 @@ class _Run:
             residual -= self.field.heat.reshape(self.number, -1) @ self.solver.cell_mean
         return residual
 
-    def _heat_slope(self, grease: Array) -> Array:
-        """How much less each bearing heats for each kelvin of its grease, (n, n_bearings, r) W/K."""
-        step = 0.5 * SLOPE_STEP
-        change = (self._quantities(grease - step) - self._quantities(grease + step))[
-            :, :, _TOTAL
-        ] / SLOPE_STEP
+    def _heat_slope(self, film: Array) -> Array:
+        """How much less each bearing heats for each kelvin of its film, (n, n_bearings, r) W/K."""
+        tables = self.solver.tables
+        change = np.empty_like(film)
+        for table, rows in self._tables:
+            change[rows] = -table.heat_slope(np.clip(film[rows], tables.low, tables.high))
         places = self.solver.heat_places.reshape(-1, 3, self.size)
         return change[:, :, None] * np.einsum("ns,bsi->nbi", self.inputs.shares, places, optimize=True)
 
-    def _grease_readings(self) -> Array:
-        """The grease's temperature of every bearing from the unknowns, (n_bearings, r)."""
+    def _film_readings(self) -> Array:
+        """The film temperature of every bearing from the unknowns, (n_bearings, r)."""
         places = self.solver.heat_places.reshape(-1, 3, self.size)
-        return grease_temperature(*np.moveaxis(places, 1, 0))
+        return film_temperature(*np.moveaxis(places, 1, 0))
 
     def settle(self) -> tuple[SteadyBatch, Array]:
-        """The steady states and the grease temperatures at which the tables were read."""
+        """The steady states and the film temperatures at which the tables were read."""
         first = np.broadcast_to(self.inputs.ambient[:, None], (self.number, len(self.solver.bearings)))
         if self.channel is not None:
             wall = np.broadcast_to(self.channel.inlet, (self.number, *self.model.cell_area.shape))
             self.field = self.channel.at(wall + 0.2 * FIRST_RISE)
         matrix, load = self._system(self._quantities(first + FIRST_RISE))
         slope = self._heat_slope(first + FIRST_RISE)
-        readings = self._grease_readings()
+        readings = self._film_readings()
         matrix += np.einsum("nbi,bj->nij", slope, readings, optimize=True)
         inverse = np.linalg.inv(matrix)
         load += np.einsum("nbi,nb->ni", slope, first + FIRST_RISE)
         unknowns = np.einsum("nij,nj->ni", inverse, load)
         settled = np.zeros(self.number, dtype=bool)
         for iteration in range(1, MOST_ITERATIONS + 1):
-            quantities, grease = self._follow(unknowns)
+            quantities, film = self._follow(unknowns)
             step = np.einsum("nij,nj->ni", inverse, self._residual(quantities, unknowns))
             unknowns = unknowns + step
             moved = np.abs(step @ self.solver.functionals.T).max(axis=1)
@@ -250,12 +249,12 @@ class _Run:
             if settled.all() or not np.isfinite(moved).all():
                 break
             if iteration % RENEWED_AFTER == 0:
-                slope = self._heat_slope(grease)
+                slope = self._heat_slope(film)
                 matrix = self._system(quantities)[0] + np.einsum(
                     "nbi,bj->nij", slope, readings, optimize=True
                 )
                 inverse = np.linalg.inv(matrix)
-        quantities, grease = self._follow(unknowns)
+        quantities, film = self._follow(unknowns)
         moving = self._moving(quantities)
         coefficients = self.inputs.coefficients.copy()
         coefficients[:, self.solver.balls] = moving[:, : len(self.solver.balls)]
@@ -269,7 +268,7 @@ class _Run:
             coefficients,
             self.field,
         )
-        return batch, grease
+        return batch, film
 
     def _estimate(self, quantities: Array, unknowns: Array) -> Array:
         """Largest change of any functional where the basis ends earlier, (n,) K."""

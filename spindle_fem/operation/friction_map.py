@@ -1,0 +1,288 @@
+"""Friction and ball conductances of bearings as polynomials of the temperature of their films.
+
+While expansion is not followed, the mechanics of a bearing depend on speed,
+thrust and the temperature of its film alone (a quarter of each raceway and half
+of the balls). :class:`FilmSeries` holds quantities over that temperature at one
+speed and thrust; :class:`FrictionMap` joins series over speeds and thrusts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebvander
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.errors import OutOfValidityError, SpecError
+from spindle_fem.operation.bearing_heat import BearingMechanics, FilmCurves
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.units import ZERO_CELSIUS_K
+
+Array = NDArray[np.float64]
+
+# Shares of the highest speed; friction moments bend most where films are thin.
+SPEED_SHARES = (0.02, 0.04, 0.08, 0.14, 0.22, 0.32, 0.44, 0.58, 0.72, 0.86, 1.0)
+FILM_TEMPERATURES = (ZERO_CELSIUS_K + 5.0, ZERO_CELSIUS_K + 95.0)
+# Eight leave 7e-4 of the heat, twelve 5e-5.
+TEMPERATURE_POINTS = 12
+NOMINAL_FILM_TEMPERATURE = ZERO_CELSIUS_K + 30.0
+# Range of thrusts that two points, the definition's among them, describe to 0.1 %.
+NARROW_THRUSTS = 0.1
+# Quantities of a map's series: natural logarithms of the moment in N·m and of both conductances in W/K.
+MOMENT, CONDUCTANCES = slice(0, 1), slice(1, 3)
+
+
+def film_temperature(inner: ArrayLike, outer: ArrayLike, balls: ArrayLike) -> NDArray:
+    """Temperature at which a film's viscosity is taken: a quarter of each raceway, half of the balls, K."""
+    return 0.25 * (np.asarray(inner) + np.asarray(outer)) + 0.5 * np.asarray(balls)
+
+
+def chebyshev_nodes(low: float, high: float, number: int, *, ends: bool = False) -> Array:
+    """Temperatures to solve at, rising, (number,) [K]; with both ends among them if asked.
+
+    >>> chebyshev_nodes(0.0, 2.0, 3, ends=True).round(12).tolist()
+    [0.0, 1.0, 2.0]
+    """
+    step = np.arange(number) / (number - 1) if ends else (np.arange(number) + 0.5) / number
+    return 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * step)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FilmSeries:
+    """Chebyshev series of quantities of every bearing over the temperature of its film.
+
+    Attributes
+    ----------
+    low, high : float, [K]
+    coefficients : (n_bearings, n_q, n_t) ndarray
+    """
+
+    low: float
+    high: float
+    coefficients: Array
+
+    @classmethod
+    def through(cls, temperatures: Array, values: Array, low: float, high: float) -> FilmSeries:
+        """The polynomials through values at as many temperatures as they have terms.
+
+        Parameters
+        ----------
+        temperatures : (n_t,) ndarray, [K]
+        values : (n_bearings, n_q, n_t) ndarray
+        low, high : float, [K]
+            Ends of the range.
+        """
+        scaled = (2.0 * temperatures - low - high) / (high - low)
+        at_nodes = chebvander(scaled, len(temperatures) - 1)
+        flat = values.reshape(-1, len(temperatures))
+        return cls(low, high, np.linalg.solve(at_nodes, flat.T).T.reshape(values.shape))
+
+    def at(self, film: NDArray, quantities: slice = slice(None)) -> NDArray:
+        """Quantities at film temperatures, (n_bearings, n_q, k).
+
+        Beyond the range the series goes on along its tangent, and so it does
+        for the imaginary part of a complex step: derivatives are exact.
+
+        Parameters
+        ----------
+        film : (n_bearings, k) ndarray, [K]
+            May be complex.
+        quantities : slice
+        """
+        own = self.coefficients[:, quantities].transpose(0, 2, 1)
+        scaled, basis = self._basis(film)
+        slope = chebder(own, axis=1)
+        beyond = np.matmul(basis[:, :, : slope.shape[1]], slope) * scaled[:, :, None]
+        found = np.matmul(basis, own) + beyond
+        return found.transpose(0, 2, 1)
+
+    def slope(self, film: Array, quantities: slice = slice(None)) -> Array:
+        """Derivatives to the film's temperature, (n_bearings, n_q, k) [1/K]; as :meth:`at`."""
+        own = chebder(self.coefficients[:, quantities].transpose(0, 2, 1), axis=1)
+        _, basis = self._basis(film)
+        return (2.0 / (self.high - self.low)) * np.matmul(basis[:, :, : own.shape[1]], own).transpose(0, 2, 1)
+
+    def require(self, film: ArrayLike) -> None:
+        """Refuse film temperatures that the series was not made for.
+
+        Raises
+        ------
+        OutOfValidityError
+        """
+        values = np.asarray(film)
+        if values.min() < self.low or values.max() > self.high:
+            raise OutOfValidityError(
+                "friction map: film temperature",
+                f"{values.min():.6g} to {values.max():.6g} K is outside {self.low:.6g} to {self.high:.6g} K.",
+                "Tabulate the friction over a range that holds it.",
+            )
+
+    def _basis(self, film: NDArray) -> tuple[NDArray, Array]:
+        """What films are beyond the range in its half widths (n_bearings, k), and polynomials inside."""
+        scaled = (2.0 * film - self.low - self.high) / (self.high - self.low)
+        inside = np.clip(scaled.real, -1.0, 1.0)
+        return scaled - inside, chebvander(inside, self.coefficients.shape[2] - 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrictionMap:
+    """Friction moment and ball conductance of every bearing over speed, thrust and film temperature.
+
+    Attributes
+    ----------
+    bearings : tuple of str
+    speed : (n_speeds,) ndarray, [rad/s]
+    thrust : (n_thrusts,) ndarray, [N]
+    turning : CubicSpline
+        Over the logarithm of the speed, (n_thrusts, n_bearings, 3, n_t): series of the
+        logarithms of the moment and of the conductances to the inner and the outer raceway.
+    at_rest : (n_thrusts, n_bearings, 3, n_t) ndarray
+        The same at standstill, where no lubricant flows around the balls; moments as at the first speed.
+    shares : CubicSpline or None
+        Over the thrust, (n_thrusts,): how much each of them counts; None where
+        there is but one.
+    """
+
+    bearings: tuple[str, ...]
+    speed: Array
+    thrust: Array
+    turning: CubicSpline
+    at_rest: Array
+    shares: CubicSpline | None
+
+    def at(self, speed: float, thrust: float) -> FilmSeries:
+        """Series over the film temperature at a speed (rad/s) and thrust (N).
+
+        Below the first speed of the map the moment is that of the first.
+
+        Raises
+        ------
+        OutOfValidityError
+            A speed or thrust outside the map.
+        """
+        self._require(speed, thrust)
+        shares = np.ones(1) if self.shares is None else self.shares(thrust)
+        turning = np.tensordot(shares, self.turning(np.log(max(speed, self.speed[0]))), axes=1)
+        found = FilmSeries(*FILM_TEMPERATURES, turning)
+        if speed >= self.speed[0]:
+            return found
+        # What the lubricant carries around the balls goes with the root of the speed.
+        nodes = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
+        films = np.tile(nodes, (len(self.bearings), 1))
+        still = FilmSeries(*FILM_TEMPERATURES, np.tensordot(shares, self.at_rest, axes=1))
+        values = [np.exp(item.at(films)) for item in (still, found)]
+        between = values[0] + np.sqrt(speed / self.speed[0]) * (values[1] - values[0])
+        between[:, MOMENT] = values[1][:, MOMENT]
+        return FilmSeries.through(nodes, np.log(between), *FILM_TEMPERATURES)
+
+    def heat(self, speed: float, thrust: float, film: Array) -> Array:
+        """Friction heat of every bearing before its factors, (n_bearings,) [W], at films (n_bearings,) K."""
+        return speed * np.exp(self.at(speed, thrust).at(film[:, None], MOMENT)[:, 0, 0])
+
+    def nominal_conductance(self, speed: float, thrust: float) -> Array:
+        """Between balls and inner and outer raceway with films at 30 °C, (n_bearings, 2) [W/K]."""
+        film = np.full((len(self.bearings), 1), NOMINAL_FILM_TEMPERATURE)
+        return np.exp(self.at(speed, thrust).at(film, CONDUCTANCES)[:, :, 0])
+
+    def _require(self, speed: float, thrust: float) -> None:
+        for name, value, known in (("speed", speed, self.speed), ("thrust", thrust, self.thrust)):
+            lowest = 0.0 if name == "speed" else known[0]
+            slack = 1e-6 * max(known[-1], 1.0)
+            if not lowest - slack <= value <= known[-1] + slack:
+                raise OutOfValidityError(
+                    f"friction map: {name}",
+                    f"{value:.6g} is outside {lowest:.6g} to {known[-1]:.6g}.",
+                    "Tabulate the friction over a range that holds it.",
+                )
+
+
+def needs_map(spec: MachineSpec) -> bool:
+    """Whether friction or ball rows of a machine follow their films."""
+    return spec.heat.model != "table" or any(group.ball_row.kind == "contact" for group in spec.bearing_set)
+
+
+def thrusts_between(spec: MachineSpec, low: float, high: float) -> tuple[float, ...]:
+    """Thrusts at which to solve the bearings so that a range and the definition's are covered.
+
+    Parameters
+    ----------
+    low, high : float, [N]
+    """
+    given = spec.operation.thrust
+    low, high = min(low, given), max(high, given)
+    found = {low, given, high}
+    wide = high - low
+    if wide > NARROW_THRUSTS * max(abs(low), abs(high)):
+        middle = 0.5 * (low + high)
+        # A definition near the middle is the middle.
+        if abs(middle - given) > 0.15 * wide:
+            found.add(middle)
+    return tuple(sorted(found))
+
+
+def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence[float]) -> FrictionMap:
+    """Solve a machine's bearings over speed, thrust and film temperature.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+        With an analytical or empirical heat model, or ball rows that follow
+        their contacts.
+    highest_speed : float, [rad/s]
+    thrusts : sequence of float, [N]
+        That occur; a cubic spline between them (a parabola through three).
+
+    Raises
+    ------
+    SpecError
+        Nothing to tabulate, or heat that follows expansion.
+    NoEquilibriumError, OutOfValidityError
+    """
+    if not needs_map(spec):
+        raise SpecError("heat.model", "the heat is given by table already.", "Use the machine as it is.")
+    if spec.heat.thermal_preload and spec.heat.model != "table":
+        raise SpecError(
+            "heat.thermal_preload",
+            "with it heat follows every ring, and no table over one film temperature holds.",
+            "Switch it off for the fast model (--set heat.thermal_preload=false), give the heat by table "
+            "(--set heat.model=table, with a [heat.table]), or run the full model (spindle-fem transient).",
+        )
+    mechanics = BearingMechanics(spec)
+    names = tuple(bearing.name for _, bearing in spec.bearings)
+    factors = np.array([group.heat_factor.value for group, _ in spec.bearings])
+    speeds = highest_speed * np.array(SPEED_SHARES)
+    loads = np.unique(np.asarray(thrusts, dtype=float))
+    kelvin = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
+
+    def series(speed: float, thrust: float) -> Array:
+        curves = mechanics.over_film_temperature(_point(spec, speed, thrust), kelvin)
+        values = np.array([_log_quantities(curves[name], speed) for name in names])
+        if speed > 0.0:
+            values[:, MOMENT] -= np.log(factors)[:, None, None]
+        return FilmSeries.through(kelvin, values, *FILM_TEMPERATURES).coefficients
+
+    turning = np.array([[series(speed, thrust) for thrust in loads] for speed in speeds])
+    at_rest = np.array([series(0.0, thrust) for thrust in loads])
+    shares = CubicSpline(loads, np.eye(len(loads))) if len(loads) > 1 else None
+    return FrictionMap(names, speeds, loads, CubicSpline(np.log(speeds), turning), at_rest, shares)
+
+
+def _log_quantities(curves: FilmCurves, speed: float) -> Array:
+    """Logarithms of moment and conductances over the film temperature, (3, n_t); no moment at standstill."""
+    moment = np.log(curves.heat / speed) if speed > 0.0 else np.zeros_like(curves.heat)
+    return np.array((moment, np.log(curves.conductance_inner), np.log(curves.conductance_outer)))
+
+
+def _point(spec: MachineSpec, speed: float, thrust: float) -> OperatingPoint:
+    given = OperatingPoint.of(spec)
+    return OperatingPoint(
+        float(speed),
+        float(thrust),
+        given.ambient_temperature,
+        given.coolant_inlet_temperature,
+        given.coolant_flow,
+    )
