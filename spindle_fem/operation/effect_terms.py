@@ -2,7 +2,7 @@
 
 The one evaluator of every model: mesh, reduced model and written network ask it for the heat of each
 place, the factor on each bearing's friction and the factor on each coefficient, at one instant or at
-many. Heat of several terms in one place adds up. Factors of several terms on one coefficient or one
+many. Heats of several terms in one place add up. Factors of several terms on one coefficient or one
 bearing's friction multiply: two independent causes that each halve a conductance leave a quarter.
 """
 
@@ -106,7 +106,7 @@ class TermAnswers:
     Attributes
     ----------
     heat : Quantities
-        Of every one of :attr:`EffectTerms.places`, W; K for fluids.
+        Of every one of :attr:`EffectTerms.places`, W; K for fluids. A place may stand there twice.
     friction : Quantities
         Factor on the friction heat of every one of :attr:`EffectTerms.bearings`.
     factor : Quantities
@@ -127,13 +127,10 @@ class _Target:
     positions : slice or (k,) int ndarray
     fresh : bool
         Whether no earlier term has these quantities.
-    repeated : bool
-        Whether the term names one of them more than once.
     """
 
     positions: Positions
     fresh: bool
-    repeated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,8 +220,10 @@ class EffectTerms:
     ----------
     reads : tuple of str
         Place of each sensed temperature.
-    places, bearings, coefficients : tuple of str
-        What the terms heat and scale, each once.
+    places, sources : tuple of str
+        Place of every heat and the name of the term that gives it.
+    bearings, coefficients : tuple of str
+        What the terms scale, each once.
     n_states : int
         Numbers that all terms remember.
 
@@ -246,11 +245,14 @@ class EffectTerms:
         self.values = [term.values(parameters) for term in terms]
         self.reads = tuple(name for term in terms for name in term.reads)
         self.n_sensed, self.n_states = len(self.reads) + unread, sum(term.n_states for term in terms)
-        self.places, self._heat = _targets(terms, "heat_places")
+        self.places = tuple(place for term in terms for place in term.heat_places)
+        self.sources = tuple(term.name for term in terms for _ in term.heat_places)
         self.bearings, self._friction = _targets(terms, "bearings")
         self.coefficients, self._factor = _targets(terms, "coefficients")
         reads = itertools.accumulate((len(term.reads) for term in terms), initial=0)
         states = itertools.accumulate((term.n_states for term in terms), initial=0)
+        heats = itertools.accumulate((len(term.heat_places) for term in terms), initial=0)
+        self._heat = [slice(*ends) for ends in itertools.pairwise(heats)]
         rows = zip(itertools.pairwise(reads), itertools.pairwise(states), strict=True)
         self._layouts = []
         for term, values, (read, state) in zip(terms, self.values, rows, strict=True):
@@ -263,7 +265,7 @@ class EffectTerms:
 
         Parameters
         ----------
-        kind : {"heat_places", "bearings", "coefficients"}
+        kind : {"bearings", "coefficients"}
         name : str
             One of that kind.
         """
@@ -308,7 +310,7 @@ class EffectTerms:
             layout = self._layouts[number]
             context = layout.context(instants, sensed, states, derivatives)
             if term.heat_places:
-                self._add(heat, self._heat[number], layout, term.heat(context))
+                self._put(heat, self._heat[number], layout, term.heat(context))
             if term.bearings:
                 self._multiply(friction, self._friction[number], layout, term.friction(context))
             if term.coefficients:
@@ -338,7 +340,7 @@ class EffectTerms:
             if term.n_states:
                 context = layout.context(instants, sensed, states, derivatives)
                 each = steps if np.ndim(steps) == 0 else np.repeat(steps, layout.width(derivatives))
-                self._add(found, _Target(layout.states, True), layout, term.advance(context, each))
+                self._put(found, layout.states, layout, term.advance(context, each))
         return found
 
     def _quantities(self, number: int, rows: int, fill: float, derivatives: Derivatives) -> Quantities:
@@ -350,16 +352,11 @@ class EffectTerms:
         value = np.full((number, rows), fill)
         return Quantities(value, np.zeros((number, rows, width)), self.n_sensed, self.n_states)
 
-    def _add(self, found: Quantities, target: _Target, layout: _Layout, answers: NDArray) -> None:
-        """Add a term's complex answers (k, n · columns) to some quantities, in place."""
+    def _put(self, found: Quantities, rows: slice, layout: _Layout, answers: NDArray) -> None:
+        """Put a term's complex answers (k, n · columns) into quantities of its own, in place."""
         value, slopes = _split(answers, len(found.value))
-        if not target.repeated:
-            found.value[:, target.positions] += value
-            self._spread(found, target.positions, layout, slopes)
-            return
-        for row, position in enumerate(target.positions):
-            found.value[:, position] += value[:, row]
-            self._spread(found, slice(position, position + 1), layout, slopes[:, row : row + 1])
+        found.value[:, rows] = value
+        self._spread(found, rows, layout, slopes)
 
     def _multiply(self, found: Quantities, target: _Target, layout: _Layout, answers: NDArray) -> None:
         """Multiply some quantities by a term's complex answers, in place."""
@@ -404,15 +401,14 @@ def _targets(terms: Sequence[Term], kind: str) -> tuple[tuple[str, ...], list[_T
     found = []
     for term in terms:
         names = getattr(term, kind)
-        repeated = len(set(names)) != len(names)
-        if repeated and kind != "heat_places":
+        if len(set(names)) != len(names):
             raise SpecError(f"term {term.name}", f"names one of its {kind} twice.", "Name each once.")
         fresh = not any(name in known for name in names)
         at = np.array([known.setdefault(name, len(known)) for name in names], dtype=np.int64)
         if at.size and np.array_equal(at, np.arange(at[0], at[0] + at.size)):
             found.append(_Target(slice(int(at[0]), int(at[0]) + at.size), fresh))
         else:
-            found.append(_Target(at, fresh, repeated))
+            found.append(_Target(at, fresh))
     return tuple(known), found
 
 

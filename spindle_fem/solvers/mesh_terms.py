@@ -9,8 +9,7 @@ the field, at every stage of a time step.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,9 +17,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from spindle_fem.definition.uncertain_parameters import with_parameters
-from spindle_fem.effects.framework.term import COOLANT_INLET, FLOW, FLUID_PREFIX, Term, TermContext
+from spindle_fem.effects.framework.term import COOLANT_INLET, FLOW, FLUID_PREFIX, Term
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.operation.coefficient_table import CoefficientTable, build_coefficient_table, gap_radii_of
+from spindle_fem.operation.effect_terms import (
+    Derivatives,
+    EffectTerms,
+    Instants,
+    multiplied,
+    require_known,
+)
 from spindle_fem.operation.loads import LoadChange
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -106,60 +112,47 @@ class FieldTerms:
     """
 
     def __init__(self, machine: PreparedMachine, lumped_names: Sequence[str], physics: Physics) -> None:
-        terms = physics.terms
-        self.machine, self.terms = machine, terms
-        if len({term.name for term in terms}) != len(terms):
-            raise SpecError("terms", "two of them have the same name.", "Give each a name of its own.")
-        self.values = [term.values(physics.values) for term in terms]
-        self.lumped_names = tuple(lumped_names)
+        self.machine, self.lumped_names = machine, tuple(lumped_names)
+        self.terms = EffectTerms(physics.terms, physics.values)
         self.table: CoefficientTable = build_coefficient_table(
             machine.spec, tuple(machine.mesh.joints), gap_radii_of(machine.spec, machine.operators)
         )
         self._n = machine.operators.n_unknowns
-        self._places = self._wanted_places()
-        self._factors = self._of_parameters(self.table.factors(physics.factors))
-        reads = [name for term in terms for name in term.reads]
-        size = self._n + len(self.lumped_names)
-        self._lossy = tuple(
-            dict.fromkeys(
-                n for term, own in zip(terms, self.values, strict=True) for n in term.place_conductance(own)
-            )
+        self._capacities, self._losses = (
+            [getattr(term, kind)(own) for term, own in self._each()]
+            for kind in ("place_capacity", "place_conductance")
         )
-        rows = [self._places[name] for name in (*reads, *self._lossy)]
-        self._sense = np.array(rows).reshape(-1, size)
-        ends = np.cumsum([0, *(len(term.reads) for term in terms)])
-        self._reads = [slice(a, b) for a, b in itertools.pairwise(ends)]
-        ends = np.cumsum([0, *(term.n_states for term in terms)])
-        self._states = [slice(a, b) for a, b in itertools.pairwise(ends)]
-        initial = [term.initial_state(own) for term, own in zip(terms, self.values, strict=True)]
-        self._initial = np.concatenate(initial) if initial else np.zeros(0)
+        self._places = self._known_places()
+        self._factors = self._of_parameters(self.table.factors(physics.factors))
+        self._lossy = tuple(dict.fromkeys(name for losses in self._losses for name in losses))
+        rows = [self._places[name] for name in (*self.terms.reads, *self._lossy)]
+        self._sense = np.array(rows).reshape(-1, self._n + len(self.lumped_names))
+        self._initial = self.terms.initial_states()
         self._scale, self._lumped_capacity = self._added_capacity()
         self._begin: _Begin | None = None
 
+    def _each(self) -> Iterator[tuple[Term, Mapping[str, float]]]:
+        """Every term with the values of its parameters."""
+        return zip(self.terms.terms, self.terms.values, strict=True)
+
     # ---------------------------------------------------------------- set-up
-    def _wanted_places(self) -> dict[str, Array]:
+    def _known_places(self) -> dict[str, Array]:
+        """Places of the machine, after a look whether it has all that the terms name."""
+        spec = self.machine.spec
         found = dict(named_places(self.machine, self.lumped_names, self._n + len(self.lumped_names)))
-        wanted: dict[str, Array] = {}
-        for term, own in zip(self.terms, self.values, strict=True):
-            names = [*term.reads, *term.place_capacity(own), *term.place_conductance(own)]
-            names += [name for name in term.heat_places if not name.startswith(FLUID_PREFIX)]
-            for name in names:
+        films = [f"{FLUID_PREFIX}{surface}" for film in spec.film for surface in film.surface]
+        require_known(
+            self.terms.terms,
+            places=found,
+            fluids=(*films, COOLANT_INLET),
+            bearings=[bearing.name for _, bearing in spec.bearings],
+            coefficients=self.table.groups,
+        )
+        for number, term in enumerate(self.terms.terms):
+            for name in (*self._capacities[number], *self._losses[number]):
                 if name not in found:
                     raise SpecError(f"term {term.name}", f'names "{name}".', did_you_mean(name, found))
-                wanted[name] = found[name]
-            films = {f"{FLUID_PREFIX}{s}" for film in self.machine.spec.film for s in film.surface}
-            for name in set(term.heat_places) - set(names) - films - {COOLANT_INLET}:
-                raise SpecError(f"term {term.name}", f'shifts "{name}".', did_you_mean(name, films))
-            for name in term.coefficients:
-                self._require(term, name, self.table.groups)
-            for name in term.bearings:
-                self._require(term, name, [bearing.name for _, bearing in self.machine.spec.bearings])
-        return wanted
-
-    @staticmethod
-    def _require(term: Term, name: str, known: Sequence[str] | Mapping[str, object]) -> None:
-        if name not in known:
-            raise SpecError(f"term {term.name}", f'scales "{name}".', did_you_mean(name, known))
+        return found
 
     def _of_parameters(self, factors: Mapping[str, float]) -> dict[str, float]:
         """Factors of coefficients, and of friction by ``heat.<bearing>``."""
@@ -174,8 +167,8 @@ class FieldTerms:
         lumped: dict[str, float] = {}
         scale: Array | None = None
         storage = None
-        for term, own in zip(self.terms, self.values, strict=True):
-            for place, capacity in term.place_capacity(own).items():
+        for capacities in self._capacities:
+            for place, capacity in capacities.items():
                 mean = self._places[place]
                 for node, share in zip(self.lumped_names, mean[self._n :], strict=True):
                     if share:
@@ -258,28 +251,15 @@ class FieldTerms:
 
     # --------------------------------------------------------------- details
     def _sensed(self, temperature: Array, lumped: Array) -> Array:
+        """What terms read, then the places that lose heat, [K]."""
         return self._sense @ np.concatenate((temperature, lumped))
-
-    def _context(
-        self, number: int, time: float, inputs: Mapping[str, float], sensed: Array, memory: Array
-    ) -> TermContext:
-        return TermContext(
-            time,
-            inputs,
-            sensed[self._reads[number], None].astype(complex),
-            memory[self._states[number], None].astype(complex),
-            {name: np.array([value], dtype=complex) for name, value in self.values[number].items()},
-        )
 
     def _advanced(
         self, time: float, step: float, inputs: Mapping[str, float], sensed: Array, memory: Array
     ) -> Array:
-        after = memory.copy()
-        for number, term in enumerate(self.terms):
-            if term.n_states:
-                context = self._context(number, time, inputs, sensed, memory)
-                after[self._states[number]] = np.asarray(term.advance(context, step))[:, 0].real
-        return after
+        terms = self.terms
+        read = sensed[None, : terms.n_sensed]
+        return terms.advance(Instants(time, inputs), step, read, memory[None], Derivatives.NONE).value[0]
 
     def _memory(self, time: float, sensed: Array, inputs: Mapping[str, float]) -> Array:
         """Memory at a time of the step: the mean of what both ends would make of it."""
@@ -299,37 +279,37 @@ class FieldTerms:
         sensed: Array,
         memory: Array,
     ) -> LoadChange:
-        factors = dict(self._factors)
+        terms = self.terms
+        read, means = sensed[None, : terms.n_sensed], sensed[terms.n_sensed :]
+        answers = terms.at(Instants(time, inputs), read, memory[None], Derivatives.NONE)
+        factors = multiplied(
+            (
+                self._factors,
+                *(term.operating_factor(point, own) for term, own in self._each()),
+                dict(zip(terms.coefficients, answers.factor.value[0].tolist(), strict=True)),
+                {
+                    f"heat.{name}": value
+                    for name, value in zip(terms.bearings, answers.friction.value[0].tolist(), strict=True)
+                },
+            )
+        )
         fluids: dict[str, float] = {}
         nodal: dict[str, Array] = {}
         lumped: dict[str, float] = {}
         inlet = 0.0
-        first_lossy = len(sensed) - len(self._lossy)
-        means = dict(zip(self._lossy, sensed[first_lossy:].tolist(), strict=True))
-        field = (time, inputs, sensed, memory)
-        for number, term in enumerate(self.terms):
-            context = self._context(number, *field)
-            own = self.values[number]
-            for name, value in term.operating_factor(point, own).items():
-                factors[name] = factors.get(name, 1.0) * value
-            for names, method, prefix in (
-                (term.coefficients, term.factor, ""),
-                (term.bearings, term.friction, "heat."),
-            ):
-                answers = np.asarray(method(context))[:, 0].real if names else ()
-                for name, value in zip(names, answers, strict=True):
-                    factors[prefix + name] = factors.get(prefix + name, 1.0) * float(value)
-            answers = np.asarray(term.heat(context))[:, 0].real if term.heat_places else ()
-            for place, value in zip(term.heat_places, answers, strict=True):
-                if place == COOLANT_INLET:
-                    inlet += float(value)
-                elif place in self._places:
-                    self._put(term.name, place, float(value), nodal, lumped)
-                else:
-                    surface = place.removeprefix(FLUID_PREFIX)
-                    fluids[surface] = fluids.get(surface, 0.0) + float(value)
-            for place, conductance in term.place_conductance(own).items():
-                heat = conductance * (point.ambient_temperature - means[place])
+        heats = zip(terms.sources, terms.places, answers.heat.value[0].tolist(), strict=True)
+        for name, place, heat in heats:
+            if place == COOLANT_INLET:
+                inlet += heat
+            elif place in self._places:
+                self._put(name, place, heat, nodal, lumped)
+            else:
+                surface = place.removeprefix(FLUID_PREFIX)
+                fluids[surface] = fluids.get(surface, 0.0) + heat
+        warmth = dict(zip(self._lossy, means.tolist(), strict=True))
+        for term, losses in zip(terms.terms, self._losses, strict=True):
+            for place, conductance in losses.items():
+                heat = conductance * (point.ambient_temperature - warmth[place])
                 self._put(term.name, place, heat, nodal, lumped)
         return LoadChange(
             friction={n.removeprefix("heat."): v for n, v in factors.items() if n.startswith("heat.")},
@@ -346,6 +326,7 @@ class FieldTerms:
     def _put(
         self, name: str, place: str, heat: float, nodal: dict[str, Array], lumped: dict[str, float]
     ) -> None:
+        """Spread heat of a term over a place, on the mesh and on lumped nodes."""
         mean = self._places[place]
         if mean[: self._n].any():
             nodal[name] = nodal.get(name, 0.0) + heat * mean[: self._n]

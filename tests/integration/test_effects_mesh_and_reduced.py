@@ -220,10 +220,10 @@ def test_the_steady_state_is_where_the_transient_ends(machine, fast):
 def test_places_and_coefficients_that_do_not_exist_are_refused(machine):
     inputs = InputHistory(TIMES, STANDARD, *inputs_over(TIMES))
     for change, message in (
-        ({"reads": ("housinh",)}, 'names "housinh".*housing'),
-        ({"heat_places": ("fluid.nowhere",)}, r'shifts "fluid\.nowhere"'),
+        ({"reads": ("housinh",)}, 'reads "housinh".*housing'),
+        ({"heat_places": ("fluid.nowhere",)}, r'puts heat into "fluid\.nowhere"'),
         ({"coefficients": ("joint.nowhere",)}, r'scales "joint\.nowhere"'),
-        ({"bearings": ("F9",)}, 'scales "F9"'),
+        ({"bearings": ("F9",)}, 'scales the friction of "F9"'),
     ):
         term = Term()
         term.name = "odd"

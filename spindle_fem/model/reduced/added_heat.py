@@ -95,8 +95,8 @@ class _Moved:
         Product of the factors on its fluid's temperature.
     fluid_targets : list of int
         Asked parameters among these factors.
-    shift : int or None
-        Place, among those of the terms, that shifts its fluid.
+    shifts : list of int
+        Heats of the terms that are shifts of its fluid, K.
     depends : list of slice
         Derivatives of its factor that are not always zero.
     """
@@ -109,14 +109,14 @@ class _Moved:
     uniform: Array
     fluid_scale: float
     fluid_targets: list[int]
-    shift: int | None
+    shifts: list[int]
     depends: list[slice]
 
 
 class AddedHeat:
     """Terms that answer to temperatures on one model: columns, sensed temperatures, evaluation.
 
-    Added are the heat of every place that terms name, then of every heat place of every bearing whose
+    Added are every heat that terms put into places, then the heat of every heat place of every bearing whose
     friction they scale, then what every coefficient that they scale conducts more in each direction.
 
     Parameters
@@ -175,7 +175,6 @@ class AddedHeat:
         first = len(self.terms.reads)
         for name, (vectors, spectrum) in zip(scaled, directions, strict=True):
             own, width = fast.fluid_parameters(name), len(spectrum)
-            shift = next((row for row, film in self._fluids if film == name), None)
             self._moved.append(
                 _Moved(
                     name,
@@ -186,7 +185,7 @@ class AddedHeat:
                     vectors.T @ model.one,
                     float(np.prod([parameters.get(item, 1.0) for item in own])),
                     [i for i, item in enumerate(self.derivatives) if item in own],
-                    shift,
+                    [row for row, film in self._fluids if film == name],
                     self.terms.depends("coefficients", name),
                 )
             )
@@ -293,8 +292,8 @@ class AddedHeat:
         own = item.fluid_scale * self.fast.fluid_temperature(name, where.instants.inputs)
         shift, shift_by = where.shifts.get(name, (0.0, None))
         fluid = np.broadcast_to(own + shift, len(sensed))
-        if item.shift is not None:
-            fluid = fluid + answers.heat.value[:, item.shift]
+        for row in item.shifts:
+            fluid = fluid + answers.heat.value[:, row]
         flow = strength * (fluid[:, None] * uniform - sensed[:, item.sensed])
         excess = (answers.factor.value[:, number] - 1.0)[:, None]
         moved, by_fluid = excess * strength, excess * strength * uniform
@@ -307,8 +306,8 @@ class AddedHeat:
             # The derivative of each direction's column to that direction itself.
             diagonal = slice(first, first + len(uniform) * width, width + 1)
             found.by.reshape(len(sensed), -1)[:, diagonal] -= moved
-        if item.shift is not None:
-            found.by[:, columns] += by_fluid[:, :, None] * answers.heat.by[:, item.shift, None]
+        for row in item.shifts:
+            found.by[:, columns] += by_fluid[:, :, None] * answers.heat.by[:, row, None]
         by_parameter = found.by_parameter
         if by_parameter.shape[2]:
             self._scaled_by(found, columns, touched.get(name, ()))

@@ -195,7 +195,7 @@ class _Columns:
         self, fast: FastModel, built: RunOperators, derivatives: Sequence[str], places: Sequence[str]
     ) -> None:
         self.fast, self.built, self.derivatives = fast, built, tuple(derivatives)
-        self.names = [place for place in places if place != COOLANT_INLET]
+        self.names = [place for place in dict.fromkeys(places) if place != COOLANT_INLET]
 
     def of(self, place: str) -> int:
         """Column of a place."""
