@@ -1,8 +1,10 @@
-"""One mesh for all coupled tests: the recorded spindle, coarse."""
+"""Machines prepared once for all coupled tests, on their coarse meshes."""
 
 import pytest
 
 from spindle_fem.definition.load import load_machine
+from spindle_fem.model.reduced.build_reduced import reduced_model_of
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.solvers.coupled_steady import prepare_machine
 from spindle_fem.studies.solve_machine import solve_prepared
 
@@ -27,3 +29,15 @@ def reference():
 @pytest.fixture(scope="session")
 def reference_result(reference):
     return solve_prepared(reference)
+
+
+@pytest.fixture(scope="session")
+def small():
+    """The recorded spindle with linear temperatures on its coarse mesh: small enough for direct solves."""
+    return prepare_machine(load_machine("recorded_spindle", ["mesh.preset=coarse", "mesh.order=1"]))
+
+
+@pytest.fixture(scope="session")
+def small_fast(small):
+    """Its reduced model, which the cache keeps between workers and runs."""
+    return FastModel(reduced_model_of(small.spec), small.spec)

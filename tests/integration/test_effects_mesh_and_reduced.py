@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.catalogue.coolant_film import TransitionTerm
 from spindle_fem.effects.catalogue.thermal_preload import ThermalPreloadTerm
 from spindle_fem.effects.framework.laws import amplitude
@@ -17,14 +16,12 @@ from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.effects.framework.unrecorded import InIntervals, UnrecordedHeatTerm
 from spindle_fem.errors import SpecError
 from spindle_fem.model.mesh.equations import assemble_capacity
-from spindle_fem.model.reduced.build_reduced import ReductionOptions, reduced_model_of
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
-from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
+from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
 from spindle_fem.solvers.mesh_terms import Physics, steady_physics, with_capacity, with_factors
 from spindle_fem.solvers.readings import ReadingRows
@@ -36,13 +33,13 @@ LITRE_PER_MINUTE = 1e-3 / 60.0
 
 
 @pytest.fixture(scope="module")
-def machine():
-    return prepare_machine(load_machine("recorded_spindle", SMALL))
+def machine(small):
+    return small
 
 
 @pytest.fixture(scope="module")
-def fast(machine):
-    return FastModel(reduced_model_of(machine.spec, options=ReductionOptions()), machine.spec)
+def fast(small_fast):
+    return small_fast
 
 
 def preload():

@@ -184,11 +184,12 @@ def test_reference_spindle_mesh():
     assert max(map(abs, area_errors(mesh).values())) < 1e-3
 
 
-def test_twenty_random_designs_mesh():
-    """Housing of the reference spindle with 20 channels of the design space."""
+@pytest.mark.parametrize("number", [4, pytest.param(20, marks=pytest.mark.slow)])
+def test_random_designs_mesh(number):
+    """Housing of the reference spindle with channels of the design space."""
     reference = build_assembly(load_machine("wu_tan_2016"))
     housing = [part for part in reference.parts if part.name == "housing"]
-    for assembly in draw_valid_designs(housing, reference.channel.definition, 20, seed=2026):
+    for assembly in draw_valid_designs(housing, reference.channel.definition, number, seed=2026):
         mesh = generate_mesh(assembly, build_sizes(assembly, "coarse"), threads=1)
         assert mesh.min_quality > 0.05, assembly.channel.definition
         assert max(map(abs, area_errors(mesh).values())) < 1e-3

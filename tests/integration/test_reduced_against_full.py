@@ -9,13 +9,12 @@ import pytest
 from scipy.sparse.linalg import splu, spsolve
 
 from spindle_fem.commands.simulate_command import simulate_machine
-from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.machine.view.place_names import ACROSS, UP
-from spindle_fem.model.reduced.build_reduced import ReductionOptions, build_reduced_model, reduced_model_of
+from spindle_fem.model.reduced import build_reduced as building
+from spindle_fem.model.reduced.build_reduced import ReductionOptions, reduced_model_of
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
-from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.mesh_model import build_mesh_model
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
@@ -32,14 +31,13 @@ FLOW = 20.0e-3 / 60.0
 
 
 @pytest.fixture(scope="module")
-def machine():
-    """The recorded spindle, linear temperatures on the coarse mesh: small enough for direct solves."""
-    return prepare_machine(load_machine("recorded_spindle", OVERRIDES))
+def machine(small):
+    return small
 
 
 @pytest.fixture(scope="module")
-def fast(machine):
-    return FastModel(build_reduced_model(machine), machine.spec)
+def fast(small_fast):
+    return small_fast
 
 
 def history(times, speed, ambient, inlet):
@@ -170,31 +168,28 @@ def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fa
     assert np.ptp(full.reading("SP05")) > 3.0
 
 
-def test_it_is_found_again_in_the_cache(machine, monkeypatch, tmp_path):
+def test_it_is_found_again_in_the_cache(machine, fast, monkeypatch, tmp_path):
     monkeypatch.setenv("SPINDLE_FEM_CACHE", str(tmp_path))
-    small = ReductionOptions(samples=1, checks=1, sigmas=0.1, tolerance=1e-3, error=5.0, largest=60)
-    from spindle_fem.model.reduced import build_reduced as build
-
     made = []
 
-    def prepare(spec, progress=None):
-        made.append(spec)
-        return replace(machine, spec=spec)
+    def build(prepared, options, **more):
+        made.append(prepared)
+        return replace(fast.model, digest=building.reduced_digest(prepared, options.key(prepared)))
 
-    monkeypatch.setattr(build, "prepare_machine", prepare)
-    first = reduced_model_of(machine.spec, options=small)
-    stages = []
-    again = reduced_model_of(machine.spec, options=small, progress=stages.append)
-    assert stages == []
+    monkeypatch.setattr(building, "prepare_machine", lambda spec, **more: spec)
+    monkeypatch.setattr(building, "build_reduced_model", build)
+    spec, options = machine.spec, ReductionOptions()
+    first, again = reduced_model_of(spec), reduced_model_of(spec)
+    assert made == [spec]
     assert np.array_equal(first.operators, again.operators)
     # a machine with other coefficients, within the range of the first and beyond it
-    near, far = (with_parameters(machine.spec, {"film.outside": factor}) for factor in (1.02, 2.0))
-    assert reduced_model_of(near, options=small, as_given=True).digest == first.digest
-    assert made == [machine.spec]
-    assert reduced_model_of(far, options=small, as_given=True).digest != first.digest
-    assert reduced_model_of(near, options=small).digest != first.digest
-    assert made == [machine.spec, far, near]
-    assert reduced_model_of(machine.spec, options=replace(small, tolerance=1e-2)).digest != first.digest
+    near, far = (with_parameters(spec, {"film.outside": factor}) for factor in (1.02, 50.0))
+    assert reduced_model_of(near, as_given=True).digest == first.digest
+    assert made == [spec]
+    assert reduced_model_of(far, as_given=True).digest != first.digest
+    assert reduced_model_of(near).digest != first.digest
+    assert made == [spec, far, near]
+    assert reduced_model_of(spec, options=replace(options, tolerance=1e-2)).digest != first.digest
 
 
 @pytest.fixture(scope="module")

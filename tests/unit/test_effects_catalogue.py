@@ -1,14 +1,10 @@
 """Every effect of the catalogue on a lumped spindle and a small network."""
 
-import tomllib
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from spindle_fem.definition.load import load_machine
-from spindle_fem.definition.network_tables import validate_network_machine
 from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.effects.registry import (
     build,
@@ -20,137 +16,18 @@ from spindle_fem.effects.registry import (
     interval_effects,
 )
 from spindle_fem.errors import SpecError, UnitError
-from spindle_fem.machine.view.build_view import view_of
-from spindle_fem.model.lumped.network_view import view_of_network
-from spindle_fem.model.lumped.written_network import build_network
-from spindle_fem.model.reduced.drive import drive_of_recording
-from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
-from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.recordings.align import read_recording
-from tests.support.lumped_spindle import lumped_model
-
-SPINDLE_RECORDING = """
-schema = "spindle-fem/recording/1"
-name = "steps"
-data = "spindle.csv"
-time = {column = "t", unit = "s"}
-"""
-CHANNEL = """
-[[channel]]
-column = "%s"
-role = "temperature"
-probe = "%s"
-unit = "degC"
-sigma = 0.1
-"""
-INPUT = """
-[[channel]]
-column = "%s"
-role = "input"
-hold = "%s"
-drives = "%s"
-unit = "%s"
-"""
-NETWORK = """
-schema = "spindle-fem/machine/1"
-name = "small motor"
-[[network.node]]
-name = "winding"
-capacity = {value = "180 J/K", sigma_rel = 0.5}
-[[network.node]]
-name = "body"
-capacity = {value = "500 J/K", sigma_rel = 0.5}
-[[network.node]]
-name = "jacket"
-capacity = {value = "300 J/K", sigma_rel = 0.5}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.boundary]]
-name = "coolant"
-temperature = "18 degC"
-[[network.link]]
-between = ["winding", "body"]
-conductance = {value = "2.3 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "ambient"]
-conductance = {value = "0.5 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "jacket"]
-conductance = {value = "1.5 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["jacket", "coolant"]
-conductance = {value = "0.8 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "coolant"]
-conductance = {value = "0.4 W/K", sigma_rel = 0.5}
-[[network.source]]
-node = "winding"
-input = "power"
-gain = {value = "0.8 W/W", sigma_rel = 0.1}
-[[network.source]]
-node = "body"
-input = "speed"
-gain = {value = "15 W", sigma_rel = 0.3}
-reference = "1000 rpm"
-"""
-
-
-def _spindle(folder):
-    """Fast model, recording, view and drive of a lumped reference spindle."""
-    time = np.arange(0.0, 7200.0, 30.0)
-    speed = np.select([time < 300, time < 2700, time < 3600, time < 5400], [0.0, 3000.0, 0.0, 1500.0], 4000.0)
-    columns = {"t": time, "speed": speed, "ambient": 20.0 + 0.5 * np.sin(time / 900.0)}
-    columns["coolant_in"] = np.where(time < 4000.0, 15.0, 30.0)
-    text = SPINDLE_RECORDING
-    probes = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
-    for probe in probes:
-        columns[f"{probe}_degC"] = 22.0 + 8.0 * time / time[-1]
-        text += CHANNEL % (f"{probe}_degC", probe)
-    for column, hold, drives, unit in (
-        ("speed", "previous", "speed", "rpm"),
-        ("ambient", "linear", "ambient", "degC"),
-        ("coolant_in", "linear", "coolant_inlet", "degC"),
-    ):
-        text += INPUT % (column, hold, drives, unit)
-    recording = _written(folder, "spindle", columns, text)
-    spec = load_machine("recorded_spindle")
-    fast = FastModel(lumped_model(spec), spec)
-    return fast, recording, view_of(fast.names, recording), drive_of_recording(spec, recording)
-
-
-def _network(folder):
-    """Fast model, recording, view and drive of a small network."""
-    time = np.arange(0.0, 5000.0, 25.0)
-    columns = {
-        "t": time,
-        "winding": 20.0 + 20.0 * time / 5000.0,
-        "body": 20.0 + 10.0 * time / 5000.0,
-        "ambient": 20.0 + np.sin(time / 900.0),
-        "power": np.where(time < 2500.0, 120.0, 40.0),
-        "speed": np.select([time < 500, time < 2500, time < 3000], [0.0, 1500.0, 0.0], 800.0),
-    }
-    text = SPINDLE_RECORDING.replace("spindle.csv", "network.csv")
-    for probe in ("winding", "body"):
-        text += CHANNEL % (probe, probe)
-    for name, hold, unit in (
-        ("ambient", "linear", "degC"),
-        ("power", "previous", "W"),
-        ("speed", "previous", "rpm"),
-    ):
-        text += INPUT % (name, hold, name, unit)
-    recording = _written(folder, "network", columns, text)
-    spec = validate_network_machine(tomllib.loads(NETWORK), "motor.toml")
-    fast = NetworkFastModel(build_network(spec.network), spec)
-    return fast, recording, view_of_network(fast.network, recording), fast.drive(recording)
-
-
-def _written(folder, name, columns, text):
-    pd.DataFrame(columns).to_csv(folder / f"{name}.csv", index=False)
-    (folder / f"{name}.toml").write_text(text, encoding="utf-8")
-    return read_recording(folder / f"{name}.toml")
+from tests.support.effect_machines import (
+    COLDER,
+    IDS,
+    INTERVALS,
+    KINDS,
+    POINT,
+    WARMER,
+    _network,
+    _spindle,
+)
 
 
 @pytest.fixture(scope="module")
@@ -158,9 +35,6 @@ def machines(tmp_path_factory):
     """Both machines by kind: fast model, recording, view, drive."""
     folder = tmp_path_factory.mktemp("machines")
     return {"geometry": _spindle(folder), "network": _network(folder)}
-
-
-INTERVALS = [(900.0, 1800.0), (2600.0, 3900.0)]
 
 
 def everything(view):
@@ -205,42 +79,7 @@ def parts_of(term):
     return found
 
 
-KINDS = ("geometry", "network")
-POINT = OperatingPoint(260.0, 1500.0, 293.0, 295.0, 3.0e-4)
-
-
 # ------------------------------------------------------------------ catalogue
-IDS = {
-    "thermal_preload": "missing_physics",
-    "viscosity_heat": "missing_physics",
-    "grease_churning": "missing_physics",
-    "starvation": "missing_physics",
-    "seal_friction": "missing_physics",
-    "windage": "missing_physics",
-    "drive_heat": "missing_physics",
-    "joint_conductance": "parameter",
-    "gap_closure": "missing_physics",
-    "mount_sink": "missing_physics",
-    "shaft_convection": "missing_physics",
-    "radiation": "missing_physics",
-    "natural_convection": "missing_physics",
-    "coolant_heating": "missing_physics",
-    "coolant_film": "missing_physics",
-    "coolant_bypass": "missing_physics",
-    "chiller_cycling": "missing_physics",
-    "ambient_drift": "missing_physics",
-    "heat_split": "parameter",
-    "heat_scale": "parameter",
-    "heat_capacity": "parameter",
-    "sensor_offset": "sensor",
-    "sensor_gain": "sensor",
-    "sensor_lag": "sensor",
-    "sensor_drift": "sensor",
-    "sensor_detached": "sensor",
-    "clock_shift": "sensor",
-    "unrecorded_heat_source": "missing_physics",
-    "unrecorded_cooling": "missing_physics",
-}
 
 
 def test_the_catalogue_is_complete_and_each_kind_is_right():
@@ -377,25 +216,6 @@ def _run(fast, recording, drive, terms, values):
     if isinstance(fast, NetworkFastModel):
         start = fast.start(recording, drive)
     return simulate_fast(fast, drive, start, parameters=values, terms=terms).temperature
-
-
-# Sign of the mean change of the named channel at positive amplitude.
-WARMER = {
-    ("thermal_preload", "front_bearings"): 0,
-    ("seal_friction", "nose"): 0,
-    ("windage", "shaft"): 3,
-    ("drive_heat", "drive_end"): 4,
-    ("mount_sink", "flange"): 3,
-    ("grease_churning", "front_bearings"): 0,
-    ("starvation", "front_bearings"): 0,
-    ("coolant_bypass", "channel"): 3,
-    ("unrecorded_heat_source", "housing"): 3,
-}
-COLDER = {
-    ("shaft_convection", "shaft"): 3,
-    ("unrecorded_cooling", "housing"): 3,
-    ("coolant_film", "channel"): 3,
-}
 
 
 def test_heat_warms_and_losses_cool(machines):

@@ -16,13 +16,6 @@ LONG_FILES = {
     "spindle_fem/inference/hypothesis_search.py",
     "spindle_fem/inference/simulated_plant.py",
     "spindle_fem/model/reduced/fast_model.py",
-    "tests/integration/test_coupled_transient.py",
-    "tests/integration/test_diagnose_network.py",
-    "tests/unit/test_definition_refusals.py",
-    "tests/unit/test_effects_catalogue.py",
-    "tests/unit/test_inference_hypothesis_fit.py",
-    "tests/unit/test_inference_outcome.py",
-    "tests/unit/test_report_outputs.py",
     "validation/draw.py",
     "validation/laws.py",
 }

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.optimize import lsq_linear
 from scipy.stats import chi2, multivariate_normal
 
 from spindle_fem.definition.network_tables import validate_network_machine
@@ -17,15 +16,13 @@ from spindle_fem.inference.candidate_response import BaseRun, Variant
 from spindle_fem.inference.drive_steps import even_drive
 from spindle_fem.inference.hypothesis_fit import (
     Belief,
-    Coordinate,
     Problem,
-    _bounded_step,
     _huber,
     candidate_coordinates,
 )
 from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates, slow_error_of
-from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener, likely_slow_error
+from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, Plant
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
@@ -452,87 +449,6 @@ def synthetic_with(plant, folder, temperatures):
 
 
 # ------------------------------------------------------------------- coordinates
-def test_coordinates_go_there_and_back():
-    logarithmic = Coordinate("a", 5.0, 0.3, True, -4.0, 4.0)
-    assert logarithmic.at(1.0) == pytest.approx(5.0 * np.exp(0.3))
-    assert logarithmic.of(logarithmic.at(-1.7)) == pytest.approx(-1.7)
-    linear = Coordinate("b", 20.0, 4.0, False, -2.0, np.inf, "K")
-    assert linear.at(0.5) == 22.0
-    assert linear.of(30.0) == pytest.approx(2.5)
-    assert linear.of(-100.0) == -2.0
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_a_bounded_step_is_the_least_squares_step_within_the_bounds(seed):
-    generator = np.random.default_rng(seed)
-    jacobian, residual = generator.normal(size=(12, 4)), 3.0 * generator.normal(size=12)
-    # Nearly orthogonal columns, for which holding what would leave is exact.
-    jacobian, _ = np.linalg.qr(jacobian)
-    position = generator.uniform(-0.5, 0.5, 4)
-    low, high = np.full(4, -0.8), np.array([0.8, np.inf, 0.6, np.inf])
-    move = _bounded_step(jacobian.T @ jacobian, jacobian.T @ residual, 0.0, position, low, high)
-    exact = lsq_linear(jacobian, residual, bounds=(low - position, high - position), tol=1e-14).x
-    assert position + move == pytest.approx(np.clip(position + move, low, high), abs=1e-15)
-    assert move == pytest.approx(exact, abs=1e-6)
-
-
-def test_an_unbounded_step_is_newtons():
-    generator = np.random.default_rng(2)
-    root, gradient = generator.normal(size=(5, 3)), generator.normal(size=3)
-    hessian = root.T @ root
-    free = np.full(3, np.inf)
-    move = _bounded_step(hessian, gradient, 0.0, np.zeros(3), -free, free)
-    assert hessian @ move == pytest.approx(gradient)
-    damped = _bounded_step(hessian, gradient, 10.0, np.zeros(3), -free, free)
-    assert (hessian + 10.0 * np.diag(np.diag(hessian))) @ damped == pytest.approx(gradient)
-
-
-def test_large_residuals_count_linearly():
-    assert _huber(np.array([-2.0, 3.0, 10.0])) == pytest.approx([4.0, 9.0, 51.0])
-    step = 1e-6
-    slope = (_huber(np.array([3.0 + step])) - _huber(np.array([3.0 - step]))) / (2.0 * step)
-    assert slope == pytest.approx([6.0], abs=1e-4)
 
 
 # ---------------------------------------------------------------------- whitener
-def bins_of(count, *, number=1.0, spacing=0.0, seed=0):
-    generator = np.random.default_rng(seed)
-    times = np.cumsum(generator.uniform(40.0, 90.0, count))
-    many = np.full(count, number)
-    rows = np.arange(count)
-    return ChannelBins(0, rows, rows, times, many, np.full(count, spacing), 0.1)
-
-
-def test_whitened_readings_are_independent_of_unit_variance():
-    bins, slow = bins_of(60, number=4.0, spacing=12.0), SlowError(0.2, 700.0)
-    factor = bins.factor(slow)
-    white = Whitener(bins, slow)
-    assert white(factor) == pytest.approx(np.eye(60), abs=1e-10)
-    assert white.log_root_determinant == pytest.approx(0.5 * np.linalg.slogdet(factor @ factor.T)[1])
-
-
-def test_the_filter_is_the_cholesky_factor(monkeypatch):
-    bins, slow = bins_of(150), SlowError(0.15, 900.0)
-    values = np.random.default_rng(1).normal(size=(150, 3))
-    dense = Whitener(bins, slow)
-    monkeypatch.setattr("spindle_fem.inference.reading_noise.MOST_DENSE", 100)
-    filtered = Whitener(bins, slow)
-    assert filtered.factor is None
-    assert filtered(values) == pytest.approx(dense(values), rel=1e-9, abs=1e-9)
-    assert filtered(values[:, 0]) == pytest.approx(dense(values[:, 0]), rel=1e-9, abs=1e-9)
-    assert filtered.log_root_determinant == pytest.approx(dense.log_root_determinant, rel=1e-10)
-
-
-def test_the_slow_error_of_a_known_process_is_found():
-    generator = np.random.default_rng(4)
-    true = SlowError(0.17, 1200.0)
-    residuals = []
-    for seed in range(6):
-        bins = bins_of(120, seed=seed)
-        residuals.append((bins, bins.factor(true) @ generator.normal(size=120)))
-    choices = {"sigmas": (0.01, 0.05, 0.11, 0.17, 0.25, 0.65), "times": (300.0, 1200.0, 4800.0)}
-    found = likely_slow_error(residuals, **choices)
-    assert found.sigma in (0.11, 0.17, 0.25)
-    assert found.time == 1200.0
-    held = likely_slow_error(residuals, prior=SlowError(0.01, 1200.0), prior_width=0.005, **choices)
-    assert held.sigma == 0.01

@@ -7,20 +7,18 @@ from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 
-from spindle_fem.definition.load import load_machine, write_machine
+from spindle_fem.definition.load import write_machine
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.errors import BadInputError
-from spindle_fem.inference.diagnosis import Diagnosis, _overlapping
+from spindle_fem.inference.diagnosis import _overlapping
 from spindle_fem.inference.findings import findings_of, noise_level, predictions_at_stamps, rmse
 from spindle_fem.inference.further_tests import AGAIN, answer, reachable_places, trials_of
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.hypothesis_search import OTHER_SPOTS, Hypothesis, Search
 from spindle_fem.inference.mismatch_place import significant_stretches, smoothed_scores, where_of
-from spindle_fem.inference.missing_heat import Pattern, explain, onset_answers
 from spindle_fem.inference.next_measurement import (
     EXISTING,
     expected_information,
@@ -31,127 +29,26 @@ from spindle_fem.inference.prepared_problem import (
     COMMON_RADIAL_SIGMA,
     EXPECTED_SLOW,
     PROBE_PLACE_SIGMA,
-    calibrate,
     known_before,
 )
-from spindle_fem.inference.simulated_plant import Plant
-from spindle_fem.inference.verdict import Judgement, Ranked
 from spindle_fem.inference.worker_processes import Workers
-from spindle_fem.machine.view.build_view import view_of
-from spindle_fem.machine.view.meridian_places import centre_of, regions_of
-from spindle_fem.machine.view.part_roles import Layout
-from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.recordings.align import read_recording
+from spindle_fem.machine.view.meridian_places import centre_of
 from spindle_fem.report.diagnosis_data import diagnosis_dataset
 from spindle_fem.report.diagnosis_report import SCHEMA, draw_figures, write_diagnosis_report
 from spindle_fem.report.diagnosis_words import verdict_sentence
-from tests.support.lumped_spindle import lumped_model
-
-PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "steps"
-data = "steps.csv"
-time = {column = "t", unit = "s"}
-[[channel]]
-column = "speed"
-role = "input"
-hold = "previous"
-drives = "speed"
-unit = "rpm"
-[[channel]]
-column = "ambient"
-role = "input"
-drives = "ambient"
-unit = "degC"
-"""
-CHANNEL = """
-[[channel]]
-column = "%s"
-role = "temperature"
-probe = "%s"
-unit = "degC"
-sigma = 0.1
-"""
-TIMES = np.arange(0.0, 10800.0, 30.0)
-RUNS, STOPS = 1800.0, 8100.0
-FROM, UNTIL, HEAT = 3000.0, 6000.0, 200.0
-
-
-def written(folder, temperatures):
-    columns = {
-        "t": TIMES,
-        "speed": np.where((TIMES >= RUNS) & (TIMES < STOPS), 3000.0, 0.0),
-        "ambient": np.full(TIMES.size, 20.0),
-    }
-    columns |= {name: temperatures[:, column] for column, name in enumerate(PROBES)}
-    pd.DataFrame(columns).to_csv(folder / "steps.csv", index=False)
-    text = MANIFEST + "".join(CHANNEL % (name, name) for name in PROBES)
-    (folder / "steps.toml").write_text(text, encoding="utf-8")
-    return read_recording(folder / "steps.toml")
-
-
-class Case:
-    """A lumped spindle, and recordings of it with one effect more."""
-
-    def __init__(self, folder):
-        self.folder = folder
-        self.spec = load_machine("recorded_spindle")
-        model = lumped_model(self.spec)
-        slopes = np.zeros((len(model.probe_names), 2, model.size))
-        model = replace(
-            model,
-            probe_gradients=slopes,
-            place_names=(*model.place_names, *(f"near.{name}" for name in model.probe_names)),
-            places=np.vstack((model.places, model.probes)),
-        )
-        self.fast = FastModel(model, self.spec)
-        self.blank = written(folder, np.tile(20.0, (TIMES.size, len(PROBES))))
-        self.view = view_of(self.fast.names, self.blank)
-        self.candidates = {(c.effect, c.component): c for c in reversed(candidates_for(self.view))}
-        heat = effect_of("unrecorded_heat_source").over(self.view, "front_bearings", [(FROM, UNTIL)])
-        self.candidates[heat.effect, heat.component] = heat
-
-    def diagnosis(self, truth, amplitude, verdict, rivals):
-        """Fits and judgement about a recording with an effect, as the search would hand them on."""
-        candidate = self.candidates[truth] if truth else None
-        plant = Plant(self.fast, [self.blank], [np.ones(TIMES.size, dtype=bool)])
-        values, chosen = {}, ()
-        if candidate is not None:
-            factors = {item.name for item in candidate.factors}
-            name = candidate.amplitude
-            values, chosen = {f"effect:{name}" if name in factors else name: amplitude}, (candidate,)
-        on_grid = plant.predict(0, values, chosen).temperature
-        true = np.array([np.interp(TIMES, plant.drives[0].grid, column) for column in on_grid.T]).T
-        noise = np.random.default_rng(7).normal(0.0, 0.1, true.shape)
-        recording = written(self.folder, true - 273.15 + noise)
-        held = (TIMES > 4000.0) & (TIMES < 5000.0)
-        plant = Plant(self.fast, [recording], [~held])
-        calibrated = calibrate(None, plant)
-        problem = Problem(plant, calibrated.belief, EXPECTED_SLOW, plant.observations)
-        sets = [(self.candidates[key],) for key in ((truth,) if truth else ()) + rivals]
-        null = problem.fit()
-        found = [Hypothesis(problem.fit(members), -3.0) for members in sets]
-        hypotheses = (*found, Hypothesis(null, -1.0))
-        shares = [1.0] if not rivals else [0.6, 0.4]
-        ranked = [Ranked(item, share) for item, share in zip(found, shares, strict=False)]
-        best = ranked[0] if ranked else Ranked(hypotheses[-1], 1.0)
-        judgement = Judgement(verdict, 0.5 if not truth else 1e-6, best, tuple(ranked[1:]), 0.0, "")
-        patterns = [Pattern(spot, places) for spot, places in self.view.spots.items()]
-        tracks = [explain(item) for item in onset_answers(problem, null, patterns, 0)]
-        return Diagnosis(
-            plant,
-            self.view,
-            calibrated,
-            hypotheses,
-            judgement,
-            null,
-            best.fit,
-            tuple(tracks),
-            "from 4000 s to 5000 s",
-            len(self.candidates),
-            {},
-        )
+from tests.support.diagnosed_spindle import (
+    DRY_BEARING,
+    DRY_SET,
+    EVIDENCE,
+    FROM,
+    HEAT,
+    LOOSE,
+    PROBES,
+    SEAT,
+    TIMES,
+    UNTIL,
+    Case,
+)
 
 
 @pytest.fixture(scope="module")
@@ -186,64 +83,6 @@ def lying(case):
 
 
 # ---------------------------------------------------------------------- places
-def test_places_are_those_of_the_drawing():
-    spec = load_machine("recorded_spindle")
-    probe = next(p for p in spec.probe if p.name == "SP04")
-    assert centre_of(spec, "SP04") == (probe.r, probe.z)
-    assert centre_of(spec, "near.SP04") == centre_of(spec, "SP04")
-    bearing = next(b for _, b in spec.bearings if b.name == "F2")
-    radius, place = centre_of(spec, "F2")
-    assert place == pytest.approx(sum(bearing.z) / 2.0)
-    assert radius == pytest.approx(0.0825)
-    assert centre_of(spec, "F2.inner_ring")[0] < radius < centre_of(spec, "F2.outer_ring")[0]
-    front = [b.z for group, b in spec.bearings if group.name == "front"]
-    assert centre_of(spec, "front_bearings")[1] == pytest.approx(np.mean(front))
-    assert centre_of(spec, "nose")[1] < min(front)[0]
-    assert centre_of(spec, "drive_end")[1] > max(b.z[1] for _, b in spec.bearings)
-    assert centre_of(spec, "ambient") is None
-
-
-def test_the_channel_lies_within_its_turns():
-    spec = load_machine("recorded_spindle")
-    (region,) = regions_of(spec, "channel")
-    assert region.r == pytest.approx((0.108, 0.118))
-    assert region.z == pytest.approx((0.042, 0.174))
-
-
-def test_the_shaft_between_its_bearings_ends_where_they_sit():
-    spec = load_machine("recorded_spindle")
-    found = regions_of(spec, "shaft_gap")
-    seats = [b.z for _, b in spec.bearings]
-    assert min(r.z[0] for r in found) >= max(z[1] for z in seats if z[1] < 0.3)
-    assert max(r.z[1] for r in found) <= min(z[0] for z in seats if z[0] > 0.3)
-
-
-def test_walls_that_face_the_shaft_and_rings_have_a_place():
-    spec = load_machine("recorded_spindle")
-    walls = regions_of(spec, "standing_gap")
-    assert [region.z for region in walls] == [pytest.approx((0.157, 0.180)), pytest.approx((0.180, 0.410))]
-    assert [region.r for region in walls] == [pytest.approx((0.095, 0.095)), pytest.approx((0.090, 0.090))]
-    # By their areas.
-    assert centre_of(spec, "standing_gap")[1] == pytest.approx(0.282, abs=1e-3)
-    (ring,) = regions_of(spec, "around.SP04")
-    assert ring.z == pytest.approx((0.27845, 0.30155), abs=1e-4)
-    assert ring.r == pytest.approx((0.090, 0.10255), abs=1e-4)
-
-
-def test_the_cover_holds_the_seal_of_the_nose():
-    spec = load_machine("recorded_spindle")
-    heat = Layout(spec, {"cover", "front_outer_spacer"}).heat()
-    assert heat["standing_nose"] == ("cover",)
-    assert "standing_drive_end" not in heat
-    assert "standing_nose" not in Layout(spec, set()).heat()
-
-
-def test_a_probe_lies_in_the_largest_segment_around_it():
-    spec = load_machine("recorded_spindle")
-    probes = {probe.name: probe for probe in spec.probe}
-    layout = Layout(spec, {"housing.middle_body", "housing.flange"})
-    assert layout.place_of_probe(probes["SP04"]) == "housing.middle_body"
-    assert Layout(spec, set()).place_of_probe(probes["SP04"]) == "housing"
 
 
 def test_a_decision_does_not_wait_for_which_part_of_a_component_it_is(case):
@@ -317,16 +156,6 @@ class Tabled(Search):
 
     def _exchange(self):
         pass
-
-
-DRY_BEARING, DRY_SET = ("starvation", "F2"), ("starvation", "front_bearings")
-LOOSE, SEAT = ("sensor_detached", "SP02"), ("joint_conductance", "F2")
-EVIDENCE = {
-    frozenset((DRY_BEARING, LOOSE)): -60.0,
-    frozenset((DRY_BEARING, LOOSE, SEAT)): -40.0,
-    frozenset((DRY_SET, LOOSE, SEAT)): -15.0,
-    frozenset((DRY_SET, LOOSE)): -10.0,
-}
 
 
 def test_what_a_single_bearing_needed_beside_it_is_left_out_beside_its_set(case, heated):

@@ -9,9 +9,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from spindle_fem.definition.load import load_machine, validate
 from spindle_fem.errors import BadInputError
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.report import block_page as document
@@ -20,99 +18,16 @@ from spindle_fem.report.figure_style import new_figure
 from spindle_fem.report.interactive_view import SURFACE_GROUP, display_surface, viewer_payload
 from spindle_fem.report.run_outputs import OutputHelpers, write_outputs
 from spindle_fem.report.run_report import in_order, rebuild_report, render_run_report
-from spindle_fem.results.dataset import build_dataset, default_paths, read_dataset, spec_digest, write_dataset
-from spindle_fem.results.output_folder import MARKER, is_complete, output_folder, require_complete
+from spindle_fem.results.dataset import build_dataset, read_dataset
+from spindle_fem.results.output_folder import output_folder
 from spindle_fem.results.run_summary import build_summary
 from spindle_fem.results.thermal_result import (
-    BearingResult,
     Check,
-    CoolantResult,
     EnergyBalance,
     ThermalResult,
 )
 from spindle_fem.validity import CodedWarning
-
-PARTS = ("shaft", "F1.inner_ring", "F1.outer_ring", "housing")
-WALL = "housing.channel_wall"
-
-
-def make_result(machine: str = "wu_tan_2016", **changes) -> ThermalResult:
-    """Tubes in contact under the names of a shipped machine, with made-up temperatures."""
-    spec = load_machine(machine)
-    mesh = build_joined_tubes(
-        (0.03, 0.07, 0.079, 0.095, 0.15),
-        0.1,
-        ((2, 1, 1, 2), 12, 3),
-        parts=PARTS,
-        rotating=(True, True, False, False),
-    )
-    surfaces = {WALL if name == "housing.outer" else name: facets for name, facets in mesh.surfaces.items()}
-    owners = {name: name.rsplit(".", 1)[0] for name in surfaces}
-    areas = {WALL if name == "housing.outer" else name: area for name, area in mesh.cad_area.items()}
-    mesh = dataclasses.replace(mesh, surfaces=surfaces, part_of_surface=owners, cad_area=areas)
-    temperature = 300.0 + 100.0 * mesh.points[:, 2] - 50.0 * np.hypot(mesh.points[:, 0], mesh.points[:, 1])
-    number = len(surfaces[WALL])
-    along = np.linspace(0.1, 3.5, 12)
-    bearings = {
-        bearing.name: BearingResult(
-            heat=100.0,
-            terms={"rolling": 80.0, "sliding": 20.0, "seal": 0.0},
-            heat_to={"inner": 25.0, "outer": 25.0, "balls": 50.0},
-            temperature_inner=310.0,
-            temperature_outer=301.0,
-            temperature_ball=315.0,
-            contact_angle_inner=0.3,
-            contact_angle_outer=float("nan"),
-            preload=1100.0,
-            film_thickness=4.0e-7,
-            film_thickness_ratio=5.5,
-        )
-        for _, bearing in spec.bearings
-    }
-    coolant = None
-    if spec.coolant is not None:
-        coolant = CoolantResult(
-            **{"flow": 3.3e-4, "inlet_temperature": 288.15, "outlet_temperature": 289.0, "heat": 400.0},
-            **{
-                "reynolds": 292.0,
-                "prandtl": 1200.0,
-                "velocity": 2.8,
-                "regime": "laminar",
-                "source": "a source",
-                "in_range": False,
-            },
-            **{"pressure_drop": 4.2e5, "pumping_power": 140.0, "hydraulic_diameter": 0.0109, "length": 3.55},
-            **{"wetted_area": 0.156, "position": along, "angle": along * 8.8},
-            **{"bulk_temperature": 288.15 + 0.2 * along, "wall_temperature": 297.0 + 0.0 * along},
-            **{"film_coefficient": 260.0 + along, "film_low": 200.0 + along, "film_high": 400.0 + along},
-            **{"mean_film_coefficient": 262.0, "mean_film_low": 202.0, "mean_film_high": 402.0},
-        )
-    total = 100.0 * len(bearings)
-    values = {
-        "spec": spec,
-        "mesh": mesh,
-        "order": 2,
-        "n_unknowns": len(mesh.points),
-        "temperature": temperature,
-        "air_temperature": {},
-        "film_coefficient": {WALL: np.full(number, 262.0)},
-        "fluid_temperature": {WALL: np.full(number, 288.5)},
-        "bearings": bearings,
-        "coolant": coolant,
-        "probes": {"SP01": 299.15},
-        "energy": EnergyBalance(total, {f"{name}.balls": 100.0 for name in bearings}, {WALL: total}),
-        "heat_flows": {"F1.inner_ring|shaft": -12.5},
-        "area_error_relative": {WALL: 1.0e-5},
-        "volume_error_relative": dict.fromkeys(PARTS, 2.0e-5),
-        "temperature_minimum": float(temperature.min()),
-        "temperature_maximum": float(temperature.max()),
-        "temperature_maximum_at": mesh.points[temperature.argmax()],
-        "checks": (Check("energy balance", 1.0e-12, 1.0e-8, "", True, "heat in equals heat out"),),
-        "warnings": (CodedWarning("coolant_film_extrapolated", "Pr is <1200> & allowed 657."),),
-        "iterations": {"coupling": 5},
-        "timings": {"solve": 1.0},
-    }
-    return ThermalResult(**{**values, **changes})
+from tests.support.made_result import make_result
 
 
 @pytest.fixture(scope="module")
@@ -283,95 +198,9 @@ def test_a_large_surface_is_thinned_to_its_budget(result):
 
 
 # ------------------------------------------------------------------ result.nc
-def test_dataset_has_units_names_and_provenance(result, tmp_path):
-    dataset = build_dataset(result, sources=("Somebody (1999)",))
-    path = write_dataset(dataset, tmp_path / "result.nc")
-    read = read_dataset(path)
-    xr.testing.assert_identical(read, dataset)
-    for name, variable in read.data_vars.items():
-        assert {"units", "long_name"} <= set(variable.attrs), name
-    assert "Somebody (1999)" in read.attrs["sources"]
-    assert read.attrs["spec_sha256"] == spec_digest(result.spec)
-    assert json.loads(read.attrs["versions"])["python"]
-    assert float(read["bearing_temperature_ball"].sel(bearing="F1")) == pytest.approx(41.85)
-    assert float(read["bearing_heat_term"].sel(bearing="F1", heat_term="sliding")) == 20.0
-
-
-def test_dataset_means_are_exact_for_a_field_linear_in_z(result):
-    dataset = build_dataset(result)
-    wall = dataset.sel(surface=WALL)
-    assert float(wall["surface_area"]) == pytest.approx(2.0 * np.pi * 0.15 * 0.1, rel=1.0e-4)
-    assert float(wall["surface_temperature_mean"]) == pytest.approx(300.0 + 5.0 - 7.5 - 273.15, abs=2.0e-3)
-    assert float(wall["surface_film_coefficient"]) == pytest.approx(262.0)
-    assert float(wall["surface_fluid_temperature"]) == pytest.approx(15.35)
-    assert np.isnan(float(dataset["surface_film_coefficient"].sel(surface="shaft.z0")))
-    assert float(dataset["part_temperature_max"].sel(part="shaft")) == pytest.approx(300 + 10 - 1.5 - 273.15)
-
-
-def test_definition_in_the_dataset_reads_back_to_the_same_machine(result):
-    import tomllib
-
-    text = build_dataset(result).attrs["machine_definition_toml"]
-    assert spec_digest(validate(tomllib.loads(text), "result.nc")) == spec_digest(result.spec)
-
-
-def test_digest_follows_values():
-    assert spec_digest(load_machine("wu_tan_2016")) != spec_digest(
-        load_machine("wu_tan_2016", ["channel.depth=11mm"])
-    )
-
-
-def test_defaults_are_what_the_file_does_not_give():
-    paths = default_paths(load_machine("wu_tan_2016"))
-    assert "coolant.pumping_heat" in paths
-    assert "coolant.flow" not in paths
-
-
-def test_unknown_schema_is_refused(tmp_path):
-    xr.Dataset(attrs={"schema": "spindle-fem/result/99"}).to_netcdf(tmp_path / "result.nc", engine="h5netcdf")
-    with pytest.raises(BadInputError, match=r'schema is .*/99.* Known: "spindle-fem/result/1"'):
-        read_dataset(tmp_path / "result.nc")
-
-
-def test_missing_dataset_is_refused(tmp_path):
-    with pytest.raises(BadInputError, match="there is no such file"):
-        read_dataset(tmp_path / "result.nc")
 
 
 # ------------------------------------------------------------------ the folder
-def test_folder_is_marked_until_it_is_complete(tmp_path):
-    with output_folder(tmp_path / "a" / "run") as folder:
-        assert not is_complete(folder)
-    assert is_complete(folder)
-
-
-def test_folder_keeps_its_marker_and_the_reason_after_an_error(tmp_path):
-    with pytest.raises(ZeroDivisionError), output_folder(tmp_path / "run") as folder:
-        raise ZeroDivisionError("half way")
-    assert "ZeroDivisionError: half way" in (folder / MARKER).read_text()
-    with pytest.raises(BadInputError, match=r"is incomplete: .*half way"):
-        require_complete(folder)
-    with output_folder(folder):
-        pass
-    assert is_complete(folder)
-
-
-def test_folder_refuses_a_file(tmp_path):
-    (tmp_path / "run").write_text("mine")
-    with pytest.raises(BadInputError, match="is a file"), output_folder(tmp_path / "run"):
-        pass
-
-
-def test_folder_refuses_what_is_not_its_own(tmp_path):
-    (tmp_path / "thesis.tex").write_text("mine")
-    with pytest.raises(BadInputError, match=r"other content \(thesis\.tex\)"), output_folder(tmp_path):
-        pass
-    assert [item.name for item in tmp_path.iterdir()] == ["thesis.tex"]
-
-
-def test_folder_that_does_not_exist_has_no_report(tmp_path):
-    with pytest.raises(BadInputError, match="there is no such folder"):
-        rebuild_report(tmp_path / "nothing")
 
 
 @pytest.fixture(scope="module")
