@@ -8,14 +8,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
+
 from book.chapters import ENTRIES
-from book.page import Chapter, Entry, Pictures, environment, render_chapter
+from book.page import Chapter, Entry, Pictures, link, render_chapter
 from book.work import Desk, fingerprint
 from spindle_fem.errors import BadInputError
-from spindle_fem.report.block_page import Section
+from spindle_fem.report.block_page import Commands, Section, Table, Text, render_document
+from spindle_fem.report.run_tables import column, rows_of
 from spindle_fem.results.output_folder import replace_text
 
 CLAIMS = Path(__file__).parent / "claims.toml"
+AGAIN = (
+    "make book                       # this book",
+    "make study                      # the concealed study it reads, hours; STUDY=folder for another",
+)
 
 
 def read_claims(entries: Sequence[Entry]) -> list[dict[str, Any]]:
@@ -85,20 +92,26 @@ def _contents(made: Sequence[tuple[Entry, Chapter]], claims: Sequence[dict[str, 
     words = f"Written {when} from the source with fingerprint {fingerprint('tool')}."
     if desk.outdated:
         words += f" Made with an earlier version of the source: {', '.join(dict.fromkeys(desk.outdated))}."
-    return (
-        environment()
-        .get_template("contents.html.j2")
-        .render(
-            kind="spindle_fem",
-            title="Verification and validation",
-            subtitle="Every figure in these pages was made by running the program; none is pasted by hand.",
-            sections=[
-                Section("chapters", "Chapters", ()),
-                Section("claims", "Claims of the README", ()),
-                Section("again", "Run it again", ()),
-            ],
-            chapters=made,
-            claims=claims,
-            made=words,
-        )
+    found = [
+        [Markup("{}&nbsp; {}").format(number, link(entry)), chapter.outcome]
+        for number, (entry, chapter) in enumerate(made, start=1)
+    ]
+    shown = [[claim["text"], Markup("; ").join(map(link, claim["entries"]))] for claim in claims]
+    sections = [
+        Section(
+            "chapters", "Chapters", [Table((column("chapter"), column("what came out")), rows_of(found))]
+        ),
+        Section(
+            "claims",
+            "What the README claims, and where it is shown",
+            [Table((column("claim"), column("chapter")), rows_of(shown))],
+        ),
+        Section("again", "Run it again", [Commands(AGAIN), Text(words)]),
+    ]
+    return render_document(
+        "spindle_fem",
+        "Verification and validation",
+        sections,
+        "Every figure in these pages was made by running the program; none is pasted by hand.",
+        "The pages need no network; the pictures are also in the folder “pictures”.",
     )

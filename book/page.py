@@ -4,43 +4,28 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from spindle_fem import __version__
-from spindle_fem.report.block_page import Illustration, Section, illustration_of
+from markupsafe import Markup
+
+from spindle_fem.report.block_page import (
+    Bullets,
+    Columns,
+    Commands,
+    Heading,
+    Illustration,
+    Notice,
+    Section,
+    Text,
+    illustration_of,
+    render_document,
+)
 from spindle_fem.report.figure_style import save_png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-TEMPLATES = Path(__file__).parent / "templates"
-
-
-@dataclass(frozen=True, slots=True)
-class Commands:
-    """Lines for a shell."""
-
-    lines: Sequence[str]
-    kind: str = field(default="commands", init=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Heading:
-    """A heading within a section."""
-
-    text: str
-    kind: str = field(default="heading", init=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Links:
-    """Sentences with a link each: pairs of words and address."""
-
-    items: Sequence[tuple[str, str]]
-    kind: str = field(default="links", init=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,41 +85,28 @@ class Pictures:
         shutil.copyfile(path, self.folder / f"{self.chapter}_{name}.png")
 
 
-def environment() -> Any:
-    """The report's templates with those of the book on top, everything escaped."""
-    import jinja2
-
-    made = jinja2.Environment(
-        loader=jinja2.ChoiceLoader(
-            [
-                jinja2.FileSystemLoader(TEMPLATES),
-                jinja2.PackageLoader("spindle_fem.report", "templates"),
-            ]
-        ),
-        autoescape=jinja2.select_autoescape(["html", "j2"]),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    made.globals["program_version"] = __version__
-    return made
+def link(entry: Entry, words: str = "") -> Markup:
+    """A link to a chapter's page, by its title or other words."""
+    return Markup('<a href="{}">{}</a>').format(entry.page, words or entry.title)
 
 
 def render_chapter(entry: Entry, chapter: Chapter, entries: Sequence[Entry]) -> str:
     """HTML of a chapter, with links to those before and after it."""
     at = list(entries).index(entry)
-    sections = list(chapter.sections)
+    opening: list[Any] = [Notice(chapter.outcome, chapter.tone)]
+    if chapter.left_out:
+        opening.append(Text(chapter.left_out))
+    if chapter.evidence or chapter.not_evidence:
+        shown = [Heading("What this is evidence of"), Bullets(chapter.evidence)]
+        opening.append(Columns([shown, [Heading("What it is not"), Bullets(chapter.not_evidence)]]))
+    sections = [Section("", "", opening), *chapter.sections]
     if chapter.commands:
         sections.append(Section("again", "Run it again", [Commands(chapter.commands)]))
-    return (
-        environment()
-        .get_template("chapter.html.j2")
-        .render(
-            kind="Verification and validation",
-            title=f"{at + 1}  {entry.title}",
-            chapter=chapter,
-            sections=sections,
-            before=entries[at - 1] if at else None,
-            after=entries[at + 1] if at + 1 < len(entries) else None,
-        )
+    ways = [Markup('<a href="index.html">All chapters</a>')]
+    if at:
+        ways.append(link(entries[at - 1], f"before: {entries[at - 1].title}"))
+    if at + 1 < len(entries):
+        ways.append(link(entries[at + 1], f"next: {entries[at + 1].title}"))
+    return render_document(
+        "Verification and validation", f"{at + 1}  {entry.title}", sections, Markup(" · ").join(ways)
     )

@@ -13,9 +13,9 @@ from book.diagnoses import (
     place_blocks,
     verdict_blocks,
 )
-from book.page import Chapter, Commands, Pictures
+from book.page import Chapter, Pictures
 from book.work import ROOT, Desk, read_json
-from spindle_fem.report.block_page import Notice, Section, Table, Text
+from spindle_fem.report.block_page import Commands, Notice, Section, Table, Text
 from spindle_fem.report.diagnosis_words import chance, set_words
 from spindle_fem.report.run_tables import column, number, rows_of, significant
 

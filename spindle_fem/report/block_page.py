@@ -1,8 +1,8 @@
-"""Reports put together from blocks: for every command that is not a single run.
+"""Pages put together from blocks: the report of every command, and the book.
 
-A report is a list of sections, a section a list of blocks (text, table,
-figure, cards, warnings). All look like the report of a run and are as
-self-contained.
+A page is a list of sections, a section a list of blocks; one template draws
+them. What is inside a page needs no network and no other file. Texts and
+cells are escaped but where they are ``markupsafe.Markup``.
 
 >>> from spindle_fem.report.run_tables import column, rows_of
 >>> table = Table((column("design"), column("°C", number=True)), rows_of([["a", "31.5"]]))
@@ -16,12 +16,13 @@ from __future__ import annotations
 
 import base64
 import io
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+from spindle_fem import __version__
 from spindle_fem.report.figure_style import rasterise
-from spindle_fem.report.page_templates import render_page
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,6 +40,22 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
+class Heading:
+    """A heading within a section."""
+
+    text: str
+    kind: str = field(default="heading", init=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """Lines for a shell."""
+
+    lines: Sequence[str]
+    kind: str = field(default="commands", init=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Bullets:
     """A list of sentences."""
 
@@ -48,10 +65,11 @@ class Bullets:
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A paragraph that stands out."""
+    """A paragraph that stands out; with a ``lead`` in bold, an alert."""
 
     text: str
     tone: Literal["good", "bad", ""] = ""
+    lead: str = ""
     kind: str = field(default="notice", init=False)
 
 
@@ -73,12 +91,16 @@ class Warnings:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Columns of :func:`~spindle_fem.report.run_tables.column`, rows of ``rows_of``."""
+    """Columns of :func:`~spindle_fem.report.run_tables.column`, rows of ``rows_of``.
+
+    With ``folded``, its summary, it is shut until it is clicked, but where ``open``.
+    """
 
     columns: Sequence[Mapping[str, Any]]
     rows: Sequence[Mapping[str, Any]]
     caption: str = ""
     folded: str = ""
+    open: bool = False
     kind: str = field(default="table", init=False)
 
 
@@ -95,12 +117,36 @@ class Illustration:
 
 
 @dataclass(frozen=True, slots=True)
+class Columns:
+    """Blocks side by side where the page is wide enough."""
+
+    columns: Sequence[Sequence[Any]]
+    kind: str = field(default="columns", init=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Interactive:
+    """A template of its own with its data as JSON, and the script that brings it to life."""
+
+    template: str
+    script: str
+    data: Any
+    kind: str = field(default="part", init=False)
+
+    @property
+    def payload(self) -> str:
+        """The data as it may stand in a page."""
+        return json.dumps(self.data).replace("</", "<\\/")
+
+
+@dataclass(frozen=True, slots=True)
 class Section:
-    """A heading with its blocks; ``id`` is the anchor."""
+    """A heading with its blocks; ``id`` is the anchor. Without a title it is not among the contents."""
 
     id: str
     title: str
     blocks: Sequence[Any]
+    screen_only: bool = False
 
 
 def illustration_of(picture: Figure | Image | Path, caption: str, alt: str = "") -> Illustration:
@@ -123,15 +169,39 @@ def illustration_of(picture: Figure | Image | Path, caption: str, alt: str = "")
     return Illustration(source, caption, alt or caption, *image.size)
 
 
-def render_document(kind: str, title: str, sections: Sequence[Section], subtitle: str = "") -> str:
-    """HTML of a report.
+def render_document(
+    kind: str,
+    title: str,
+    sections: Sequence[Section],
+    subtitle: str = "",
+    footer: str = "This file needs no network and no other file.",
+) -> str:
+    """HTML of a page.
 
     Parameters
     ----------
     kind : str
-        What the report is of, set above the title: "Sweep", "Diagnosis".
+        What the page is of, set above the title: "Sweep", "Diagnosis".
     title : str
     sections : sequence of Section
-    subtitle : str
+    subtitle, footer : str
     """
-    return render_page("document.html.j2", kind=kind, title=title, subtitle=subtitle, sections=sections)
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("spindle_fem.report", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    scripts = [block.script for section in sections for block in section.blocks if block.kind == "part"]
+    return environment.get_template("page.html.j2").render(
+        kind=kind,
+        title=title,
+        subtitle=subtitle,
+        sections=sections,
+        footer=footer,
+        scripts=scripts,
+        program_version=__version__,
+    )

@@ -10,11 +10,26 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
 from spindle_fem.errors import BadInputError
 from spindle_fem.report import run_tables as tables
-from spindle_fem.report.block_page import Illustration, illustration_of
+from spindle_fem.report.block_page import (
+    Bullets,
+    Cards,
+    Columns,
+    Heading,
+    Illustration,
+    Interactive,
+    Notice,
+    Section,
+    Table,
+    Text,
+    Warnings,
+    illustration_of,
+    render_document,
+)
 from spindle_fem.report.definition_tables import input_groups
-from spindle_fem.report.page_templates import render_page
 from spindle_fem.results.output_folder import replace_text, require_complete
 from spindle_fem.results.run_summary import SUMMARY_SCHEMA
 
@@ -49,6 +64,31 @@ CAPTIONS = {
     "mesh": "The mesh, opened along the vertical plane; colours are parts.",
 }
 
+_ANSWERS = (
+    Text(
+        "The steady temperature of the whole machine at one speed, thrust, room and coolant: where it is "
+        "hottest, how much warmer the inner rings are than the outer ones, how much of the bearings’ heat "
+        "the coolant takes and how much leaves by other ways, what the probes should read, and what the channel "
+        "costs in pressure."
+    ),
+    Text(
+        Markup(
+            "It does not answer how the machine warms up (that is <code>spindle-fem simulate</code>), how "
+            "the parts deform, or how long grease and bearings last."
+        )
+    ),
+)
+_OVER_SPEED_TEXT = Text(
+    "Contact mechanics, films and friction of every bearing at the temperatures of this run; dashed films "
+    "are flooded and isothermal at 40 °C."
+)
+_MARKS_TEXT = Text(
+    Markup(
+        "Everything that went in, with the mark of its source: <strong>P</strong> paper, <strong>C</strong> "
+        "catalogue, <strong>A</strong> assumed; no mark: a default of the program. “± 30 %” is one standard "
+        "deviation of the logarithm."
+    )
+)
 _LIMITS = (
     "Steady state of one operating point; loads, speed and surroundings constant.",
     "Turning parts have one temperature all round in the time mean; standing parts are three-dimensional.",
@@ -122,54 +162,105 @@ def render_run_report(
     illustrations: Mapping[str, Illustration | None],
 ) -> str:
     """HTML of a run; everything it needs is inside."""
+    definition = tomllib.loads(dataset.attrs["machine_definition_toml"])
+    sections = [
+        Section("headline", "Headline numbers", _headline(summary)),
+        Section("answers", "What this answers", [*_ANSWERS, *_drawn(illustrations, "machine_definition")]),
+        Section("temperature", "Temperature field", _temperature(surface, illustrations)),
+    ]
+    if summary["bearings"]:
+        sections.append(Section("bearings", "Bearings", _bearings(summary, illustrations)))
+    over_speed = _drawn(illustrations, *(name for name in CAPTIONS if name.startswith(OVER_SPEED)))
+    if over_speed:
+        sections.append(Section("over_speed", "Bearings over speed", [_OVER_SPEED_TEXT, *over_speed]))
+    coolant = tables.coolant_table(summary)
+    if coolant is not None:
+        pictures = _drawn(illustrations, "coolant", "channel_walls")
+        sections.append(
+            Section("coolant", "Coolant", [Text(coolant["sentence"]), _table(coolant), *pictures])
+        )
+    balance = _table(
+        tables.balance_table(summary), "Heat put in and heat that leaves; negative values enter the machine."
+    )
+    sections += [
+        Section("balance", "Energy balance", [balance, *_drawn(illustrations, "heat_balance")]),
+        Section("probes", "Probes, joints and surfaces", [_places(summary, dataset)]),
+        Section("checks", "Checks", _checks(summary, illustrations)),
+        Section("inputs", "Inputs", _inputs(definition, dataset)),
+        Section("limits", "Limits of validity", [Bullets(_LIMITS)]),
+        Section("versions", "Versions and provenance", _versions(summary, dataset)),
+    ]
+    return render_document("Thermal run", dataset.attrs["title"], sections, _subtitle(definition))
+
+
+def _table(found: Mapping[str, Any], caption: str = "") -> Table:
+    return Table(found["columns"], found["rows"], caption)
+
+
+def _drawn(illustrations: Mapping[str, Illustration | None], *names: str) -> list[Illustration]:
+    """Those of some pictures that there are."""
+    found = (illustrations.get(name) for name in names)
+    return [picture for picture in found if picture is not None]
+
+
+def _headline(summary: Mapping[str, Any]) -> list[Any]:
+    checks = summary.get("checks", ())
+    failed = [item["name"] for item in checks if not item["passed"]]
+    if failed:
+        first = Notice("The numbers below must not be used.", "bad", f"Failed: {', '.join(failed)}.")
+    else:
+        imbalance = tables.significant(abs(summary["energy"]["imbalance_relative"]), 2)
+        to = imbalance if imbalance != "0" else "round-off"
+        first = Notice(f"All {len(checks)} checks of this run passed; heat in and out agree to {to}.", "good")
+    return [first, Cards(tables.headline(summary)), Warnings(summary["warnings"])]
+
+
+def _temperature(surface: xr.Dataset | None, illustrations: Mapping[str, Illustration | None]) -> list[Any]:
     from spindle_fem.report.interactive_view import viewer_payload
 
-    definition = tomllib.loads(dataset.attrs["machine_definition_toml"])
-    view = None if surface is None else json.dumps(viewer_payload(surface)).replace("</", "<\\/")
-    failed = [item["name"] for item in summary.get("checks", ()) if not item["passed"]]
-    has_bearings, coolant = bool(summary["bearings"]), tables.coolant_table(summary)
-    over_speed = any(drawn and name.startswith(OVER_SPEED) for name, drawn in illustrations.items())
-    sections = [
-        ("headline", "Headline numbers", True),
-        ("answers", "What this answers", True),
-        ("temperature", "Temperature field", True),
-        ("bearings", "Bearings", has_bearings),
-        ("over_speed", "Bearings over speed", over_speed),
-        ("coolant", "Coolant", coolant is not None),
-        ("balance", "Energy balance", True),
-        ("probes", "Probes, joints and surfaces", True),
-        ("checks", "Checks", True),
-        ("inputs", "Inputs", True),
-        ("limits", "Limits of validity", True),
-        ("versions", "Versions", True),
+    view = [] if surface is None else [Interactive("viewer.html.j2", "viewer.js", viewer_payload(surface))]
+    names = ("temperature_cut", "meridian_temperature", "axial_profiles", "radial_profiles")
+    return [*view, *_drawn(illustrations, *names)]
+
+
+def _bearings(summary: Mapping[str, Any], illustrations: Mapping[str, Illustration | None]) -> list[Any]:
+    close_ups = [name for name in illustrations if name.startswith("bearings_")]
+    return [
+        _table(tables.bearing_table(summary), "Heat, temperatures and state of each bearing."),
+        _table(tables.term_table(summary), "Friction heat of each bearing, W."),
+        *_drawn(illustrations, "heat_by_bearing", *close_ups),
     ]
-    return render_page(
-        "run.html.j2",
-        kind="Thermal run",
-        title=dataset.attrs["title"],
-        subtitle=_subtitle(definition),
-        sections=[{"id": key, "title": title} for key, title, shown in sections if shown],
-        headline=tables.headline(summary),
-        warnings=summary["warnings"],
-        failed_checks=failed,
-        imbalance=tables.significant(abs(summary["energy"]["imbalance_relative"]), 2),
-        figures=illustrations,
-        over_speed_captions=tuple(name for name in CAPTIONS if name.startswith(OVER_SPEED)),
-        view3d=view,
-        bearings=tables.bearing_table(summary),
-        terms=tables.term_table(summary),
-        coolant=coolant,
-        balance=tables.balance_table(summary),
-        probes=tables.probe_table(summary),
-        joints=tables.joint_table(summary),
-        surfaces=tables.surface_table(dataset),
-        checks=tables.check_table(summary),
-        mesh=tables.mesh_table(summary),
-        inputs=input_groups(definition, dataset.attrs.get("machine_defaults", "").split("\n")),
-        limits=_LIMITS,
-        versions=tables.version_table(summary, dataset.attrs),
-        sources=[line for line in str(dataset.attrs.get("sources", "")).split("\n") if line],
-    )
+
+
+def _places(summary: Mapping[str, Any], dataset: xr.Dataset) -> Columns:
+    probes, joints = tables.probe_table(summary), tables.joint_table(summary)
+    left = [_table(probes, "What the probes should read.")] if probes["rows"] else []
+    left.append(_table(tables.surface_table(dataset), "Exposed surfaces with a film: area means."))
+    through = "Heat through each joint, from the first-named part to the second."
+    return Columns([left, [_table(joints, through)] if joints["rows"] else []])
+
+
+def _checks(summary: Mapping[str, Any], illustrations: Mapping[str, Illustration | None]) -> list[Any]:
+    return [
+        Text("A failed check ends a run with an error; this table shows by how much each one held."),
+        _table(tables.check_table(summary)),
+        _table(tables.mesh_table(summary), "Mesh: largest differences from the solid model."),
+        *_drawn(illustrations, "mesh"),
+    ]
+
+
+def _inputs(definition: Mapping[str, Any], dataset: xr.Dataset) -> list[Any]:
+    groups = input_groups(definition, dataset.attrs.get("machine_defaults", "").split("\n"))
+    folded = [
+        Table(group["columns"], group["rows"], folded=group["title"], open=group["open"]) for group in groups
+    ]
+    return [_MARKS_TEXT, *folded]
+
+
+def _versions(summary: Mapping[str, Any], dataset: xr.Dataset) -> list[Any]:
+    sources = [line for line in str(dataset.attrs.get("sources", "")).split("\n") if line]
+    listed = [Heading("Sources of the models"), Bullets(sources)] if sources else []
+    return [_table(tables.version_table(summary, dataset.attrs)), *listed]
 
 
 def embedded_figures(folder: Path) -> dict[str, Illustration | None]:

@@ -18,13 +18,14 @@ from spindle_fem.report.block_page import (
     Bullets,
     Cards,
     Illustration,
+    Interactive,
     Notice,
     Section,
     Table,
     illustration_of,
+    render_document,
 )
 from spindle_fem.report.figure_style import save_png
-from spindle_fem.report.page_templates import render_page
 from spindle_fem.report.run_tables import column, rows_of
 from spindle_fem.report.sweep_best import best_designs
 from spindle_fem.report.sweep_scales import Scale, scale_of_column
@@ -97,14 +98,10 @@ def write_sweep_report(
     for name, figure in figures.items():
         pictures[name] = illustration_of(save_png(figure, place / f"{name}.png"), _CAPTIONS[name])
     sections = _sections(summary, rows, parameters, outputs, films, pictures)
-    html = render_page(
-        "sweep.html.j2",
-        kind="Design study",
-        title=summary["study"],
-        subtitle=f"{summary['designs']} designs of {summary['machine']}.",
-        sections=sections,
-        explorer=_explorer(summary, solved, parameters, outputs),
-    )
+    explorer = Interactive("designs.html.j2", "designs.js", _explorer(summary, solved, parameters, outputs))
+    sections.append(Section("explore", "Designs one by one", [explorer], screen_only=True))
+    subtitle = f"{summary['designs']} designs of {summary['machine']}."
+    html = render_document("Design study", summary["study"], sections, subtitle)
     return replace_text(folder / "report.html", html)
 
 
@@ -360,11 +357,11 @@ def answered_by(row: Row) -> str:
 
 def _explorer(
     summary: Mapping[str, Any], solved: Sequence[Row], parameters: Sequence[Scale], outputs: Sequence[Scale]
-) -> str:
+) -> dict[str, Any]:
     """Data of the clickable chart: every solved design by every column that is a number."""
     columns = [item for item in (*parameters, *outputs) if not item.words]
     optimum = summary["optimum"]
-    content = {
+    return {
         "columns": [item.label for item in columns],
         "start": _start_columns(summary, columns, len(parameters)),
         "front": [] if optimum is None else optimum["front"],
@@ -379,7 +376,6 @@ def _explorer(
             for row in solved
         ],
     }
-    return json.dumps(content).replace("</", "<\\/")
 
 
 def _start_columns(summary: Mapping[str, Any], columns: Sequence[Scale], first_output: int) -> list[int]:

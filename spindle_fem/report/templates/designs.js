@@ -1,17 +1,3 @@
-{% extends "document.html.j2" %}
-{% block content %}
-{{ super() }}
-<section aria-labelledby="explore" class="screen-only">
-<h2 id="explore">Designs one by one</h2>
-<p>Choose what to plot; click a design, or step through them with the arrow keys. Filled: keeps every limit; ringed: best or on the front.</p>
-<p><label>across <select id="sweep-x"></select></label> <label>up <select id="sweep-y"></select></label></p>
-<svg id="sweep-chart" viewBox="0 0 900 470" role="group" aria-label="Designs" style="width:100%;max-width:62rem;border:1px solid var(--line);border-radius:4px"></svg>
-<div class="scroll" id="sweep-detail" aria-live="polite"></div>
-</section>
-{% endblock %}
-{% block scripts %}
-<script type="application/json" id="sweep-data">{{ explorer | safe }}</script>
-<script>
 (function () {
   "use strict";
   var data = JSON.parse(document.getElementById("sweep-data").textContent);
@@ -83,5 +69,3 @@
   });
   if (data.designs.length && data.columns.length) { draw(); }
 }());
-</script>
-{% endblock %}
