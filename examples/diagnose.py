@@ -48,7 +48,7 @@ data.to_csv(folder / "data.csv", index=False)
 (folder / "recording.toml").write_text(MANIFEST, encoding="utf-8")
 
 machine = Path(__file__).with_name("pump.toml")
-answer = spindle_fem.diagnose(machine, [folder / "recording.toml"], folder / "answer", report=False)
+answer = spindle_fem.diagnose_without_report(machine, [folder / "recording.toml"], folder / "answer")
 before, after = (answer["fit"][when]["heldout_rmse_K"] for when in ("before", "after"))
 print(f"{answer['verdict']}: error on readings that the fit did not see {before:.2f} K, then {after:.2f} K")
 for finding in answer["findings"]:

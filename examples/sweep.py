@@ -37,7 +37,7 @@ study.write_text(STUDY, encoding="utf-8")
 
 # Linear elements on a coarse mesh and heat by table answer within seconds; leave them out for the real thing.
 quick = ("mesh.preset=coarse", "mesh.order=1", "heat.model=table")
-summary = spindle_fem.sweep_machine("small_two_start", study, folder / "answers", quick)
+summary = spindle_fem.sweep("small_two_start", study, folder / "answers", quick)
 
 with (folder / "answers" / "results.csv").open(encoding="utf-8") as table:
     rows = list(csv.DictReader(table))

@@ -11,6 +11,7 @@ from typing import Any
 
 __version__ = "0.1.0"
 
+# Module of each public name, and its name there where that is another.
 _PLACES = {
     "load_machine": "spindle_fem.definition.load",
     "solve": "spindle_fem.studies.solve_machine",
@@ -18,10 +19,14 @@ _PLACES = {
     "check_machine": "spindle_fem.commands.machine_commands",
     "mesh_machine": "spindle_fem.commands.machine_commands",
     "heat_table": "spindle_fem.commands.heat_command",
-    "sweep_machine": "spindle_fem.commands.sweep_command",
-    "simulate_machine": "spindle_fem.commands.simulate_command",
+    "crosscheck": "spindle_fem.commands.crosscheck_command:crosscheck_machine",
+    "sweep": "spindle_fem.commands.sweep_command:sweep_machine",
+    "transient": "spindle_fem.commands.transient_command:run_transient_study",
+    "simulate": "spindle_fem.commands.simulate_command:simulate_machine",
     "diagnose": "spindle_fem.commands.diagnose_command",
-    "bearing_report": "spindle_fem.physics.bearings.bearing_file",
+    "diagnose_without_report": "spindle_fem.commands.diagnose_command",
+    "bearing": "spindle_fem.physics.bearings.bearing_file:bearing_report",
+    "read_recording": "spindle_fem.recordings.align",
     # Registries, to add things of one's own with ``add`` or ``register``, and what makes such things.
     "BEARING_KINDS": "spindle_fem.physics.bearings.bearing_kinds",
     "COOLANTS": "spindle_fem.physics.coolant.coolants",
@@ -43,4 +48,10 @@ def __getattr__(name: str) -> Any:
     """Load a public function from its module on first use."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_PLACES[name]), name)
+    module, _, attribute = _PLACES[name].partition(":")
+    return getattr(importlib.import_module(module), attribute or name)
+
+
+def __dir__() -> list[str]:
+    """Public names, loaded or not."""
+    return sorted({*globals(), *__all__})

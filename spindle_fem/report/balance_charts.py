@@ -20,9 +20,9 @@ from spindle_fem.report.figure_style import (
     new_figure,
     pixel_axes,
     set_title,
-    spread,
     styled,
 )
+from spindle_fem.report.leader_labels import spread
 from spindle_fem.report.run_tables import heat_by_source, readable
 from spindle_fem.results.thermal_result import CoolantResult, EnergyBalance, ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K

@@ -21,9 +21,9 @@ from spindle_fem.report.figure_style import (
     new_figure,
     pixel_axes,
     set_title,
-    spread,
     styled,
 )
+from spindle_fem.report.leader_labels import spread
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,7 +13,8 @@ from matplotlib.patches import Circle, Rectangle
 
 from spindle_fem.definition.machine_spec import Channel, MachineSpec
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
-from spindle_fem.report.figure_style import CYCLE, INK, MUTED, Label, new_figure, pixel_axes, spread, styled
+from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, pixel_axes, set_title, styled
+from spindle_fem.report.leader_labels import Label, draw_labels
 from spindle_fem.units import ZERO_CELSIUS_K
 
 _BY_NAME = (
@@ -102,16 +103,18 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
     head.set(xlim=(0.0, width_px), ylim=(total, 0.0))
     head.axis("off")
     head.patch.set_alpha(0.0)
-    head.text(margin, 34.0, spec.title or spec.name, fontsize=12.5, fontweight="bold", va="center")
-    head.text(margin, 66.0, _operating_point(spec), fontsize=9.0, color=MUTED, va="center")
+    set_title(figure, spec.title or spec.name, _operating_point(spec))
 
     def pixels(z: float, radius: float) -> tuple[float, float]:
         left = margin + 70.0
         return left + (z - z_low + z_margin) * scale, top + (1.03 * reach - radius) * scale
 
     ends = (margin, width_px - margin)
-    _rail(head, _above(spec), pixels, top - 14.0, -1.0, ends)
-    _rail(head, _below(spec, assembly), pixels, top + drawing_height + 62.0, 1.0, ends)
+    for labels, edge, sign in (
+        (_above(spec), top - 18.0, -1.0),
+        (_below(spec, assembly), top + drawing_height + 66.0, 1.0),
+    ):
+        draw_labels(head, labels, [pixels(*label.at) for label in labels], edge, sign, ends)
     for number, (colour, text) in enumerate(legend):
         column, row = divmod(number, max(rows, 1))
         x, y = margin + 10.0 + column * 0.5 * width_px, total - 24.0 - 30.0 * (rows - 1 - row)
@@ -359,25 +362,3 @@ def _below(spec: MachineSpec, assembly: AssemblyGeometry) -> list[Label]:
 def _two_lines(name: str) -> str:
     head, _, tail = name.rpartition(" ")
     return f"{head}\n{tail}" if head else tail
-
-
-def _rail(
-    axes: Axes, labels: list[Label], pixels: object, edge: float, sign: float, ends: tuple[float, float]
-) -> None:
-    if not labels:
-        return
-    places = np.array([pixels(*label.at) for label in labels])
-    longest = [max(len(line) for line in label.text.split("\n")) for label in labels]
-    centres = spread(places[:, 0], [12.2 * characters + 20.0 for characters in longest], *ends)
-    for label, place, centre in zip(labels, places, centres, strict=True):
-        axes.plot([centre, place[0]], [edge, place[1]], color="white", linewidth=2.4, alpha=0.8)
-        axes.plot([centre, place[0]], [edge, place[1]], color=INK, linewidth=0.8)
-        axes.plot(*place, marker="o", markersize=4.2, markerfacecolor="white", markeredgecolor=INK)
-        axes.text(
-            centre,
-            edge + 4.0 * sign,
-            label.text,
-            ha="center",
-            va="bottom" if sign < 0.0 else "top",
-            fontsize=8.8,
-        )

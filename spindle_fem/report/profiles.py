@@ -6,14 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.tri import Triangulation
+from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.report.drawn_surfaces import SegmentSet, TriangleSet
-from spindle_fem.report.figure_style import TEMPERATURE_LABEL, TEMPERATURE_MAP, ColourBar, scale_of
+from spindle_fem.report.figure_style import INK, TEMPERATURE_LABEL, TEMPERATURE_MAP, ColourBar, scale_of
 from spindle_fem.report.plane_sections import boundary_lines, section_of_triangles, section_of_volume
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
+
+_MM = 1.0e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,3 +141,15 @@ def largest_part(volumes: Mapping[str, float], rotating: Mapping[str, bool], *, 
     """
     candidates = {name: volume for name, volume in volumes.items() if rotating[name] == turning}
     return max(candidates, key=candidates.__getitem__) if candidates else None
+
+
+def draw_field(axes: Axes, section: MeridianSection, bar: ColourBar, isotherms: ArrayLike) -> None:
+    """Temperature of a meridian section with isotherms (degC) and outlines, in mm, z across."""
+    faces = section.faces
+    triangles = Triangulation(faces.points[:, 2] * _MM, faces.points[:, 1] * _MM, faces.triangles)
+    celsius = faces.values[:, 0] - ZERO_CELSIUS_K
+    axes.tripcolor(triangles, celsius, cmap=bar.colour_map, norm=bar.norm, shading="gouraud", rasterized=True)
+    if np.size(isotherms):
+        axes.tricontour(triangles, celsius, levels=isotherms, colors="white", linewidths=0.55, alpha=0.8)
+    lines = section.outlines.points[..., [2, 1]] * _MM
+    axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8))

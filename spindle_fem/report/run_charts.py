@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
-from matplotlib.tri import Triangulation
 
 from spindle_fem.report.figure_style import (
     BALLS,
@@ -26,7 +24,13 @@ from spindle_fem.report.figure_style import (
     set_title,
     styled,
 )
-from spindle_fem.report.profiles import MeridianSection, axial_profile, largest_part, radial_profile
+from spindle_fem.report.profiles import (
+    MeridianSection,
+    axial_profile,
+    draw_field,
+    largest_part,
+    radial_profile,
+)
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -48,17 +52,8 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
         xlim=(z.min() - pad, z.max() + pad), ylim=(height.min() - pad, height.max() + pad), aspect="equal"
     )
     axes.grid(False)
-    triangulation = Triangulation(z, height, faces.triangles)
-    celsius = faces.values[:, 0] - ZERO_CELSIUS_K
-    axes.tripcolor(
-        triangulation, celsius, cmap=bar.colour_map, norm=bar.norm, shading="gouraud", rasterized=True
-    )
     step = _isotherm_step(bar.high - bar.low)
-    levels = np.arange(math.ceil(bar.low / step) * step, bar.high, step)
-    if levels.size:
-        axes.tricontour(triangulation, celsius, levels=levels, colors="white", linewidths=0.55, alpha=0.8)
-    lines = section.outlines.points[..., [2, 1]] * _MM
-    axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8))
+    draw_field(axes, section, bar, np.arange(math.ceil(bar.low / step) * step, bar.high, step))
     for group, bearing in result.spec.bearings:
         kind = result.spec.bearing_types[group.bearing_type]
         colour = bar.colours(result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K)

@@ -26,13 +26,12 @@ from spindle_fem.report.figure_style import (
     FILM_MAP,
     TEMPERATURE_MAP,
     ColourBar,
-    Label,
     grouped,
-    picture_figure,
-    pictures_side_by_side,
     scale_of,
 )
+from spindle_fem.report.leader_labels import Label
 from spindle_fem.report.machine_drawing import part_colours
+from spindle_fem.report.picture_sheets import picture_figure, pictures_side_by_side
 from spindle_fem.report.plane_sections import clip_segments, clip_triangles
 from spindle_fem.report.profiles import MeridianSection
 from spindle_fem.report.scenes import SceneRenderer, View, ball_triangles

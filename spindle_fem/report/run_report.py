@@ -68,8 +68,8 @@ _ANSWERS = (
     Text(
         "The steady temperature of the whole machine at one speed, thrust, room and coolant: where it is "
         "hottest, how much warmer the inner rings are than the outer ones, how much of the bearings’ heat "
-        "the coolant takes and how much leaves by other ways, what the probes should read, and what the channel "
-        "costs in pressure."
+        "the coolant takes and how much leaves by other ways, what the probes should read, and what the "
+        "channel costs in pressure."
     ),
     Text(
         Markup(

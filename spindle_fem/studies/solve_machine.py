@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
@@ -35,13 +37,17 @@ from spindle_fem.validity import CodedWarning
 
 
 def solve(
-    spec: MachineSpec, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
+    machine: MachineSpec | str | Path,
+    point: OperatingPoint | None = None,
+    *,
+    progress: Progress = lambda stage: None,
 ) -> ThermalResult:
     """Steady temperatures of a machine, with its self-checks.
 
     Parameters
     ----------
-    spec : MachineSpec
+    machine : MachineSpec, str or Path
+        Loaded, or its file, or the name of one that ships.
     point : OperatingPoint, optional
         The definition's own by default.
     progress : callable
@@ -56,6 +62,7 @@ def solve(
     ------
     GeometryError, MeshQualityError, NoSteadyStateError, ConvergenceError, EnergyBalanceError
     """
+    spec = machine if isinstance(machine, MachineSpec) else load_machine(machine)
     return solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress)
 
 

@@ -59,7 +59,6 @@ OPEN_CIRCLES: tuple[tuple[str, str], ...] = (
     ("spindle_fem.definition.network_faults", "spindle_fem.definition.network_tables"),
     ("spindle_fem.machine.geometry.faces", "spindle_fem.machine.geometry.assembly"),
     ("spindle_fem.machine.geometry.meridian", "spindle_fem.machine.geometry.assembly"),
-    ("spindle_fem.report.figure_style", "spindle_fem.report.scenes"),
 )
 
 

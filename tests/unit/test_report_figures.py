@@ -13,7 +13,8 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.report import run_tables as tables
 from spindle_fem.report.definition_tables import customary, input_groups
-from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of, spread
+from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of
+from spindle_fem.report.leader_labels import spread
 from spindle_fem.report.machine_drawing import channel_sections, machine_drawing, part_colours
 
 
