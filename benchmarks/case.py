@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.machine.meshing.tagged_mesh import Joint, TaggedMesh
-from spindle_fem.solvers.coupled_steady import CoupledState, PreparedMachine, solve_coupled
+from spindle_fem.solvers.coupled_steady import CoupledState, solve_coupled
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 STEPS = 100
 STEP_S = 60.0

@@ -24,7 +24,7 @@ from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.results.thermal_result import ThermalResult
-from spindle_fem.solvers.coupled_steady import machine_on_mesh, prepare_machine
+from spindle_fem.solvers.prepared_machine import machine_on_mesh, prepare_machine
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.sweep.channel_map import MOVABLE
 from spindle_fem.studies.sweep.morphing import LATTICE, lattice_assembly, lattice_machine, move_mesh

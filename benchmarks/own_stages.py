@@ -19,7 +19,6 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.model.lumped.machine_network import build_machine_network
-from spindle_fem.model.lumped.machine_steady import solve_machine_network
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.model.mesh.step_control import StepControl
@@ -29,7 +28,9 @@ from spindle_fem.model.reduced.build_reduced import build_reduced_model
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.report.run_outputs import write_outputs
 from spindle_fem.report.run_report import peak_memory_MB
-from spindle_fem.solvers.coupled_steady import machine_on_mesh, solve_coupled
+from spindle_fem.solvers.coupled_steady import solve_coupled
+from spindle_fem.solvers.machine_network_steady import solve_machine_network
+from spindle_fem.solvers.prepared_machine import machine_on_mesh
 from spindle_fem.studies.solve_machine import solve_prepared, with_heat_study
 
 STEP_S = 60.0

@@ -21,14 +21,14 @@ import pandas as pd
 
 from spindle_fem.definition.load import machine_folder
 from spindle_fem.definition.network_tables import load_network_machine
-from spindle_fem.model.lumped.network_steady import solve_steady
 from spindle_fem.model.lumped.network_transient import simulate_transient
 from spindle_fem.model.lumped.thermal_network import ConductanceLaw, ThermalNetwork
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.compare import compare
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.studies.simulate_network import simulate_on_recording
+from spindle_fem.solvers.network_steady import solve_steady
+from spindle_fem.solvers.simulate_network import simulate_on_recording
 
 ROWS = 200_000
 MANIFEST = """

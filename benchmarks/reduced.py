@@ -27,7 +27,7 @@ from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.operation.coefficient_table import free_parameters
-from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
+from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.studies.transient_study import StudyResult, run_study, study_of
 
 RPM = np.pi / 30.0

@@ -26,7 +26,7 @@ from case import loads_of, write_case
 from comparison import OURS, PROGRAMS, compare, find_python, with_ratios
 
 from spindle_fem.definition.load import load_machine
-from spindle_fem.solvers.coupled_steady import prepare_machine
+from spindle_fem.solvers.prepared_machine import prepare_machine
 
 MACHINE = "wu_tan_2016"
 SIZES = (68_000, 200_000, 800_000)

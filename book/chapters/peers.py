@@ -180,7 +180,7 @@ def _write_case(folder: Path) -> Path:
     if (folder / "case.json").is_file():
         return folder
     from spindle_fem.definition.load import load_machine
-    from spindle_fem.solvers.coupled_steady import prepare_machine
+    from spindle_fem.solvers.prepared_machine import prepare_machine
 
     sys.path.insert(0, str(ROOT / "benchmarks"))
     try:

@@ -59,7 +59,7 @@ def run_machine(
     with output_folder(folder) as place, stages(progress) as tell, OutputHelpers() as helpers:
         # loaded after the helpers start, which load their own at the same time
         from spindle_fem.report.run_report import read_summary
-        from spindle_fem.solvers.coupled_steady import prepare_machine
+        from spindle_fem.solvers.prepared_machine import prepare_machine
         from spindle_fem.studies.run_checks import require_checks
         from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared, with_heat_study
 

@@ -14,7 +14,7 @@ from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.model.reduced.defined_effects import physics_of
 from spindle_fem.report.transient_report import write_transient_report
 from spindle_fem.results.output_folder import output_folder, replace_text
-from spindle_fem.solvers.coupled_steady import prepare_machine
+from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
 from spindle_fem.studies.transient_study import StudyResult, load_study, run_study
 from spindle_fem.studies.transient_summary import summarise

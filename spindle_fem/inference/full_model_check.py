@@ -29,10 +29,10 @@ from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, GAP_PREFIX, JUM
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.parallel import WorkerPool, one_thread, thread_count
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_transient import simulate_full, start_at
 from spindle_fem.solvers.mesh_terms import Physics
+from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.solvers.transient_records import MachineTransient, TransientOptions
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import FastTransient, simulate_fast
 from spindle_fem.operation.coefficient_table import INNER_SHARE
 from spindle_fem.recordings.align import Recording
-from spindle_fem.studies.simulate_network import initial_parameters, simulate_on_recording
+from spindle_fem.solvers.simulate_network import initial_parameters, simulate_on_recording
 
 Array = NDArray[np.float64]
 

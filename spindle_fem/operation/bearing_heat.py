@@ -32,8 +32,6 @@ from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.bearings.rings import SeatMaterial
 from spindle_fem.validity import CodedWarning
 
-# A preload this many times that of assembly ends a bearing, whatever the loop then does.
-LARGEST_PRELOAD_RATIO = 5.0
 _ORIENTATION = {"towards_rear": 1, "towards_nose": -1}
 
 
@@ -100,27 +98,59 @@ def heat_model_of(spec: MachineSpec) -> HeatModel:
     return by_table
 
 
+def follows_preload(spec: MachineSpec) -> bool:
+    """Whether expansion changes the preload of a machine's bearings, and with it their heat."""
+    return bool(spec.bearing_set) and spec.heat.thermal_preload and spec.heat.model != "table"
+
+
+def at_assembly_size(spec: MachineSpec) -> MachineSpec:
+    """The same machine with bearings that keep the size of assembly."""
+    return spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": False})})
+
+
 def table_heat(spec: MachineSpec, point: OperatingPoint) -> tuple[dict[str, float], tuple[CodedWarning, ...]]:
     """Heat of every bearing by the table, W: linear in speed, first order in thrust.
 
     Beyond the last speed the last segment is continued and a warning says so.
     """
-    table = spec.heat.table
-    speeds = np.asarray(table.speed)
+    end = spec.heat.table.speed[-1]
     warnings: tuple[CodedWarning, ...] = ()
-    if point.speed > speeds[-1] * (1.0 + 1e-9):
+    if point.speed > end * (1.0 + 1e-9):
         text = (
             f"Speed {point.speed * 30 / np.pi:.0f} rpm lies beyond the heat table, which ends at "
-            f"{speeds[-1] * 30 / np.pi:.0f} rpm; its last segment was continued."
+            f"{end * 30 / np.pi:.0f} rpm; its last segment was continued."
         )
         warnings = (CodedWarning("heat_table_extrapolated", text),)
-    heat = {}
-    for group, bearing in spec.bearings:
-        nominal = HEAT_MODELS["table"](point.speed, speeds, table.heat[bearing.name])
-        slope = table.thrust_coefficient.get(bearing.name, 0.0)
-        factor = 1.0 + slope * (point.thrust / table.reference_thrust - 1.0)
-        heat[bearing.name] = max(0.0, nominal * factor) * group.heat_factor.value
-    return heat, warnings
+    names = [bearing.name for _, bearing in spec.bearings]
+    heat = heat_of_table(spec, np.array([point.speed]), np.array([point.thrust]))[0]
+    return dict(zip(names, heat.tolist(), strict=True)), warnings
+
+
+def heat_of_table(
+    spec: MachineSpec, speed: NDArray[np.float64], thrust: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Heat of every bearing by the table, (n, n_bearings) W, in the order of ``spec.bearings``.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    speed : (n,) ndarray, [rad/s]
+    thrust : (n,) ndarray, [N]
+    """
+    table = spec.heat.table
+    columns = [
+        group.heat_factor.value
+        * HEAT_MODELS["table"](
+            speed,
+            table.speed,
+            table.heat[bearing.name],
+            thrust,
+            thrust_coefficient=table.thrust_coefficient.get(bearing.name, 0.0),
+            reference_thrust=table.reference_thrust,
+        )
+        for group, bearing in spec.bearings
+    ]
+    return np.stack(columns, axis=-1) if columns else np.empty((len(speed), 0))
 
 
 class BearingMechanics:
@@ -305,11 +335,6 @@ class BearingMechanics:
             )
             warnings += state.warnings
         return heat, tuple(warnings)
-
-
-def preload_runs_away(preload: Mapping[str, float], assembled: Mapping[str, float]) -> bool:
-    """Whether a preload has grown beyond what a bearing survives."""
-    return any(preload[name] > LARGEST_PRELOAD_RATIO * assembled[name] for name in preload)
 
 
 def _control(options: HeatOptions) -> str:

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.machine.view.machine_names import coefficient_groups
 from spindle_fem.model.mesh.thermal_operators import ThermalOperators
+from spindle_fem.operation.coefficients import ball_row_capacity, linear_coefficients, material_capacities
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
 
 INNER_SHARE = "heat.inner_share"
-# A natural film's constant part is taken where the wall is this much warmer than the air.
-NATURAL_DIFFERENCE = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,40 +42,13 @@ class CoefficientTable:
 
     def base(self, point: OperatingPoint) -> dict[str, float]:
         """Every coefficient at an operating point, SI; only films and gaps depend on it."""
-        spec = self.spec
-        values = {f"conductivity.{name}": item.thermal_conductivity for name, item in spec.materials.items()}
-        conductance = {f"joint.{group.name}": group.conductance.value for group in spec.joint}
-        values |= {f"joint.{name}": conductance[self.groups[f"joint.{name}"][1]] for name in self.contacts}
-        for film in spec.film:
-            fluid = point.ambient_temperature if film.temperature == "ambient" else film.temperature
-            if isinstance(film, NaturalFilm):
-                value = natural_reference(spec, film)
-            else:
-                value = float(film_coefficient(film, point, np.array([fluid]), fluid)[0][0])
-            values |= {f"film.{surface}": value for surface in film.surface}
-        for gap in spec.gap:
-            values[f"gap.{gap.name}"] = gap_coefficient(gap, point, *self.gap_radii[gap.name])[0]
-        for group, bearing in spec.bearings:
-            for side in ("inner", "outer"):
-                values[f"balls.{bearing.name}.{side}"] = group.ball_row.conductance.value
-        return values
+        return linear_coefficients(self.spec, point, self.contacts, self.gap_radii)
 
     def capacities(self) -> dict[str, float]:
         """Volumetric capacity of every material [J/(m³·K)] and capacity of every ball row [J/K]."""
-        spec = self.spec
-        factor = spec.heat_capacity_factor.value
-        values = {
-            f"capacity.{name}": factor * item.volumetric_heat_capacity
-            for name, item in spec.materials.items()
-        }
-        for group, bearing in spec.bearings:
-            kind = spec.bearing_types[group.bearing_type]
-            volume = kind.ball_count * np.pi / 6.0 * kind.ball_diameter**3
-            material = spec.materials[kind.ball_material]
-            own = group.ball_row.capacity
-            values[f"capacity.{bearing.name}.balls"] = factor * (
-                own if own is not None else volume * material.volumetric_heat_capacity
-            )
+        values = {f"capacity.{name}": value for name, value in material_capacities(self.spec).items()}
+        for group, bearing in self.spec.bearings:
+            values[f"capacity.{bearing.name}.balls"] = ball_row_capacity(self.spec, group)
         return values
 
     def heat_groups(self, bearing: str) -> tuple[str, ...]:
@@ -160,10 +131,3 @@ def gap_radii_of(spec: MachineSpec, operators: ThermalOperators) -> dict[str, tu
 def free_parameters(spec: MachineSpec) -> dict[str, float]:
     """1 σ of the logarithm of every uncertain parameter, by name."""
     return {item.name: item.sigma_log for item in uncertain_parameters(spec)}
-
-
-def natural_reference(spec: MachineSpec, film: NaturalFilm) -> float:
-    """What the operators hold of a natural film: its coefficient 10 K above the defined surroundings."""
-    point = OperatingPoint.of(spec)
-    fluid = point.ambient_temperature if film.temperature == "ambient" else film.temperature
-    return float(film_coefficient(film, point, np.array([fluid + NATURAL_DIFFERENCE]), fluid)[0][0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.operation.channel_cells import ChannelCells
@@ -36,10 +36,21 @@ class CoolantState:
 
 
 class CoolantLoop:
-    """Marches the coolant of one machine over given wall temperatures."""
+    """Marches the coolant of one machine over given wall temperatures.
 
-    def __init__(self, spec: MachineSpec, cells: ChannelCells) -> None:
+    Parameters
+    ----------
+    spec : MachineSpec
+    cells : ChannelCells
+    cell_factor : (n_along,) ndarray, optional
+        Further factor on the film of each cell along the channel.
+    """
+
+    def __init__(
+        self, spec: MachineSpec, cells: ChannelCells, cell_factor: NDArray[np.float64] | None = None
+    ) -> None:
         channel = spec.channel
+        self.cell_factor = np.ones(cells.is_port.shape) if cell_factor is None else cell_factor
         self.spec = spec
         self.cells = cells
         self.coolant = coolant_by_name(spec.coolant.fluid)
@@ -71,15 +82,8 @@ class CoolantLoop:
         """
         settings = self.spec.coolant
         inlet = point.coolant_inlet_temperature
-        pressure = channel_pressure_drop(
-            self.section,
-            point.coolant_flow,
-            self.coolant.properties(inlet),
-            float(critical_reynolds_schmidt(self.section.curvature_ratio)),
-            port_diameter=self.port_diameter,
-            port_length=self.port_length,
-        )
-        factor = film_factor * settings.film_factor.value * self._port_factor(point, inlet)
+        pressure = self.pressure_drop(point.coolant_flow, inlet)
+        factor = film_factor * settings.film_factor.value * self.cell_factors(point.coolant_flow, inlet)
         local = settings.properties_at == "bulk"
         march = march_channel(
             self.section,
@@ -101,13 +105,37 @@ class CoolantLoop:
         )
         return CoolantState(march, value, low, high, pressure)
 
-    def _port_factor(self, point: OperatingPoint, inlet: float) -> NDArray[np.float64]:
-        """Film of the drillings over that of the channel: short tubes, thermally developing."""
-        factor = np.ones(self.cells.is_port.shape)
+    def pressure_drop(self, flow: float, inlet: float) -> PressureDrop:
+        """Pressure drop of the channel at a flow (m³/s), properties at the inlet temperature (K)."""
+        return channel_pressure_drop(
+            self.section,
+            flow,
+            self.coolant.properties(inlet),
+            float(critical_reynolds_schmidt(self.section.curvature_ratio)),
+            port_diameter=self.port_diameter,
+            port_length=self.port_length,
+        )
+
+    def pumping_power(self, flow: float, inlet: float) -> float:
+        """Friction heat that the definition gives to the coolant, W."""
+        return self.pressure_drop(flow, inlet).pumping_power if self.spec.coolant.pumping_heat else 0.0
+
+    def cell_factors(self, flow: ArrayLike, inlet: ArrayLike) -> NDArray[np.float64]:
+        """Factor on the film of each cell along the channel, (..., n_along).
+
+        Where the coolant enters and leaves by drillings, their film (short
+        tubes, thermally developing) over that of the channel.
+
+        Parameters
+        ----------
+        flow, inlet : (...) array_like, [m³/s], [K]
+        """
+        flow, inlet = np.broadcast_arrays(np.asarray(flow, dtype=float), np.asarray(inlet, dtype=float))
+        factor = np.tile(self.cell_factor, (*flow.shape, 1))
         if self.port_diameter is None:
             return factor
         properties = self.coolant.properties(inlet)
-        velocity = point.coolant_flow / self.section.starts / (0.25 * np.pi * self.port_diameter**2)
+        velocity = flow / self.section.starts / (0.25 * np.pi * self.port_diameter**2)
         reynolds = velocity * self.port_diameter / properties.kinematic_viscosity
         graetz = reynolds * properties.prandtl * self.port_diameter / self.port_length
         port = (
@@ -115,8 +143,7 @@ class CoolantLoop:
             * properties.thermal_conductivity
             / self.port_diameter
         )
-        state = ChannelState(self.coolant, point.coolant_flow, inlet)
-        factor[self.cells.is_port] = (
-            float(port) / select_film(self.spec.coolant.film_model, self.section, state).value
-        )
+        state = ChannelState(self.coolant, flow, inlet)
+        ratio = np.asarray(port / select_film(self.spec.coolant.film_model, self.section, state).value)
+        factor[..., self.cells.is_port] *= ratio[..., None]
         return factor

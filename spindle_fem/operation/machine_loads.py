@@ -12,12 +12,19 @@ from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.channel_cells import ChannelCells, build_channel_cells
+from spindle_fem.operation.coefficients import (
+    ball_conductances,
+    ball_row_capacity,
+    film_coefficient,
+    fluid_temperature,
+    gap_coefficient,
+)
 from spindle_fem.operation.coolant_loop import CoolantLoop, CoolantState
 from spindle_fem.operation.facet_centres import facet_centres
 from spindle_fem.operation.gap_bands import GapBands, angle_of, build_gap_bands
+from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads, LumpedLoad
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
 from spindle_fem.validity import CodedWarning, fold_warnings
 
 GAP_BAND_WIDTH = 0.02
@@ -115,6 +122,13 @@ class LoadsBuilder:
             return (f"{bearing}.balls",)
         return tuple(f"{bearing}.balls[{sector}]" for sector in range(self.n_sectors))
 
+    @property
+    def lumped_names(self) -> tuple[str, ...]:
+        """Names of the lumped nodes, ball rows and gap air, in the order of every :class:`Loads`."""
+        balls = [node for _, bearing in self.spec.bearings for node in self.ball_nodes(bearing.name)]
+        air = [f"{gap.name}[{cell}]" for gap in self.spec.gap for cell in range(self.gaps[gap.name].n_cells)]
+        return (*balls, *air)
+
     # ------------------------------------------------------------------ loads
     def at(
         self, point: OperatingPoint, state: FieldState, change: LoadChange = NO_CHANGE
@@ -137,7 +151,7 @@ class LoadsBuilder:
         lumped: list[LumpedLoad] = []
         for group, bearing in self.spec.bearings:
             heat = heats[bearing.name]
-            shares = self.shares(heat.total)
+            shares = {body: share * heat.total for body, share in heat_shares(self.spec.heat).items()}
             heat_to[bearing.name] = shares
             surface_heat[f"{bearing.name}.inner_raceway"] = shares["inner"]
             surface_heat[f"{bearing.name}.outer_raceway"] = shares["outer"]
@@ -167,31 +181,14 @@ class LoadsBuilder:
         )
         return loads, coolant
 
-    def shares(self, total: float) -> dict[str, float]:
-        """Where a bearing's heat enters: both rings and the balls, W."""
-        heat = self.spec.heat
-        rings = (1.0 - heat.ball_share) * total
-        inner = heat.inner_share.value
-        return {"inner": inner * rings, "outer": (1.0 - inner) * rings, "balls": heat.ball_share * total}
-
     def _ball_row(
         self, group: BearingSet, name: str, heat: BearingHeat, ball_heat: float, change: LoadChange
     ) -> list[LumpedLoad]:
-        spec = self.spec
-        kind = spec.bearing_types[group.bearing_type]
-        row = group.ball_row
-        if row.kind == "constant":
-            conductances = (row.conductance.value,) * 2
-        else:
-            conductances = (heat.conductance_inner, heat.conductance_outer)
         conductances = [
             value * change.factor(f"balls.{name}.{side}")
-            for value, side in zip(conductances, ("inner", "outer"), strict=True)
+            for value, side in zip(ball_conductances(group, heat), ("inner", "outer"), strict=True)
         ]
-        material = spec.materials[kind.ball_material]
-        volume = kind.ball_count * np.pi / 6.0 * kind.ball_diameter**3
-        capacity = row.capacity if row.capacity is not None else volume * material.volumetric_heat_capacity
-        capacity *= spec.heat_capacity_factor.value
+        capacity = ball_row_capacity(self.spec, group)
         raceways = (f"{name}.inner_raceway", f"{name}.outer_raceway")
         sectors = {
             surface: np.minimum(
@@ -217,7 +214,7 @@ class LoadsBuilder:
     ) -> dict[str, FilmLoad]:
         films = {}
         for film in self.spec.film:
-            fluid = point.ambient_temperature if film.temperature == "ambient" else film.temperature
+            fluid = fluid_temperature(film, point.ambient_temperature)
             for surface in film.surface:
                 wall = state.facets[surface]
                 coefficient, said = film_coefficient(film, point, wall, fluid)

@@ -31,9 +31,9 @@ from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadCh
 from spindle_fem.operation.machine_loads import FieldState
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.march import march_enthalpy
-from spindle_fem.solvers.coupled_steady import PreparedMachine
 from spindle_fem.solvers.input_history import FIELD_OF, OperatingHistory
 from spindle_fem.solvers.mesh_terms import NO_PHYSICS, FieldTerms, Physics
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 Array = NDArray[np.float64]
 

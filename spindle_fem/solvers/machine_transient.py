@@ -13,10 +13,11 @@ from spindle_fem.errors import EnergyBalanceError, NoSteadyStateError, SpecError
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.model.mesh.time_stepper import EnergyAccount, TransientResult, integrate
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.coupled_steady import RUNAWAY_TEMPERATURE, CoupledState, PreparedMachine
+from spindle_fem.solvers.coupled_steady import RUNAWAY_TEMPERATURE, CoupledState
 from spindle_fem.solvers.coupled_transient import CoupledInputs, coolant_heat
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics, with_factors
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.solvers.readings import ReadingRows
 from spindle_fem.solvers.transient_records import (
     DEFAULT_OPTIONS,

@@ -30,7 +30,7 @@ from spindle_fem.operation.effect_terms import (
 from spindle_fem.operation.loads import LoadChange
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.coupled_steady import PreparedMachine, machine_on_mesh
+from spindle_fem.solvers.prepared_machine import PreparedMachine, machine_on_mesh
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from spindle_fem.model.mesh.evaluate import mean_matrix, probe_matrix
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.coupled_steady import PreparedMachine
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 Array = NDArray[np.float64]
 CoolantAt = Callable[[float], tuple[OperatingPoint, float]]

@@ -101,7 +101,8 @@ def heat_study(
 def _solved_temperatures(
     spec: MachineSpec, speeds: Sequence[float]
 ) -> dict[float, dict[str, BearingTemperatures]]:
-    from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
+    from spindle_fem.solvers.coupled_steady import solve_coupled
+    from spindle_fem.solvers.prepared_machine import prepare_machine
 
     machine = prepare_machine(spec)
     point = OperatingPoint.of(spec)

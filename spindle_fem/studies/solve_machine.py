@@ -23,14 +23,11 @@ from spindle_fem.results.thermal_result import (
 from spindle_fem.solvers.coupled_steady import (
     FIELD_TOLERANCE,
     LINEAR_RESIDUAL_LIMIT,
-    Clock,
     CoupledState,
-    PreparedMachine,
-    Progress,
     coolant_mismatch,
-    prepare_machine,
     solve_coupled,
 )
+from spindle_fem.solvers.prepared_machine import Clock, PreparedMachine, Progress, prepare_machine
 from spindle_fem.studies import run_checks as checks
 from spindle_fem.studies.heat_study import heat_study
 from spindle_fem.validity import CodedWarning

@@ -27,7 +27,7 @@ from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.coupled_steady import PreparedMachine, solve_coupled
+from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.coupled_transient import CoupledInputs
 from spindle_fem.solvers.input_history import FIELD_OF, OperatingHistory
 from spindle_fem.solvers.machine_transient import (
@@ -39,6 +39,7 @@ from spindle_fem.solvers.machine_transient import (
     start_from,
 )
 from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics, settled_memory, steady_physics, with_factors
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.solvers.readings import ReadingRows
 
 Array = NDArray[np.float64]

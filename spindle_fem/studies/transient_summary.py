@@ -8,7 +8,7 @@ import numpy as np
 
 from spindle_fem.errors import NoSteadyStateError
 from spindle_fem.results.run_summary import package_versions
-from spindle_fem.solvers.coupled_steady import PreparedMachine
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.transient_study import StudyResult, time_to_stay_within
 from spindle_fem.units import ZERO_CELSIUS_K

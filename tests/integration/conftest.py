@@ -5,7 +5,7 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.model.reduced.build_reduced import reduced_model_of
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.solvers.coupled_steady import prepare_machine
+from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.studies.solve_machine import solve_prepared
 
 

@@ -11,8 +11,9 @@ from spindle_fem.errors import CheckFailedError, FaultsError, NoSteadyStateError
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.coupled_steady import LINEAR_RESIDUAL_LIMIT, prepare_machine, solve_coupled
+from spindle_fem.solvers.coupled_steady import LINEAR_RESIDUAL_LIMIT, solve_coupled
 from spindle_fem.solvers.preload_runaway import HeatResponse, highest_stable_speed
+from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.studies.run_checks import require_checks
 from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
 

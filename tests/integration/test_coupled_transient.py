@@ -19,11 +19,12 @@ from spindle_fem.errors import (
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
+from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.coupled_transient import CoupledInputs
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_transient import MachineEnergy, TransientOptions, simulate_full, start_from
 from spindle_fem.solvers.mesh_terms import Physics
+from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.transient_study import run_study, study_of, time_to_stay_within

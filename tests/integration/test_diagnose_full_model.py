@@ -16,9 +16,9 @@ from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.report.diagnosis_full_model import full_model_sections
-from spindle_fem.solvers.coupled_steady import prepare_machine
 from spindle_fem.solvers.machine_transient import simulate_full
 from spindle_fem.solvers.mesh_terms import Physics
+from spindle_fem.solvers.prepared_machine import prepare_machine
 from tests.support.lumped_spindle import lumped_model
 
 PROBES = ("SP01", "SP05", "COOLANT_OUT")

@@ -21,8 +21,9 @@ from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.coupled_steady import prepare_machine, solve_coupled
+from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
+from spindle_fem.solvers.prepared_machine import prepare_machine
 
 RPM = np.pi / 30.0
 OVERRIDES = ("mesh.preset=coarse", "mesh.order=1")

@@ -15,8 +15,8 @@ from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.coupled_steady import prepare_machine
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
+from spindle_fem.solvers.prepared_machine import prepare_machine
 
 RPM = np.pi / 30.0
 OVERRIDES = ("mesh.preset=coarse", "mesh.order=1")

@@ -15,7 +15,7 @@ from spindle_fem.errors import BadInputError, FaultsError
 from spindle_fem.report.sweep_report import rebuild_sweep_report
 from spindle_fem.results.output_folder import MARKER, is_complete
 from spindle_fem.results.run_summary import build_summary
-from spindle_fem.solvers.coupled_steady import prepare_machine
+from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.sweep import run_tasks as runner
 from spindle_fem.studies.sweep.evaluate_design import FILM_HIGH, FILM_LOW

@@ -12,7 +12,7 @@ from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.classify_faces import port_coordinates
 from spindle_fem.machine.meshing.quality import AREA_TOLERANCE, area_errors, gmsh_quality, volume_errors
 from spindle_fem.model.mesh.mesh_operators import build_operators
-from spindle_fem.solvers.coupled_steady import machine_on_mesh
+from spindle_fem.solvers.prepared_machine import machine_on_mesh
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.sweep import evaluate_design as evaluation
 from spindle_fem.studies.sweep import morphing

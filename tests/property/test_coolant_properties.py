@@ -9,7 +9,8 @@ from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
 from spindle_fem.physics.coolant.coolants.water import Water
 from spindle_fem.physics.coolant.duct_friction import channel_pressure_drop
-from spindle_fem.physics.coolant.march import linearise_march, march_channel, march_enthalpy
+from spindle_fem.physics.coolant.linear_march import linearise_march
+from spindle_fem.physics.coolant.march import march_channel, march_enthalpy
 from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
 
 OIL = OilIsoVg32()

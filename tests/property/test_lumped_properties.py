@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from spindle_fem.model.lumped.network_steady import solve_steady
 from spindle_fem.model.lumped.network_transient import simulate_transient
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.solvers.network_steady import solve_steady
 
 ROOM, BATH = 293.15, 303.15
 several = settings(max_examples=40, deadline=None)

@@ -8,7 +8,8 @@ from spindle_fem.errors import OutOfValidityError
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
 from spindle_fem.physics.coolant.coolants.water import Water
-from spindle_fem.physics.coolant.march import linearise_march, march_channel, march_enthalpy
+from spindle_fem.physics.coolant.linear_march import MarchMaps, linearise_march, march_maps, outlet_stretch
+from spindle_fem.physics.coolant.march import march_channel, march_enthalpy
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
 OIL = OilIsoVg32()
@@ -113,6 +114,42 @@ def test_linearisation_reproduces_the_march_and_its_derivative(shape):
     assert (np.tril(line.matrix, k=-1) <= 0.0).all()
 
 
+def test_maps_give_bulk_and_outlet_of_the_march():
+    rng = np.random.default_rng(5)
+    wall, area = 290.0 + 20.0 * rng.random((2, 6)), 0.01 + 0.03 * rng.random((2, 6))
+    film, pumping = 100.0 + 900.0 * rng.random((2, 6)), 10.0 * rng.random((2, 6))
+    maps = march_maps(0.05 * 1900.0, area, film, pumping)
+    march = march_enthalpy(INLET, 0.05, 1900.0, wall, area, film, pumping)
+    bulk = np.einsum("...ij,...j->...i", maps.bulk_from_wall, wall)
+    bulk += INLET * maps.bulk_from_inlet + maps.bulk_from_friction
+    np.testing.assert_allclose(bulk, march.bulk_temperature, rtol=1e-13)
+    outlet = (maps.outlet_from_wall * wall).sum(axis=-1)
+    outlet += INLET * maps.outlet_from_inlet + maps.outlet_from_friction
+    np.testing.assert_allclose(outlet, march.outlet_temperature, rtol=1e-13)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-4])
+def test_maps_take_complex_films_for_their_derivative(scale):
+    area, film = np.array([0.01, 0.03, 0.02]), scale * np.array([200.0, 600.0, 400.0])
+    step, difference = 1e-30, 1e-6
+    by_step = march_maps(95.0, area, film * (1.0 + 1j * step), 4.0)
+    above, below = (march_maps(95.0, area, film * factor, 4.0) for factor in (1 + difference, 1 - difference))
+    for name in MarchMaps.__slots__:
+        central = (getattr(above, name) - getattr(below, name)) / (2.0 * difference)
+        exact = np.imag(getattr(by_step, name)) / step
+        np.testing.assert_allclose(exact, central, rtol=1e-6, atol=2e-10)
+
+
+def test_a_cell_counted_from_its_outlet_takes_the_same_heat():
+    march = march_enthalpy(INLET, 0.05, 1900.0, [310.0], [0.04], [800.0])
+    units = np.array([800.0 * 0.04 / 95.0])
+    stretch, slope = outlet_stretch(units)
+    heat = stretch * 800.0 * 0.04 * (310.0 - march.outlet_temperature)
+    assert heat == pytest.approx(march.heat, rel=1e-13)
+    above, below = outlet_stretch(units + 1e-6)[0], outlet_stretch(units - 1e-6)[0]
+    assert slope == pytest.approx((above - below) / 2e-6, rel=1e-8)
+
+
 def test_results_are_frozen():
     march = march_enthalpy(INLET, 0.3, 1900.0, [300.0], [0.1], 250.0)
     with pytest.raises(ValueError, match="read-only"):
@@ -191,11 +228,6 @@ class TestMarchChannel:
         local = self.march(properties_at="local", model="helical")
         assert local.film.value.shape == (30,)
         assert local.film.value[-1] > local.film.value[0]
-
-    def test_linearisation_belongs_to_the_final_state(self):
-        found = self.march(properties_at="local", wall_correction=True)
-        heat = found.linearisation.constant + found.linearisation.matrix @ self.WALL
-        np.testing.assert_allclose(heat, found.march.heat, rtol=1e-9)
 
     def test_film_factor_scales_the_film(self):
         plain, fouled = self.march(), self.march(film_factor=0.5)

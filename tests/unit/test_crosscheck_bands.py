@@ -10,9 +10,9 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.model.lumped.links import SurfacePatch
 from spindle_fem.model.lumped.machine_network import build_machine_network
-from spindle_fem.model.lumped.machine_steady import solve_machine_network
 from spindle_fem.operation.bearing_heat import heat_model_of
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.machine_network_steady import solve_machine_network
 from spindle_fem.studies.crosscheck.causes import CHECKS, _narrow_raceways, band_lines, contact_bands
 
 

@@ -11,12 +11,12 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import NoSteadyStateError
 from spindle_fem.model.lumped.ball_contacts import BallContactLaw
 from spindle_fem.model.lumped.friction_table import film_temperature, tabulate_friction
+from spindle_fem.model.lumped.machine_balance import SparseBalance
 from spindle_fem.model.lumped.machine_network import build_machine_network
-from spindle_fem.model.lumped.machine_network_transient import simulate_machine_network
-from spindle_fem.model.lumped.machine_steady import SparseBalance, solve_machine_network
 from spindle_fem.model.lumped.operating_state import operate
 from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.machine_network_steady import solve_machine_network
 
 
 @pytest.fixture(scope="module")
@@ -80,15 +80,6 @@ def test_tables_stand_for_the_heat_model(friction_machine):
         assert tables.heat[name].c == pytest.approx(one_by_one.heat[name].c, rel=1e-6, abs=1e-9)
 
 
-def test_a_transient_with_friction_ends_in_its_steady_state(friction_machine):
-    network, point, model = friction_machine
-    steady = solve_machine_network(network, point, heat_model=model).temperature
-    run = simulate_machine_network(
-        network, np.arange(0.0, 40 * 3600.0, 600.0), [(0.0, point)], heat_model=model
-    )
-    assert run.temperature[-1] == pytest.approx(steady, abs=0.01)
-
-
 PRELOAD = ("heat.thermal_preload=true", "operation.speed=500 rpm")
 
 
@@ -103,10 +94,6 @@ def test_network_follows_the_preload_to_its_fixed_point():
     cold = {name: BearingTemperatures(*(point.ambient_temperature,) * 5) for name in exact}
     assert 1.5 < exact["F3"].preload / model(point, cold)[0]["F3"].preload < 5.0
     assert state.imbalance_relative < 1e-10
-    run = simulate_machine_network(
-        network, np.arange(0.0, 30 * 3600.0, 600.0), [(0.0, point)], heat_model=model
-    )
-    assert run.temperature[-1] == pytest.approx(state.temperature, abs=0.05)
 
 
 def test_network_says_from_which_speed_on_the_preload_runs_away():

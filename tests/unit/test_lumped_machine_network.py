@@ -11,13 +11,14 @@ from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.model.lumped.cells import build_cells, channel_zone, side_wall_area
 from spindle_fem.model.lumped.friction_table import tabulate_friction
 from spindle_fem.model.lumped.heat_laws import FrictionLaw
+from spindle_fem.model.lumped.machine_balance import SparseBalance
 from spindle_fem.model.lumped.machine_network import build_machine_network
-from spindle_fem.model.lumped.machine_network_transient import simulate_machine_network
-from spindle_fem.model.lumped.machine_steady import SparseBalance, newton, solve_machine_network
-from spindle_fem.model.lumped.network_steady import solve_steady
 from spindle_fem.model.lumped.operating_state import operate
 from spindle_fem.operation.bearing_heat import heat_model_of
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.machine_network_steady import solve_machine_network
+from spindle_fem.solvers.network_steady import solve_steady
+from spindle_fem.solvers.newton import newton
 
 MACHINES = ("recorded_spindle", "small_two_start", "uncooled")
 
@@ -154,40 +155,12 @@ def test_coolant_nodes_are_the_enthalpy_march(network):
     assert np.diff(np.concatenate([[law.inlet], end])) * law.capacity_rate == pytest.approx(heat, rel=1e-9)
 
 
-def test_a_long_transient_ends_in_the_steady_state(network):
-    point = OperatingPoint.of(network.spec)
-    steady = solve_machine_network(network, point).temperature
-    run = simulate_machine_network(network, np.arange(0.0, 40 * 3600.0 + 1.0, 600.0), [(0.0, point)])
-    assert run.temperature[-1] == pytest.approx(steady, abs=1e-6)
-    assert run.temperature[0] == pytest.approx(np.full(72, point.ambient_temperature))
-
-
-def test_transient_does_not_depend_on_the_step():
-    network = build_machine_network(load_machine("small_two_start"))
-    point = OperatingPoint.of(network.spec)
-    runs = [
-        simulate_machine_network(network, np.arange(0.0, 3600.1, step), [(0.0, point)])
-        for step in (20.0, 5.0)
-    ]
-    assert runs[0].temperature == pytest.approx(runs[1].temperature[::4], abs=5e-3)
-
-
-def test_first_step_of_a_transient_stores_what_goes_in(network):
-    """Heat put in less heat given off is the change of what is stored, over one short step."""
-    point = OperatingPoint.of(network.spec)
-    ambient = np.full(network.n_nodes, point.ambient_temperature)
-    balance = SparseBalance(operate(network, point, heat_model_of(network.spec)))
-    run = simulate_machine_network(network, [0.0, 1e-3], [(0.0, point)])
-    stored = network.capacity @ (run.temperature[1] - ambient)
-    assert stored == pytest.approx(1e-3 * balance.net_heat(ambient).sum(), rel=2e-3)
-
-
 def test_double_heat_doubles_the_rise(network):
     """Linear machine: table heat, fixed films."""
     point = OperatingPoint.of(network.spec)
     model = heat_model_of(network.spec)
     net = operate(network, point, model)
-    temperature = newton(net, np.full(72, 300.0))[0]
+    temperature = newton(SparseBalance(net), np.full(72, 300.0))[0]
     matrix, load = SparseBalance(net).matrix, SparseBalance(net).load
     twice = np.linalg.solve(matrix, load + net.heat)
     none = np.linalg.solve(matrix, load - net.heat)
@@ -205,14 +178,6 @@ def test_bad_arguments_are_refused_by_name(spindle, network):
     wide = spindle.model_copy(update={"channel": spindle.channel.model_copy(update={"width": 0.025})})
     with pytest.raises(FaultsError, match="neighbouring turns"):
         build_machine_network(wide)
-    point = OperatingPoint.of(spindle)
-    for times, schedule, said in (
-        ([0.0, 0.0], [(0.0, point)], "times"),
-        ([0.0, 10.0], [(5.0, point)], "schedule"),
-        ([0.0, 10.0], [(0.0, point), (5.0, point)], "schedule"),
-    ):
-        with pytest.raises(SpecError, match=said):
-            simulate_machine_network(network, times, schedule)
 
 
 def test_a_film_hotter_than_its_table_is_refused():
@@ -235,4 +200,4 @@ def test_a_machine_that_loses_no_heat_has_no_steady_state(spindle):
         net, conductance=np.where(outward, 0.0, net.conductance), streams=(np.empty(0, int),) * 2
     )
     with pytest.raises(NoSteadyStateError):
-        newton(sealed, np.full(network.n_nodes, 300.0))
+        newton(SparseBalance(sealed), np.full(network.n_nodes, 300.0))

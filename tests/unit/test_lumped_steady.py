@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from spindle_fem.errors import NoSteadyStateError, SpecError, UnknownSurfaceError
-from spindle_fem.model.lumped.network_steady import solve_steady
 from spindle_fem.model.lumped.node_balance import NetworkBalance
 from spindle_fem.model.lumped.thermal_network import ConductanceLaw, Parameter, ThermalNetwork
+from spindle_fem.solvers.network_steady import solve_steady
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 

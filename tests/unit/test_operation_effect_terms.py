@@ -20,8 +20,8 @@ from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.effect_terms import Derivatives, EffectTerms, Instants
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.coupled_steady import prepare_machine
 from spindle_fem.solvers.mesh_terms import FieldTerms, Physics
+from spindle_fem.solvers.prepared_machine import prepare_machine
 from tests.support.sample_terms import Closure, Fading, Feedback, Friction, LaterFriction
 from tests.unit.test_reduced_network import MACHINE, written
 

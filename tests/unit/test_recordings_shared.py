@@ -11,7 +11,7 @@ from spindle_fem.definition.network_tables import load_network_machine
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare
-from spindle_fem.studies.simulate_network import simulate_on_recording
+from spindle_fem.solvers.simulate_network import simulate_on_recording
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 FOLDER = Path(os.environ.get("SPINDLE_FEM_RECORDINGS", BESIDE))

@@ -16,7 +16,7 @@ from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.studies.simulate_network import simulate_on_recording
+from spindle_fem.solvers.simulate_network import simulate_on_recording
 
 MACHINE = """
 schema = "spindle-fem/machine/1"

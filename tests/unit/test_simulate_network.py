@@ -17,7 +17,7 @@ from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare, simulation_summary, write_simulated
 from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.studies.simulate_network import (
+from spindle_fem.solvers.simulate_network import (
     initial_parameters,
     initial_state,
     magnitude_history,

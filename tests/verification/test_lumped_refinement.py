@@ -7,7 +7,7 @@ import pytest
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.model.lumped.machine_network import build_machine_network
-from spindle_fem.model.lumped.machine_steady import solve_machine_network
+from spindle_fem.solvers.machine_network_steady import solve_machine_network
 from spindle_fem.studies.crosscheck.axisymmetric import solve_axisymmetric
 from spindle_fem.studies.crosscheck.gather_fields import gather_axisymmetric, gather_network
 

@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, factor, rows
 from spindle_fem.effects.framework.machine_view import FrictionTable, MachineView
@@ -42,31 +39,10 @@ class HeatSplitTerm(Term):
         """Heat of every raceway, (2 n, k) W."""
         share = context.parameters["inner_share_change"] * self._ring_share
         moved = [
-            share * table_heat(table, context.inputs["speed"], context.inputs["thrust"])
+            share * table.heat_at(abs(context.inputs["speed"]), context.inputs["thrust"])
             for table in self._tables.values()
         ]
         return rows(context, *(sign * value for value in moved for sign in (1.0, -1.0)))
-
-
-def table_heat(table: FrictionTable, speed: ArrayLike, thrust: ArrayLike) -> NDArray[np.float64]:
-    """Friction heat of one bearing, W, linear between entries and beyond them.
-
-    Parameters
-    ----------
-    table : FrictionTable
-    speed : array_like, [rad/s]
-    thrust : array_like, [N]
-
-    >>> float(table_heat(FrictionTable((0.0, 100.0), (0.0, 50.0)), 20.0, 1750.0))
-    10.0
-    """
-    grid, heat = np.asarray(table.speed), np.asarray(table.heat)
-    speed = np.abs(np.asarray(speed, dtype=float))
-    segment = np.clip(np.searchsorted(grid, speed, side="right") - 1, 0, grid.size - 2)
-    part = (speed - grid[segment]) / (grid[segment + 1] - grid[segment])
-    nominal = heat[segment] + part * (heat[segment + 1] - heat[segment])
-    loaded = 1.0 + table.thrust_coefficient * (np.asarray(thrust) / table.reference_thrust - 1.0)
-    return np.maximum(0.0, nominal * loaded)
 
 
 class HeatSplit(Effect):

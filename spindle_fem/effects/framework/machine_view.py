@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.coolant.properties import coolant_by_name
 
 Array = NDArray[np.float64]
@@ -76,12 +77,14 @@ class FrictionTable:
 
         Beyond the table's ends the last straight line goes on; heat is never negative.
         """
-        grid, values = np.asarray(self.speed), np.asarray(self.heat)
-        segment = np.clip(np.searchsorted(grid, speed, side="right") - 1, 0, len(grid) - 2)
-        fraction = (speed - grid[segment]) / (grid[segment + 1] - grid[segment])
-        nominal = values[segment] + fraction * (values[segment + 1] - values[segment])
-        factor = 1.0 + self.thrust_coefficient * (thrust / self.reference_thrust - 1.0)
-        return np.maximum(0.0, nominal * factor)
+        return HEAT_MODELS["table"](
+            speed,
+            self.speed,
+            self.heat,
+            thrust,
+            thrust_coefficient=self.thrust_coefficient,
+            reference_thrust=self.reference_thrust,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline, RectBivariateSpli
 
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.model.lumped.links import SurfacePatch
+from spindle_fem.physics.coolant.linear_march import outlet_stretch
 
 Array = NDArray[np.float64]
 Triplets = tuple[NDArray[np.int64], NDArray[np.int64], Array]
@@ -181,8 +182,8 @@ class CoolantLaw:
         number = len(self.nodes)
         units = np.bincount(self.cell, plain, number) / self.capacity_rate
         units_by_h = np.bincount(self.cell, plain_by_h, number) / self.capacity_rate
-        stretch = np.expm1(units) / units
-        stretch_by_h = (np.exp(units) - stretch) / units * units_by_h
+        stretch, by_units = outlet_stretch(units)
+        stretch_by_h = by_units * units_by_h
         value = stretch[self.cell] * plain
         return value, stretch[self.cell] * plain_by_h + stretch_by_h[self.cell] * plain
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import GeometryError, SpecError
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
-from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.lumped.cells import Channelling, MeridianCells, build_cells, channel_zone
 from spindle_fem.model.lumped.links import (
     NodeCentres,
@@ -37,6 +36,7 @@ from spindle_fem.model.lumped.partition import (
     sliced_partition,
 )
 from spindle_fem.operation.channel_cells import ChannelCells
+from spindle_fem.operation.coefficients import ball_row_capacity, joint_conductances
 from spindle_fem.operation.coolant_loop import CoolantLoop
 
 Array = NDArray[np.float64]
@@ -216,11 +216,7 @@ def build_machine_network(
     conductivity = np.array([material.thermal_conductivity for material in materials])
     volumetric = np.array([material.volumetric_heat_capacity for material in materials])
     centres = node_centres(cells, partition, spec.heat_capacity_factor.value * volumetric)
-    groups = group_of_contacts(spec, assembly.joint_names)
-    joints = {
-        name: np.inf if group.conductance == "perfect" else group.conductance.value
-        for name, group in groups.items()
-    }
+    joints = joint_conductances(spec, assembly.joint_names)
     links = solid_links(cells, partition, centres, conductivity, joints)
     surfaces = {
         name: surface_patch(faces, cells, partition, centres, conductivity)
@@ -350,13 +346,8 @@ def _coolant_cells(spec, cells, partition, patch) -> CoolantCells:
 def _names_and_capacity(spec, partition, centres, gaps, coolant) -> tuple[tuple[str, ...], Array]:
     names, capacity = list(partition.node_names), [centres.capacity]
     for group, bearing in spec.bearings:
-        kind = spec.bearing_types[group.bearing_type]
-        volume = kind.ball_count * np.pi / 6.0 * kind.ball_diameter**3
-        own = group.ball_row.capacity
-        if own is None:
-            own = volume * spec.materials[kind.ball_material].volumetric_heat_capacity
         names.append(f"{bearing.name}.balls")
-        capacity.append(np.array([own * spec.heat_capacity_factor.value]))
+        capacity.append(np.array([ball_row_capacity(spec, group)]))
 
     def band_names(label: str, edges: Array) -> list[str]:
         middle = 0.5 * (edges[1:] + edges[:-1])

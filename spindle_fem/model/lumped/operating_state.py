@@ -17,9 +17,10 @@ from spindle_fem.model.lumped.heat_laws import CoolantLaw, FrictionLaw, WallFilm
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
+from spindle_fem.operation.coefficients import ball_conductances, film_coefficient, gap_coefficient
+from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import Coolant
 from spindle_fem.physics.coolant.regimes import ChannelState, select_film
@@ -257,20 +258,7 @@ def _merged(first, second, conductance, kind):
 
 def _bearing(machine, group, name, heat: BearingHeat, links):
     """Links of a ball row, and where its heat goes."""
-    settings = machine.spec.heat
-    rings = 1.0 - settings.ball_share
-    inner_share = settings.inner_share.value
-    shares = {
-        "inner": inner_share * rings,
-        "outer": (1.0 - inner_share) * rings,
-        "balls": settings.ball_share,
-    }
-    row = group.ball_row
-    conductances = (
-        (row.conductance.value,) * 2
-        if row.kind == "constant"
-        else (heat.conductance_inner, heat.conductance_outer)
-    )
+    shares, conductances = heat_shares(machine.spec.heat), ball_conductances(group, heat)
     ball = machine.ball_nodes[name]
     spread = np.zeros(machine.n_nodes)
     spread[ball] = shares["balls"]
@@ -382,12 +370,8 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
 def _pumping(machine: MachineNetwork, point: OperatingPoint) -> Array:
     """Friction heat of the flow in each coolant cell, W."""
     coolant = machine.coolant
-    if not machine.spec.coolant.pumping_heat:
-        return np.zeros(len(coolant.area))
-    state = coolant.loop.at(
-        point, np.full(coolant.loop.cells.cell_area.shape, point.coolant_inlet_temperature)
-    )
-    return state.pressure.pumping_power * coolant.area / coolant.area.sum()
+    power = coolant.loop.pumping_power(point.coolant_flow, point.coolant_inlet_temperature)
+    return power * coolant.area / coolant.area.sum()
 
 
 @lru_cache(maxsize=TABLES_KEPT)

@@ -20,7 +20,7 @@ from spindle_fem.model.reduced.snapshots import Sample, SnapshotSpace, shifted_s
 from spindle_fem.model.reduced.steady_batch import SteadyBatch, SteadySolver
 from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads, friction_loads
 from spindle_fem.model.thermal_model import ThermalModel, project
-from spindle_fem.solvers.coupled_steady import PreparedMachine
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]

@@ -30,7 +30,7 @@ from spindle_fem.operation.coefficient_table import (
 )
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine
+from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

@@ -11,14 +11,13 @@ from spindle_fem.model.reduced.design_inputs import DesignInputs
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.channel_cells import cells_of_model
 from spindle_fem.operation.coolant_loop import CoolantLoop
-from spindle_fem.physics.coolant.duct_friction import PressureDrop, channel_pressure_drop
-from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
-from spindle_fem.physics.coolant.march import linearise_march, march_enthalpy
+from spindle_fem.physics.coolant.duct_friction import PressureDrop
+from spindle_fem.physics.coolant.linear_march import linearise_march
+from spindle_fem.physics.coolant.march import march_enthalpy
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.physics.coolant.regimes import (
     ChannelState,
     FilmCoefficient,
-    critical_reynolds_schmidt,
     select_film,
 )
 
@@ -74,7 +73,7 @@ class ChannelBatch:
         self.flow = inputs.flow[:, None, None]
         at_inlet = self.coolant.properties(self.inlet)
         self.mass_flow = at_inlet.density * self.flow / self.section.starts
-        factor = inputs.film_factor[:, None] * self._port_factor(inputs)
+        factor = inputs.film_factor[:, None] * self.loop.cell_factors(inputs.flow, inputs.inlet)
         self.factor = (factor if band is None else factor * band)[:, None, :]
         self.local = self.settings.properties_at == "bulk"
         self.pumping: Array = np.zeros((len(inputs), *self.area.shape))
@@ -84,21 +83,6 @@ class ChannelBatch:
             share = self.area / self.area.sum(axis=1, keepdims=True) / self.section.starts
             self.pumping = power * share
         self._fixed: tuple[FilmCoefficient, Array] | None = None
-
-    def _port_factor(self, inputs: DesignInputs) -> Array:
-        """Film of the drillings over that of the channel, as :class:`CoolantLoop` has it, (n, n_along)."""
-        factor = np.ones((len(inputs), self.area.shape[1]))
-        diameter, length = self.loop.port_diameter, self.loop.port_length
-        if diameter is None:
-            return factor
-        properties = self.coolant.properties(inputs.inlet)
-        velocity = inputs.flow / self.section.starts / (0.25 * np.pi * diameter**2)
-        graetz = velocity * diameter / properties.kinematic_viscosity * properties.prandtl * diameter / length
-        port = nusselt_sieder_tate(graetz, extrapolate=True) * properties.thermal_conductivity / diameter
-        state = ChannelState(self.coolant, inputs.flow, inputs.inlet)
-        ratio = port / select_film(self.settings.film_model, self.section, state).value
-        factor[:, self.loop.cells.is_port] = ratio[:, None]
-        return factor
 
     def at(self, wall: Array, before: ChannelField | None = None) -> ChannelField:
         """Films and heat at wall temperatures, (n, n_starts, n_along) K.
@@ -156,16 +140,6 @@ class ChannelBatch:
 
 def pressure_drops(loop: CoolantLoop, inputs: DesignInputs) -> list[PressureDrop]:
     """Pressure drop of every design, at inlet properties."""
-    section = loop.section
-    critical = float(critical_reynolds_schmidt(section.curvature_ratio))
     return [
-        channel_pressure_drop(
-            section,
-            point.coolant_flow,
-            loop.coolant.properties(point.coolant_inlet_temperature),
-            critical,
-            port_diameter=loop.port_diameter,
-            port_length=loop.port_length,
-        )
-        for point in inputs.points
+        loop.pressure_drop(point.coolant_flow, point.coolant_inlet_temperature) for point in inputs.points
     ]

@@ -24,8 +24,8 @@ from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.recordings.align import Recording
-from spindle_fem.solvers.coupled_steady import PreparedMachine
 from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 Array = NDArray[np.float64]
 

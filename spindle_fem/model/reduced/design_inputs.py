@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.reduced.heat_tables import mechanical_keys
+from spindle_fem.operation.coefficients import fluid_temperature, linear_coefficients
+from spindle_fem.operation.heat_shares import BODIES, heat_shares
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
 
 Array = NDArray[np.float64]
 
@@ -89,14 +89,17 @@ def design_inputs(
         Keys where they are known.
     """
     points = tuple(OperatingPoint.of(spec) for spec in specs)
-    groups = {name: group.name for name, group in group_of_contacts(specs[0], contacts).items()}
     rows, fluids = [], []
     for spec, point in zip(specs, points, strict=True):
-        values, fluid = _coefficients(spec, point, groups, gap_radii)
+        values = linear_coefficients(spec, point, contacts, gap_radii)
         rows.append([values[name] for name in names])
+        fluid = {
+            f"film.{surface}": fluid_temperature(film, point.ambient_temperature)
+            for film in spec.film
+            for surface in film.surface
+        }
         fluids.append([fluid[name] for name in fluid_names])
-    balls = np.array([spec.heat.ball_share for spec in specs])
-    inner = np.array([spec.heat.inner_share.value for spec in specs])
+    shares = [[heat_shares(spec.heat)[body] for body in BODIES] for spec in specs]
     has_channel = specs[0].coolant is not None
     return DesignInputs(
         tuple(specs),
@@ -107,30 +110,6 @@ def design_inputs(
         np.array([point.coolant_inlet_temperature for point in points]),
         np.array([point.coolant_flow for point in points]),
         np.array([spec.coolant.film_factor.value if has_channel else 1.0 for spec in specs]),
-        np.column_stack(((1.0 - balls) * inner, (1.0 - balls) * (1.0 - inner), balls)),
+        np.array(shares),
         tuple(mechanics) if mechanics is not None else mechanical_keys(specs, points),
     )
-
-
-def _coefficients(
-    spec: MachineSpec,
-    point: OperatingPoint,
-    groups: Mapping[str, str],
-    gap_radii: Mapping[str, tuple[float, float]],
-) -> tuple[dict[str, float], dict[str, float]]:
-    values = {f"conductivity.{name}": item.thermal_conductivity for name, item in spec.materials.items()}
-    conductance = {group.name: group.conductance.value for group in spec.joint}
-    values |= {f"joint.{contact}": conductance[group] for contact, group in groups.items()}
-    fluids = {}
-    for film in spec.film:
-        fluid = point.ambient_temperature if film.temperature == "ambient" else film.temperature
-        value = float(film_coefficient(film, point, np.array([fluid]), fluid)[0][0])
-        for surface in film.surface:
-            values[f"film.{surface}"], fluids[f"film.{surface}"] = value, fluid
-    for gap in spec.gap:
-        values[f"gap.{gap.name}"] = gap_coefficient(gap, point, *gap_radii[gap.name])[0]
-    for group, bearing in spec.bearings:
-        constant = group.ball_row.kind == "constant"
-        for side in ("inner", "outer"):
-            values[f"balls.{bearing.name}.{side}"] = group.ball_row.conductance.value if constant else np.nan
-    return values, fluids

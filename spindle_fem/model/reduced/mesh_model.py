@@ -24,7 +24,7 @@ from spindle_fem.operation.machine_loads import FieldState
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.probe_places import probe_positions, probe_slopes
-from spindle_fem.solvers.coupled_steady import PreparedMachine
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 Array = NDArray[np.float64]
 # Wetted surfaces of one lumped node, each with its exchange coefficient by facet.

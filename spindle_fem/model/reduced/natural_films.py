@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.term import Term, TermContext
-from spindle_fem.operation.coefficient_table import natural_reference
+from spindle_fem.operation.coefficients import (
+    film_coefficient_and_slope,
+    fluid_temperature,
+    natural_reference,
+)
 from spindle_fem.operation.effect_terms import OneInstant
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.outside_films import film_coefficient
-
-DIFFERENCE = 1e-3
 
 
 class NaturalFilmTerm(OneInstant, Term):
@@ -38,14 +39,11 @@ class NaturalFilmTerm(OneInstant, Term):
     def factor(self, context: TermContext) -> NDArray[np.complex128]:
         """Coefficient at the wall's temperature over that which the operators hold, (1, k)."""
         ambient = context.inputs["ambient"]
-        fluid = ambient if self.film.temperature == "ambient" else self.film.temperature
+        fluid = fluid_temperature(self.film, ambient)
         wall = float(context.temperatures[0, 0].real)
-        # The correlation takes no complex numbers: its slope by a central difference.
-        walls = np.array([wall, wall + DIFFERENCE, wall - DIFFERENCE])
         point = OperatingPoint(context.inputs["speed"], context.inputs["thrust"], ambient, ambient, 0.0)
-        value, _ = film_coefficient(self.film, point, walls, fluid)
-        slope = (value[1] - value[2]) / (2.0 * DIFFERENCE)
-        return ((value[0] + slope * (context.temperatures - wall)) / self.reference).astype(complex)
+        value, slope = film_coefficient_and_slope(self.film, point, wall, fluid)
+        return ((value + slope * (context.temperatures - wall)) / self.reference).astype(complex)
 
 
 def natural_film_terms(spec: MachineSpec) -> tuple[NaturalFilmTerm, ...]:

@@ -37,7 +37,7 @@ from spindle_fem.model.reduced.network_operators import (
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import Recording
-from spindle_fem.studies.simulate_network import (
+from spindle_fem.solvers.simulate_network import (
     initial_parameters,
     initial_state,
     magnitude_history,

@@ -70,25 +70,6 @@ class MarchResult:
         return abs(taken - self.enthalpy_rise) / moved if moved > 0.0 else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class MarchLinearisation:
-    """Heat of the cells as a linear function of all wall temperatures.
-
-    ``heat = constant + matrix @ wall_temperature`` for each channel, exact at
-    fixed film coefficients and heat capacities; a coupled solver that takes
-    it in needs no iteration between wall and coolant.
-
-    Attributes
-    ----------
-    matrix : (..., n, n) ndarray, [W/K]
-        Lower triangular: a cell feels its own wall and those upstream.
-    constant : (..., n) ndarray, [W]
-    """
-
-    matrix: NDArray[np.float64]
-    constant: NDArray[np.float64]
-
-
 def march_enthalpy(
     inlet_temperature: float,
     mass_flow: float,
@@ -136,20 +117,10 @@ def march_enthalpy(
         np.asarray(specific_heat_capacity, dtype=np.float64),
         np.asarray(pumping_heat, dtype=np.float64),
     )
-    require_range(
-        "coolant march",
-        inlet_temperature=(inlet_temperature, *POSITIVE),
-        mass_flow=(mass_flow, *POSITIVE),
-        specific_heat_capacity=(capacity, *POSITIVE),
-        wall_temperature=(wall, *POSITIVE),
-        wetted_area=(area, *NOT_NEGATIVE),
-        film_coefficient=(film, *NOT_NEGATIVE),
-        pumping_heat=(pumping, -POSITIVE[1], POSITIVE[1]),
-        how_to_fix="Give SI values; without flow there is nothing to march.",
-    )
+    require_march(inlet_temperature, mass_flow, capacity, area, film, pumping, wall)
     capacity_rate = mass_flow * capacity
     units = film * area / capacity_rate
-    reached, mean_share, second_share = _exponential_shares(units)
+    reached, mean_share, second_share = exponential_shares(units)
     friction_rise = pumping / capacity_rate
     # Everything is counted from the inlet temperature: rounding then scales with
     # the temperature differences, not with 300 K.
@@ -175,65 +146,27 @@ def march_enthalpy(
     )
 
 
-def linearise_march(
-    inlet_temperature: float,
-    mass_flow: float,
-    specific_heat_capacity: ArrayLike,
-    wetted_area: ArrayLike,
-    film_coefficient: ArrayLike,
-    pumping_heat: ArrayLike = 0.0,
-) -> MarchLinearisation:
-    """Heat of every cell as a linear function of all wall temperatures.
-
-    Parameters
-    ----------
-    inlet_temperature : float, [K]
-    mass_flow : float, [kg/s]
-        Of each channel in parallel.
-    specific_heat_capacity : (..., n) array_like or float, [J/(kg·K)]
-    wetted_area : (..., n) array_like, [m²]
-    film_coefficient : (..., n) array_like or float, [W/(m²·K)]
-    pumping_heat : (..., n) array_like or float, [W]
-
-    Returns
-    -------
-    MarchLinearisation
-
-    Raises
-    ------
-    OutOfValidityError
-        As ``march_enthalpy``.
-
-    >>> line = linearise_march(288.15, 0.3, 1900.0, [0.04] * 4, 250.0)
-    >>> march = march_enthalpy(288.15, 0.3, 1900.0, [300.0, 310.0, 305.0, 290.0], [0.04] * 4, 250.0)
-    >>> bool(np.allclose(line.constant + line.matrix @ [300.0, 310.0, 305.0, 290.0], march.heat))
-    True
-    """
-    area = np.atleast_1d(np.asarray(wetted_area, dtype=np.float64))
-    # With the wall at inlet temperature the march gives the part that friction makes,
-    # and checks the input.
-    at_inlet = march_enthalpy(
-        inlet_temperature,
-        mass_flow,
-        specific_heat_capacity,
-        inlet_temperature,
-        area,
-        film_coefficient,
-        pumping_heat,
+def require_march(
+    inlet: ArrayLike,
+    mass_flow: ArrayLike,
+    capacity: NDArray[np.float64],
+    area: NDArray[np.float64],
+    film: NDArray[np.float64],
+    pumping: NDArray[np.float64],
+    wall: ArrayLike = 1.0,
+) -> None:
+    """Refuse a march without flow, or with a negative area, film coefficient or heat capacity."""
+    require_range(
+        "coolant march",
+        inlet_temperature=(inlet, *POSITIVE),
+        mass_flow=(mass_flow, *POSITIVE),
+        specific_heat_capacity=(capacity, *POSITIVE),
+        wall_temperature=(wall, *POSITIVE),
+        wetted_area=(area, *NOT_NEGATIVE),
+        film_coefficient=(film, *NOT_NEGATIVE),
+        pumping_heat=(pumping, -POSITIVE[1], POSITIVE[1]),
+        how_to_fix="Give SI values; without flow there is nothing to march.",
     )
-    capacity_rate = mass_flow * at_inlet.specific_heat_capacity
-    units = np.asarray(film_coefficient, dtype=np.float64) * area / capacity_rate
-    reached, _, _ = _exponential_shares(units)
-    passed = np.cumsum(units, axis=-1)
-    before = passed - units
-    # Share of cell j's rise that is left at the inlet of cell i, for j < i.
-    decay = np.exp(np.minimum(passed[..., None, :] - before[..., :, None], 0.0))
-    strictly_lower = np.tril(np.ones((area.shape[-1],) * 2), k=-1)
-    from_upstream = strictly_lower * decay * reached[..., None, :]
-    own = np.eye(area.shape[-1])
-    matrix = (capacity_rate * reached)[..., :, None] * (own - from_upstream)
-    constant = at_inlet.heat - matrix.sum(axis=-1) * inlet_temperature
-    return MarchLinearisation(matrix=_frozen(matrix), constant=_frozen(constant))
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,15 +179,12 @@ class ChannelMarch:
     film : FilmCoefficient
         Before ``film_factor``; values of shape (..., n), or floats when
         nothing varies along the channel.
-    linearisation : MarchLinearisation
-        At the final film coefficients and heat capacities.
     mass_flow : float, [kg/s]
         Of each start.
     """
 
     march: MarchResult
     film: FilmCoefficient
-    linearisation: MarchLinearisation
     mass_flow: float
 
 
@@ -363,10 +293,7 @@ def march_channel(
             f"bulk temperature still changes by {change:.3g} K after {_ITERATIONS} iterations.",
             'Use properties_at = "inlet", or more cells.',
         )
-    line = linearise_march(
-        inlet_temperature, mass_flow, march.specific_heat_capacity, area, coefficient, pumping
-    )
-    return ChannelMarch(march=march, film=film, linearisation=line, mass_flow=mass_flow)
+    return ChannelMarch(march=march, film=film, mass_flow=mass_flow)
 
 
 def _with_true_enthalpy(march: MarchResult, coolant: Coolant, mass_flow: float) -> MarchResult:
@@ -391,12 +318,12 @@ def _mean_heat_capacity(
     return coolant.properties(inlet + rise).specific_heat_capacity @ (0.5 * weights)
 
 
-def _exponential_shares(
+def exponential_shares(
     units: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """1 − e^−N, (1 − e^−N)/N and (1 − (1 − e^−N)/N)/N, exact for small N too."""
+    """1 − e^−N, (1 − e^−N)/N and (1 − (1 − e^−N)/N)/N, exact for small N too; N may be complex."""
     reached = -np.expm1(-units)
-    small = units < 1.0e-2
+    small = np.abs(units) < 1.0e-2
     divisor = np.where(small, 1.0, units)
     series_mean = 1.0 - units / 2.0 * (1.0 - units / 3.0 * (1.0 - units / 4.0 * (1.0 - units / 5.0)))
     mean_share = np.where(small, series_mean, reached / divisor)

@@ -17,12 +17,18 @@ from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementQuad2, FacetBasis, LinearForm, MeshQuad
 
 from spindle_fem.errors import ConvergenceError
-from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.lumped.cells import Faces, MeridianCells
 from spindle_fem.model.lumped.heat_laws import CoolantLaw
 from spindle_fem.model.lumped.machine_network import MachineNetwork
-from spindle_fem.model.lumped.machine_steady import MachineNetworkState
-from spindle_fem.operation.outside_films import film_coefficient, gap_coefficient
+from spindle_fem.operation.coefficients import (
+    ball_conductances,
+    film_coefficient,
+    fluid_temperature,
+    gap_coefficient,
+    joint_conductances,
+)
+from spindle_fem.physics.coolant.linear_march import outlet_stretch
+from spindle_fem.solvers.machine_network_steady import MachineNetworkState
 
 Array = NDArray[np.float64]
 FULL_TURN = 2.0 * np.pi
@@ -206,11 +212,7 @@ def solve_axisymmetric(state: MachineNetworkState) -> AxisymmetricState:
 
 def _joints(system: _Assembly, machine: MachineNetwork) -> None:
     contact = system.cells.contact
-    groups = group_of_contacts(machine.spec, machine.assembly.joint_names)
-    value = {
-        name: np.inf if group.conductance == "perfect" else group.conductance.value
-        for name, group in groups.items()
-    }
+    value = joint_conductances(machine.spec, machine.assembly.joint_names)
     h = np.array([value[name] for name in contact.name], dtype=float)
     # a perfect contact is a very good one: 1e9 W/(m²K) leaves 1e-5 K at 10 kW/m²
     h = np.where(np.isinf(h), 1.0e9, h)
@@ -236,13 +238,7 @@ def _balls(system: _Assembly, state: MachineNetworkState) -> float:
     for group, bearing in machine.spec.bearings:
         lump = system.n_field + machine.ball_nodes[bearing.name] - machine.n_solid
         given = network.bearing_heat[bearing.name]
-        row = group.ball_row
-        pair = (
-            (row.conductance.value,) * 2
-            if row.kind == "constant"
-            else (given.conductance_inner, given.conductance_outer)
-        )
-        for side, conductance in zip(("inner", "outer"), pair, strict=True):
+        for side, conductance in zip(("inner", "outer"), ball_conductances(group, given), strict=True):
             surface = f"{bearing.name}.{side}_raceway"
             area = float(machine.surfaces[surface].area.sum())
             basis = _surface(system, surface)
@@ -263,7 +259,7 @@ def _films(system: _Assembly, state: MachineNetworkState) -> list[tuple[Array, f
     network = state.network
     lost = []
     for film in network.machine.spec.film:
-        fluid = network.point.ambient_temperature if film.temperature == "ambient" else film.temperature
+        fluid = fluid_temperature(film, network.point.ambient_temperature)
         for surface in film.surface:
             wall = state.temperature[network.machine.surfaces[surface].node]
             value, _ = film_coefficient(film, network.point, wall, fluid)
@@ -306,7 +302,7 @@ def _coolant(system: _Assembly, state: MachineNetworkState) -> None:
     coolant, cells = machine.coolant, system.cells
     start = system.n_field + machine.coolant_start - machine.n_solid
     units = h * coolant.area / law.capacity_rate
-    stretched = h * np.expm1(units) / units
+    stretched = h * outlet_stretch(units)[0]
     wall = cells.wall
     position = wall.middle[:, 0]
     of_wall = np.clip(np.searchsorted(coolant.edges, position) - 1, 0, len(h) - 1)

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.model.lumped.machine_network import MachineNetwork, build_machine_network
-from spindle_fem.model.lumped.machine_steady import MachineNetworkState, solve_machine_network
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures, HeatModel
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.coupled_steady import CoupledState, PreparedMachine, prepare_machine, solve_coupled
+from spindle_fem.solvers.coupled_steady import CoupledState, solve_coupled
+from spindle_fem.solvers.machine_network_steady import MachineNetworkState, solve_machine_network
+from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.studies.crosscheck.axisymmetric import solve_axisymmetric
 from spindle_fem.studies.crosscheck.gather_fields import gather_axisymmetric, gather_network
 from spindle_fem.studies.crosscheck.regions import build_regions, node_temperatures

@@ -13,10 +13,11 @@ from spindle_fem import __version__
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import BadInputError, GeometryError
 from spindle_fem.model.lumped.machine_network import MachineNetwork, build_machine_network
-from spindle_fem.model.lumped.machine_steady import MachineNetworkState, solve_machine_network
 from spindle_fem.operation.bearing_heat import HeatModel, heat_model_of
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.coupled_steady import PreparedMachine, prepare_machine, solve_coupled
+from spindle_fem.solvers.coupled_steady import solve_coupled
+from spindle_fem.solvers.machine_network_steady import MachineNetworkState, solve_machine_network
+from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.studies.crosscheck.axisymmetric import solve_axisymmetric
 from spindle_fem.studies.crosscheck.causes import CAUSES, CHECKS, CauseStudy, study_causes
 from spindle_fem.studies.crosscheck.flux_matched import MatchedNetwork, element_state, match_fluxes

@@ -22,8 +22,10 @@ from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.model.lumped.operating_state import operate
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
+from spindle_fem.operation.coefficients import fluid_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.coupled_steady import CoupledState, PreparedMachine
+from spindle_fem.solvers.coupled_steady import CoupledState
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.studies.crosscheck.node_comparison import fem_flows
 from spindle_fem.studies.crosscheck.regions import NodeRegions, node_temperatures
 
@@ -265,7 +267,7 @@ def _film_boundary(machine: MachineNetwork, surface: str) -> str:
 
 def _film_fluid(machine: MachineNetwork, surface: str, point: OperatingPoint) -> float:
     film = _film_of(machine, surface)
-    return point.ambient_temperature if film.temperature == "ambient" else film.temperature
+    return fluid_temperature(film, point.ambient_temperature)
 
 
 def _element_fluxes(machine: MachineNetwork, state: ElementState) -> dict[tuple[int, int], float]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.model.lumped.machine_network import MachineNetwork
-from spindle_fem.model.lumped.machine_steady import MachineNetworkState
+from spindle_fem.solvers.machine_network_steady import MachineNetworkState
 from spindle_fem.studies.crosscheck.axisymmetric import AxisymmetricState
 from spindle_fem.studies.crosscheck.regions import cells_at
 

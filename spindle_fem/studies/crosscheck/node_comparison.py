@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.model.lumped.machine_network import MachineNetwork
-from spindle_fem.model.lumped.machine_steady import MachineNetworkState
 from spindle_fem.operation.channel_cells import helix_coordinates
 from spindle_fem.operation.facet_centres import facet_centres
-from spindle_fem.solvers.coupled_steady import CoupledState, PreparedMachine
+from spindle_fem.solvers.coupled_steady import CoupledState
+from spindle_fem.solvers.machine_network_steady import MachineNetworkState
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.studies.crosscheck.regions import (
     NodeRegions,
     facet_nodes,

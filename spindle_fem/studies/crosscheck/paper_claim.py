@@ -12,11 +12,12 @@ from typing import Any
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.model.lumped.machine_network import build_machine_network
-from spindle_fem.model.lumped.machine_steady import MachineNetworkState, solve_machine_network
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import coolant_by_name
-from spindle_fem.solvers.coupled_steady import CoupledState, PreparedMachine, prepare_machine, solve_coupled
+from spindle_fem.solvers.coupled_steady import CoupledState, solve_coupled
+from spindle_fem.solvers.machine_network_steady import MachineNetworkState, solve_machine_network
+from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
 
 OPTIMUM_DEPTH = 19.0e-3

@@ -16,7 +16,8 @@ from spindle_fem.model.mesh.element_integrals import evaluate_shape
 from spindle_fem.model.mesh.evaluate import quadratic_shape
 from spindle_fem.operation.channel_cells import helix_coordinates
 from spindle_fem.operation.facet_centres import facet_centres
-from spindle_fem.solvers.coupled_steady import CoupledState, PreparedMachine
+from spindle_fem.solvers.coupled_steady import CoupledState
+from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 Array = NDArray[np.float64]
 # Keast (1986), degree 2, four points; weights of the unit tetrahedron sum to 1/6.

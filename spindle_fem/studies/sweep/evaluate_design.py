@@ -28,13 +28,12 @@ from spindle_fem.machine.meshing.sizes import build_sizes
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
 from spindle_fem.model.reduced.heat_tables import mechanical_key
-from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.parallel import one_thread
 from spindle_fem.results.run_summary import build_summary
 from spindle_fem.results.thermal_result import ThermalResult
-from spindle_fem.solvers.coupled_steady import machine_on_mesh
+from spindle_fem.solvers.prepared_machine import machine_on_mesh
 from spindle_fem.studies.run_checks import require_checks
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.sweep.designs import Design
@@ -292,21 +291,10 @@ def solve_checked(task: DesignTask, film_ratio: NDArray[np.float64] | None = Non
     """
     machine = machine_on_mesh(task.spec, *shared_operators(task))
     if film_ratio is not None:
-        machine.builder.coolant_loop = _BandLoop(task.spec, machine.builder.cells, film_ratio)
+        machine.builder.coolant_loop = CoolantLoop(task.spec, machine.builder.cells, film_ratio)
     result = solve_prepared(machine)
     require_checks(result.checks, task.spec.name)
     return result
-
-
-class _BandLoop(CoolantLoop):
-    """The coolant with its film elsewhere in the band, each cell by its own ratio."""
-
-    def __init__(self, spec: MachineSpec, cells: ChannelCells, ratio: NDArray[np.float64]) -> None:
-        super().__init__(spec, cells)
-        self._ratio = ratio
-
-    def _port_factor(self, point: OperatingPoint, inlet: float) -> NDArray[np.float64]:
-        return super()._port_factor(point, inlet) * self._ratio
 
 
 def _values(result: ThermalResult, spec: MachineSpec, outputs: Iterable[str]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from spindle_fem.model.reduced.steady_batch import SteadyBatch, SteadySolver
 from spindle_fem.model.thermal_model import FORMAT, ThermalModel
 from spindle_fem.parallel import one_thread
 from spindle_fem.results.thermal_result import ThermalResult
-from spindle_fem.solvers.coupled_steady import machine_on_mesh
+from spindle_fem.solvers.prepared_machine import machine_on_mesh
 from spindle_fem.studies.sweep.evaluate_design import (
     FILM_HIGH,
     FILM_LOW,

@@ -18,12 +18,12 @@ from spindle_fem.errors import (
 )
 from spindle_fem.model.lumped.driven_inputs import boundary_history, source_history
 from spindle_fem.model.lumped.exact_steps import LinearSystem
-from spindle_fem.model.lumped.network_steady import solve_steady
 from spindle_fem.model.lumped.network_transient import simulate_transient
 from spindle_fem.model.lumped.node_balance import NetworkBalance, explicit_derivative
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.solvers.network_steady import solve_steady
 from spindle_fem.units import ANGULAR_SPEED_UNIT, registry
 
 Array = NDArray[np.float64]

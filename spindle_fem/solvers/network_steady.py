@@ -1,4 +1,4 @@
-"""Steady state of a thermal network by Newton–Raphson with its analytic Jacobian."""
+"""Steady state of a written thermal network, and whether it is a stable one."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError
+from spindle_fem.errors import EnergyBalanceError, NoSteadyStateError
 from spindle_fem.model.lumped.node_balance import NetworkBalance
 from spindle_fem.model.lumped.thermal_network import Array, Inputs, ThermalNetwork
+from spindle_fem.solvers.newton import newton
 
 BALANCE_TOLERANCE = 1.0e-10
 
@@ -87,9 +88,6 @@ def solve_steady(
     EnergyBalanceError
         Heat in and out differ by more than 1e-10 of the flows.
 
-    Source: damped Newton iteration, Deuflhard (2004), Newton Methods for
-    Nonlinear Problems, chapter 3 (residual monotonicity).
-
     >>> import numpy as np
     >>> wall = ThermalNetwork(("body",), [100.0], [0], [1], [2.0], ("room",), [290.0],
     ...     source_node=[0], source_input=(None,), source_gain=[10.0], source_exponent=[1.0])
@@ -97,64 +95,39 @@ def solve_steady(
     295.0
     """
     inputs = {} if inputs is None else inputs
-    balance = NetworkBalance(network)
     boundary = network.boundary_values(inputs)
     node_heat = network.node_heat(network.source_values(inputs))
+    balance = _AtInputs(network, boundary, node_heat, inputs, tolerance)
     start = float(boundary.mean()) if boundary.size else 293.15
-    temperature = np.full(network.n_nodes, start) if initial is None else np.array(initial, dtype=float)
-
-    net, derivative = balance(temperature, boundary, node_heat, inputs)
-    norm = float(np.abs(net).max(initial=0.0))
-    for iteration in range(1, max_iterations + 1):
-        try:
-            step = np.linalg.solve(derivative, -net)
-        except np.linalg.LinAlgError as error:
-            raise NoSteadyStateError(
-                "network",
-                f"the heat balance is singular at iteration {iteration}.",
-                "A node loses no heat at this state, or heat grows with temperature as fast as it is lost.",
-            ) from error
-        damping = 1.0
-        while True:
-            trial = temperature + damping * step
-            sensible = bool(np.all(np.isfinite(trial)) and np.all(trial > 0.0))
-            if sensible:
-                trial_net, trial_derivative = balance(trial, boundary, node_heat, inputs)
-                trial_norm = float(np.abs(trial_net).max(initial=0.0))
-                scale = _flow_scale(balance, trial, boundary, node_heat)
-                if trial_norm <= max((1.0 - 0.25 * damping) * norm, tolerance * scale):
-                    break
-            damping *= 0.5
-            if damping < 1.0e-4:
-                raise NoSteadyStateError(
-                    "network",
-                    f"no step lowers the imbalance of {norm:.3g} W at node "
-                    f'"{network.node_names[int(np.abs(net).argmax())]}".',
-                    "Heat grows faster than it is lost, or a law and its derivative disagree.",
-                )
-        moved = float(np.abs(trial - temperature).max(initial=0.0))
-        temperature, net, derivative, norm = trial, trial_net, trial_derivative, trial_norm
-        if not network.is_linear and float(temperature.max(initial=0.0)) > temperature_limit:
-            raise NoSteadyStateError(
-                "network",
-                f'node "{network.node_names[int(temperature.argmax())]}" passes {temperature_limit:g} K.',
-                "Heat grows with temperature faster than it is lost.",
-            )
-        # a linear balance is solved in one step; a nonlinear one must also have stopped moving
-        if norm <= tolerance * scale and (network.is_linear or moved < 1.0e-8):
-            require_stable(derivative, network)
-            return _state(network, balance, temperature, boundary, node_heat, inputs, iteration)
-    raise ConvergenceError(
-        "network",
-        f"{max_iterations} Newton steps left an imbalance of {norm:.3g} W.",
-        "Start nearer to the solution (initial) or allow more steps.",
-    )
+    first = np.full(network.n_nodes, start) if initial is None else np.array(initial, dtype=float)
+    temperature, derivative, steps = newton(balance, first, hottest=temperature_limit, most=max_iterations)
+    require_stable(derivative, network)
+    return _state(network, balance.balance, temperature, boundary, node_heat, inputs, steps)
 
 
-def _flow_scale(balance: NetworkBalance, temperature: Array, boundary: Array, node_heat: Array) -> float:
-    # the rounding of K T is that of conductance times absolute temperature, so this is the attainable scale
-    rounding = np.abs(balance.node_matrix).sum() * float(temperature.max(initial=0.0)) * 1.0e-2
-    return float(np.abs(node_heat).sum() + rounding)
+class _AtInputs:
+    """Heat balance of a written network at fixed inputs."""
+
+    name = "network"
+
+    def __init__(
+        self, network: ThermalNetwork, boundary: Array, node_heat: Array, inputs: Inputs, tolerance: float
+    ) -> None:
+        self.balance = NetworkBalance(network)
+        self.node_names, self.is_linear = network.node_names, network.is_linear
+        self.boundary, self.node_heat, self.inputs = boundary, node_heat, inputs
+        self._tolerance = tolerance
+        self._conductance = 1.0e-2 * float(np.abs(self.balance.node_matrix).sum())
+        self._given = float(np.abs(node_heat).sum())
+
+    def __call__(self, temperature: Array) -> tuple[Array, Array]:
+        return self.balance(temperature, self.boundary, self.node_heat, self.inputs)
+
+    def rounding(self, temperature: Array, derivative: Array) -> float:
+        """That of conductance times absolute temperature is the least that can be reached."""
+        del derivative
+        scale = self._given + self._conductance * float(temperature.max(initial=0.0))
+        return self._tolerance * scale
 
 
 def require_stable(derivative: Array, network: ThermalNetwork) -> None:

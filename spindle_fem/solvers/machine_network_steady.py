@@ -1,0 +1,289 @@
+"""Steady state of a machine's network: heat, contacts and preload at its own bearing temperatures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError
+from spindle_fem.model.lumped.friction_table import tabulate_friction
+from spindle_fem.model.lumped.heat_laws import CoolantLaw, WallFilmLaw
+from spindle_fem.model.lumped.machine_balance import SparseBalance, bearing_temperatures
+from spindle_fem.model.lumped.machine_network import MachineNetwork
+from spindle_fem.model.lumped.operating_state import OperatingNetwork, coolant_law, operate
+from spindle_fem.operation.bearing_heat import (
+    BearingTemperatures,
+    HeatModel,
+    at_assembly_size,
+    follows_preload,
+    heat_model_of,
+)
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.fixed_point import REFUSED, Iteration, fixed_point
+from spindle_fem.solvers.newton import newton
+from spindle_fem.solvers.preload_runaway import PreloadGuard, highest_settling_speed, no_equilibrium
+
+Array = NDArray[np.float64]
+BALANCE_TOLERANCE = 1.0e-10
+# K; of the bearings' temperatures between rounds, with the heat model asked in each.
+TOLERANCE = 1.0e-7
+# Contacts that follow their films leave some 1e-5 of the last change: the state is good to about 1e-6 K.
+FOLLOWED_TOLERANCE = 0.1
+# K; about a state that films will leave, a smaller Newton step is not worth its while.
+FIRST_ROUND = 0.05
+# Contacts and heat that expansion does not change are taken anew as they are found.
+TAKEN_ANEW = Iteration(relaxation=1.0, mixing_below=0.0, most=30)
+FOLLOWING_PRELOAD = Iteration(relaxation=0.4, mixing_below=1.0, depth=4, most=150)
+# From below, steps towards a fixed point shrink; this many growing ones in a row lead to none.
+GROWING_STEPS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class MachineNetworkState:
+    """A steady state of a machine's network.
+
+    Attributes
+    ----------
+    temperature : (n,) ndarray, [K]
+    boundary_heat : mapping of film surface to float, [W]
+        Out of the machine; ``coolant`` is what the oil carries away.
+    heat_in : float, [W]
+    imbalance_relative : float
+        Of the heat in and out, over the larger of heat and flows.
+    coolant_outlet : float, [K]
+        NaN without coolant.
+    iterations : int
+        Newton steps, all rounds.
+    """
+
+    network: OperatingNetwork
+    temperature: Array
+    boundary_heat: Mapping[str, float]
+    heat_in: float
+    imbalance_relative: float
+    coolant_outlet: float
+    iterations: int
+
+    def bearing_temperatures(self) -> dict[str, BearingTemperatures]:
+        """Raceways, balls and what the rings sit on."""
+        return bearing_temperatures(self.network, self.temperature)
+
+    def links(self) -> list[tuple[int, int, str, float]]:
+        """Every flow as (first, second, kind, heat from first to second in W); boundaries follow nodes."""
+        network = self.network
+        both = np.concatenate([self.temperature, network.boundary_temperature])
+        flow = network.conductance * (both[network.first] - both[network.second])
+        found = list(
+            zip(
+                network.first.tolist(),
+                network.second.tolist(),
+                network.kind.tolist(),
+                flow.tolist(),
+                strict=True,
+            )
+        )
+        ambient = self.temperature.size
+        for law in network.laws:
+            if isinstance(law, WallFilmLaw):
+                heat = np.bincount(law.patch.node, law.heat(self.temperature)[0], self.temperature.size)
+                found += [(int(n), ambient, law.name, float(heat[n])) for n in np.flatnonzero(heat)]
+            elif isinstance(law, CoolantLaw):
+                h = law.coefficients(self.temperature)[0]
+                coolant = law.nodes[law.cell]
+                heat = law.conductances(h)[0] * (self.temperature[law.patch.node] - self.temperature[coolant])
+                pairs, inverse = np.unique(
+                    np.column_stack([law.patch.node, coolant]), axis=0, return_inverse=True
+                )
+                summed = np.bincount(inverse.ravel(), heat, len(pairs))
+                found += [
+                    (int(a), int(b), "coolant", float(value))
+                    for (a, b), value in zip(pairs, summed, strict=True)
+                ]
+        return found
+
+
+def solve_machine_network(
+    machine: MachineNetwork,
+    point: OperatingPoint | None = None,
+    *,
+    heat_model: HeatModel | None = None,
+    start: Array | None = None,
+) -> MachineNetworkState:
+    """Steady state of a machine's network with heat, contacts and films at its own temperatures.
+
+    Parameters
+    ----------
+    machine : MachineNetwork
+    point : OperatingPoint, optional
+        The definition's own by default.
+    heat_model : HeatModel, optional
+        The definition's own by default.
+    start : (n,) ndarray, [K], optional
+
+    Raises
+    ------
+    NoSteadyStateError, ConvergenceError, OutOfValidityError
+    EnergyBalanceError
+        Heat in and out differ by more than 1e-10.
+
+    Where expansion changes the preload, the iteration starts from the state
+    without expansion, so that cold grease does not carry it past the fixed
+    point, and creeps up while the preload grows.
+    """
+    point = OperatingPoint.of(machine.spec) if point is None else point
+    heat_model = heat_model_of(machine.spec) if heat_model is None else heat_model
+    if not follows_preload(machine.spec):
+        return _Operation(machine, point, heat_model, start).solve()
+
+    def settles(speed: float) -> bool:
+        try:
+            _follow_preload(machine, replace(point, speed=speed), heat_model, start)
+        except (NoSteadyStateError, ConvergenceError):
+            return False
+        return True
+
+    try:
+        return _follow_preload(machine, point, heat_model, start)
+    except NoSteadyStateError as error:
+        limit = highest_settling_speed(point.speed, settles)
+        begins = f"A thermal equilibrium exists up to about {limit * 30.0 / np.pi:.0f} rpm."
+        raise NoSteadyStateError(error.where, error.what, f"{begins} {error.how_to_fix}") from error
+
+
+def _follow_preload(
+    machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel, start: Array | None
+) -> MachineNetworkState:
+    rigid = replace(machine, spec=at_assembly_size(machine.spec))
+    first = _Operation(rigid, point, heat_model_of(rigid.spec), None).solve()
+    return _PreloadOperation(machine, point, heat_model, start).solve(first.bearing_temperatures())
+
+
+class _Operation:
+    """A machine's network at one point, bearing temperatures by bearing temperatures."""
+
+    def __init__(
+        self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel, start: Array | None
+    ) -> None:
+        self.machine, self.point, self.heat_model = machine, point, heat_model
+        self.friction = tabulate_friction(machine.spec, point, heat_model)
+        self.coolant = None if machine.coolant is None else coolant_law(machine, point)
+        ambient = point.ambient_temperature
+        self.temperature = np.full(machine.n_nodes, ambient) if start is None else start
+        self.cold = {name: BearingTemperatures(*(ambient,) * 5) for name in machine.ball_nodes}
+        self.network: OperatingNetwork | None = None
+        self.newton_steps = 0
+        self.rounds = 0
+
+    def solve(self) -> MachineNetworkState:
+        """Steady state with heat and contacts of the bearings at its own temperatures."""
+        fixed_point(self.respond, self.settled, _vector(self.cold), TAKEN_ANEW, self.machine.spec.name)
+        return _state(self.network, self.temperature, self.newton_steps)
+
+    def respond(self, given: Array) -> Array:
+        """Bearing temperatures of the machine with heat and contacts at given ones."""
+        self.network = operate(
+            self.machine,
+            self.point,
+            self.heat_model,
+            around=_named(given, self.cold),
+            friction=self.friction,
+            coolant=self.coolant,
+        )
+        first = self.rounds == 0 and self.friction is not None
+        self.temperature, _, used = newton(
+            SparseBalance(self.network), self.temperature, enough=FIRST_ROUND if first else 0.0
+        )
+        self.newton_steps += used
+        self.rounds += 1
+        return _vector(bearing_temperatures(self.network, self.temperature))
+
+    def settled(self, given: Array, found: Array) -> bool:
+        """Whether the bearings have the temperatures that their contacts were taken at."""
+        if not any(group.ball_row.kind == "contact" for group in self.machine.spec.bearing_set):
+            return True
+        tolerance = TOLERANCE if self.friction is None else FOLLOWED_TOLERANCE
+        return self.rounds > 1 and float(np.abs(found - given).max(initial=0.0)) < tolerance
+
+
+class _PreloadOperation(_Operation):
+    """The same while expansion changes the preload, and with it the heat."""
+
+    def __init__(
+        self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel, start: Array | None
+    ) -> None:
+        super().__init__(machine, point, heat_model, start)
+        self.guard = PreloadGuard.of(heat_model(point, self.cold)[0])
+        self.change, self.growing = np.inf, 0
+
+    def solve(self, start: Mapping[str, BearingTemperatures]) -> MachineNetworkState:
+        """Steady state, from the bearing temperatures without expansion."""
+        name = self.machine.spec.name
+        try:
+            fixed_point(self.respond, self.settled, _vector(start), FOLLOWING_PRELOAD, name)
+        except REFUSED as error:
+            raise no_equilibrium(name, self.point, str(error)) from error
+        return _state(self.network, self.temperature, self.newton_steps)
+
+    def settled(self, given: Array, found: Array) -> bool:
+        """Whether the bearings have the temperatures that their heat was taken at; refuses a runaway."""
+        name = self.machine.spec.name
+        reason = self.guard.reason(self.network.bearing_heat)
+        if reason:
+            raise no_equilibrium(name, self.point, reason)
+        change = float(np.abs(found - given).max())
+        if change < TOLERANCE:
+            return True
+        self.growing = self.growing + 1 if self.change < change else 0
+        self.change = change
+        if self.growing >= GROWING_STEPS and change > FOLLOWING_PRELOAD.mixing_below:
+            raise no_equilibrium(
+                name, self.point, "heat grows faster with the preload than the machine carries it away."
+            )
+        return False
+
+
+def _vector(around: Mapping[str, BearingTemperatures]) -> Array:
+    rows = [[getattr(item, key) for key in BearingTemperatures.__slots__] for item in around.values()]
+    return np.array(rows, dtype=float).ravel()
+
+
+def _named(values: Array, like: Mapping[str, BearingTemperatures]) -> dict[str, BearingTemperatures]:
+    rows = values.reshape(len(like), -1).tolist() if like else []
+    return {name: BearingTemperatures(*row) for name, row in zip(like, rows, strict=True)}
+
+
+def _state(network: OperatingNetwork, temperature: Array, iterations: int) -> MachineNetworkState:
+    machine, n = network.machine, network.n_nodes
+    both = np.concatenate([temperature, network.boundary_temperature])
+    flow = network.conductance * (both[network.first] - both[network.second])
+    out: dict[str, float] = {}
+    outward = network.second >= n
+    for kind in dict.fromkeys(network.kind[outward]):
+        out[str(kind)] = float(flow[outward & (network.kind == kind)].sum())
+    heat_in = float(network.heat.sum())
+    for law in network.laws:
+        law.require_valid(temperature)
+        if isinstance(law, WallFilmLaw):
+            out[law.name] = float(law.heat(temperature)[0].sum())
+        elif not isinstance(law, CoolantLaw):
+            heat_in += float(law(temperature)[0].sum())
+    outlet = float("nan")
+    if machine.coolant is not None:
+        outlet = float(temperature[network.streams[1][-1]])
+        rises = both[network.streams[1]] - both[network.streams[0]]
+        out["coolant"] = float(network.stream_rate * rises.sum())
+    # at rest there is no flow to compare with: rounding is that of conductance times absolute temperature
+    rounding = 1.0e-7 * float(network.conductance.sum()) * float(both.max())
+    scale = max(abs(heat_in), *(abs(value) for value in out.values()), rounding)
+    imbalance = abs(heat_in - sum(out.values())) / scale
+    if imbalance > BALANCE_TOLERANCE:
+        raise EnergyBalanceError(
+            machine.spec.name,
+            f"the network takes in {heat_in:.9g} W and gives off {sum(out.values()):.9g} W "
+            f"({imbalance:.1e} relative).",
+            f"Allowed: {BALANCE_TOLERANCE:.0e}.",
+        )
+    return MachineNetworkState(network, temperature, out, heat_in, imbalance, outlet, iterations)

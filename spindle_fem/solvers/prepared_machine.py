@@ -1,0 +1,166 @@
+"""A machine made ready for the full model: mesh, integrals, sorted loads, conduction problem."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.machine.meshing.build_mesh import build_mesh
+from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
+from spindle_fem.operation.bearing_heat import at_assembly_size, heat_model_of
+from spindle_fem.operation.coefficients import joint_conductances
+from spindle_fem.operation.loads import Loads
+from spindle_fem.operation.machine_loads import FieldState, LoadsBuilder
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedMachine:
+    """A machine with mesh, operators and sorted loads, ready to be solved at any operating point."""
+
+    spec: MachineSpec
+    mesh: TaggedMesh
+    operators: ThermalOperators
+    builder: LoadsBuilder
+    joint_conductance: Mapping[str, float]
+    conductivity: Mapping[str, float]
+    volumetric_capacity: Mapping[str, float]
+    geometry_notes: tuple[str, ...] = ()
+    timings: Mapping[str, float] = field(default_factory=dict)
+
+    def field_state(self, unknowns: NDArray[np.float64], lumped: Mapping[str, float]) -> FieldState:
+        """What the loads see of a field: the mean over each facet, and the lumped nodes."""
+        facets = {
+            surface: self.operators.facet_integral(unknowns, rows) / self.operators.facet_area[rows]
+            for surface, rows in self.operators.surface_rows.items()
+        }
+        sides = {
+            joint: tuple(
+                float(
+                    self.operators.facet_integral(unknowns, rows).sum()
+                    / self.operators.facet_area[rows].sum()
+                )
+                for rows in self.operators.joint_rows[joint]
+            )
+            for joint in self.operators.joint_rows
+            if not joint.endswith(":face")
+        }
+        return FieldState(facets, sides, lumped)
+
+    def problem(self, loads: Loads) -> ConductionProblem:
+        """Conduction problem of given loads."""
+        films = tuple(
+            Film(surface, film.coefficient, film.temperature, film.name)
+            for surface, film in loads.films.items()
+        )
+        lumped = tuple(
+            LumpedNode(node.name, tuple(node.connections.items()), node.capacity, node.heat)
+            for node in loads.lumped
+        )
+        change = loads.change
+        return ConductionProblem(
+            self.operators,
+            {part: value * change.factor(f"conductivity.{part}") for part, value in self.conductivity.items()}
+            if change.coefficients
+            else self.conductivity,
+            films=films,
+            joint_conductance={
+                name: value * change.factor(f"joint.{name}") for name, value in self.joint_conductance.items()
+            }
+            if change.coefficients
+            else self.joint_conductance,
+            surface_heat=loads.surface_heat,
+            nodal_heat=change.nodal_heat,
+            capacity_scale=change.capacity_scale,
+            lumped_nodes=lumped,
+            volumetric_capacity=self.volumetric_capacity,
+            adiabatic="rest",
+        )
+
+
+def prepare_machine(
+    spec: MachineSpec, *, size_factor: float | None = None, progress: Progress = lambda stage: None
+) -> PreparedMachine:
+    """Mesh a machine and integrate what every solve shares.
+
+    Parameters
+    ----------
+    spec : MachineSpec
+    size_factor : float, optional
+        In place of the machine's own, for mesh-refinement estimates.
+    progress : callable
+        Told each stage by name as it begins.
+    """
+    clock = Clock(progress)
+    clock.begin("geometry")
+    assembly = build_assembly(spec)
+    clock.begin("mesh")
+    mesh = build_mesh(
+        assembly,
+        preset=spec.mesh.preset,
+        size_factor=spec.mesh.size_factor if size_factor is None else size_factor,
+        sizes=spec.mesh.size,
+    )
+    clock.begin("assembly")
+    operators = build_operators(mesh, spec.mesh.order)
+    machine = machine_on_mesh(spec, mesh, operators)
+    clock.end()
+    return replace(machine, timings=clock.timings)
+
+
+def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOperators) -> PreparedMachine:
+    """A machine on a mesh and operators that exist: its geometry must be the one that was meshed.
+
+    Heat, films, flow, oil, joints and materials may differ from those of the
+    machine that the mesh was made for.
+    """
+    facet_area = {surface: operators.facet_areas(surface) for surface in mesh.surfaces}
+    materials = {part: spec.part_material(part) for part in mesh.part_names}
+    capacity_factor = spec.heat_capacity_factor.value
+    return PreparedMachine(
+        spec=spec,
+        mesh=mesh,
+        operators=operators,
+        builder=LoadsBuilder(spec, mesh, facet_area, heat_model_of(spec)),
+        joint_conductance=joint_conductances(spec, mesh.joints),
+        conductivity={part: material.thermal_conductivity for part, material in materials.items()},
+        volumetric_capacity={
+            part: capacity_factor * material.volumetric_heat_capacity for part, material in materials.items()
+        },
+    )
+
+
+def without_expansion(machine: PreparedMachine) -> PreparedMachine:
+    """The same machine with bearings that keep the size of assembly."""
+    return machine_on_mesh(at_assembly_size(machine.spec), machine.mesh, machine.operators)
+
+
+class Clock:
+    """Seconds of each stage; tells the progress callback as stages begin."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.progress = progress
+        self.timings: dict[str, float] = {}
+        self._stage = ""
+        self._since = 0.0
+
+    def begin(self, stage: str) -> None:
+        """End the stage before and start this one."""
+        self.end()
+        self._stage, self._since = stage, time.perf_counter()
+        self.progress(stage)
+
+    def end(self) -> None:
+        """End the stage that runs."""
+        if self._stage:
+            self.timings[self._stage] = time.perf_counter() - self._since
+        self._stage = ""
