@@ -137,7 +137,7 @@ def test_maps_take_complex_films_for_their_derivative(scale):
     for name in MarchMaps.__slots__:
         central = (getattr(above, name) - getattr(below, name)) / (2.0 * difference)
         exact = np.imag(getattr(by_step, name)) / step
-        np.testing.assert_allclose(exact, central, rtol=1e-6, atol=2e-10)
+        np.testing.assert_allclose(exact, central, rtol=1e-6, atol=1e-9)
 
 
 def test_a_cell_counted_from_its_outlet_takes_the_same_heat():
