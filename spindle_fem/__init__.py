@@ -39,6 +39,7 @@ _PLACES = {
     "UserCoolant": "spindle_fem.physics.coolant.user_coolant",
     "friction_model": "spindle_fem.physics.bearings.heat_model",
     "joint_law": "spindle_fem.physics.surroundings.joint_law",
+    "register_effect": "spindle_fem.effects.registry",
     "nusselt_correlation": "spindle_fem.physics.coolant.film_correlation",
 }
 __all__ = ["__version__", *_PLACES]

@@ -78,12 +78,13 @@ def range_fault(name: str, value: ArrayLike, lowest: float, highest: float) -> s
     offending = values[outside]
     overshoot = np.maximum(lowest - offending, offending - highest)
     worst = offending[np.argmax(np.where(np.isnan(overshoot), np.inf, overshoot))]
-    allowed = _range_text(lowest, highest)
+    allowed = range_text(lowest, highest)
     number = f" ({offending.size} of {values.size} values outside)" if values.size > 1 else ""
     return f"{name} is {worst:.6g}, allowed {allowed}{number}"
 
 
-def _range_text(lowest: float, highest: float) -> str:
+def range_text(lowest: float, highest: float) -> str:
+    """A range in words: "0.5 to 2000", "above 0", "any finite number"."""
     above_zero = lowest == POSITIVE[0]
     if highest >= POSITIVE[1]:
         if lowest <= -POSITIVE[1]:

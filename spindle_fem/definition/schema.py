@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from spindle_fem.definition.field_types import ChoiceRule, FreeQuantityRule, Name, QuantityRule, RangeRule
+from spindle_fem.registry import Registry
 from spindle_fem.units import quantity_example
 
 
@@ -108,6 +109,14 @@ def literal_values(annotation: Any) -> tuple[Any, ...]:
     alternatives, metadata = _peeled(annotation)
     listed = [value for item in alternatives if get_origin(item) is Literal for value in get_args(item)]
     return (*listed, *(name for item in metadata if isinstance(item, ChoiceRule) for name in item.things))
+
+
+def registry_of(annotation: Any) -> Registry | None:
+    """The registry whose things a field names, or whose laws give its value; None for other fields."""
+    _, metadata = _peeled(annotation)
+    chosen = next((item.things for item in metadata if isinstance(item, ChoiceRule)), None)
+    rule = quantity_rule(annotation)
+    return rule.laws if chosen is None and rule is not None else chosen
 
 
 def is_text(annotation: Any) -> bool:

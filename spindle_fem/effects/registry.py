@@ -1,4 +1,4 @@
-"""Every effect of the package, found by walking it: a new file is a new effect."""
+"""Every effect: those of the catalogue's files, found by walking it, and those that a program adds."""
 
 from __future__ import annotations
 
@@ -26,8 +26,11 @@ Owner = TypeVar("Owner", Term, Reading)
 STANDING_REYNOLDS = (100.0, 1000.0)
 
 
+_added: dict[str, Effect] = {}
+
+
 @cache
-def _found() -> Mapping[str, Effect]:
+def _shipped() -> Mapping[str, Effect]:
     effects: dict[str, Effect] = {}
     for module in sorted(item.name for item in iter_modules(package.__path__)):
         loaded = import_module(f"{package.__name__}.{module}")
@@ -38,6 +41,24 @@ def _found() -> Mapping[str, Effect]:
                     raise SpecError("effects", f'two have the name "{kind.name}".', "Give each its own.")
                 effects[kind.name] = kind()
     return MappingProxyType(effects)
+
+
+def _found() -> Mapping[str, Effect]:
+    return {**_shipped(), **_added}
+
+
+def register_effect(kind: type[Effect]) -> type[Effect]:
+    """Add an effect of one's own to the catalogue; a decorator of its class.
+
+    Raises
+    ------
+    SpecError
+        There is an effect of this name.
+    """
+    if kind.name in _found():
+        raise SpecError("effects", f'there is a "{kind.name}" already.', "Give yours another name.")
+    _added[kind.name] = kind()
+    return kind
 
 
 def catalogue() -> dict[str, Effect]:

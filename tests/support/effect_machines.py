@@ -17,6 +17,7 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
 from tests.support.lumped_spindle import lumped_model
 
+PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
 SPINDLE_RECORDING = """
 schema = "spindle-fem/recording/1"
 name = "steps"
@@ -91,8 +92,7 @@ def _spindle(folder):
     columns = {"t": time, "speed": speed, "ambient": 20.0 + 0.5 * np.sin(time / 900.0)}
     columns["coolant_in"] = np.where(time < 4000.0, 15.0, 30.0)
     text = SPINDLE_RECORDING
-    probes = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
-    for probe in probes:
+    for probe in PROBES:
         columns[f"{probe}_degC"] = 22.0 + 8.0 * time / time[-1]
         text += CHANNEL % (f"{probe}_degC", probe)
     for column, hold, drives, unit in (
@@ -142,51 +142,3 @@ def _written(folder, name, columns, text):
 INTERVALS = [(900.0, 1800.0), (2600.0, 3900.0)]
 KINDS = ("geometry", "network")
 POINT = OperatingPoint(260.0, 1500.0, 293.0, 295.0, 3.0e-4)
-IDS = {
-    "thermal_preload": "missing_physics",
-    "viscosity_heat": "missing_physics",
-    "grease_churning": "missing_physics",
-    "starvation": "missing_physics",
-    "seal_friction": "missing_physics",
-    "windage": "missing_physics",
-    "drive_heat": "missing_physics",
-    "joint_conductance": "parameter",
-    "gap_closure": "missing_physics",
-    "mount_sink": "missing_physics",
-    "shaft_convection": "missing_physics",
-    "radiation": "missing_physics",
-    "natural_convection": "missing_physics",
-    "coolant_heating": "missing_physics",
-    "coolant_film": "missing_physics",
-    "coolant_bypass": "missing_physics",
-    "chiller_cycling": "missing_physics",
-    "ambient_drift": "missing_physics",
-    "heat_split": "parameter",
-    "heat_scale": "parameter",
-    "heat_capacity": "parameter",
-    "sensor_offset": "sensor",
-    "sensor_gain": "sensor",
-    "sensor_lag": "sensor",
-    "sensor_drift": "sensor",
-    "sensor_detached": "sensor",
-    "clock_shift": "sensor",
-    "unrecorded_heat_source": "missing_physics",
-    "unrecorded_cooling": "missing_physics",
-}
-# Sign of the mean change of the named channel at positive amplitude.
-WARMER = {
-    ("thermal_preload", "front_bearings"): 0,
-    ("seal_friction", "nose"): 0,
-    ("windage", "shaft"): 3,
-    ("drive_heat", "drive_end"): 4,
-    ("mount_sink", "flange"): 3,
-    ("grease_churning", "front_bearings"): 0,
-    ("starvation", "front_bearings"): 0,
-    ("coolant_bypass", "channel"): 3,
-    ("unrecorded_heat_source", "housing"): 3,
-}
-COLDER = {
-    ("shaft_convection", "shaft"): 3,
-    ("unrecorded_cooling", "housing"): 3,
-    ("coolant_film", "channel"): 3,
-}

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import spindle_fem
+from scripts.definition_page import options, reference_page
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.definition.reference_page import reference_page
 from spindle_fem.definition.schema import annotation_of, fields_of, shape_of
 
 PAGE = Path(spindle_fem.__file__).parents[1] / "docs" / "machine_definition.md"
@@ -30,7 +30,7 @@ MODELS = list(dict.fromkeys(models_below(MachineSpec)))
 @pytest.mark.skipif(not PAGE.parent.is_dir(), reason="the page lies in the source tree, not in the wheel")
 def test_the_page_is_up_to_date():
     assert PAGE.read_text(encoding="utf-8") == reference_page(), (
-        "run: python -m spindle_fem.definition.reference_page > docs/machine_definition.md"
+        "run: python -m scripts.definition_page > docs/machine_definition.md"
     )
 
 
@@ -53,3 +53,12 @@ def test_limits_units_and_defaults_stand_in_the_page():
         "### `[materials.NAME]`",
     ):
         assert line in page
+
+
+def test_everything_that_an_option_names_stands_in_the_page():
+    page, found = reference_page(), options()
+    assert {"coolant.film_model", "heat.model", "joint.conductance", "bearing_types.NAME.kind"} <= set(found)
+    for things in found.values():
+        for name in things:
+            assert things.summary(name), f"{things.package}.{name} has no docstring"
+            assert f"| `{name}` |" in page

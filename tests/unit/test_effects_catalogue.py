@@ -1,10 +1,15 @@
 """Every effect of the catalogue on a lumped spindle and a small network."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scripts import effects_page
+from spindle_fem.effects import catalogue as effects
+from spindle_fem.effects import registry
+from spindle_fem.effects.framework.card import GROUPS
 from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.effects.registry import (
     build,
@@ -19,12 +24,10 @@ from spindle_fem.errors import SpecError, UnitError
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from tests.support.effect_machines import (
-    COLDER,
-    IDS,
     INTERVALS,
     KINDS,
     POINT,
-    WARMER,
+    PROBES,
     _network,
     _spindle,
 )
@@ -82,17 +85,36 @@ def parts_of(term):
 # ------------------------------------------------------------------ catalogue
 
 
-def test_the_catalogue_is_complete_and_each_kind_is_right():
-    assert {name: effect.kind for name, effect in catalogue().items()} == IDS
-    assert {effect.name for effect in interval_effects()} == {"unrecorded_heat_source", "unrecorded_cooling"}
+def test_every_file_of_the_catalogue_is_an_effect_of_its_name():
+    files = {path.stem for path in Path(effects.__file__).parent.glob("*.py")} - {"__init__"}
+    assert set(catalogue()) == files
     for effect in catalogue().values():
+        assert effect.kind in ("missing_physics", "parameter", "sensor")
         assert effect.title
         assert effect.check.endswith(".")
+        assert effect.card.group in GROUPS
+        assert effect.card.law
+        assert effect.card.size
+        assert effect.card.acts_on
+
+
+def test_the_page_of_effects_is_up_to_date():
+    page = effects_page.PAGE.read_text(encoding="utf-8")
+    assert page == effects_page.renewed(page), "run: python -m scripts.effects_page"
+
+
+def test_a_program_adds_an_effect_of_its_own(monkeypatch):
+    monkeypatch.setattr(registry, "_added", {})
+    own = type("Own", (type(effect_of("windage")),), {"name": "own"})
+    assert registry.register_effect(own) is own
+    assert type(effect_of("own")) is own
+    with pytest.raises(SpecError, match='there is a "own" already'):
+        registry.register_effect(own)
 
 
 def test_every_effect_is_offered_somewhere(machines):
     offered = {c.effect for kind in KINDS for c in everything(machines[kind][2])}
-    assert offered == set(IDS)
+    assert offered == set(catalogue())
 
 
 def test_an_effect_that_the_machine_already_has_is_not_offered(machines):
@@ -221,17 +243,20 @@ def _run(fast, recording, drive, terms, values):
 def test_heat_warms_and_losses_cool(machines):
     fast, recording, view, drive = machines["geometry"]
     plain = _run(fast, recording, drive, (), {})
+    wanted = {effect.name for effect in catalogue().values() if effect.card.makes is not None}
+    assert {"seal_friction", "unrecorded_cooling"} <= wanted
     seen = set()
     for candidate in everything(view):
-        key = (candidate.effect, candidate.component)
-        sign = 1.0 if key in WARMER else -1.0 if key in COLDER else 0.0
-        if not sign or not candidate.terms or "curvature" in candidate.form:
+        makes = effect_of(candidate.effect).card.makes
+        if makes is None or candidate.component != makes.at or not candidate.terms:
+            continue
+        if "curvature" in candidate.form:
             continue
         run = _run(fast, recording, drive, candidate.terms, amplitude_at(candidate, candidate.reference))
-        channel = WARMER.get(key, COLDER.get(key))
-        assert sign * (run - plain)[:, channel].mean() > 0.0, candidate.label
-        seen.add(key)
-    assert seen == set(WARMER) | set(COLDER)
+        sign = {"warmer": 1.0, "colder": -1.0}[makes.way]
+        assert sign * (run - plain)[:, PROBES.index(makes.probe)].mean() > 0.0, candidate.label
+        seen.add(candidate.effect)
+    assert seen == wanted
 
 
 def test_more_capacity_follows_more_slowly(machines):
@@ -244,33 +269,12 @@ def test_more_capacity_follows_more_slowly(machines):
 
 
 # ------------------------------------------------------------------ reports
-NAMES = {
-    "heat_scale": {"factor": ""},
-    "heat_split": {"inner_share_change": ""},
-    "joint_conductance": {"factor": ""},
-    "coolant_bypass": {"fraction": ""},
-    "heat_capacity": {"capacity": "J/K"},
-    "sensor_offset": {"offset": "K"},
-    "sensor_gain": {"gain": ""},
-    "sensor_lag": {"time_constant": "s"},
-    "sensor_drift": {"rate": "K/h"},
-    "clock_shift": {"shift": "s"},
-    "drive_heat": {"heat_at_3000rpm": "W"},
-    "seal_friction": {"heat_per_1000rpm": "W"},
-    "windage": {"heat_at_4500rpm": "W"},
-    "mount_sink": {"temperature_above_ambient": "K"},
-    "chiller_cycling": {"period": "s", "amplitude": "K"},
-    "starvation": {"onset_speed": "rpm"},
-    "unrecorded_heat_source": {"heat": "W"},
-}
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_findings_carry_the_agreed_names_and_units(machines, kind):
     for candidate in everything(machines[kind][2]):
         effect = effect_of(candidate.effect)
         reported = effect.report(candidate, amplitude_at(candidate, candidate.reference))
-        for name, unit in NAMES.get(candidate.effect, {}).items():
+        for name, unit in effect.card.states.items():
             assert reported[name].unit == unit, candidate.label
         if candidate.effect == "unrecorded_cooling":
             assert "conductance" in reported or "heat" in reported

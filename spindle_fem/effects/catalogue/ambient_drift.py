@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported
 from spindle_fem.effects.framework.laws import (
     Complex,
@@ -76,6 +77,19 @@ class AmbientDrift(Effect):
     check = (
         "Place and shielding of the ambient sensor, doors, heating, neighbouring machines; log the air "
         "temperature beside the spindle at three heights."
+    )
+    card = Card(
+        group="Surroundings",
+        law=(
+            "air shifted by: a steady drift; a ramp between two instants; a step; a hump "
+            "e^(-((t-t₀)/w)²/2); a sine, free, daily or yearly"
+        ),
+        size=(
+            "± 8 K over the span; change ± 5 K (ramp), ± 3 K (step, hump); amplitude ± 2 K; instants, "
+            "widths and periods wide over the span"
+        ),
+        acts_on="all films to the ambient, or of one boundary",
+        source="ISO 230-3",
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Array, Candidate, Effect, Reported
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, repeated, shape
 from spindle_fem.effects.framework.machine_view import MachineView, fluid_place
@@ -67,6 +68,14 @@ class ChillerCycling(Effect):
     check = (
         "Chiller: log the inlet temperature every few seconds; hysteresis of its controller, tank volume, "
         "compressor starts per hour."
+    )
+    card = Card(
+        group="Coolant",
+        law="inlet + A sin(2πt/P + φ), or a rounded sawtooth",
+        size="A ± 2 K; P 600 s ×/÷ e^0.9; φ any; P from the spectrum of what is left over",
+        acts_on="channel, coolants of a network",
+        source="makers' data of two-point chillers",
+        states={"period": "s", "amplitude": "K"},
     )
     # A controller's switching wanders with the load.
     law_sigma = MappingProxyType({"period": 0.01})

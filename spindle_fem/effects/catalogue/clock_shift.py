@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
 from spindle_fem.effects.framework.filters import delayed
 from spindle_fem.effects.framework.laws import Complex, linear
@@ -39,6 +40,13 @@ class ClockShift(SensorEffect):
     title = "the channel's clock is off"
     check = (
         "Clocks and time zones of the loggers, buffering and averaging on the way; give both one common mark."
+    )
+    card = Card(
+        group="Sensors",
+        law="T(t - shift)",
+        size="± 400 s",
+        acts_on="every sensor",
+        states={"shift": "s"},
     )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Array, Candidate, Effect, Reading, Reported
 from spindle_fem.effects.framework.laws import Complex, amplitude
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -66,6 +67,14 @@ class CoolantBypass(Effect):
     check = (
         "O-rings between sleeve and body, relief valve, crossed hoses; measure the flow at the outlet and "
         "compare the pressure drop with that of the full flow."
+    )
+    card = Card(
+        group="Coolant",
+        law="flow × 1 - f; the outlet sensor reads the channel's flow, or both mixed",
+        size="f ± 0.3 (below 0.95)",
+        acts_on="channel",
+        states={"fraction": ""},
+        makes=Makes("warmer", probe="SP04", at="channel"),
     )
     # The share changes with the flow and the oil's viscosity.
     law_sigma = MappingProxyType({"fraction": 0.05})

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported
 from spindle_fem.effects.framework.laws import amplitude, factor, linear, shape, smooth_step
 from spindle_fem.effects.framework.machine_view import ChannelFlow, MachineView
@@ -91,6 +92,14 @@ class CoolantFilm(Effect):
         "Channel for deposits, air pockets and the right flow (pressure drop against flow); where the "
         "film changes "
         "with the Reynolds number, step the oil temperature and watch the housing beside the channel."
+    )
+    card = Card(
+        group="Coolant",
+        law="fouling: film × factor; transition: × 1 + a S((Re - Re₀)/w); curvature: × (Re/Re_m)^p",
+        size="factor ×/÷ e^0.6; a ± 3, Re₀ searched over the range that occurs, w 80 ×/÷ e^0.7; p ± 0.3",
+        acts_on="channel",
+        source="Dravid et al. (1971), AIChE J. 17, 1114; TEMA",
+        makes=Makes("colder", probe="SP04", at="channel"),
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature, rows
 from spindle_fem.effects.framework.machine_view import MachineView, fluid_place
@@ -59,6 +60,13 @@ class CoolantHeating(Effect):
     kind = "missing_physics"
     title = "the coolant warms on its way, so that what it passes last is cooled less"
     check = "Coolant flow and its rise from inlet to outlet: heat taken up over flow times heat capacity."
+    card = Card(
+        group="Coolant",
+        law="a link's coolant is warmer by what earlier links gave off, over the capacity rate",
+        size="± 0.3 K/W over the sum of conductances",
+        acts_on="networks only: a channel always has it",
+        source="enthalpy balance",
+    )
 
     def in_definition(self, spec: MachineSpec) -> bool:
         """Every channel with a flow warms its coolant."""

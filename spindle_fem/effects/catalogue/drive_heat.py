@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -27,6 +28,15 @@ class DriveHeat(Effect):
     check = (
         "Belt tension and pulley temperature, coupling, motor flange: compare their temperatures with the "
         "rear bearings after an hour at constant speed; run uncoupled if possible."
+    )
+    card = Card(
+        group="Heat by speed",
+        law="P (n/3000 rpm)^m, lagged τ or prompt",
+        size="P ± 0.25 Q; m 1.3 ± 0.35; τ 900 s ×/÷ e^0.8",
+        acts_on="drive end, nodes",
+        source="Childs & Cowburn (1987), Proc. IMechE 201, 41",
+        states={"heat_at_3000rpm": "W"},
+        makes=Makes("warmer", probe="SP05", at="drive_end"),
     )
     # It enters at more than one place.
     law_sigma = MappingProxyType({"heat_at_3000rpm": 0.1})

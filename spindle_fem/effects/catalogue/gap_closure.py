@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words, quantity
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, relaxed, rows, shape, smooth_step
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -87,6 +88,16 @@ class GapClosure(Effect):
     check = (
         "Outer-ring fits and bore roundness: measure clearance cold; look for fretting rust; compare ring "
         "and housing temperatures during warm-up, where the difference must rise first and then fall."
+    )
+    card = Card(
+        group="Contacts and capacity",
+        law=(
+            "conductance × 1 - a (1 - s), s follows S((x - x₀)/w) with a lag τ; x: each seat's outer ring"
+            " over the housing (a spacer's: the mean of their s), or all of them over their start"
+        ),
+        size="a ± 1 (at most 0.995); x₀ 8 ± 5 K; w 5 K ×/÷ e^0.5; τ 600 s ×/÷ e^0.4",
+        acts_on="outer seats of a set with their spacers, links between nodes",
+        source="5 µm of air conduct 5000 W/(m²·K); 190 mm of steel close it with 2 to 3 K",
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect
 from spindle_fem.effects.framework.laws import (
     RPM,
@@ -104,6 +105,17 @@ class GreaseChurning(Effect):
     check = (
         "Lubrication record: was the set refilled, overfilled or long at rest? Run the grease in step by "
         "step and repeat the test; the extra heat must not come back."
+    )
+    card = Card(
+        group="Bearings",
+        law=(
+            "friction × 1 + a e^(-x^s); x grows while turning by (n/3000 rpm)^m in τ; in a second form it"
+            " goes back at rest"
+        ),
+        size="a ± 0.4; τ 1800 s ×/÷ e^0.9; s 1 ×/÷ e^0.15; m 0.5 ± 0.5 (0 to 1.5); at rest 300 s ×/÷ e^1",
+        acts_on="set, bearing, source",
+        source="Lugt (2009), Tribol. Trans. 52, 470",
+        makes=Makes("warmer", probe="SP01", at="front_bearings"),
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, relaxed, rows, shape
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -90,6 +91,16 @@ class HeatCapacity(Effect):
     title = "there is thermal mass that the model lacks"
     check = (
         "What is mounted that the drawing does not show: fixture, tool and holder, adapter, standing coolant."
+    )
+    card = Card(
+        group="Contacts and capacity",
+        law=(
+            "further capacity at the mean temperature of a place, or behind a contact that it follows "
+            "with a lag, at the housing on any side"
+        ),
+        size="C ± 0.3 of the place's own, or 0.15 of the housing's; lag 1200 s ×/÷ e^0.8",
+        acts_on="housing, flange, nose, drive end, shaft, channel, nodes",
+        states={"capacity": "J/K"},
     )
     # A body on one side, or behind a contact of its own, takes up heat as a smaller or larger one all round.
     law_sigma = MappingProxyType({"capacity": 0.3})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import factor
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -18,6 +19,13 @@ class HeatScale(Effect):
     check = (
         "Preload, grease quantity and the drag torque of the set against its data sheet; where the heat "
         "comes from a measured power, the calibration of that measurement."
+    )
+    card = Card(
+        group="Bearings",
+        law="heat × factor",
+        size="factor ×/÷ e^0.4, wider than the definition's own",
+        acts_on="set, bearing, source",
+        states={"factor": ""},
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, factor, rows
 from spindle_fem.effects.framework.machine_view import FrictionTable, MachineView
@@ -58,6 +59,14 @@ class HeatSplit(Effect):
     check = (
         "Nothing to repair as such: compare shaft and housing temperatures beside the bearings, and ask "
         "whether preload or contact angle differ from the drawing."
+    )
+    card = Card(
+        group="Bearings",
+        law="moves a share of the friction heat from outer to inner raceways",
+        size="change ± 0.15; all bearings: the machine's own share",
+        acts_on="set, all bearings",
+        source="Harris & Kotzalas (2006)",
+        states={"inner_share_change": ""},
     )
     # A share moves with speed and load, and what of it the rings see depends on where their heat is made.
     law_sigma = MappingProxyType({"inner_share_change": 0.08})

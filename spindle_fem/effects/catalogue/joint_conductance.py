@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import factor
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -45,6 +46,14 @@ class JointConductance(Effect):
     check = (
         "Fit, flatness and cleanliness of the contact, bolt torque, filler or grease in the gap; compare the "
         "temperatures on both sides at steady state."
+    )
+    card = Card(
+        group="Contacts and capacity",
+        law="conductance × factor",
+        size="factor ×/÷ e^0.6, wider than the definition's own",
+        acts_on="outer and inner seats of a set or bearing, joint groups, flange to frame, links",
+        source="Yovanovich (2005), IEEE CPT 28, 182",
+        states={"factor": ""},
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

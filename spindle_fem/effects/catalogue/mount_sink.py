@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, quantity
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, repeated, shape
 from spindle_fem.effects.framework.machine_view import MachineView, fluid_place
@@ -58,6 +59,14 @@ class MountSink(Effect):
     check = (
         "Temperature of the machine frame beside the flange: a contact thermometer over one shift; "
         "hydraulic unit, motor or coolant tank on the same casting."
+    )
+    card = Card(
+        group="Surroundings",
+        law="frame ΔT above the ambient, at once, or a share s of it and the rest with 1 - e^(-t/τ)",
+        size="ΔT ± 5 K, both signs; s 0.5 ± 0.35, τ 2 h ×/÷ e^0.8",
+        acts_on="film between flange and frame, boundary links",
+        states={"temperature_above_ambient": "K"},
+        makes=Makes("warmer", probe="SP04", at="flange"),
     )
     # A frame is not at one temperature.
     law_sigma = MappingProxyType({"temperature_above_ambient": 0.1})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, power
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -41,6 +42,13 @@ class NaturalConvection(Effect):
     check = (
         "Outside surfaces for covers, draught and dirt; measure wall and air temperature at two steady "
         "states of different heat."
+    )
+    card = Card(
+        group="Surroundings",
+        law="film × (1 + a g)/(1 + a c), g = (ΔT/10 K)^m",
+        size="a ± 0.7; m 0.3 ± 0.08; c 0.5 ± 0.4",
+        acts_on="standing outside, boundary links",
+        source="Churchill & Chu (1975), Int. J. Heat Mass Transfer 18, 1049, 1323",
     )
 
     def in_definition(self, spec: MachineSpec) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -47,6 +48,13 @@ class Radiation(Effect):
     check = (
         "Paint and bare metal of the outside (emissivity), hot or cold bodies in sight (oven, window, "
         "coolant tank); compare a surface with and without a reflecting foil."
+    )
+    card = Card(
+        group="Surroundings",
+        law="the same with g = (T⁴ - T_air⁴)/(T - T_air) over its value at 303 and 293 K",
+        size="a ± 0.6; c 0.5 ± 0.4",
+        acts_on="standing outside, boundary links",
+        source="Stefan-Boltzmann",
     )
 
     def in_definition(self, spec: MachineSpec) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -31,6 +32,17 @@ class SealFriction(Effect):
     check = (
         "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the "
         "spindle by hand with and without the seal."
+    )
+    card = Card(
+        group="Heat by speed",
+        law="P (n/1000 rpm)^m, lasting, or × 1 + b e^(-t/τ) while a lip runs in",
+        size=(
+            "P ± 0.1 Q; m 1 ± 0.1; share of what holds the seal 0.15 ± 0.15; b 0.3 ± 0.3, τ 5000 s ×/÷ e^0.8"
+        ),
+        acts_on="nose, drive end, nodes",
+        source="constant torque; makers' data of radial seals",
+        states={"heat_per_1000rpm": "W"},
+        makes=Makes("warmer", probe="SP01", at="nose"),
     )
     # Contact force and grease of a lip change with temperature; how much of it the shaft takes is guessed.
     law_sigma = MappingProxyType({"heat_per_1000rpm": 0.2})

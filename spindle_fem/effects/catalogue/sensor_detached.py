@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
 from spindle_fem.effects.framework.filters import first_order_lag
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, shape, smooth_step
@@ -69,6 +70,15 @@ class SensorDetached(SensorEffect):
     check = (
         "Is the sensor still in its bore or glued on? Pull gently at the cable; look at the clamp and "
         "the paste."
+    )
+    card = Card(
+        group="Sensors",
+        law="m τ y' = T + m (T_air - T) - y, m from t₀ on over a width w; or from the start",
+        size=(
+            "m ± 0.4 (0 to 1); t₀ searched; w 30 s ×/÷ e; τ, the time to follow the air alone, 600 s ×/÷ "
+            "e^0.8"
+        ),
+        acts_on="every sensor",
     )
 
     def __init__(self) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
 from spindle_fem.effects.framework.laws import Complex, linear, softplus
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -44,6 +45,13 @@ class SensorDrift(SensorEffect):
     name = "sensor_drift"
     title = "the sensor drifts with time"
     check = "Cable, plug and moisture of the sensor; supply and cold junction of the logger; recalibrate."
+    card = Card(
+        group="Sensors",
+        law="T + rate t, from the first stamp or an instant on",
+        size="± 2 K over the span",
+        acts_on="every sensor",
+        states={"rate": "K/h"},
+    )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """From the first stamp, or from an instant on."""

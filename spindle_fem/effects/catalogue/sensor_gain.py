@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
 from spindle_fem.effects.framework.laws import Complex, amplitude
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -39,6 +40,13 @@ class SensorGain(SensorEffect):
     name = "sensor_gain"
     title = "the sensor's scale is wrong: it errs the more the further it is from 20 °C"
     check = "Sensor type and scaling set in the logger; calibrate at two temperatures (ice and 60 °C)."
+    card = Card(
+        group="Sensors",
+        law="20 °C + gain (T - 20 °C)",
+        size="1 ± 0.15",
+        acts_on="every sensor",
+        states={"gain": ""},
+    )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """One form."""

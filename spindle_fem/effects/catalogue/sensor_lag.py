@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
 from spindle_fem.effects.framework.filters import first_order_lag
 from spindle_fem.effects.framework.laws import Complex, amplitude
@@ -45,6 +46,13 @@ class SensorLag(SensorEffect):
     check = (
         "Seat of the sensor: is it pushed home, with thermal paste, and not in a thick well? Touch it "
         "with a hot tip."
+    )
+    card = Card(
+        group="Sensors",
+        law="τ y' = T - y from the first value, exact on any stamps",
+        size="τ ± 300 s (above 0)",
+        acts_on="every sensor",
+        states={"time_constant": "s"},
     )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:

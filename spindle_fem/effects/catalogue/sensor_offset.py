@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
 from spindle_fem.effects.framework.laws import Complex, linear
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -39,6 +40,13 @@ class SensorOffset(SensorEffect):
     check = (
         "Compare the sensor with a reference in one bath or before the start, when everything has one "
         "temperature."
+    )
+    card = Card(
+        group="Sensors",
+        law="T + offset",
+        size="± 1.5 K",
+        acts_on="every sensor",
+        states={"offset": "K"},
     )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:

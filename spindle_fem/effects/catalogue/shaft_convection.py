@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM, Complex, amplitude, fluid_temperature, linear, power, rows
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -78,6 +79,17 @@ class ShaftConvection(Effect):
     check = (
         "Draught at the shaft ends, open guards, air through the hollow shaft (drawbar bore, purge air); "
         "measure the shaft end's temperature at two speeds."
+    )
+    card = Card(
+        group="Surroundings",
+        law=(
+            "films of the shaft ends × 1 + a (n/3000 rpm)^m, or loss G (n/3000 rpm)^m (T - T_air) of the "
+            "whole shaft"
+        ),
+        size="a ± 1; G ± 0.1 Q / usual rise; m 0.8 ± 0.2",
+        acts_on="shaft, boundary links",
+        source="Becker (1963), Int. J. Heat Mass Transfer 6, 1053",
+        makes=Makes("colder", probe="SP04", at="shaft"),
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words, quantity
 from spindle_fem.effects.framework.laws import (
     RPM,
@@ -85,6 +86,18 @@ class Starvation(Effect):
     check = (
         "Grease quantity, age and bleeding; ramp the speed slowly through the onset and watch drag torque, "
         "temperature and noise; compare with freshly greased bearings."
+    )
+    card = Card(
+        group="Bearings",
+        law="friction × 1 + a s, s follows S((n - n₀)/w)·(1 + g (n - n₀)₊) with a lag",
+        size=(
+            "a ± 0.4 (above -0.9); n₀ 0.6 ± 0.3 of the highest speed, searched; w 120 rpm ×/÷ e^0.7; g 0 "
+            "± 0.2 per 1000 rpm; lag 100 s ×/÷ e"
+        ),
+        acts_on="set, bearing, source with a speed",
+        source="Cann et al. (2004), Tribol. Int. 37, 859",
+        states={"onset_speed": "rpm"},
+        makes=Makes("warmer", probe="SP01", at="front_bearings"),
     )
     # Replenishment fails over a range of speeds.
     law_sigma = MappingProxyType({"onset_speed": 0.06})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, power, relaxed, repeated, shape, softplus
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -69,6 +70,16 @@ class ThermalPreload(Effect):
         "Preload and fits of the set: measure the preload cold and warm (axial stiffness or drag torque), "
         "check spacer lengths, and whether the outer rings can still slide; compare cooling of housing "
         "and shaft."
+    )
+    card = Card(
+        group="Bearings",
+        law="friction × 1 + a (w s₊(x/w) / 10 K)^m; x: inner less outer rings of the set, lagged τ",
+        size="a ± 0.25; m 1.45 ×/÷ e^0.12; τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4",
+        acts_on="each bearing set (its bearings share one preload)",
+        source=(
+            "Hertz, load with deflection^1.5; Bossmanns & Tu (1999), Int. J. Mach. Tools Manuf. 39, 1345"
+        ),
+        makes=Makes("warmer", probe="SP01", at="front_bearings"),
     )
 
     def in_definition(self, spec: MachineSpec) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
@@ -57,6 +58,16 @@ class UnrecordedCooling(UnrecordedEffect):
     check = (
         "What runs in these intervals: cutting fluid, air blast, an open door or guard, a second coolant "
         "circuit; compare the intervals with the machine's programme and record the suspect."
+    )
+    card = Card(
+        group="Way out",
+        law=(
+            "conductance to the surroundings (or heat taken away) in intervals, or following a recorded "
+            "quantity"
+        ),
+        size="conductance 0.2 Q over the usual rise, heat ± 0.2 Q; the rest as above",
+        acts_on="every place heat may come from",
+        makes=Makes("colder", probe="SP04", at="housing"),
     )
     check_law = "What blows or flows at this place with the {}; vary it alone and watch this place."
     interval_forms = ("conductance", "heat")

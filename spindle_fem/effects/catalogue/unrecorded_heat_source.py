@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Reported, capital, place_words, quantity
 from spindle_fem.effects.framework.laws import amplitude
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
@@ -22,6 +23,17 @@ class UnrecordedHeatSource(UnrecordedEffect):
     check = (
         "What runs in these intervals: cutting, hydraulic clamping, chip heap, lamp, neighbouring drive; "
         "compare the intervals with the machine's programme and record the suspect."
+    )
+    card = Card(
+        group="Way out",
+        law=(
+            "heat u(t - b) - u(t - e) with first-order edges in intervals, or heat with a power m of a "
+            "recorded quantity"
+        ),
+        size="heat ± 0.2 Q; τ 200 s ×/÷ e^0.7; edges ± 300 s; m 1 ± 0.3",
+        acts_on="every place heat may come from",
+        states={"heat": "W"},
+        makes=Makes("warmer", probe="SP04", at="housing"),
     )
     check_law = (
         "What rubs, brakes or is driven at this place with the {}; vary it alone and watch this place."

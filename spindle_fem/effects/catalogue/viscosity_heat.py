@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, repeated
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -95,6 +96,13 @@ class ViscosityHeat(Effect):
     check = (
         "Grease: grade, viscosity and quantity; compare the drag torque of the cold spindle with that of the "
         "warm one at the same speed."
+    )
+    card = Card(
+        group="Bearings",
+        law="friction × (ν(T)/ν(T₀))^p; ν of the grease's oil by Walther, T of the rings",
+        size="p ± 0.4; T₀ 35 ± 10 °C",
+        acts_on="set, source",
+        source="ASTM D341; Palmgren (1959): moment with ν^(2/3)",
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -29,6 +30,15 @@ class Windage(Effect):
     check = (
         "Parts that stir air (clamping unit, fan, bolt heads, rotor), gap widths; measure the power at "
         "the highest speed without load, and at half of it: an eighth should be left."
+    )
+    card = Card(
+        group="Heat by speed",
+        law="P (n/4500 rpm)^m, a share s at the standing wall of the gap",
+        size="P ± 0.25 Q; m 3 ± 0.15; s 0.15 ± 0.15",
+        acts_on="shaft in the air gap, nodes",
+        source="Bilgen & Boulos (1973), J. Fluids Eng. 95, 122",
+        states={"heat_at_4500rpm": "W"},
+        makes=Makes("warmer", probe="SP04", at="shaft"),
     )
     # The exponent changes with the regime.
     law_sigma = MappingProxyType({"heat_at_4500rpm": 0.1})

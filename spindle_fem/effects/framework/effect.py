@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermParameter
@@ -172,6 +173,8 @@ class Effect(ABC):
         In plain words, for reports: "the grease thins as it warms".
     check : str
         What a maintenance engineer should look at when it is found.
+    card : Card
+        Row of the documentation, and what tests hold it to.
     prior_weight : float
         How likely the effect is before the data, beside the others of the catalogue.
     law_sigma : mapping of str to float
@@ -183,6 +186,7 @@ class Effect(ABC):
     kind: Kind
     title: str
     check: str
+    card: Card
     prior_weight: float = 1.0
     law_sigma: Mapping[str, float] = MappingProxyType({})
 

@@ -1,6 +1,6 @@
 """The reference page of machine definitions, written from the models.
 
-``python -m spindle_fem.definition.reference_page > docs/machine_definition.md`` renews it.
+``python -m scripts.definition_page > docs/machine_definition.md`` renews it.
 """
 
 from __future__ import annotations
@@ -14,14 +14,23 @@ from pydantic.fields import FieldInfo
 
 from spindle_fem.definition.field_types import MARKS, NAME_RULE
 from spindle_fem.definition.machine_spec import MACHINE_SCHEMA, MachineSpec
-from spindle_fem.definition.schema import Shape, annotation_of, quantity_rule, shape_of, value_text
-from spindle_fem.units import Uncertain
+from spindle_fem.definition.schema import (
+    Shape,
+    annotation_of,
+    quantity_rule,
+    registry_of,
+    shape_of,
+    value_text,
+)
+from spindle_fem.registry import Registry
+from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
+from spindle_fem.validity import range_text
 
 _MARKS = "; ".join(f"{letter} {meaning}" for letter, meaning in MARKS.items())
 _INTRODUCTION = f"""\
 # Machine definitions
 
-<!-- Written by `python -m spindle_fem.definition.reference_page`; edit the models, not this page. -->
+<!-- Written by `python -m scripts.definition_page`; edit the models, not this page. -->
 
 A machine is one [TOML](https://toml.io) file. `spindle-fem check FILE` reads it, names every fault at
 once with file, key, value and what is allowed, and exits with 2 if there is any. Unknown keys are
@@ -75,7 +84,48 @@ def reference_page() -> str:
     """Markdown text that lists every table and key of a machine definition."""
     sections = [_INTRODUCTION, "## Tables\n"]
     sections += list(_sections("", Shape("table", (MachineSpec,)), in_list=False))
+    sections += list(_choices())
     return "\n".join(sections).rstrip() + "\n"
+
+
+def options(path: str = "", model: type[BaseModel] = MachineSpec) -> dict[str, Registry]:
+    """Options of a table and of those in it that name a registered thing, by their path."""
+    found: dict[str, Registry] = {}
+    for key, field in _fields(model):
+        annotation, own = annotation_of(field), f"{path}.{key}".lstrip(".")
+        things = registry_of(annotation)
+        if things is not None:
+            found[own] = things
+        inner = shape_of(annotation)
+        while inner.kind in ("list", "mapping"):
+            own += ".NAME" if inner.kind == "mapping" else ""
+            inner = shape_of(inner.inner)
+        for nested in inner.models:
+            found |= options(own, nested)
+    return found
+
+
+def _choices() -> Iterator[str]:
+    """Everything that an option names, with its source and range."""
+    yield "## What options name\n"
+    yield "One file each; a program adds its own with `register` or `add` (`examples/`).\n"
+    for option, things in options().items():
+        yield f"### `{option}`\n"
+        yield "| name | what it is | range |\n|---|---|---|"
+        for name in things:
+            yield f"| `{name}` | {things.summary(name).rstrip('.')} | {_range_text(things[name])} |"
+        yield ""
+
+
+def _range_text(thing: Any) -> str:
+    """Range of validity in words."""
+    if hasattr(thing, "lowest_temperature"):
+        low, high = (
+            value - ZERO_CELSIUS_K for value in (thing.lowest_temperature, thing.highest_temperature)
+        )
+        return f"{low:.6g} to {high:.6g} °C"
+    limits = getattr(thing, "ranges", {})
+    return "; ".join(f"{name.replace('_', ' ')} {range_text(*ends)}" for name, ends in limits.items())
 
 
 def _sections(path: str, shape: Shape, *, in_list: bool) -> Iterator[str]:
