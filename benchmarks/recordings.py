@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from spindle_fem.definition.load import machine_folder
-from spindle_fem.definition.network_tables import load_network_machine
+from spindle_fem.definition.network_load import load_network_machine
 from spindle_fem.model.lumped.network_transient import simulate_transient
 from spindle_fem.model.lumped.thermal_network import ConductanceLaw, ThermalNetwork
 from spindle_fem.model.lumped.written_network import build_network

@@ -7,15 +7,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from spindle_fem.machine.geometry.assembly import (
-    AnnularSegment,
-    AssemblyGeometry,
-    FaceBox,
-    PartGeometry,
-    SurfaceDefinition,
-    assemble,
-)
+from spindle_fem.machine.geometry.assembly import AssemblyGeometry, assemble
 from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
+from spindle_fem.machine.geometry.part_shapes import AnnularSegment, FaceBox, PartGeometry, SurfaceDefinition
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.mesh_cache import file_checksum, save_npz
 from spindle_fem.machine.meshing.mesh_files import CHECKSUMS, named_mesh_folder

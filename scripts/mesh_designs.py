@@ -1,7 +1,7 @@
 """Mesh many random channel designs of a machine and report each.
 
 ``python scripts/mesh_designs.py --number 300 --seed 1`` draws designs from the
-space of spindle_fem.machine.geometry.design_space, meshes every valid one at the coarse
+space of scripts.design_space, meshes every valid one at the coarse
 preset and ends with status 1 if one fails.
 """
 
@@ -11,10 +11,10 @@ import argparse
 import sys
 import time
 
+from scripts.design_space import draw_valid_designs
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpindleFemError
 from spindle_fem.machine.geometry.assembly import build_assembly
-from spindle_fem.machine.geometry.design_space import draw_valid_designs
 from spindle_fem.machine.meshing.build_mesh import generate_mesh
 from spindle_fem.machine.meshing.sizes import build_sizes
 

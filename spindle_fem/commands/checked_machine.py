@@ -68,11 +68,8 @@ def load_network(machine: str | Path, overrides: Iterable[str]) -> NetworkMachin
     from spindle_fem.definition.inherit import apply_overrides
     from spindle_fem.definition.load import find_machine, read_toml
     from spindle_fem.definition.network_faults import network_faults
-    from spindle_fem.definition.network_tables import (
-        NetworkMachineSpec,
-        NetworkSpec,
-        validate_network_machine,
-    )
+    from spindle_fem.definition.network_load import validate_network_machine
+    from spindle_fem.definition.network_tables import NetworkMachineSpec, NetworkSpec
     from spindle_fem.model.lumped.written_network import build_network
     from spindle_fem.model.reduced.defined_effects import check_network_effects, require_known_effects
 

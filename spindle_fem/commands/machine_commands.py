@@ -92,7 +92,7 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
     FaultsError
     """
     from spindle_fem.definition.load import find_machine, read_definition
-    from spindle_fem.definition.network_tables import is_network_machine
+    from spindle_fem.definition.network_load import is_network_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 

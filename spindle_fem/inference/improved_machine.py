@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spindle_fem.definition import network_tables as network_spec
+from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import write_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters

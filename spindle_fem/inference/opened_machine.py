@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from spindle_fem.definition import network_tables as network_spec
+from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.load import find_machine, load_machine, read_definition
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.network_tables import NetworkMachineSpec

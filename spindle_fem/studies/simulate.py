@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition import network_tables as network_spec
+from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.load import find_machine, load_machine, read_definition, write_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import with_parameters

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.commands.crosscheck_command import crosscheck_machine
-from spindle_fem.definition.network_tables import load_network_machine
+from spindle_fem.definition.network_load import load_network_machine
 from spindle_fem.errors import FaultsError, SpindleFemError
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.solvers.network_steady import solve_steady

@@ -12,7 +12,8 @@ import pytest
 
 from spindle_fem.cache import CACHE_VARIABLE, _module_file, cache_directory, source_digest
 from spindle_fem.errors import BadInputError, MeshTagError
-from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+from spindle_fem.machine.geometry.assembly import assemble
+from spindle_fem.machine.geometry.part_shapes import AnnularSegment, PartGeometry
 from spindle_fem.machine.meshing.mesh_cache import (
     cached_mesh,
     load_npz,

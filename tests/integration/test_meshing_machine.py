@@ -8,21 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scripts.design_space import draw_valid_designs
 from spindle_fem.cache import CACHE_VARIABLE
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import GeometryError, MeshQualityError, MeshTagError
-from spindle_fem.machine.geometry.assembly import (
+from spindle_fem.machine.geometry.assembly import assemble, build_assembly
+from spindle_fem.machine.geometry.cad_solids import build_solids, gmsh_session
+from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
+from spindle_fem.machine.geometry.part_shapes import (
     AnnularSegment,
     BallRowGeometry,
     FaceBox,
     PartGeometry,
     SurfaceDefinition,
-    assemble,
-    build_assembly,
 )
-from spindle_fem.machine.geometry.cad_solids import build_solids, gmsh_session
-from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
-from spindle_fem.machine.geometry.design_space import draw_valid_designs
 from spindle_fem.machine.geometry.step_file import export_step
 from spindle_fem.machine.meshing.build_mesh import build_mesh, generate_mesh
 from spindle_fem.machine.meshing.classify_faces import classify_face

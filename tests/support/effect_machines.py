@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from spindle_fem.definition.load import load_machine
-from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network

@@ -5,9 +5,9 @@ from spindle_fem.errors import OutOfValidityError
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
 from spindle_fem.physics.coolant.coolants.water import Water
-from spindle_fem.physics.coolant.film_map import film_map
 from spindle_fem.physics.coolant.regimes import FILM_MODELS, ChannelState, select_film
 from spindle_fem.physics.coolant.user_coolant import UserCoolant
+from spindle_fem.studies.sweep.film_map import film_map
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
 OIL = OilIsoVg32()

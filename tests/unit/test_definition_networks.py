@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import machine_folder
-from spindle_fem.definition.network_tables import (
+from spindle_fem.definition.network_load import (
     is_network_machine,
     load_network_machine,
     validate_network_machine,

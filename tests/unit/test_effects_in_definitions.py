@@ -9,7 +9,7 @@ import pytest
 
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import find_machine, load_machine, read_definition, validate, write_machine
-from spindle_fem.definition.network_tables import validate_network_machine, write_network_machine
+from spindle_fem.definition.network_load import validate_network_machine, write_network_machine
 from spindle_fem.effects.framework.effect import Candidate, Reading
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.errors import FaultsError

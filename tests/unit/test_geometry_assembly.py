@@ -8,14 +8,8 @@ import pytest
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import FaultsError, GeometryError
-from spindle_fem.machine.geometry.assembly import (
-    AnnularSegment,
-    FaceBox,
-    PartGeometry,
-    SurfaceDefinition,
-    assemble,
-    build_assembly,
-)
+from spindle_fem.machine.geometry.assembly import assemble, build_assembly
+from spindle_fem.machine.geometry.part_shapes import AnnularSegment, FaceBox, PartGeometry, SurfaceDefinition
 
 
 def ring(z_start, z_end, inner, outer):

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scripts.design_space import draw_valid_designs
 from spindle_fem.errors import FaultsError
-from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+from spindle_fem.machine.geometry.assembly import assemble
 from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition, ChannelGeometry
-from spindle_fem.machine.geometry.design_space import draw_valid_designs
+from spindle_fem.machine.geometry.part_shapes import AnnularSegment, PartGeometry
 
 
 def ring(z_start, z_end, inner, outer):

@@ -51,11 +51,7 @@ MAY_LOAD_PYVISTA = {"report", "cli"}
 # Climbs that are left to mend: from, to.
 OPEN: set[tuple[str, str]] = set()
 # Imports between files that close a circle: left to mend.
-OPEN_CIRCLES: tuple[tuple[str, str], ...] = (
-    ("spindle_fem.definition.network_faults", "spindle_fem.definition.network_tables"),
-    ("spindle_fem.machine.geometry.faces", "spindle_fem.machine.geometry.assembly"),
-    ("spindle_fem.machine.geometry.meridian", "spindle_fem.machine.geometry.assembly"),
-)
+OPEN_CIRCLES: tuple[tuple[str, str], ...] = ()
 
 
 def floor_of(module: str) -> str:

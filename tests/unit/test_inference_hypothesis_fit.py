@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
-from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.effects.registry import candidates_for, interval_effects
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.inference.candidate_response import BaseRun, Variant

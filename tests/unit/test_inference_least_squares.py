@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.errors import RecordingError
 from spindle_fem.inference.least_squares import BOUND_SIGMAS, calibrate, prediction_interval
 from spindle_fem.inference.predictor import NetworkPredictor, Prior

@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import ellipk
 
-from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+from spindle_fem.machine.geometry.assembly import assemble
+from spindle_fem.machine.geometry.part_shapes import AnnularSegment, PartGeometry
 from spindle_fem.model.lumped.cells import build_cells
 from spindle_fem.model.lumped.links import node_centres, solid_links
 from spindle_fem.model.lumped.partition import Partition

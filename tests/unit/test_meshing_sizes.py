@@ -7,8 +7,9 @@ import math
 import pytest
 
 from spindle_fem.errors import BadInputError
-from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+from spindle_fem.machine.geometry.assembly import assemble
 from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
+from spindle_fem.machine.geometry.part_shapes import AnnularSegment, PartGeometry
 from spindle_fem.machine.meshing.sizes import build_sizes, edge_sizes
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import load_machine
-from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import SpecError
 from spindle_fem.machine.view.build_view import view_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import machine_folder
-from spindle_fem.definition.network_tables import load_network_machine
+from spindle_fem.definition.network_load import load_network_machine
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.model.lumped.written_network import build_network

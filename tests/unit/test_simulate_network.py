@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from spindle_fem.definition.network_tables import validate_network_machine
+from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.errors import FaultsError, RecordingError, SpecError
 from spindle_fem.model.lumped.network_transient import simulate_transient
 from spindle_fem.model.lumped.written_network import build_network

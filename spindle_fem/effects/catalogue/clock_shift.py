@@ -8,19 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.card import Card
-from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
+from spindle_fem.effects.framework.effect import Array, Candidate, Reported
 from spindle_fem.effects.framework.filters import delayed
 from spindle_fem.effects.framework.laws import Complex, linear
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.sensor import Form, SensorEffect
-from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.effects.framework.sensor import ChannelReading, Form, SensorEffect
 
 
-class ShiftedReading(Reading):
+class ShiftedReading(ChannelReading):
     """The temperature of some seconds earlier."""
-
-    def __init__(self, channel: str, name: str, parameters: tuple[TermParameter, ...]) -> None:
-        self.channel, self.name, self.parameters = channel, name, parameters
 
     def read(
         self,
@@ -37,6 +33,7 @@ class ClockShift(SensorEffect):
     """A logger whose clock is off against that of the inputs."""
 
     name = "clock_shift"
+    reading_kind = ShiftedReading
     title = "the channel's clock is off"
     check = (
         "Clocks and time zones of the loggers, buffering and averaging on the way; give both one common mark."
@@ -54,10 +51,6 @@ class ClockShift(SensorEffect):
         most = 0.25 * machine.duration
         shift = linear("shift", 0.0, min(400.0, most), "s", low=-most, high=most)
         return {"": ((shift,), min(200.0, 0.5 * most), ({},))}
-
-    def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
-        """Of a channel."""
-        return ShiftedReading(channel, name, parameters)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How far."""

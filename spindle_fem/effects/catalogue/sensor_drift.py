@@ -8,22 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.card import Card
-from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
+from spindle_fem.effects.framework.effect import Array, Candidate, Reported
 from spindle_fem.effects.framework.laws import Complex, linear, softplus
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.sensor import Form, SensorEffect
-from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.effects.framework.sensor import ChannelReading, Form, SensorEffect
 
 LATER = "from a time on"
 # Of the bend where a drift begins, s.
 BEND = 60.0
 
 
-class DriftReading(Reading):
+class DriftReading(ChannelReading):
     """Temperature plus an error that grows in proportion to time, from zero or from an instant on."""
-
-    def __init__(self, channel: str, name: str, parameters: tuple[TermParameter, ...]) -> None:
-        self.channel, self.name, self.parameters = channel, name, parameters
 
     def read(
         self,
@@ -43,6 +39,7 @@ class SensorDrift(SensorEffect):
     """Error in proportion to time."""
 
     name = "sensor_drift"
+    reading_kind = DriftReading
     title = "the sensor drifts with time"
     check = "Cable, plug and moisture of the sensor; supply and cold junction of the logger; recalibrate."
     card = Card(
@@ -63,10 +60,6 @@ class SensorDrift(SensorEffect):
             "": ((rate,), reference, ({},)),
             LATER: ((rate, start), reference, [{"start": share * span} for share in (0.2, 0.4, 0.6, 0.8)]),
         }
-
-    def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
-        """Of a channel."""
-        return DriftReading(channel, name, parameters)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How fast."""

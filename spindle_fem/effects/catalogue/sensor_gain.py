@@ -8,20 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.card import Card
-from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
+from spindle_fem.effects.framework.effect import Array, Candidate, Reported
 from spindle_fem.effects.framework.laws import Complex, amplitude
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.sensor import Form, SensorEffect
-from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.effects.framework.sensor import ChannelReading, Form, SensorEffect
 
 PIVOT = 293.15
 
 
-class GainReading(Reading):
+class GainReading(ChannelReading):
     """Temperature with a wrong scale about 20 °C."""
-
-    def __init__(self, channel: str, name: str, parameters: tuple[TermParameter, ...]) -> None:
-        self.channel, self.name, self.parameters = channel, name, parameters
 
     def read(
         self,
@@ -38,6 +34,7 @@ class SensorGain(SensorEffect):
     """Wrong scale, or a sensor that is badly coupled to what it measures."""
 
     name = "sensor_gain"
+    reading_kind = GainReading
     title = "the sensor's scale is wrong: it errs the more the further it is from 20 °C"
     check = "Sensor type and scaling set in the logger; calibrate at two temperatures (ice and 60 °C)."
     card = Card(
@@ -51,10 +48,6 @@ class SensorGain(SensorEffect):
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """One form."""
         return {"": ((amplitude("gain", 0.15, null=1.0, low=0.0, high=5.0),), 1.1, ({},))}
-
-    def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
-        """Of a channel."""
-        return GainReading(channel, name, parameters)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """The scale."""

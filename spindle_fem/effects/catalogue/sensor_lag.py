@@ -8,19 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.card import Card
-from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
+from spindle_fem.effects.framework.effect import Array, Candidate, Reported
 from spindle_fem.effects.framework.filters import first_order_lag
 from spindle_fem.effects.framework.laws import Complex, amplitude
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.sensor import Form, SensorEffect
-from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.effects.framework.sensor import ChannelReading, Form, SensorEffect
 
 
-class LagReading(Reading):
+class LagReading(ChannelReading):
     """First-order lag from the first value."""
-
-    def __init__(self, channel: str, name: str, parameters: tuple[TermParameter, ...]) -> None:
-        self.channel, self.name, self.parameters = channel, name, parameters
 
     def read(
         self,
@@ -42,6 +38,7 @@ class SensorLag(SensorEffect):
     """
 
     name = "sensor_lag"
+    reading_kind = LagReading
     title = "the sensor follows the temperature late"
     check = (
         "Seat of the sensor: is it pushed home, with thermal paste, and not in a thick well? Touch it "
@@ -60,10 +57,6 @@ class SensorLag(SensorEffect):
         longest = 0.5 * machine.duration
         size = amplitude("time_constant", min(300.0, longest), "s", high=longest)
         return {"": ((size,), min(200.0, 0.5 * longest), ({},))}
-
-    def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
-        """Of a channel."""
-        return LagReading(channel, name, parameters)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How late."""

@@ -8,18 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.card import Card
-from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
+from spindle_fem.effects.framework.effect import Array, Candidate, Reported
 from spindle_fem.effects.framework.laws import Complex, linear
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.sensor import Form, SensorEffect
-from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.effects.framework.sensor import ChannelReading, Form, SensorEffect
 
 
-class OffsetReading(Reading):
+class OffsetReading(ChannelReading):
     """Temperature plus a constant."""
-
-    def __init__(self, channel: str, name: str, parameters: tuple[TermParameter, ...]) -> None:
-        self.channel, self.name, self.parameters = channel, name, parameters
 
     def read(
         self,
@@ -36,6 +32,7 @@ class SensorOffset(SensorEffect):
     """Constant error; class B resistance sensors err by 0.3 K + 0.005 |t| (IEC 60751)."""
 
     name = "sensor_offset"
+    reading_kind = OffsetReading
     title = "the sensor reads a constant too much or too little"
     check = (
         "Compare the sensor with a reference in one bath or before the start, when everything has one "
@@ -52,10 +49,6 @@ class SensorOffset(SensorEffect):
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """One form."""
         return {"": ((linear("offset", 0.0, 1.5, "K", low=-50.0, high=50.0),), 1.0, ({},))}
-
-    def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
-        """Of a channel."""
-        return OffsetReading(channel, name, parameters)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """By how much."""

@@ -13,18 +13,32 @@ from spindle_fem.effects.framework.term import TermParameter
 Form = tuple[tuple[TermParameter, ...], float, Sequence[Mapping[str, float]]]
 
 
+class ChannelReading(Reading):
+    """A reading that takes nothing but its channel and its parameters."""
+
+    def __init__(self, channel: str, name: str, parameters: tuple[TermParameter, ...]) -> None:
+        self.channel, self.name, self.parameters = channel, name, parameters
+
+
 class SensorEffect(Effect):
-    """One candidate for every channel and form."""
+    """One candidate for every channel and form.
+
+    Attributes
+    ----------
+    reading_kind : type of ChannelReading
+        What the sensor tells; an effect whose reading needs more has a ``reading`` of its own.
+    """
 
     kind = "sensor"
+    reading_kind: type[ChannelReading]
 
     @abstractmethod
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """Parameters, reference and starts of every form."""
 
-    @abstractmethod
     def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
         """The reading of a channel."""
+        return self.reading_kind(channel, name, parameters)
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Every channel."""

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from spindle_fem.machine.geometry.assembly import FaceBox
-
-Facing = Literal["outward", "inward", "front", "rear"]
+from spindle_fem.machine.geometry.part_shapes import FaceBox, Facing
 
 NANOMETRES = 1.0e9
 VOID = -1

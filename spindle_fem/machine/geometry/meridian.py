@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,7 @@ from spindle_fem.machine.geometry.faces import (
     merge_pieces,
     to_nanometres,
 )
-
-if TYPE_CHECKING:
-    from spindle_fem.machine.geometry.assembly import PartGeometry, SurfaceDefinition
+from spindle_fem.machine.geometry.part_shapes import PartGeometry, SurfaceDefinition
 
 
 @dataclass(frozen=True, slots=True)

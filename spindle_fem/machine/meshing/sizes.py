@@ -9,8 +9,9 @@ from types import MappingProxyType
 from typing import Literal
 
 from spindle_fem.errors import BadInputError, did_you_mean
-from spindle_fem.machine.geometry.assembly import AssemblyGeometry, PartGeometry
+from spindle_fem.machine.geometry.assembly import AssemblyGeometry
 from spindle_fem.machine.geometry.faces import MeridianEdge
+from spindle_fem.machine.geometry.part_shapes import PartGeometry
 
 Preset = Literal["coarse", "normal", "fine"]
 
@@ -116,7 +117,8 @@ def build_sizes(
     BadInputError
         Unknown preset, unknown name or a size that is not positive.
 
-    >>> from spindle_fem.machine.geometry.assembly import AnnularSegment, PartGeometry, assemble
+    >>> from spindle_fem.machine.geometry.assembly import assemble
+    from spindle_fem.machine.geometry.part_shapes import AnnularSegment, PartGeometry
     >>> ring = PartGeometry("ring", (AnnularSegment(0.0, 0.02, 0.05, 0.06),))
     >>> round(build_sizes(assemble([ring]), "normal").part["ring"], 6)
     0.01

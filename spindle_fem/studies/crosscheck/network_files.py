@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.network_tables import validate_network_machine, write_network_machine
+from spindle_fem.definition.network_load import validate_network_machine, write_network_machine
 from spindle_fem.operation.bearing_heat import HeatModel
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.studies.crosscheck.flux_matched import MatchedNetwork

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.duct_friction import channel_pressure_drop
-from spindle_fem.physics.coolant.film_map import FilmMap, film_map
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.physics.coolant.transition import critical_reynolds_schmidt
+from spindle_fem.studies.sweep.film_map import FilmMap, film_map
 from spindle_fem.units import ZERO_CELSIUS_K
 
 PAPER_DEPTH, PAPER_TEMPERATURE = 19.0e-3, 31.0 + ZERO_CELSIUS_K

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from spindle_fem.errors import FaultsError
-from spindle_fem.machine.geometry.assembly import AssemblyGeometry, PartGeometry, SurfaceDefinition, assemble
+from spindle_fem.machine.geometry.assembly import AssemblyGeometry, assemble
 from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
+from spindle_fem.machine.geometry.part_shapes import PartGeometry, SurfaceDefinition
 
 # Range of each dimension, m; turns, starts and hand are drawn from lists.
 DEPTH_RANGE = (5.0e-3, 30.0e-3)

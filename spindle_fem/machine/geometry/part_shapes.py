@@ -1,0 +1,65 @@
+"""What a machine is drawn from: rings of its parts, boxes that pick faces, named surfaces, rows of balls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Facing = Literal["outward", "inward", "front", "rear"]
+
+
+@dataclass(frozen=True, slots=True)
+class AnnularSegment:
+    """A ring of rectangular meridian section, lengths in m."""
+
+    z_start: float
+    z_end: float
+    inner_radius: float
+    outer_radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class PartGeometry:
+    """A solid of revolution: its segments fused into one."""
+
+    name: str
+    segments: tuple[AnnularSegment, ...]
+    rotating: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FaceBox:
+    """Exposed faces that look one way and lie between bounds, lengths in m.
+
+    Attributes
+    ----------
+    facing : {"outward", "inward", "front", "rear"}
+        Direction of the normal: +r, -r, -z, +z.
+    z, r : (low, high) or None
+        A face that lies in the range only in part is split there; None takes
+        every face. A plane face is asked for with equal bounds or a range.
+    """
+
+    facing: Facing
+    z: tuple[float, float] | None = None
+    r: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceDefinition:
+    """A named exposed surface of one part, the union of its boxes."""
+
+    name: str
+    part: str
+    where: tuple[FaceBox, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BallRowGeometry:
+    """Balls of a bearing: drawn in the solid model, one temperature in the mesh."""
+
+    name: str
+    z: float
+    pitch_radius: float
+    ball_diameter: float
+    ball_count: int
