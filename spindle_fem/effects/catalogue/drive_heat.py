@@ -9,7 +9,7 @@ from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.speed_heat import SpeedHeatTerm
+from spindle_fem.effects.framework.speed_heat import SpeedHeatTerm, turning_places
 
 NAME = "heat_at_3000rpm"
 
@@ -43,33 +43,23 @@ class DriveHeat(Effect):
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Lagging, or at once; nodes of a network with something turning."""
-        keys = machine.spots if machine.kind == "network" else ("drive_end",)
+        size = (NAME, max(10.0, 0.25 * machine.typical_heat), 3000.0 * RPM)
         found = []
-        for key in keys:
-            speeds = machine.speeds(key)
-            for speed in speeds if key in machine.heat else ():
-                own = speed if len(speeds) > 1 else ""
-                for word, lag in (("lag", 900.0), ("prompt", 0.0)):
-                    form = f"{own} {word}".strip()
-                    size = (NAME, max(10.0, 0.25 * machine.typical_heat), 3000.0 * RPM)
-                    term = SpeedHeatTerm(
-                        self.term_name(key, form),
-                        machine.heat[key],
-                        speed,
-                        size,
-                        exponent=(1.3, 0.35),
-                        lag=lag,
+        for key, speed, own in turning_places(machine, ("drive_end",)):
+            for word, lag in (("lag", 900.0), ("prompt", 0.0)):
+                form = f"{own} {word}".strip()
+                name = self.term_name(key, form)
+                term = SpeedHeatTerm(name, machine.heat[key], speed, size, exponent=(1.3, 0.35), lag=lag)
+                found.append(
+                    self.candidate(
+                        machine.component(key),
+                        term,
+                        amplitude=NAME,
+                        reference=size[1],
+                        form=machine.form(key, form),
+                        starts=[{"lag": 300.0}, {"lag": 900.0}, {"lag": 2500.0}] if lag else ({},),
                     )
-                    found.append(
-                        self.candidate(
-                            machine.component(key),
-                            term,
-                            amplitude=NAME,
-                            reference=size[1],
-                            form=machine.form(key, form),
-                            starts=[{"lag": 300.0}, {"lag": 900.0}, {"lag": 2500.0}] if lag else ({},),
-                        )
-                    )
+                )
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.card import Card
-from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
+from spindle_fem.effects.framework.effect import Candidate, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, power
-from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.outside_film_law import (
     REFERENCE_DIFFERENCE,
+    OutsideFilmEffect,
     OutsideFilmTerm,
-    of_films,
-    outside_films,
 )
-from spindle_fem.effects.framework.term import TermContext
+from spindle_fem.effects.framework.term import TermContext, TermParameter
 
 # Rounds the law off where wall and air have one temperature, K.
 ROUNDING = 0.5
@@ -30,14 +28,14 @@ class NaturalConvectionTerm(OutsideFilmTerm):
         return power(square, 0.5 * context.parameters["exponent"])
 
 
-class NaturalConvection(Effect):
+class NaturalConvection(OutsideFilmEffect):
     """Nusselt number with the power 1/4 (laminar) to 1/3 (turbulent) of the difference.
 
     Source: Churchill & Chu (1975), Int. J. Heat Mass Transfer 18, 1049-1053, 1323-1329.
     """
 
     name = "natural_convection"
-    kind = "missing_physics"
+    term_kind = NaturalConvectionTerm
     title = "the outside film grows with the temperature difference to the room"
     check = (
         "Outside surfaces for covers, draught and dirt; measure wall and air temperature at two steady "
@@ -55,20 +53,12 @@ class NaturalConvection(Effect):
         """A natural film has free convection and radiation."""
         return any(isinstance(film, NaturalFilm) for film in spec.film)
 
-    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """The standing outside; boundary links of a network."""
-        found = []
-        for key, films in outside_films(machine).items():
-            parameters = (
-                amplitude("convective_share", 0.7, high=5.0),
-                linear("exponent", 0.3, 0.08, low=0.1, high=1.0),
-                linear("carried_share", 0.5, 0.4, low=0.0, high=1.0),
-            )
-            term = NaturalConvectionTerm(self.term_name(key), *of_films(machine, films), parameters)
-            found.append(
-                self.candidate(machine.component(key), term, amplitude="convective_share", reference=0.7)
-            )
-        return tuple(found)
+    def free_parameters(self) -> tuple[TermParameter, ...]:
+        """Share of the nominal film at the reference difference, and its power."""
+        return (
+            amplitude("convective_share", 0.7, high=5.0),
+            linear("exponent", 0.3, 0.08, low=0.1, high=1.0),
+        )
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How strongly the film follows."""

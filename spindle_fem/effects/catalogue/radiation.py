@@ -6,17 +6,15 @@ from collections.abc import Mapping
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.card import Card
-from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
-from spindle_fem.effects.framework.laws import Complex, amplitude, linear
-from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.effect import Candidate, Reported, capital, place_words
+from spindle_fem.effects.framework.laws import Complex, amplitude
 from spindle_fem.effects.framework.outside_film_law import (
     REFERENCE_DIFFERENCE,
     REFERENCE_TEMPERATURE,
+    OutsideFilmEffect,
     OutsideFilmTerm,
-    of_films,
-    outside_films,
 )
-from spindle_fem.effects.framework.term import TermContext
+from spindle_fem.effects.framework.term import TermContext, TermParameter
 
 
 def radiative(wall: Complex, fluid: Complex) -> Complex:
@@ -35,7 +33,7 @@ class RadiationTerm(OutsideFilmTerm):
         return radiative(wall, fluid) / NOMINAL
 
 
-class Radiation(Effect):
+class Radiation(OutsideFilmEffect):
     """Exchange with large surroundings by the fourth power.
 
     Source: Stefan-Boltzmann law; 5.7 W/(m²·K) for a black wall at 293 K, so
@@ -43,7 +41,7 @@ class Radiation(Effect):
     """
 
     name = "radiation"
-    kind = "missing_physics"
+    term_kind = RadiationTerm
     title = "surfaces lose heat by radiation, faster than in proportion to their temperature"
     check = (
         "Paint and bare metal of the outside (emissivity), hot or cold bodies in sight (oven, window, "
@@ -61,19 +59,9 @@ class Radiation(Effect):
         """A natural film has free convection and radiation."""
         return any(isinstance(film, NaturalFilm) for film in spec.film)
 
-    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """The standing outside; boundary links of a network."""
-        found = []
-        for key, films in outside_films(machine).items():
-            parameters = (
-                amplitude("radiative_share", 0.6, high=5.0),
-                linear("carried_share", 0.5, 0.4, low=0.0, high=1.0),
-            )
-            term = RadiationTerm(self.term_name(key), *of_films(machine, films), parameters)
-            found.append(
-                self.candidate(machine.component(key), term, amplitude="radiative_share", reference=0.6)
-            )
-        return tuple(found)
+    def free_parameters(self) -> tuple[TermParameter, ...]:
+        """Share of the nominal film at the reference difference."""
+        return (amplitude("radiative_share", 0.6, high=5.0),)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How large the part is."""

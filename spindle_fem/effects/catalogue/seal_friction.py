@@ -9,7 +9,7 @@ from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.speed_heat import SpeedHeatTerm
+from spindle_fem.effects.framework.speed_heat import SpeedHeatTerm, turning_places
 
 NAME = "heat_per_1000rpm"
 # Forms, and how likely they are: most machines have run before.
@@ -49,34 +49,30 @@ class SealFriction(Effect):
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Lasting or running in, at both shaft ends; every node of a network that has something turning."""
-        ends = machine.spots if machine.kind == "network" else ("nose", "drive_end")
+        size = (NAME, max(5.0, 0.1 * machine.typical_heat), 1000.0 * RPM)
         found = []
-        for key in ends:
-            speeds = machine.speeds(key)
-            for speed in speeds if key in machine.heat else ():
-                own = speed if len(speeds) > 1 else ""
-                size = (NAME, max(5.0, 0.1 * machine.typical_heat), 1000.0 * RPM)
-                for word, likelihood in LIKELIHOODS.items():
-                    form = f"{own} {word}".strip()
-                    term = SpeedHeatTerm(
-                        self.term_name(key, form),
-                        machine.heat[key],
-                        speed,
-                        size,
-                        exponent=(1.0, 0.1),
-                        beside=machine.heat.get(f"standing_{key}", ()),
-                        runs_in=word == RUNS_IN,
+        for key, speed, own in turning_places(machine, ("nose", "drive_end")):
+            for word, likelihood in LIKELIHOODS.items():
+                form = f"{own} {word}".strip()
+                term = SpeedHeatTerm(
+                    self.term_name(key, form),
+                    machine.heat[key],
+                    speed,
+                    size,
+                    exponent=(1.0, 0.1),
+                    beside=machine.heat.get(f"standing_{key}", ()),
+                    runs_in=word == RUNS_IN,
+                )
+                found.append(
+                    self.candidate(
+                        machine.component(key),
+                        term,
+                        amplitude=NAME,
+                        reference=size[1],
+                        form=machine.form(key, form),
+                        likelihood=likelihood,
                     )
-                    found.append(
-                        self.candidate(
-                            machine.component(key),
-                            term,
-                            amplitude=NAME,
-                            reference=size[1],
-                            form=machine.form(key, form),
-                            likelihood=likelihood,
-                        )
-                    )
+                )
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

@@ -9,7 +9,7 @@ from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.speed_heat import SpeedHeatTerm
+from spindle_fem.effects.framework.speed_heat import SpeedHeatTerm, turning_places
 
 NAME = "heat_at_4500rpm"
 
@@ -45,23 +45,19 @@ class Windage(Effect):
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """The shaft; every node of a network that has something turning."""
-        keys = machine.spots if machine.kind == "network" else ("shaft_gap",)
+        size = (NAME, max(10.0, 0.25 * machine.typical_heat), 4500.0 * RPM)
         found = []
-        for key in keys:
-            speeds = machine.speeds(key)
-            for speed in speeds if key in machine.heat else ():
-                form = speed if len(speeds) > 1 else ""
-                size = (NAME, max(10.0, 0.25 * machine.typical_heat), 4500.0 * RPM)
-                term = SpeedHeatTerm(
-                    self.term_name(key, form),
-                    machine.heat[key],
-                    speed,
-                    size,
-                    exponent=(3.0, 0.15),
-                    beside=machine.heat.get("standing_gap", ()) if key == "shaft_gap" else (),
-                )
-                component = "shaft" if machine.kind == "geometry" else machine.component(key)
-                found.append(self.candidate(component, term, amplitude=NAME, reference=size[1], form=form))
+        for key, speed, form in turning_places(machine, ("shaft_gap",)):
+            term = SpeedHeatTerm(
+                self.term_name(key, form),
+                machine.heat[key],
+                speed,
+                size,
+                exponent=(3.0, 0.15),
+                beside=machine.heat.get("standing_gap", ()) if key == "shaft_gap" else (),
+            )
+            component = "shaft" if machine.kind == "geometry" else machine.component(key)
+            found.append(self.candidate(component, term, amplitude=NAME, reference=size[1], form=form))
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

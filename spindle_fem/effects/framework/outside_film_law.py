@@ -6,7 +6,8 @@ from abc import abstractmethod
 
 import numpy as np
 
-from spindle_fem.effects.framework.laws import Complex, columns, fluid_temperature
+from spindle_fem.effects.framework.effect import Candidate, Effect
+from spindle_fem.effects.framework.laws import Complex, columns, fluid_temperature, linear
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
 
@@ -59,13 +60,37 @@ class OutsideFilmTerm(Term):
         return found
 
 
-def outside_films(machine: MachineView) -> dict[str, tuple[str, ...]]:
-    """Films by component: those of the standing outside; every boundary link of a network."""
-    if machine.kind == "network":
-        return {key: films for key, films in machine.films.items() if films}
-    return {"housing": machine.films["housing"]} if machine.films.get("housing") else {}
+class OutsideFilmEffect(Effect):
+    """One candidate for the standing outside, and for every boundary link of a network.
 
+    Attributes
+    ----------
+    term_kind : type of OutsideFilmTerm
+    """
 
-def of_films(machine: MachineView, films: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
-    """Films, their walls and fluids."""
-    return films, tuple(machine.walls[f] for f in films), tuple(machine.fluids[f] for f in films)
+    kind = "missing_physics"
+    term_kind: type[OutsideFilmTerm]
+
+    @abstractmethod
+    def free_parameters(self) -> tuple[TermParameter, ...]:
+        """The amplitude, at whose size responses are screened, and the shape."""
+
+    def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
+        """The standing outside; boundary links of a network."""
+        if machine.kind == "network":
+            places = {key: films for key, films in machine.films.items() if films}
+        else:
+            places = {"housing": machine.films["housing"]} if machine.films.get("housing") else {}
+        found = []
+        for key, films in places.items():
+            parameters = (*self.free_parameters(), linear("carried_share", 0.5, 0.4, low=0.0, high=1.0))
+            walls, fluids = (
+                tuple(known[film] for film in films) for known in (machine.walls, machine.fluids)
+            )
+            term = self.term_kind(self.term_name(key), films, walls, fluids, parameters)
+            found.append(
+                self.candidate(
+                    machine.component(key), term, amplitude=parameters[0].name, reference=parameters[0].sigma
+                )
+            )
+        return tuple(found)

@@ -2,15 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, power, relaxed, repeated, shape
+from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermContext
 
 # Before any data: value and standard deviation.
 SHARE_BESIDE = (0.15, 0.15)
 # Of what runs in: heat beyond the lasting one when new, and its time constant with its logarithm's deviation.
 RUN_IN, RUN_IN_TIME = (0.3, 0.3), (5000.0, 0.8)
+
+
+def turning_places(machine: MachineView, places: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
+    """Where heat may follow a speed: place, speed, and how a form tells the speed from others there.
+
+    Parameters
+    ----------
+    machine : MachineView
+    places : tuple of str
+        Of a machine with geometry; in a network every node with something turning.
+    """
+    for key in machine.spots if machine.kind == "network" else places:
+        speeds = machine.speeds(key)
+        for speed in speeds if key in machine.heat else ():
+            yield key, speed, speed if len(speeds) > 1 else ""
 
 
 class SpeedHeatTerm(Term):
