@@ -33,6 +33,10 @@ fi
 [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,cluster,optimise]'
 
+# What a first run would wait for: compiled while the pictures' libraries are checked.
+"$venv/bin/python" -m spindle_fem.model.mesh.kernels.compile &
+compiling=$!
+
 works() { "$venv/bin/python" -c 'import gmsh, vtk, pyvista as pv
 p = pv.Plotter(off_screen=True, window_size=(64, 64)); p.add_mesh(pv.Sphere()); p.screenshot(None)' >/dev/null 2>&1; }
 if ! works; then
@@ -45,3 +49,5 @@ if ! works; then
         exit 1
     }
 fi
+
+wait "$compiling"

@@ -14,6 +14,7 @@ from __future__ import annotations
 from spindle_fem.parallel.background_process import BackgroundProcess
 from spindle_fem.parallel.worker_pool import Shared, WorkerPool
 from spindle_fem.parallel.worker_threads import (
+    beside,
     core_count,
     hand_over,
     in_threads,
@@ -26,6 +27,7 @@ __all__ = [
     "BackgroundProcess",
     "Shared",
     "WorkerPool",
+    "beside",
     "core_count",
     "hand_over",
     "in_threads",

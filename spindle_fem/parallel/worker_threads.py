@@ -114,3 +114,28 @@ def in_threads(jobs: Sequence[Job]) -> list:
         if error is not None:
             raise error
     return answers
+
+
+def beside(job: Job) -> Job:
+    """Start a job in another thread; what is returned waits for it and gives its answer.
+
+    With one core the job begins when it is waited for.
+    """
+    if core_count() == 1:
+        return job
+    answer: queue.SimpleQueue = queue.SimpleQueue()
+
+    def work() -> None:
+        try:
+            answer.put((job(), None))
+        except Exception as error:  # noqa: BLE001 - who waits raises it
+            answer.put((None, error))
+
+    def wait() -> Any:
+        value, error = answer.get()
+        if error is not None:
+            raise error
+        return value
+
+    hand_over(1, work)
+    return wait

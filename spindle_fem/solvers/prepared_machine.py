@@ -14,11 +14,13 @@ from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.model.mesh.kernels.compile import compile_kernels
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
 from spindle_fem.operation.bearing_heat import at_assembly_size, heat_model_of
 from spindle_fem.operation.coefficients import joint_conductances
 from spindle_fem.operation.loads import Loads
 from spindle_fem.operation.machine_loads import FieldState, LoadsBuilder
+from spindle_fem.parallel import beside
 
 Progress = Callable[[str], None]
 
@@ -102,6 +104,7 @@ def prepare_machine(
     """
     clock = Clock(progress)
     clock.begin("geometry")
+    kernels = beside(compile_kernels)
     assembly = build_assembly(spec)
     clock.begin("mesh")
     mesh = build_mesh(
@@ -111,6 +114,7 @@ def prepare_machine(
         sizes=spec.mesh.size,
     )
     clock.begin("assembly")
+    kernels()
     operators = build_operators(mesh, spec.mesh.order)
     machine = machine_on_mesh(spec, mesh, operators)
     clock.end()

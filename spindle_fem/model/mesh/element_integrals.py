@@ -138,10 +138,14 @@ def elements_by_forms(loaded: SkfemMesh) -> ElementIntegrals:
     _require_upright(int(np.sum(np.any(loaded.basis.mapping.detDF(loaded.basis.X) <= 0.0, axis=1))))
     rows, columns = upper_pairs(loaded.basis.Nbfun)
     load = forms.source.elemental(loaded.basis).tolocal()
+    conduction, storage = (
+        np.ascontiguousarray(form.elemental(loaded.basis).tolocal()[:, rows, columns])
+        for form in (forms.conduction, forms.capacity)
+    )
     return ElementIntegrals(
-        forms.conduction.elemental(loaded.basis).tolocal()[:, rows, columns],
-        forms.capacity.elemental(loaded.basis).tolocal()[:, rows, columns],
-        load,
+        conduction,
+        storage,
+        np.ascontiguousarray(load),
         # shape functions sum to one
         load.sum(axis=1),
     )

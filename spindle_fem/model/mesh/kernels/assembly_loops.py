@@ -105,7 +105,9 @@ def fill_upper(low, high, elements, starts, members, extra_starts, extra, counts
                 seen[count] = elements[e, k]
                 last[elements[e, k]] = count
                 count += np.uint32(1)
-        kept = write_row(i, extra_starts, extra, seen, last, count, indices, end)
+        kept = write_row(
+            np.uint32(i), extra_starts, extra, seen, last, np.uint32(count), indices, np.uint32(end)
+        )
         counts[i + 1] = kept
         end += kept
     return end
@@ -141,7 +143,9 @@ def write_row(i, extra_starts, extra, seen, last, count, indices, end):
 def find_pairs(low, high, one, other, indptr, indices, slots):
     """Upper entry that couples two nodes, for each pair of a range; -1 where there is none."""
     for pair in range(low, high):
-        i, j = min(one[pair], other[pair]), max(one[pair], other[pair])
+        i, j = one[pair], other[pair]
+        if j < i:
+            i, j = j, i
         slots[pair] = -1
         for place in range(indptr[i], indptr[i + np.uint32(1)]):
             if indices[place] == j:

@@ -92,7 +92,9 @@ def fill_linear_rows(
                 last[j] = count
                 count += one
         begin = end
-        end += write_row(i, extra_starts, extra, seen, last, count, indices, begin)
+        end += write_row(
+            np.uint32(i), extra_starts, extra, seen, last, np.uint32(count), indices, np.uint32(begin)
+        )
         conduction[begin], storage[begin] = around, volume / 10.0
         load[i] = 0.25 * volume
         part_of_slot[begin] = part[i]
