@@ -18,7 +18,7 @@ _PACKAGES = (
     "scikit-fem",
     "gmsh",
     "pygmsh",
-    "pyamg",
+    "numba",
     "pyvista",
     "vtk",
     "pydantic",

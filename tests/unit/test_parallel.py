@@ -232,3 +232,18 @@ def test_nothing_else_starts_threads_or_processes():
         "parallel/worker_pool.py",
         "parallel/worker_threads.py",
     }
+
+
+def test_a_job_beside_gives_its_answer_or_its_error_when_it_is_waited_for():
+    assert parallel.beside(lambda: 7)() == 7
+    with pytest.raises(BadInputError, match="it was refused"):
+        parallel.beside(refuse)()
+
+
+def test_with_one_core_a_job_beside_begins_when_it_is_waited_for(monkeypatch):
+    monkeypatch.setattr("spindle_fem.parallel.worker_threads.core_count", lambda: 1)
+    seen = []
+    waiting = parallel.beside(lambda: seen.append(1))
+    assert seen == []
+    waiting()
+    assert seen == [1]
