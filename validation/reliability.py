@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import expit, logit
+from scipy.special import expit
+
+from spindle_fem.inference.reliability import features
 
 from .score import first_right
 
 Array = NDArray[np.float64]
 
-# As the tool has them.
-LARGEST_PROBABILITY, SMALLEST_SHARE = 0.9999, 1e-3
 NAMES = (
     "constant",
     "by the logit of evidence",
@@ -29,17 +29,6 @@ NAMES = (
 )
 # Precision of the normal prior of every coefficient but the constant: few cases are wrong.
 RIDGE = 0.6
-
-
-def features(size: int, probability: float, share: float, more: float) -> list[float]:
-    """What a set's reliability is told by.
-
-    >>> features(3, 0.5, 0.1, 9.0)
-    [1.0, 0.0, 1.0, -1.0, 1.0]
-    """
-    given = float(logit(np.clip(probability, 1.0 - LARGEST_PROBABILITY, LARGEST_PROBABILITY)))
-    by_share = float(np.log10(max(share, SMALLEST_SHARE)))
-    return [1.0, given, float(max(0, size - 2)), by_share, float(np.log10(1.0 + more))]
 
 
 def experience(study: Path, results: Path) -> tuple[Array, Array]:
@@ -67,8 +56,10 @@ def experience(study: Path, results: Path) -> tuple[Array, Array]:
             evidence = diagnosis.get("evidence")
             if evidence is None:
                 raise SystemExit(f"{found}: says nothing of evidence. Diagnose the study anew.")
-            told = (evidence[key] for key in ("probability", "share_of_last", "gain_of_more"))
-            rows.append(features(len(diagnosis["findings"]), *told))
+            probability, share, more = (
+                evidence[key] for key in ("probability", "share_of_last", "gain_of_more")
+            )
+            rows.append(features(probability, len(diagnosis["findings"]), share, more))
             right.append(float(first_right(answer, diagnosis["findings"])))
     return np.array(rows).reshape(-1, len(NAMES)), np.array(right)
 

@@ -353,7 +353,7 @@ def by_strength(
 
 
 def effect_confusion(rows: list[dict[str, Any]]) -> dict[str, dict[str, int]]:
-    """Of every concealed single effect, what was named first."""
+    """What was named first for every concealed single effect, counted."""
     out: dict[str, Counter[str]] = {}
     for row in rows:
         if len(row["truth"]) > 1:

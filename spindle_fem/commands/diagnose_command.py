@@ -156,7 +156,9 @@ def _draw(place: Path, content: Mapping[str, Any]) -> Mapping[str, list[Any]]:
 
 def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, report: bool) -> dict[str, Any]:
     """Write predictions, states, the improved machine and the data of the report; the content so far."""
-    before, after = (predictions_at_stamps(diagnosis.plant, fit) for fit in (diagnosis.null, diagnosis.final))
+    before, after = (
+        predictions_at_stamps(diagnosis.predictor, fit) for fit in (diagnosis.null, diagnosis.final)
+    )
     _write_predictions(diagnosis, place, "before", before)
     _write_predictions(diagnosis, place, "after", after)
     content = diagnosis_content(diagnosis, opened, before, after)
@@ -179,7 +181,7 @@ def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, repor
 
 def _write_predictions(diagnosis: Diagnosis, place: Path, name: str, predicted: Sequence[np.ndarray]) -> None:
     """What every channel should read beside what it read, a file a recording."""
-    recordings = diagnosis.plant.recordings
+    recordings = diagnosis.predictor.recordings
     for number, recording in enumerate(recordings):
         label = f"_{number + 1}" if len(recordings) > 1 else ""
         write_simulated(place / f"{name}{label}.csv", recording, predicted[number])

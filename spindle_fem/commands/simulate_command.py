@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from spindle_fem.inference.least_squares import LEVEL, Calibration
+from spindle_fem.inference.calibration import LEVEL, Calibration
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import ALL, Comparison, simulation_summary, write_simulated
 from spindle_fem.report.read_against_predicted import draw_channels

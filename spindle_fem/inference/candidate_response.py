@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import COOLANT_INLET, FLUID_PREFIX, Term
-from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.reduced_transient import TransientRun
 from spindle_fem.operation.effect_terms import Derivatives, EffectTerms, Instants
 from spindle_fem.operation.term_memory import remembered
@@ -62,7 +62,7 @@ class BaseRun:
 
     Parameters
     ----------
-    plant : Plant
+    predictor : Predictor
     number : int
         Recording.
     values : mapping of str to float
@@ -71,16 +71,25 @@ class BaseRun:
     """
 
     def __init__(
-        self, plant: Plant, number: int, values: Mapping[str, float], candidates: Sequence[Candidate] = ()
+        self,
+        predictor: Predictor,
+        number: int,
+        values: Mapping[str, float],
+        candidates: Sequence[Candidate] = (),
     ) -> None:
-        self.plant, self.number, self.values, self.candidates = plant, number, dict(values), tuple(candidates)
-        self.run: TransientRun = plant.transient(number, values, candidates)
-        self.states, self.tracks = self.run.march(plant.start(number, values))
+        self.predictor, self.number, self.values, self.candidates = (
+            predictor,
+            number,
+            dict(values),
+            tuple(candidates),
+        )
+        self.run: TransientRun = predictor.transient(number, values, candidates)
+        self.states, self.tracks = self.run.march(predictor.start(number, values))
         drive = self.run.drive
         self.drive = drive
         self.start_inputs = {name: drive.start[:, i] for i, name in enumerate(drive.names)}
         self.end_inputs = {name: drive.end[:, i] for i, name in enumerate(drive.names)}
-        self.columns = plant.columns[number]
+        self.columns = predictor.columns[number]
         self._coefficient: dict[str, Array] = {}
         self._told: Array | None = None
 
@@ -88,7 +97,7 @@ class BaseRun:
     def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
         """Channels' answer (G + 1, c, m) to changes of states (G + 1, r, m) and coolant inlet."""
         owner = np.append(self.run.step_class, self.run.step_class[-1])
-        column = self.plant.fast.inlet_column if inlet is not None else None
+        column = self.predictor.fast.inlet_column if inlet is not None else None
         found = np.zeros((tangent.shape[0], len(self.columns), tangent.shape[2]))
         for number in np.unique(owner):
             operators, rows = self.run.operators[number], np.flatnonzero(owner == number)
@@ -111,7 +120,7 @@ class BaseRun:
 
     def place_temperature(self, place: str) -> Array:
         """Mean temperature of a place at the grid, (G + 1,) K."""
-        return self.states @ self.plant.fast.model.place(place)
+        return self.states @ self.predictor.fast.model.place(place)
 
     # ------------------------------------------------------------------ candidates
     def responses(self, variants: Sequence[Variant]) -> Array:
@@ -137,7 +146,7 @@ class BaseRun:
         return found
 
     def _dynamic(self, variants: Sequence[Variant]) -> Array:
-        steps, size = len(self.drive.steps), self.plant.fast.model.size
+        steps, size = len(self.drive.steps), self.predictor.fast.model.size
         start, end = np.zeros((steps, size, len(variants))), np.zeros((steps, size, len(variants)))
         inlet = np.zeros((steps + 1, len(variants)))
         for position, variant in enumerate(variants):
@@ -174,7 +183,7 @@ class BaseRun:
 
     def _load(self, terms: EffectTerms, memory: Array, before: bool) -> tuple[Array, Array | None]:
         """Load that a term adds at one end of every step, (G, r), and its shift of the inlet."""
-        fast, run = self.plant.fast, self.run
+        fast, run = self.predictor.fast, self.run
         model, steps = fast.model, len(self.drive.steps)
         at = slice(0, steps) if before else slice(1, steps + 1)
         instants = Instants(self.drive.grid[at], self.start_inputs if before else self.end_inputs)
@@ -211,14 +220,14 @@ class BaseRun:
 
     def _flow(self, coefficient: str, before: bool) -> Array:
         """What a unit coefficient takes out at one end of every step, (G, r)."""
-        model = self.plant.fast.model
+        model = self.predictor.fast.model
         steps = len(self.drive.steps)
         states = self.states[:steps] if before else self.states[1:]
         operator = model.operators[model.coefficient_names.index(coefficient)]
         flow = states @ operator
         if coefficient in model.fluid_names:
             inputs = self.start_inputs if before else self.end_inputs
-            fluid = self.plant.fast.fluid_temperature(coefficient, inputs)
+            fluid = self.predictor.fast.fluid_temperature(coefficient, inputs)
             flow -= np.outer(
                 np.broadcast_to(fluid, steps), model.fluid_load[model.fluid_names.index(coefficient)]
             )
@@ -227,9 +236,9 @@ class BaseRun:
     def _reading(self, variant: Variant) -> Array:
         """Difference of one channel that a sensor effect makes, (G + 1, c)."""
         if self._told is None:
-            self._told = self.plant.predict(self.number, self.values, self.candidates).temperature
+            self._told = self.predictor.predict(self.number, self.values, self.candidates).temperature
         values = self.values | variant.values(variant.candidate.reference)
-        return self.plant.read(self.number, [variant.candidate], values, self._told) - self._told
+        return self.predictor.read(self.number, [variant.candidate], values, self._told) - self._told
 
     def _steady(self, variants: Sequence[Variant]) -> Array:
         """Constant changes of the operators, by their derivatives where they do nothing."""
@@ -264,7 +273,7 @@ class BaseRun:
             names.append(own)
         asked = tuple(dict.fromkeys(name for own in names for name, _ in own))
         holder = Candidate("", "", "", "parameter", "", 0.0, 0.0, terms=tuple(terms))
-        prediction = self.plant.predict(self.number, values, (*self.candidates, holder), asked)
+        prediction = self.predictor.predict(self.number, values, (*self.candidates, holder), asked)
         found = np.zeros((*prediction.temperature.shape, len(variants)))
         for position, own in enumerate(names):
             for name, step in own:

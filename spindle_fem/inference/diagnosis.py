@@ -12,38 +12,31 @@ from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.registry import candidates_for, catalogue, interval_effects
+from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import variants_of
 from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Coordinate, Fit, Problem
-from spindle_fem.inference.hypothesis_search import Hypothesis, Search
+from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
 from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import (
     Calibrated,
-    all_stamps,
     calibrate,
     slow_error_of,
 )
-from spindle_fem.inference.simulated_plant import Plant
-from spindle_fem.inference.verdict import NEAR, NEAR_MISFIT, Judgement, judge, may_stand_for, rank, tempered
+from spindle_fem.inference.search_basis import on_search_basis
+from spindle_fem.inference.search_course import run_search
+from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 from spindle_fem.parallel import thread_count
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-# Hypotheses that are fitted again with the slow error that the best of them leaves, on the whole basis.
-REFITTED = 8
-ALWAYS_REFITTED = 2
-# More could not be kept busy.
+# Processes that fit at most: the fits of one step of a search keep no more busy.
 MOST_WORKERS = 4
-# Less likely than the best by so much (natural logarithm): of no account.
-NEGLIGIBLE = 8.0
-# So many rivals of the first set that are near it, or this much farther than what counts as near, are fitted
-# again whatever their probability: on the whole basis they may come nearer.
-NEAREST, LOOKED_AT = 3, 1.3
-#: Prior weight of effects; the ways out for what no other fits count less.
-WEIGHTS = {"unrecorded_heat_source": 0.5, "unrecorded_cooling": 0.5}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +45,7 @@ class Diagnosis:
 
     Attributes
     ----------
-    plant : Plant
+    predictor : Predictor
         Machine on the diagnosed recordings, full basis.
     view : MachineView
     calibrated : Calibrated
@@ -71,7 +64,7 @@ class Diagnosis:
     seconds : mapping of stage to float
     """
 
-    plant: Plant
+    predictor: Predictor
     view: MachineView
     calibrated: Calibrated
     hypotheses: tuple[Hypothesis, ...]
@@ -84,13 +77,13 @@ class Diagnosis:
     seconds: Mapping[str, float]
 
     @property
-    def plant_coordinates(self) -> tuple[Coordinate, ...]:
+    def machine_coordinates(self) -> tuple[Coordinate, ...]:
         """The machine's own coordinates."""
         return self.calibrated.belief.coordinates
 
     def stamp(self, seconds: float, recording: int = 0) -> float | str:
         """A time as the recording has them: seconds from its start, or an ISO 8601 stamp."""
-        start = self.plant.recordings[recording].start
+        start = self.predictor.recordings[recording].start
         if start is None:
             return float(seconds)
         moment = datetime.fromisoformat(start) + timedelta(seconds=float(seconds))
@@ -113,41 +106,41 @@ def diagnose_recordings(
         As :func:`heldout_stamps` takes it.
     progress : callable
     workers : Workers, optional
-        Who fit, by default as many as threads are given; the result does not depend on it.
+        Processes that fit, by default as many as threads are given; the result does not depend on it.
     """
     clock = _Clock()
     fast, view = machine.fast, machine.view
     workers = Workers(min(thread_count(), MOST_WORKERS)) if workers is None else workers
     recordings, calibration = machine.recordings, machine.calibration
     chosen = [heldout_stamps(item, heldout) for item in recordings]
-    plant = Plant(fast, recordings, [~mask for mask, _ in chosen], machine.effects)
+    predictor = Predictor(fast, recordings, [~mask for mask, _ in chosen], machine.effects)
     progress("diagnosis: calibration" if calibration else "diagnosis: what is known")
-    earlier = Plant(fast, calibration, all_stamps(calibration), machine.effects) if calibration else None
-    calibrated = calibrate(earlier, plant)
+    earlier = Predictor(fast, calibration, effects=machine.effects) if calibration else None
+    calibrated = calibrate(earlier, predictor)
     clock.lap("calibration")
     candidates = candidates_for(view)
     effects = catalogue()
-    weights = {name: WEIGHTS.get(name, 1.0) for name in effects}
+    weights = {name: effect.prior_weight for name, effect in effects.items()}
     places = sorted(
         {p for named in (view.spots, view.sides) for own in named.values() for p in own}
         | {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)}
     )
     known = [p for p in places if p in fast.model.place_names]
-    small = plant
+    small = predictor
     if not machine.is_network:
         contacts = sorted({name for own in view.joint_coefficients.values() for name in own})
-        small = plant.compressed([name for name, *_ in plant.uncertain()], known, contacts)
+        small = on_search_basis(predictor, [prior.name for prior in predictor.uncertain()], known, contacts)
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)
-    found = search.run()
+    found = run_search(search)
     clock.lap("search")
     progress("diagnosis: final fits")
     best = rank(found)[0].best
     slow = slow_error_of(problem, best.fit)
-    final = Problem(plant, calibrated.belief, slow, plant.observations)
+    final = Problem(predictor, calibrated.belief, slow, predictor.observations)
     overlapping = _overlapping(view)
-    readings = _Readings(plant, slow.sigma)
+    readings = _Readings(predictor, slow.sigma)
     refitted = _refit(final, found, workers, overlapping, readings)
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
@@ -169,7 +162,7 @@ def diagnose_recordings(
         ]
     clock.lap("location")
     return Diagnosis(
-        plant,
+        predictor,
         view,
         calibrated,
         tuple(refitted),
@@ -207,13 +200,13 @@ class _Readings:
 
     Parameters
     ----------
-    plant : Plant
+    predictor : Predictor
     slow : float, [K]
         Slow error of a reading.
     """
 
-    def __init__(self, plant: Plant, slow: float) -> None:
-        self._plant, self._slow = plant, slow
+    def __init__(self, predictor: Predictor, slow: float) -> None:
+        self._plant, self._slow = predictor, slow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
 
     def apart(self, one: Fit, other: Fit) -> float:
@@ -249,10 +242,10 @@ def _refit(
     best = score[id(ranked[0])]
     chosen = [
         item
-        for position, item in enumerate(ranked[:REFITTED])
-        if position < ALWAYS_REFITTED or score[id(item)] > best - NEGLIGIBLE
+        for position, item in enumerate(ranked[: tuned.REFITTED])
+        if position < tuned.ALWAYS_REFITTED or score[id(item)] > best - tuned.NEGLIGIBLE_SCORE
     ]
-    # The slow error is another one by now: what the best set needs each member for is asked again.
+    # The slow error has changed since the search: whether the best set needs each member is asked again.
     members = ranked[0].keys
     smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
     chosen += [h for h in smaller if h not in chosen]
@@ -263,12 +256,16 @@ def _refit(
         for h in ranked
         if h not in chosen
         and may_stand_for(h.fit, first, overlapping)
-        and h.fit.misfit_with_prior < first.misfit_with_prior + LOOKED_AT * NEAR_MISFIT
+        and h.fit.misfit_with_prior < first.misfit_with_prior + tuned.NEAREST_WITHIN * tuned.NEAR_MISFIT
     ]
     nearest = sorted((readings.apart(first, h.fit), i, h) for i, h in enumerate(rivals))
-    chosen += [h for distance, _, h in nearest[:NEAREST] if distance < LOOKED_AT * NEAR]
+    chosen += [
+        h
+        for distance, _, h in nearest[: tuned.NEAREST_REFITTED]
+        if distance < tuned.NEAREST_WITHIN * tuned.NEAR_READINGS
+    ]
     orders = [FitOrder(h.fit.candidates, h.fit.values, iterations=12) for h in chosen]
-    # What ran before on a part of the basis may run away on the whole of it: it is no hypothesis then.
+    # A set that could be simulated on the search's basis may run away on the whole one, and is dropped then.
     fitted = [
         Hypothesis(fit, item.log_prior)
         for fit, item in zip(workers.fits(problem, orders), chosen, strict=True)

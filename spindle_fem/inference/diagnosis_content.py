@@ -29,7 +29,7 @@ def diagnosis_content(
     before, after : sequence of (N, c) ndarray, [K]
         Predictions of both fits at the stamps of every recording.
     """
-    judgement, plant = diagnosis.judgement, diagnosis.plant
+    judgement, predictor = diagnosis.judgement, diagnosis.predictor
     findings = findings_of(diagnosis, judgement.chosen, split=True)
     alternatives = [
         {"findings": findings_of(diagnosis, item, split=False), "probability": item.probability}
@@ -39,13 +39,13 @@ def diagnosis_content(
     return {
         "schema": SCHEMA,
         "machine": opened.name,
-        "recordings": [recording.name for recording in plant.recordings],
+        "recordings": [recording.name for recording in predictor.recordings],
         "verdict": judgement.verdict,
         "reason": judgement.reason,
         "mismatch": {
             "detected": judgement.verdict != "consistent",
             "p_value": judgement.p_value,
-            "channels": channel_errors(plant, before),
+            "channels": channel_errors(predictor, before),
             **where.to_json(),
         },
         "findings": findings,
@@ -60,13 +60,13 @@ def diagnosis_content(
         "fit": {
             "before": _errors(diagnosis, before),
             "after": _errors(diagnosis, after),
-            "noise_K": noise_level(plant),
+            "noise_K": noise_level(predictor),
             "heldout": diagnosis.heldout,
             "heldout_s": [
                 [list(ends) for ends in stretches(~use, recording.times)]
-                for recording, use in zip(plant.recordings, plant.use, strict=True)
+                for recording, use in zip(predictor.recordings, predictor.use, strict=True)
             ],
-            "channels_after": channel_errors(plant, after),
+            "channels_after": channel_errors(predictor, after),
         },
         "improved_model": "improved_machine.toml",
         "machine_parameters": _machine_parameters(diagnosis),
@@ -74,23 +74,23 @@ def diagnosis_content(
         "candidates_tried": diagnosis.candidates_tried,
         "hypotheses_fitted": len(diagnosis.hypotheses),
         "seconds": dict(diagnosis.seconds),
-        "notes": [*opened.notes, *dict.fromkeys(note for drive in plant.drives for note in drive.notes)],
-        "defects": [recording.defects.to_json() for recording in plant.recordings],
+        "notes": [*opened.notes, *dict.fromkeys(note for drive in predictor.drives for note in drive.notes)],
+        "defects": [recording.defects.to_json() for recording in predictor.recordings],
         "versions": package_versions(),
     }
 
 
 def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, float]:
     return {
-        "train_rmse_K": rmse(diagnosis.plant, predicted, heldout=False),
-        "heldout_rmse_K": rmse(diagnosis.plant, predicted, heldout=True),
+        "train_rmse_K": rmse(diagnosis.predictor, predicted, heldout=False),
+        "heldout_rmse_K": rmse(diagnosis.predictor, predicted, heldout=True),
     }
 
 
 def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The machine's own parameters before and after."""
     rows = []
-    for coordinate in diagnosis.plant_coordinates:
+    for coordinate in diagnosis.machine_coordinates:
         low, high = diagnosis.final.interval(coordinate.name, 1.645)
         rows.append(
             {

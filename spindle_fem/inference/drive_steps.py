@@ -15,11 +15,11 @@ from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
 
-# Oil 3 K warmer changes film and heat capacity by 0.1 %: millikelvins.
+# Width of a class of oil temperatures, K: 3 K change film and capacity by 0.1 %, readings by millikelvins.
 INLET_BIN = 3.0
-# Of the highest speed: the films that follow it are small beside the oil's.
+# Width of a class of speeds as a share of the highest: films that follow speed are small beside the oil's.
 SPEED_BIN = 0.01
-# Classes of one oil temperature share what the channel does.
+# Oil temperatures of classes are rounded to this, K: classes of one temperature share the channel's maps.
 INLET_STEP = 0.5
 
 

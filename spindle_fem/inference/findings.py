@@ -11,19 +11,17 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.effect import Candidate, Reported, in_intervals
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import effect_of
+from spindle_fem.inference import tuned
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
-from spindle_fem.inference.hypothesis_fit import EFFECT_PREFIX, Fit
-from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.verdict import Ranked
 
 Array = NDArray[np.float64]
 
 LEVEL = 0.90
 DRAWS = 400
-# Laws of the catalogue are not exact: what the fit alone leaves open is less than what is not known.
-# Widened by 2, 95 % of 261 parameters of concealed recordings (seeds 20 and 22 to 24) lay inside; by how far
-# they lay, some 92 % do with 1.7.
-INTERVAL_WIDENING = 1.7
 
 
 def candidate_values(candidate: Candidate, values: Mapping[str, float]) -> dict[str, float]:
@@ -48,7 +46,7 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
     effect = effect_of(candidate.effect)
     central = effect.report(candidate, candidate_values(candidate, fit.values))
     generator = np.random.default_rng(seed)
-    covariance = INTERVAL_WIDENING**2 * max(fit.reduced_misfit, 1.0) * fit.covariance
+    covariance = tuned.INTERVAL_WIDENING**2 * max(fit.reduced_misfit, 1.0) * fit.covariance
     draws = generator.multivariate_normal(fit.position, covariance, DRAWS, method="eigh")
     low = np.array([c.low for c in fit.coordinates])
     high = np.array([c.high for c in fit.coordinates])
@@ -107,9 +105,9 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
 
 def _named(diagnosis: Diagnosis, candidate: Candidate) -> dict[str, str]:
     """Name of the recording in which a candidate acts, where there are several."""
-    if candidate.recording is None or len(diagnosis.plant.recordings) < 2:
+    if candidate.recording is None or len(diagnosis.predictor.recordings) < 2:
         return {}
-    return {"recording": diagnosis.plant.recordings[candidate.recording].name}
+    return {"recording": diagnosis.predictor.recordings[candidate.recording].name}
 
 
 def findings_of(diagnosis: Diagnosis, ranked: Ranked, *, split: bool) -> list[dict[str, Any]]:
@@ -143,21 +141,21 @@ def states_of(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return rows
 
 
-def predictions_at_stamps(plant: Plant, fit: Fit) -> list[Array]:
+def predictions_at_stamps(predictor: Predictor, fit: Fit) -> list[Array]:
     """What every channel of every recording should read at its own stamps, (N, c) K."""
     found = []
-    for number, recording in enumerate(plant.recordings):
-        on_grid = plant.predict(number, fit.values, fit.candidates).temperature
-        grid = plant.drives[number].grid
+    for number, recording in enumerate(predictor.recordings):
+        on_grid = predictor.predict(number, fit.values, fit.candidates).temperature
+        grid = predictor.drives[number].grid
         columns = [np.interp(recording.times, grid, column) for column in on_grid.T]
         found.append(np.array(columns).T)
     return found
 
 
-def rmse(plant: Plant, predicted: Sequence[Array], *, heldout: bool) -> float:
+def rmse(predictor: Predictor, predicted: Sequence[Array], *, heldout: bool) -> float:
     """Root mean square error over all channels of all recordings, K; NaN without readings."""
     total, number = 0.0, 0
-    for recording, use, values in zip(plant.recordings, plant.use, predicted, strict=True):
+    for recording, use, values in zip(predictor.recordings, predictor.use, predicted, strict=True):
         chosen = recording.usable & (~use if heldout else use)[:, None]
         error = (values - recording.temperature)[chosen]
         total += float(error @ error)
@@ -165,33 +163,33 @@ def rmse(plant: Plant, predicted: Sequence[Array], *, heldout: bool) -> float:
     return float(np.sqrt(total / number)) if number else float("nan")
 
 
-def noise_level(plant: Plant) -> float:
+def noise_level(predictor: Predictor) -> float:
     """Root mean square noise of a reading over all channels, K: declared, rounding included."""
     variances = []
-    for recording in plant.recordings:
+    for recording in predictor.recordings:
         for channel in range(len(recording.temperature_names)):
-            variances.append(channel_noise(plant, recording, channel) ** 2)
+            variances.append(channel_noise(predictor, recording, channel) ** 2)
     return float(np.sqrt(np.mean(variances)))
 
 
-def channel_noise(plant: Plant, recording, channel: int) -> float:
+def channel_noise(predictor: Predictor, recording, channel: int) -> float:
     """Noise of a reading of one channel, K."""
     rounding = recording.noise[channel].resolution / np.sqrt(12.0)
     return float(np.hypot(recording.sigma[channel], rounding))
 
 
-def channel_errors(plant: Plant, predicted: Sequence[Array]) -> list[dict[str, Any]]:
+def channel_errors(predictor: Predictor, predicted: Sequence[Array]) -> list[dict[str, Any]]:
     """Error of every channel of every recording."""
-    several = len(plant.recordings) > 1
+    several = len(predictor.recordings) > 1
     rows = []
-    for recording, values in zip(plant.recordings, predicted, strict=True):
+    for recording, values in zip(predictor.recordings, predicted, strict=True):
         for channel, name in enumerate(recording.temperature_names):
             usable = recording.usable[:, channel]
             error = values[usable, channel] - recording.temperature[usable, channel]
             row = {
                 "channel": name,
                 "rmse_K": float(np.sqrt(np.mean(error**2))) if error.size else None,
-                "noise_K": channel_noise(plant, recording, channel),
+                "noise_K": channel_noise(predictor, recording, channel),
                 "max_K": float(np.abs(error).max()) if error.size else None,
             }
             rows.append(row | ({"recording": recording.name} if several else {}))

@@ -21,11 +21,13 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.errors import EnergyBalanceError, SpecError, SpindleFemError, WorkerDiedError
+from spindle_fem.inference import tuned
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import channel_errors, channel_noise, predictions_at_stamps, rmse
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.opened_machine import DiagnosedMachine
-from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX, Plant
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.parallel import WorkerPool, one_thread, thread_count
 from spindle_fem.recordings.input_samples import InputHistory
@@ -41,17 +43,11 @@ Progress = Callable[[str], None]
 OFF, AUTO, COARSE, OWN = "off", "auto", "coarse", "own"
 CHOICES = (AUTO, OFF, COARSE, OWN)
 COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
-# Tolerances in terms of the noise of the quietest channel. In a duty cycle of the recorded spindle with
-# 75 jumps, readings then stay within a fifth of the noise, a twentieth on average, of what far smaller
-# ones give.
-STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 10.0, 0.1, 2.0
 # A coarse mesh is not as good as the best sensors, and loads must follow the field even for the worst, K.
 QUIETEST, LOUDEST = 0.02, 0.2
 FIRST_STEP = 30.0
 COEFFICIENT_TOLERANCE = 5.0e-3
-# Of the tolerance of a step's fixed point, where a run's balance asks for less.
-FINER = 0.25
-# Unasked, both fits are run where that takes about as long as the search: so many time steps a fit.
+# Most time steps of a fit that is run unasked: it then takes about as long as the search.
 MOST_STEPS = 800
 STEPS_AFTER_JUMP = 3
 
@@ -151,16 +147,16 @@ def full_model_errors(
         return nothing_run(mesh, "It was not asked for.")
     if machine.is_network:
         return nothing_run(OFF if mesh == AUTO else mesh, NETWORK_REASON)
-    plant = diagnosis.plant
-    options = options_for(plant) if options is None else options
+    predictor = diagnosis.predictor
+    options = options_for(predictor) if options is None else options
     if mesh == AUTO:
-        steps = expected_steps(plant, options)
+        steps = expected_steps(predictor, options)
         if steps > MOST_STEPS:
             return nothing_run(
                 mesh, f"It would take some {steps} time steps a fit; --full-model coarse runs them."
             )
         mesh = COARSE
-    finer = replace(options, coupling_tolerance=FINER * options.coupling_tolerance)
+    finer = replace(options, coupling_tolerance=tuned.FINER_COUPLING * options.coupling_tolerance)
     try:
         try:
             return _both_fits(diagnosis, machine, mesh, options, keep, progress)
@@ -171,18 +167,18 @@ def full_model_errors(
         return nothing_run(mesh, f"It could not be run: {error}")
 
 
-def options_for(plant: Plant) -> TransientOptions:
+def options_for(predictor: Predictor) -> TransientOptions:
     """How accurately time is followed: as accurately as the quietest channel can tell."""
     levels = [
-        channel_noise(plant, recording, channel)
-        for recording in plant.recordings
+        channel_noise(predictor, recording, channel)
+        for recording in predictor.recordings
         for channel in range(len(recording.temperature_names))
     ]
     noise = float(np.clip(min(levels), QUIETEST, LOUDEST))
     return TransientOptions(
-        error=STEP_ERROR * noise,
-        coupling_tolerance=COUPLING_ERROR * noise,
-        input_resolution=INPUT_RESOLUTION * noise,
+        error=tuned.STEP_ERROR * noise,
+        coupling_tolerance=tuned.COUPLING_ERROR * noise,
+        input_resolution=tuned.INPUT_RESOLUTION * noise,
         coefficient_tolerance=COEFFICIENT_TOLERANCE,
         first_step=FIRST_STEP,
         trust_contraction=True,
@@ -190,11 +186,11 @@ def options_for(plant: Plant) -> TransientOptions:
     )
 
 
-def expected_steps(plant: Plant, options: TransientOptions) -> int:
+def expected_steps(predictor: Predictor, options: TransientOptions) -> int:
     """Time steps that the inputs ask for at least, over all recordings."""
     steps = 0
-    for drive in plant.drives:
-        history = OperatingHistory.of(plant.fast.spec, inputs_of_drive(drive))
+    for drive in predictor.drives:
+        history = OperatingHistory.of(predictor.fast.spec, inputs_of_drive(drive))
         steps += len(history.breakpoints(options.input_resolution))
         steps += STEPS_AFTER_JUMP * len(history.restarts())
     return steps
@@ -208,29 +204,29 @@ def _both_fits(
     keep: Keep,
     progress: Progress,
 ) -> dict[str, Any]:
-    plant = diagnosis.plant
+    predictor = diagnosis.predictor
     progress("full model: mesh")
     prepared = prepare_machine(spec_on(machine.spec, mesh))
     fits = {"before": diagnosis.null, "after": diagnosis.final}
     if _is_same(*fits.values()):
         progress("full model: before, which is after")
-        runs = dict.fromkeys(fits, run_fit(prepared, plant, diagnosis.null, options))
+        runs = dict.fromkeys(fits, run_fit(prepared, predictor, diagnosis.null, options))
     elif mesh == COARSE and thread_count() > 1:
-        runs = _side_by_side(prepared, plant, fits, options, progress)
+        runs = _side_by_side(prepared, predictor, fits, options, progress)
     else:
-        runs = _one_by_one(prepared, plant, fits, options, progress)
+        runs = _one_by_one(prepared, predictor, fits, options, progress)
     found: dict[str, dict[str, Any]] = {}
     apart: dict[str, list[Array]] = {}
     for name, full in runs.items():
         keep(name, full.predicted)
         found[name] = {
-            "train_rmse_K": rmse(plant, full.predicted, heldout=False),
-            "heldout_rmse_K": rmse(plant, full.predicted, heldout=True),
-            "channels": channel_errors(plant, full.predicted),
+            "train_rmse_K": rmse(predictor, full.predicted, heldout=False),
+            "heldout_rmse_K": rmse(predictor, full.predicted, heldout=True),
+            "channels": channel_errors(predictor, full.predicted),
             "steps": full.steps,
             "seconds": full.seconds,
         }
-        reduced = predictions_at_stamps(plant, fits[name])
+        reduced = predictions_at_stamps(predictor, fits[name])
         apart[name] = [a - b for a, b in zip(full.predicted, reduced, strict=True)]
     supplied = any(n.startswith(FIRST_ORDER) for fit in fits.values() for n in fit.values)
     return {
@@ -242,7 +238,7 @@ def _both_fits(
         "step_error_K": options.error,
         "coupling_tolerance_K": options.coupling_tolerance,
         **found,
-        "differences": _differences(plant, apart),
+        "differences": _differences(predictor, apart),
         "first_order": FIRST_ORDER_NOTE if supplied else None,
     }
 
@@ -254,7 +250,7 @@ def spec_on(spec: MachineSpec, mesh: str) -> MachineSpec:
     return spec.model_copy(update={"mesh": spec.mesh.model_copy(update=COARSE_MESH)})
 
 
-def run_fit(machine: PreparedMachine, plant: Plant, fit: Fit, options: TransientOptions) -> FullFit:
+def run_fit(machine: PreparedMachine, predictor: Predictor, fit: Fit, options: TransientOptions) -> FullFit:
     """Run all recordings through the full model with the parameters and candidates of a fit.
 
     Raises
@@ -263,11 +259,11 @@ def run_fit(machine: PreparedMachine, plant: Plant, fit: Fit, options: Transient
     """
     began = time.perf_counter()
     predicted, steps = [], 0
-    for number, recording in enumerate(plant.recordings):
-        run = _run(machine, plant, number, fit, options)
+    for number, recording in enumerate(predictor.recordings):
+        run = _run(machine, predictor, number, fit, options)
         steps += len(run.steps.times)
-        on_grid = _readings(plant, number, fit, run)
-        grid = plant.drives[number].grid
+        on_grid = _readings(predictor, number, fit, run)
+        grid = predictor.drives[number].grid
         predicted.append(np.array([np.interp(recording.times, grid, column) for column in on_grid.T]).T)
     return FullFit(tuple(predicted), steps, time.perf_counter() - began)
 
@@ -283,19 +279,19 @@ def inputs_of_drive(drive: Drive, followed: Collection[str] = ()) -> InputHistor
     return InputHistory(drive.grid, names, np.vstack((start, end[-1:])), np.all(start == end, axis=0))
 
 
-def physics_of_fit(plant: Plant, number: int, fit: Fit) -> Physics:
+def physics_of_fit(predictor: Predictor, number: int, fit: Fit) -> Physics:
     """Terms and factors of a fit, those of the definition included, in one recording.
 
     Parameters
     ----------
-    plant : Plant
+    predictor : Predictor
     number : int
-        Of the recording.
+        Recording.
     fit : Fit
     """
     acting = _acting(fit.candidates, number)
     values = fit.values
-    terms = [*plant.effects.terms, *(term for item in acting for term in item.terms)]
+    terms = [*predictor.effects.terms, *(term for item in acting for term in item.terms)]
     of_terms = {
         name: values.get(name, item.value)
         for candidate in acting
@@ -307,7 +303,7 @@ def physics_of_fit(plant: Plant, number: int, fit: Fit) -> Physics:
         name for c in fit.candidates for name in c.parameters if name not in {item.name for item in c.factors}
     }
     scaled = {EFFECT_PREFIX + item.name: item.name for c in acting for item in c.factors}
-    factors = dict(plant.effects.factors)
+    factors = dict(predictor.effects.factors)
     for name, value in values.items():
         own = scaled.get(name)
         if own is None and not (name in of_candidates or name.startswith((*FIRST_ORDER, EFFECT_PREFIX))):
@@ -320,7 +316,7 @@ def physics_of_fit(plant: Plant, number: int, fit: Fit) -> Physics:
 # -------------------------------------------------------------------- details
 def _one_by_one(
     machine: PreparedMachine,
-    plant: Plant,
+    predictor: Predictor,
     fits: Mapping[str, Fit],
     options: TransientOptions,
     progress: Progress,
@@ -328,31 +324,31 @@ def _one_by_one(
     found = {}
     for name, fit in fits.items():
         progress(f"full model: {name}")
-        found[name] = run_fit(machine, plant, fit, options)
+        found[name] = run_fit(machine, predictor, fit, options)
     return found
 
 
 def _side_by_side(
     machine: PreparedMachine,
-    plant: Plant,
+    predictor: Predictor,
     fits: Mapping[str, Fit],
     options: TransientOptions,
     progress: Progress,
 ) -> dict[str, FullFit]:
     """Each fit in a process of its own; in this one, and said, where a process ends before its time."""
     progress(f"full model: {' and '.join(fits)}")
-    jobs = [partial(_run_alone, machine.spec, plant, fit, options) for fit in fits.values()]
+    jobs = [partial(_run_alone, machine.spec, predictor, fit, options) for fit in fits.values()]
     try:
         answers = WorkerPool(len(fits)).map(jobs, [f"full model: {name}" for name in fits])
     except WorkerDiedError as error:
         progress(f"{error.where}: {error.what}")
-        return _one_by_one(machine, plant, fits, options, progress)
+        return _one_by_one(machine, predictor, fits, options, progress)
     return dict(zip(fits, answers, strict=True))
 
 
-def _run_alone(spec: MachineSpec, plant: Plant, fit: Fit, options: TransientOptions) -> FullFit:
+def _run_alone(spec: MachineSpec, predictor: Predictor, fit: Fit, options: TransientOptions) -> FullFit:
     with threadpool_limits(1), one_thread():
-        return run_fit(prepare_machine(spec), plant, fit, options)
+        return run_fit(prepare_machine(spec), predictor, fit, options)
 
 
 def _is_same(one: Fit, other: Fit) -> bool:
@@ -364,22 +360,26 @@ def _acting(candidates: Sequence[Candidate], number: int) -> tuple[Candidate, ..
 
 
 def _run(
-    machine: PreparedMachine, plant: Plant, number: int, fit: Fit, options: TransientOptions
+    machine: PreparedMachine, predictor: Predictor, number: int, fit: Fit, options: TransientOptions
 ) -> MachineTransient:
-    physics = physics_of_fit(plant, number, fit)
-    inputs = inputs_of_drive(plant.drives[number], {name for term in physics.terms for name in term.follows})
-    start = start_at(machine, OperatingHistory.of(machine.spec, inputs), plant.start(number, fit.values))
+    physics = physics_of_fit(predictor, number, fit)
+    inputs = inputs_of_drive(
+        predictor.drives[number], {name for term in physics.terms for name in term.follows}
+    )
+    start = start_at(machine, OperatingHistory.of(machine.spec, inputs), predictor.start(number, fit.values))
     return simulate_full(machine, inputs, start=start, options=options, physics=physics)
 
 
-def _readings(plant: Plant, number: int, fit: Fit, run: MachineTransient) -> Array:
+def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient) -> Array:
     """What the channels tell of a full run, on the grid of the reduced model, (G + 1, c) K."""
-    told = np.column_stack([run.reading(probe) for probe in plant.recordings[number].probes])
-    told = plant.read(number, plant.effects.candidates, {}, told) + _first_order(plant, number, fit)
-    return plant.read(number, _acting(fit.candidates, number), fit.values, told)
+    told = np.column_stack([run.reading(probe) for probe in predictor.recordings[number].probes])
+    told = predictor.read(number, predictor.effects.candidates, {}, told) + _first_order(
+        predictor, number, fit
+    )
+    return predictor.read(number, _acting(fit.candidates, number), fit.values, told)
 
 
-def _first_order(plant: Plant, number: int, fit: Fit) -> Array | float:
+def _first_order(predictor: Predictor, number: int, fit: Fit) -> Array | float:
     """What the places of the probes and the gaps change, before the fit's own sensor effects, K."""
     if not any(name.startswith(FIRST_ORDER) for name in fit.values):
         return 0.0
@@ -388,13 +388,13 @@ def _first_order(plant: Plant, number: int, fit: Fit) -> Array | float:
     of_readings = {name for item in fit.candidates for name in item.parameters} - of_bare
     values = {name: value for name, value in fit.values.items() if name not in of_readings}
     plain = {name: value for name, value in values.items() if not name.startswith(FIRST_ORDER)}
-    moved, still = (plant.predict(number, item, bare).temperature for item in (values, plain))
+    moved, still = (predictor.predict(number, item, bare).temperature for item in (values, plain))
     return moved - still
 
 
-def _differences(plant: Plant, apart: Mapping[str, Sequence[Array]]) -> list[Mapping[str, Any]]:
+def _differences(predictor: Predictor, apart: Mapping[str, Sequence[Array]]) -> list[Mapping[str, Any]]:
     """Largest difference of full and reduced model at each channel, and of how much the fits differ."""
-    several = len(plant.recordings) > 1
+    several = len(predictor.recordings) > 1
     change = [after - before for before, after in zip(apart["before"], apart["after"], strict=True)]
     return [
         {
@@ -405,6 +405,6 @@ def _differences(plant: Plant, apart: Mapping[str, Sequence[Array]]) -> list[Map
                 for key, values in {**apart, "change": change}.items()
             },
         }
-        for number, recording in enumerate(plant.recordings)
+        for number, recording in enumerate(predictor.recordings)
         for column, name in enumerate(recording.temperature_names)
     ]

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.inference.coordinate_names import NO_VALUES, OF_ONE_RECORDING
 from spindle_fem.inference.hypothesis_fit import Fit
-from spindle_fem.inference.simulated_plant import NO_VALUES, OF_ONE_RECORDING, Plant
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.reduced.drive import STANDARD, Drive, make_drive
 from spindle_fem.model.reduced.run_start import Start
@@ -56,7 +57,7 @@ class Place:
     Attributes
     ----------
     name : str
-        Of the reduced model; of a probe, where ``is_probe``.
+        Place of the reduced model; a probe where ``is_probe``.
     words : str
     component : str
     is_probe : bool
@@ -68,13 +69,13 @@ class Place:
     is_probe: bool = False
 
 
-class TrialPlant(Plant):
+class TrialPredictor(Predictor):
     """The machine of a diagnosis in another operation, from a uniform temperature at its start."""
 
-    def __init__(self, plant: Plant, drive: Drive) -> None:
-        self.__dict__.update(copy.copy(plant.__dict__))
+    def __init__(self, predictor: Predictor, drive: Drive) -> None:
+        self.__dict__.update(copy.copy(predictor.__dict__))
         self.drives = (replace(drive, times=drive.grid),)
-        self.recordings, self.columns = plant.recordings[:1], plant.columns[:1]
+        self.recordings, self.columns = predictor.recordings[:1], predictor.columns[:1]
         self.observations, self.heldout = (), ()
 
     def start(
@@ -110,31 +111,31 @@ class Answer:
     slopes: Array
 
 
-def answer(plant: Plant, fit: Fit, trial: Trial, places: Sequence[Place], spacing: float) -> Answer:
+def answer(predictor: Predictor, fit: Fit, trial: Trial, places: Sequence[Place], spacing: float) -> Answer:
     """Simulate a trial under a hypothesis.
 
     Parameters
     ----------
-    plant : Plant
+    predictor : Predictor
     fit : Fit
     trial : Trial
     places : sequence of Place
     spacing : float, [s]
-        Of the instants at which readings are told.
+        Distance of the instants at which readings are told.
 
     Raises
     ------
     ConvergenceError
         The hypothesis runs away in this operation.
     """
-    own = TrialPlant(plant, trial.drive)
+    own = TrialPredictor(predictor, trial.drive)
     chosen = [(c, i) for i, c in enumerate(fit.coordinates) if not c.name.startswith(OF_ONE_RECORDING)]
     names = [c.name for c, _ in chosen]
     values = {name: value for name, value in fit.values.items() if not name.startswith(OF_ONE_RECORDING)}
     told = own.predict(0, values, fit.candidates, names)
     readings, slopes = [told.temperature], [told.sensitivity]
     if places:
-        means = np.array([_weights(plant, place) for place in places])
+        means = np.array([_weights(predictor, place) for place in places])
         readings.append(told.states @ means.T)
         slopes.append(told.slopes_at(means))
     grid = own.drives[0].grid
@@ -147,8 +148,8 @@ def answer(plant: Plant, fit: Fit, trial: Trial, places: Sequence[Place], spacin
     return Answer(times, _at(times, grid, whole), full)
 
 
-def _weights(plant: Plant, place: Place) -> Array:
-    model = plant.fast.model
+def _weights(predictor: Predictor, place: Place) -> Array:
+    model = predictor.fast.model
     return model.probes[model.probe_names.index(place.name)] if place.is_probe else model.place(place.name)
 
 
@@ -172,7 +173,7 @@ def reachable_places(spec: MachineSpec, names: Sequence[str]) -> tuple[Place, ..
     ----------
     spec : MachineSpec
     names : sequence of str
-        Of the model's places.
+        Places of the model.
     """
     layout = Layout(spec, set(names))
     known = set(names)
@@ -217,18 +218,18 @@ def _plain(name: str) -> str:
 
 
 # --------------------------------------------------------------------- trials
-def trials_of(plant: Plant, view: MachineView) -> tuple[Trial, ...]:
+def trials_of(predictor: Predictor, view: MachineView) -> tuple[Trial, ...]:
     """Tests worth considering on a machine, the recorded operation first."""
-    again = Trial(AGAIN, "temperature", plant.drives[0], 0)
+    again = Trial(AGAIN, "temperature", predictor.drives[0], 0)
     if view.kind == "network":
-        return (again, *_network_trials(plant))
-    return (again, *_geometry_trials(plant, view))
+        return (again, *_network_trials(predictor))
+    return (again, *_geometry_trials(predictor, view))
 
 
-def _geometry_trials(plant: Plant, view: MachineView) -> list[Trial]:
-    names = plant.drives[0].names
-    usual = _usual(plant)
-    high = max(float(np.max(drive.start[:, drive.column("speed")])) for drive in plant.drives)
+def _geometry_trials(predictor: Predictor, view: MachineView) -> list[Trial]:
+    names = predictor.drives[0].names
+    usual = _usual(predictor)
+    high = max(float(np.max(drive.start[:, drive.column("speed")])) for drive in predictor.drives)
     high = high or view.highest_speed
     levels = [round(share * high / RPM, -2) * RPM or high for share in (1.0 / 3.0, 2.0 / 3.0, 1.0)]
     middle = levels[1]
@@ -266,7 +267,7 @@ def _geometry_trials(plant: Plant, view: MachineView) -> list[Trial]:
                 [(HOLD, {"speed": middle, "thrust": value}) for value in thrusts],
             )
         )
-    if plant.fast.spec.channel is not None and usual["coolant_flow"] > 0.0:
+    if predictor.fast.spec.channel is not None and usual["coolant_flow"] > 0.0:
         found += [
             trial(
                 f"{rpm[1]} rpm held, oil temperature +{TEMPERATURE_STEP:.0f} K after "
@@ -301,15 +302,15 @@ def _geometry_trials(plant: Plant, view: MachineView) -> list[Trial]:
     return found
 
 
-def _usual(plant: Plant) -> dict[str, float]:
+def _usual(predictor: Predictor) -> dict[str, float]:
     """Mean of every input over all recordings, by name; of what is positive where that is the usual state."""
-    names = plant.drives[0].names
+    names = predictor.drives[0].names
     found = {}
     for position, name in enumerate(names):
         values = np.concatenate(
-            [drive.start[:, drive.column(name)] for drive in plant.drives if name in drive.names]
+            [drive.start[:, drive.column(name)] for drive in predictor.drives if name in drive.names]
         )
-        lengths = np.concatenate([drive.steps for drive in plant.drives if name in drive.names])
+        lengths = np.concatenate([drive.steps for drive in predictor.drives if name in drive.names])
         on = values > 0.0
         chosen = on if position < len(STANDARD) and on.any() else np.ones(len(values), dtype=bool)
         found[name] = float(np.average(values[chosen], weights=lengths[chosen]))
@@ -329,10 +330,10 @@ def _staged(
     return make_drive(times, names, values, np.ones(len(names), dtype=bool), largest_step=TEST_STEP)
 
 
-def _network_trials(plant: Plant) -> list[Trial]:
+def _network_trials(predictor: Predictor) -> list[Trial]:
     """Every input that varied: half its range, the highest, then the lowest; the others as usual."""
-    drive = plant.drives[0]
-    usual = _usual(plant)
+    drive = predictor.drives[0]
+    usual = _usual(predictor)
     duration = float(np.clip(0.25 * (drive.grid[-1] - drive.grid[0]), HOLD, 4.0 * HOLD))
     found = []
     for position, name in enumerate(drive.names):

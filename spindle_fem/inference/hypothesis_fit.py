@@ -19,24 +19,23 @@ from scipy.stats import norm
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
-from spindle_fem.inference.reading_noise import SlowError, Whitener
-from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, Observation, Plant, Prediction
+from spindle_fem.inference import tuned
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.observations import Observation
+from spindle_fem.inference.prediction import Prediction
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener
 
 Array = NDArray[np.float64]
 
 # Whitened residuals beyond this count linearly.
 OUTLIER_SIGMAS = 3.0
 MOST_ITERATIONS = 30
-# A step that gains less, or less than this share of the misfit, is the last.
-SMALLEST_GAIN = 0.02
-SMALLEST_SHARE = 3.0e-4
+# An exact fit ends with a step that lowers the misfit by less than this share: rounding comes next.
+EXACT_SHARE = 1.0e-8
+# Largest change of any coordinate in one step, and bound of the machine's coordinates, in prior deviations.
 LARGEST_MOVE = 2.0
 THETA_BOUND = 4.0
-# A step that differs from the one that was refused by less than this share is not tried.
-SAME_MOVE = 0.05
-# A fit is given up after so many steps when so many more like the last would not do, and before when so many
-# times what straight lines promise would not.
-HOPELESS_AFTER, REACH = 3, 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +45,7 @@ class Coordinate:
     Attributes
     ----------
     name : str
-        As :class:`Plant` takes it.
+        As :class:`Predictor` takes it.
     value : float
         At zero.
     sigma : float
@@ -113,7 +112,7 @@ class Fit:
         The machine's, then the candidates'.
     position : (p,) ndarray
     covariance : (p, p) ndarray
-        Of the coordinates.
+        Covariance of the coordinates.
     log_evidence : float
         Up to what all hypotheses share.
     misfit : float
@@ -123,6 +122,8 @@ class Fit:
     residual : (n,) ndarray
         Whitened.
     slow : SlowError
+    evaluations : int
+        Predictions that were asked for.
     """
 
     candidates: tuple[Candidate, ...]
@@ -134,6 +135,7 @@ class Fit:
     misfit_with_prior: float
     residual: Array
     slow: SlowError
+    evaluations: int = 0
 
     @property
     def values(self) -> dict[str, float]:
@@ -151,7 +153,7 @@ class Fit:
         return self.misfit / max(len(self.residual), 1)
 
     def interval(self, name: str, level_sigmas: float) -> tuple[float, float]:
-        """Values at so many posterior standard deviations to either side."""
+        """Values at ``level_sigmas`` posterior standard deviations to either side."""
         index = next(i for i, c in enumerate(self.coordinates) if c.name == name)
         coordinate = self.coordinates[index]
         spread = level_sigmas * float(np.sqrt(self.covariance[index, index]))
@@ -191,13 +193,13 @@ class Problem:
 
     Attributes
     ----------
-    plant : Plant
+    predictor : Predictor
     belief : Belief
     slow : SlowError
     observations : tuple of Observation
     """
 
-    plant: Plant
+    predictor: Predictor
     belief: Belief
     slow: SlowError
     observations: tuple[Observation, ...]
@@ -219,6 +221,17 @@ class Problem:
             ]
         )
 
+    def binned_residuals(self, fit: Fit) -> list[tuple[ChannelBins, Array]]:
+        """Predicted less read, K, averaged over the bins of every observation."""
+        predicted = [
+            item.temperature
+            for item in self.predict(fit.candidates, fit.coordinates, fit.position, slopes=False)
+        ]
+        return [
+            (item.bins, item.at(predicted[item.recording][:, item.channel]) - item.values)
+            for item in self.observations
+        ]
+
     def predict(
         self,
         candidates: Sequence[Candidate],
@@ -236,9 +249,9 @@ class Problem:
         names = [c.name for c in coordinates] if slopes else []
         scale = np.array([c.sigma for c in coordinates]) if slopes else np.zeros(0)
         found = []
-        for number in range(len(self.plant.recordings)):
+        for number in range(len(self.predictor.recordings)):
             beside = None if near is None else near[number]
-            prediction = self.plant.predict(number, values, candidates, names, beside)
+            prediction = self.predictor.predict(number, values, candidates, names, beside)
             found.append(replace(prediction, sensitivity=prediction.sensitivity * scale))
         return found
 
@@ -249,6 +262,7 @@ class Problem:
         *,
         iterations: int = MOST_ITERATIONS,
         hopeless: float = np.inf,
+        exact: bool = False,
     ) -> Fit:
         """Most probable values of everything that is free.
 
@@ -261,6 +275,8 @@ class Problem:
         iterations : int
         hopeless : float
             Misfit that must be within reach of the next steps; else the search ends where it is.
+        exact : bool
+            Whether to go on until a step gains next to nothing, not only less than tells hypotheses apart.
 
         Raises
         ------
@@ -283,6 +299,8 @@ class Problem:
         mean = np.concatenate((self.belief.mean, np.zeros(n_own)))
 
         def cost_at(at: Array, near: list[Prediction] | None) -> tuple[float, Array, list[Prediction] | None]:
+            nonlocal evaluations
+            evaluations += 1
             predicted = self.predict(candidates, coordinates, at, slopes=False, near=near)
             residual = self.data - self.whitened([p.temperature for p in predicted])
             pull = root @ (at - mean)
@@ -292,6 +310,7 @@ class Problem:
             predicted = self.predict(candidates, coordinates, at, near=near)
             return self.whitened([p.sensitivity for p in predicted]), predicted
 
+        evaluations = 0
         scale = np.array([c.sigma for c in coordinates])
         cost, residual, predicted = cost_at(position, None)
         jacobian, predicted = slopes_at(position, predicted)
@@ -303,7 +322,7 @@ class Problem:
             if iteration and np.isfinite(hopeless):
                 whole = _bounded_step(hessian, gradient, 0.0, position, low, high)
                 promised = float(2.0 * gradient @ whole - whole @ hessian @ whole)
-                if promised > 0.0 and cost - REACH * promised > hopeless:
+                if promised > 0.0 and cost - tuned.HOPELESS_REACH * promised > hopeless:
                     break
             improved, gain, refused = False, 0.0, None
             while damping < 1e8:
@@ -311,7 +330,10 @@ class Problem:
                 largest = float(np.abs(move).max()) if move.size else 0.0
                 if largest > LARGEST_MOVE:
                     move *= LARGEST_MOVE / largest
-                if refused is not None and np.abs(move - refused).max() < SAME_MOVE * np.abs(refused).max():
+                if (
+                    refused is not None
+                    and np.abs(move - refused).max() < tuned.SAME_STEP_WITHIN * np.abs(refused).max()
+                ):
                     damping *= 10.0
                     continue
                 try:
@@ -331,9 +353,13 @@ class Problem:
                     break
                 refused = move
                 damping *= 10.0
-            if not improved or gain < SMALLEST_GAIN + SMALLEST_SHARE * cost:
+            if not improved or gain < (
+                EXACT_SHARE * cost
+                if exact
+                else tuned.SMALLEST_DECREASE + tuned.SMALLEST_DECREASE_SHARE * cost
+            ):
                 break
-            if iteration >= HOPELESS_AFTER and cost - REACH * gain > hopeless:
+            if iteration >= tuned.HOPELESS_AFTER and cost - tuned.HOPELESS_REACH * gain > hopeless:
                 break
         if not np.isfinite(cost):
             raise ConvergenceError("diagnosis", "a hypothesis cannot be simulated at any of its parameters.")
@@ -354,6 +380,7 @@ class Problem:
             cost,
             residual,
             self.slow,
+            evaluations,
         )
 
 

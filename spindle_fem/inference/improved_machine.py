@@ -9,10 +9,10 @@ from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import write_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.registry import definition_entry
+from spindle_fem.inference.coordinate_names import OF_ONE_RECORDING, PROBE_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import candidate_values
 from spindle_fem.inference.opened_machine import DiagnosedMachine
-from spindle_fem.inference.simulated_plant import OF_ONE_RECORDING, PROBE_PREFIX
 from spindle_fem.model.lumped.written_network import value_in_definition
 from spindle_fem.units import Uncertain
 
@@ -31,7 +31,7 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     )
     own = {
         coordinate.name: (values[coordinate.name], coordinate.sigma)
-        for coordinate in diagnosis.plant_coordinates
+        for coordinate in diagnosis.machine_coordinates
         if not coordinate.name.startswith((PROBE_PREFIX, *OF_ONE_RECORDING))
     }
     if not machine.is_network:

@@ -12,11 +12,12 @@ from scipy.ndimage import median_filter
 
 from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
 from spindle_fem.effects.registry import effect_of
+from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis_fit import Fit, candidate_coordinates
 from spindle_fem.inference.missing_heat import Explanation, shares, stretches
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
-from spindle_fem.inference.simulated_plant import Plant
-from spindle_fem.inference.verdict import TEMPERATURE, counted
+from spindle_fem.inference.verdict import counted
 from spindle_fem.machine.view.meridian_places import centre_of
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import Conditions, operating_conditions
@@ -30,16 +31,8 @@ Array = NDArray[np.float64]
 # Places are listed until so much of the probability is told.
 CREDIBLE = 0.95
 SIGNIFICANT_SIGMAS = 3.0
-# Of a large mismatch the fit smears some over all times: what is small beside the largest does not count.
-SMALL_SHARE = 0.25
-# Where nothing passes although there is a mismatch: what comes near its largest departure.
-NEAR_LARGEST = 0.8
 SHORTEST_WINDOW = 600.0
 WINDOWS_A_RECORDING = 60
-# A temperature separates two conditions when it tells them apart so well (share right, balanced).
-SEPARATES = 0.9
-# A condition is named when it holds for most of a stretch.
-MOSTLY = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +78,7 @@ class Where:
     component : str
         Empty when nothing is missing.
     radius, axial : float, [m]
-        Of the component's centroid; NaN where it has none (networks, the surroundings).
+        Centroid of the component; NaN where it has none (networks, the surroundings).
     credible : tuple of str
         Components that together hold 95 % of the probability, the findings' own among them.
     shares : mapping of component to float
@@ -93,10 +86,10 @@ class Where:
     spots : mapping of component to str
         Spot of each that explains the residual best.
     missing_heat : mapping of component to MissingHeat
-        Of the credible components that heat can come from.
+        Heat missing at each credible component that heat can come from.
     when : tuple of Stretch
     stamps : tuple of (start, end, recording)
-        Of ``when``, as the recordings have them; the recording only where there are several.
+        The ends of ``when`` as the recordings have them; the recording only where there are several.
     condition : str
         What the machine does while heat is missing; while the difference is
         significant where it is no heat.
@@ -170,34 +163,34 @@ def where_of(diagnosis: Diagnosis) -> Where:
     # A sensor's reading is wrong without any heat.
     sensors = {c.component for c in candidates if c.kind == "sensor"}
     heat = {
-        name: missing_heat(diagnosis.explanations, spots[name], diagnosis.plant)
+        name: missing_heat(diagnosis.explanations, spots[name], diagnosis.predictor)
         for name in credible
         if name in spots and name not in sensors
     }
     radius, axial = _centre(diagnosis, component)
-    when = significant_stretches(diagnosis.plant, diagnosis.null)
-    several = len(diagnosis.plant.recordings) > 1
+    when = significant_stretches(diagnosis.predictor, diagnosis.null)
+    several = len(diagnosis.predictor.recordings) > 1
     stamps = tuple(
         (
             diagnosis.stamp(item.start, item.recording),
             diagnosis.stamp(item.end, item.recording),
-            diagnosis.plant.recordings[item.recording].name if several else None,
+            diagnosis.predictor.recordings[item.recording].name if several else None,
         )
         for item in when
     )
     longest = max(when, key=lambda item: item.end - item.start, default=None)
     spot = "" if component in sensors else spots.get(component, "")
-    condition = heat_condition(diagnosis.explanations, spot, diagnosis.plant) or (
+    condition = heat_condition(diagnosis.explanations, spot, diagnosis.predictor) or (
         longest.condition if longest else ""
     )
     return Where(component, radius, axial, tuple(credible), told, spots, heat, when, stamps, condition)
 
 
 def _centre(diagnosis: Diagnosis, component: str) -> tuple[float, float]:
-    """Of the component; of the very spot where something unrecorded was found."""
+    """Radius and axial place of a component, or of the spot where unrecorded heat was found there."""
     if diagnosis.view.kind != "geometry":
         return np.nan, np.nan
-    spec = diagnosis.plant.fast.spec
+    spec = diagnosis.predictor.fast.spec
     found = None
     for candidate in diagnosis.final.candidates:
         if candidate.component == component and isinstance(effect_of(candidate.effect), IntervalEffect):
@@ -218,7 +211,7 @@ def component_shares(
     Parameters
     ----------
     explanations : sequence of Explanation
-        Of every spot in every recording; recordings add up.
+        One for every spot in every recording; recordings add up.
     reported : mapping of spot to str
         Component of a spot, itself where absent.
 
@@ -237,7 +230,7 @@ def component_shares(
         evidence[item.spot] = evidence.get(item.spot, 0.0) + item.log_evidence
     if not evidence:
         return {}, {}
-    weighed = {spot: counted(gain) / TEMPERATURE for spot, gain in evidence.items()}
+    weighed = {spot: counted(gain) / tuned.GAIN_DIVISOR for spot, gain in evidence.items()}
     told: dict[str, float] = {}
     spots: dict[str, str] = {}
     for spot, share in shares(weighed).items():
@@ -248,7 +241,7 @@ def component_shares(
     return told, spots
 
 
-def missing_heat(explanations: Sequence[Explanation], spot: str, plant: Plant) -> MissingHeat:
+def missing_heat(explanations: Sequence[Explanation], spot: str, predictor: Predictor) -> MissingHeat:
     """Mean over time and signed peak of the heat track at a spot, all recordings together.
 
     A single step that stands out, as where readings are missing, is no peak.
@@ -257,7 +250,7 @@ def missing_heat(explanations: Sequence[Explanation], spot: str, plant: Plant) -
     for item in explanations:
         if item.spot != spot:
             continue
-        stop = float(plant.drives[item.recording].grid[-1])
+        stop = float(predictor.drives[item.recording].grid[-1])
         lengths = np.diff(np.append(item.times, stop))
         total += float(item.heat @ lengths)
         duration += float(lengths.sum())
@@ -267,22 +260,22 @@ def missing_heat(explanations: Sequence[Explanation], spot: str, plant: Plant) -
     return MissingHeat(total / duration if duration else 0.0, peak)
 
 
-def heat_condition(explanations: Sequence[Explanation], spot: str, plant: Plant) -> str:
+def heat_condition(explanations: Sequence[Explanation], spot: str, predictor: Predictor) -> str:
     """What the machine does while heat is missing at a spot; empty where it never clearly is.
 
-    Of several recordings the one in which it is missing for longest. Heat
+    With several recordings, that in which it is missing for longest. Heat
     counts beyond three standard errors and a quarter of its peak.
     """
     words, longest = "", 0.0
     for item in explanations:
         if item.spot != spot:
             continue
-        level = np.maximum(SIGNIFICANT_SIGMAS * item.sigma, SMALL_SHARE * np.abs(item.heat).max())
-        edges = np.append(item.times, plant.drives[item.recording].grid[-1])
+        level = np.maximum(SIGNIFICANT_SIGMAS * item.sigma, tuned.SMEAR_SHARE * np.abs(item.heat).max())
+        edges = np.append(item.times, predictor.drives[item.recording].grid[-1])
         active = np.abs(item.heat) > level
         duration = float(np.diff(edges)[active].sum())
         if duration > longest:
-            recording = plant.recordings[item.recording]
+            recording = predictor.recordings[item.recording]
             owner = np.clip(np.searchsorted(edges, recording.times, side="right") - 1, 0, len(active) - 1)
             mask = active[owner]
             if mask.any():
@@ -300,18 +293,18 @@ def main_component(diagnosis: Diagnosis) -> str:
     own = [c for c in candidates if c.kind == kind] or list(candidates)
     if len(own) < 2:
         return own[0].component if own else ""
-    change = {id(c): change_without(diagnosis.plant, diagnosis.final, c) for c in own}
+    change = {id(c): change_without(diagnosis.predictor, diagnosis.final, c) for c in own}
     return max(own, key=lambda c: change[id(c)]).component
 
 
-def change_without(plant: Plant, fit: Fit, candidate: Candidate) -> float:
+def change_without(predictor: Predictor, fit: Fit, candidate: Candidate) -> float:
     """Root mean square change of all readings when one candidate of a fit is taken away, K."""
     rest = tuple(c for c in fit.candidates if c is not candidate)
     values = values_without(fit, candidate)
     total, number = 0.0, 0
-    for recording in range(len(plant.recordings)):
-        whole = plant.predict(recording, fit.values, fit.candidates).temperature
-        part = plant.predict(recording, values, rest).temperature
+    for recording in range(len(predictor.recordings)):
+        whole = predictor.predict(recording, fit.values, fit.candidates).temperature
+        part = predictor.predict(recording, values, rest).temperature
         total += float(np.sum((whole - part) ** 2))
         number += whole.size
     return float(np.sqrt(total / max(number, 1)))
@@ -325,7 +318,7 @@ def values_without(fit: Fit, candidate: Candidate) -> dict[str, float]:
 
 
 # ----------------------------------------------------------------------- time
-def significant_stretches(plant: Plant, fit: Fit) -> tuple[Stretch, ...]:
+def significant_stretches(predictor: Predictor, fit: Fit) -> tuple[Stretch, ...]:
     """Times in which what a fit leaves is beyond three standard errors in some channel.
 
     Residuals are averaged over a window of at least 10 min; the standard error
@@ -335,19 +328,19 @@ def significant_stretches(plant: Plant, fit: Fit) -> tuple[Stretch, ...]:
 
     Parameters
     ----------
-    plant : Plant
+    predictor : Predictor
     fit : Fit
         Nothing missing.
     """
-    tracks = [_scores(plant, fit, number) for number in range(len(plant.recordings))]
+    tracks = [_scores(predictor, fit, number) for number in range(len(predictor.recordings))]
     largest = max(
         (float(np.abs(score).max()) for track in tracks for _, score in track if score.size), default=0
     )
-    limit = min(max(SIGNIFICANT_SIGMAS, SMALL_SHARE * largest), NEAR_LARGEST * largest)
+    limit = min(max(SIGNIFICANT_SIGMAS, tuned.SMEAR_SHARE * largest), tuned.NEAR_LARGEST * largest)
     if limit <= 0.0:
         return ()
     found: list[Stretch] = []
-    for number, recording in enumerate(plant.recordings):
+    for number, recording in enumerate(predictor.recordings):
         spans = []
         for times, score in tracks[number]:
             half = 0.5 * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
@@ -382,14 +375,16 @@ def join(spans: Sequence[tuple[float, float]], gap: float) -> list[tuple[float, 
     return found
 
 
-def _scores(plant: Plant, fit: Fit, number: int) -> list[tuple[Array, Array]]:
+def _scores(predictor: Predictor, fit: Fit, number: int) -> list[tuple[Array, Array]]:
     """Times and smoothed residuals in standard errors of every channel of a recording."""
-    predicted = plant.predict(number, fit.values, fit.candidates).temperature
-    window = window_of(plant.recordings[number])
+    predicted = predictor.predict(number, fit.values, fit.candidates).temperature
+    window = window_of(predictor.recordings[number])
     found = []
     for channel in range(predicted.shape[1]):
         own = [
-            o for o in (*plant.observations, *plant.heldout) if (o.recording, o.channel) == (number, channel)
+            o
+            for o in (*predictor.observations, *predictor.heldout)
+            if (o.recording, o.channel) == (number, channel)
         ]
         if not own:
             continue
@@ -450,11 +445,11 @@ def conditions_in_words(recording: Recording, spans: Sequence[tuple[float, float
 
 def _words(conditions: Conditions, mask: NDArray[np.bool_]) -> str:
     share = dict(zip(conditions.names, conditions.marks[mask].mean(axis=0), strict=True))
-    trend = [name for name in ("heating", "cooling", "steady") if share.get(name, 0.0) >= MOSTLY]
+    trend = [name for name in ("heating", "cooling", "steady") if share.get(name, 0.0) >= tuned.MOSTLY]
     states = {name: value for name, value in share.items() if name not in ("heating", "cooling", "steady")}
     kept, covered = [], 0.0
     for name in sorted(states, key=lambda key: -states[key]):
-        if covered >= SEPARATES:
+        if covered >= tuned.SEPARATES:
             break
         kept.append(name)
         covered += states[name]
@@ -482,7 +477,7 @@ def band_words(names: Sequence[str]) -> str:
 
 def separating_temperature(recording: Recording, inside: NDArray[np.bool_]) -> str:
     """``above 31 °C at SP01`` where that tells the stamps inside from those outside; else empty."""
-    best, words = SEPARATES, ""
+    best, words = tuned.SEPARATES, ""
     for column, name in enumerate(recording.temperature_names):
         usable = recording.usable[:, column]
         hot, cold = inside & usable, ~inside & usable

@@ -21,6 +21,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.linearised_fit import LinearProblem
@@ -28,11 +29,8 @@ from spindle_fem.inference.worker_processes import Workers
 
 Array = NDArray[np.float64]
 
-ONSETS = 40
 # Answers that are marched together.
 COLUMNS = 320
-WALK_SCALES = (1.0, 3.0, 10.0, 30.0, 100.0)
-MOST_INTERVALS = 3
 # Moves of edges that gain less (natural logarithm) are none.
 SMALLEST_SETTLING = 1e-6
 
@@ -45,7 +43,7 @@ class Pattern:
     ----------
     spot : str
     places : tuple of str
-        Of the model, equal parts.
+        Places of the model, which share the heat evenly.
     cooling : bool
         True: a unit conductance to the ambient; False: unit heat.
     """
@@ -127,7 +125,7 @@ def onset_answers(
     patterns: Sequence[Pattern],
     recording: int,
     *,
-    number: int = ONSETS,
+    number: int = tuned.ONSETS,
     trust: Fit | None = None,
     workers: Workers | None = None,
 ) -> list[Onsets]:
@@ -145,7 +143,7 @@ def onset_answers(
     trust : Fit or None
         As :meth:`LinearProblem.about` has it.
     workers : Workers or None
-        Who work them out; the result does not depend on it.
+        Processes that work them out; the result does not depend on it.
     """
     linear = LinearProblem.about(problem, fit, trust)
     chunk = max(1, COLUMNS // number)
@@ -168,7 +166,7 @@ def _onsets_of(
     number: int,
 ) -> list[list[Onsets]]:
     """Inner products of some spots' answers, by chunks that are marched together."""
-    base = BaseRun(problem.plant, recording, fit.values, fit.candidates)
+    base = BaseRun(problem.predictor, recording, fit.values, fit.candidates)
     grid = base.drive.grid
     onsets = np.linspace(grid[0], grid[-1], number + 1)[:-1]
     found = []
@@ -177,8 +175,8 @@ def _onsets_of(
         on_grid = [
             answers
             if other == recording
-            else np.zeros((problem.plant.drives[other].grid.size, len(columns), answers.shape[2]))
-            for other, columns in enumerate(problem.plant.columns)
+            else np.zeros((problem.predictor.drives[other].grid.size, len(columns), answers.shape[2]))
+            for other, columns in enumerate(problem.predictor.columns)
         ]
         gram, data, _ = linear.gram(problem.whitened(on_grid))
         own = [slice(index * number, (index + 1) * number) for index in range(len(chosen))]
@@ -193,7 +191,7 @@ def _onsets_of(
 
 def _march(base: BaseRun, patterns: Sequence[Pattern], onsets: Array) -> Array:
     """Answers of the channels, (G + 1, c, n_patterns * n_onsets)."""
-    model, run, drive = base.plant.fast.model, base.run, base.drive
+    model, run, drive = base.predictor.fast.model, base.run, base.drive
     loads = np.array([np.mean([model.place(p) for p in pattern.places], axis=0) for pattern in patterns]).T
     strength = np.ones((drive.grid.size, len(patterns)))
     for index, pattern in enumerate(patterns):
@@ -221,7 +219,7 @@ def explain(onsets: Onsets) -> Explanation:
     """
     best: tuple[float, float, Array, Array] | None = None
     count = len(onsets.times)
-    for scale in WALK_SCALES:
+    for scale in tuned.WALK_SCALES:
         matrix = np.eye(count) + scale**2 * onsets.gram
         lower = np.linalg.cholesky(0.5 * (matrix + matrix.T))
         right = scale * onsets.data
@@ -236,7 +234,7 @@ def explain(onsets: Onsets) -> Explanation:
     return Explanation(
         onsets.pattern.spot,
         onsets.recording,
-        evidence - np.log(len(WALK_SCALES)),
+        evidence - np.log(len(tuned.WALK_SCALES)),
         onsets.times,
         heat,
         sigma,
@@ -266,7 +264,7 @@ def find_intervals(onsets: Onsets, spread: float, stop: float) -> list[OnOff]:
     times = np.append(onsets.times, stop)
     edges: list[int] = []
     found = []
-    for number in range(1, MOST_INTERVALS + 1):
+    for number in range(1, tuned.MOST_INTERVALS + 1):
         added = _best_addition(gram, data, edges, pairs, spread)
         if added is None:
             break
@@ -353,7 +351,7 @@ def conditions_of(times: Array, speed: Array, temperature: Array) -> list[str]:
     times : (n,) ndarray, [s]
     speed : (n,) ndarray, [rad/s]
     temperature : (n,) ndarray, [K]
-        Of the machine.
+        Temperature of the machine.
     """
     rate = np.gradient(temperature, times) if len(times) > 1 else np.zeros(len(times))
     limit = max(0.1 * float(np.abs(rate).max(initial=0.0)), 1e-12)

@@ -22,6 +22,7 @@ from scipy.linalg import solve_triangular
 from spindle_fem.effects.framework.effect import in_intervals, place_words
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
+from spindle_fem.inference import tuned
 from spindle_fem.inference.further_tests import (
     AGAIN,
     Answer,
@@ -35,7 +36,7 @@ from spindle_fem.inference.further_tests import (
 )
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.reading_noise import SlowError
-from spindle_fem.inference.verdict import TEMPERATURE, Ranked, rank
+from spindle_fem.inference.verdict import Ranked, rank
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ SPACING = 300.0
 FEWEST_INSTANTS, MOST_INSTANTS = 12, 48
 # Options that tell nearly as much as the best are worth as much; the simplest of them is proposed.
 AS_GOOD = 0.9
-# Below so many bits a test is not worth calling a decision.
+# A test that is expected to tell less than this, bits, does not separate the explanations.
 HARDLY = 0.3
 EXISTING = "the sensors that are there"
 
@@ -72,7 +73,7 @@ class Option:
     spread : float, [K]
         1 σ of the difference from noise and unknown parameters.
     time : float, [s]
-        Of that instant, from the start of the test.
+        When that instant is, from the start of the test.
     levels : (float, float), [K]
         What the two predict then.
     """
@@ -194,15 +195,15 @@ def evaluate(
     diagnosis: Diagnosis, fits: Sequence[Fit], weights: Array
 ) -> tuple[list[Option], list[dict[str, str]]]:
     """Every test with and without a further sensor, and the tests that cannot be simulated."""
-    plant = diagnosis.plant
-    recording = plant.recordings[0]
+    predictor = diagnosis.predictor
+    recording = predictor.recordings[0]
     if diagnosis.view.kind == "network":
-        places = network_places(plant.fast.model.place_names, recording.probes)
+        places = network_places(predictor.fast.model.place_names, recording.probes)
     else:
         doubted = dict.fromkeys(c.component for fit in fits for c in fit.candidates if c.reading is not None)
         places = (
-            *beside_probes(tuple(doubted), plant.fast.model.probe_names),
-            *reachable_places(plant.fast.spec, plant.fast.model.place_names),
+            *beside_probes(tuple(doubted), predictor.fast.model.probe_names),
+            *reachable_places(predictor.fast.spec, predictor.fast.model.place_names),
         )
     white = np.append(recording.sigma, np.full(len(places), float(np.median(recording.sigma))))
     step = float(np.median(np.diff(recording.times)))
@@ -210,11 +211,11 @@ def evaluate(
     count = len(recording.temperature_names)
     options: list[Option] = []
     failed = []
-    for trial in trials_of(plant, diagnosis.view):
+    for trial in trials_of(predictor, diagnosis.view):
         duration = float(trial.drive.grid[-1] - trial.drive.grid[0])
         spacing = max(min(SPACING, duration / FEWEST_INSTANTS), duration / MOST_INSTANTS)
         try:
-            answers = [answer(plant, fit, trial, places, spacing) for fit in fits]
+            answers = [answer(predictor, fit, trial, places, spacing) for fit in fits]
         except (ConvergenceError, OutOfValidityError, SpecError) as error:
             failed.append({"condition": trial.name, "reason": str(error)})
             continue
@@ -269,7 +270,7 @@ def _option(
     return Option(
         trial,
         place,
-        expected_information(weights, distances / TEMPERATURE),
+        expected_information(weights, distances / tuned.GAIN_DIVISOR),
         float(distances[first, second]),
         names[chosen[at // size]],
         float(difference[at]),

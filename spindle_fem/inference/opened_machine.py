@@ -30,7 +30,7 @@ from spindle_fem.recordings.thin import thinned_recording
 
 Progress = Callable[[str], None]
 
-# A network is stepped from stamp to stamp: so many suffice for what its nodes can follow.
+# Most stamps of a network's recording, which is stepped from one to the next; more are averaged.
 MOST_STAMPS = 3_000
 
 
@@ -44,9 +44,9 @@ class DiagnosedMachine:
     spec : MachineSpec or NetworkMachineSpec
     fast : FastModel or NetworkFastModel
     effects : ActiveEffects
-        Of the definition: nominal, not diagnosed.
+        Effects of the definition: nominal, not diagnosed.
     view : MachineView
-        Of the first recording, ranges over all.
+        View of the first recording, its ranges over all.
     recordings, calibration : tuple of Recording
         As they are used: measured inputs smoothed, long ones of networks thinned.
     notes : tuple of str

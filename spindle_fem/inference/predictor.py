@@ -1,31 +1,62 @@
-"""What a calibration needs of a machine: predictions of a recording, and their derivatives."""
+"""What every channel of some recordings should read by a machine's fast model, and derivatives.
+
+One predictor serves everything: calibration and simulation ask it for every
+stamp of a recording; a diagnosis, which runs it thousands of times, on steps
+of a minute from one change of the inputs to the next.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
-from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
+from spindle_fem.effects.framework.effect import Candidate, Reading
+from spindle_fem.effects.framework.term import Term
+from spindle_fem.inference.coordinate_names import (
+    DIRECTIONS,
+    EFFECT_PREFIX,
+    GAP_PREFIX,
+    JUMP_PREFIX,
+    NO_VALUES,
+    PROBE_PREFIX,
+    START_PREFIX,
+)
+from spindle_fem.inference.drive_steps import coarse_drive, even_drive
+from spindle_fem.inference.observations import Observation, observe
+from spindle_fem.inference.prediction import Prediction
+from spindle_fem.inference.recording_gaps import (
+    gap_pieces,
+    hidden_forcing,
+    hidden_in,
+    jump_forcing,
+    unseen_jumps,
+)
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import Drive, drive_of_recording, inputs_at
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
-from spindle_fem.model.reduced.reduced_transient import FastTransient, simulate_fast
+from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
+from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.operation.coefficient_table import INNER_SHARE
 from spindle_fem.recordings.align import Recording
-from spindle_fem.solvers.simulate_network import initial_parameters, simulate_on_recording
 
 Array = NDArray[np.float64]
+
+# Longest step of a diagnosed machine with geometry, s; readings are averaged over as long.
+STEP = 60.0
+# A network's recordings last minutes or months: longest bin [s], and number of bins of a recording.
+LONGEST_BIN, BINS = 600.0, 300
+# A share of heat stays below one.
+LARGEST_SHARE = 0.999
 
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """One free parameter.
+    """One uncertain parameter.
 
     Attributes
     ----------
@@ -46,175 +77,386 @@ class Prior:
     highest: float = np.inf
 
 
-class Predictor(Protocol):
-    """A machine with free parameters on its recordings."""
-
-    priors: tuple[Prior, ...]
-    recordings: tuple[Recording, ...]
-
-    def predict(self, log_factors: Array, *, derivatives: bool = True) -> list[tuple[Array, Array]]:
-        """Prediction (N, c) [K] and derivatives (N, c, p) [K] for every recording."""
-        ...
-
-
-class MachinePredictor:
-    """A machine with geometry by its reduced model.
+class Predictor:
+    """A machine on its recordings.
 
     Parameters
     ----------
-    fast : FastModel
+    fast : FastModel or NetworkFastModel
     recordings : sequence of Recording
-    fixed : mapping of str to float
-        Factors of parameters that stay as they are.
+    use : sequence of (N,) bool ndarray, optional
+        Stamps that may be fitted, per recording; the rest is held out. All by default.
     effects : ActiveEffects
-        Physics beyond the machine's own, as its definition has it.
+        What the definition itself switches on.
+    step : float, [s]
+        Longest step; a network takes that of its recording.
+    at_stamps : bool
+        Whether to predict every stamp, each recording on its own grid and with no gap left open, instead
+        of steps for a diagnosis.
+    drives : sequence of Drive, optional
+        Inputs over time that are known already.
+    same_within : float
+        Operating points whose coefficients differ by less than this share have the same operators.
     """
 
     def __init__(
         self,
-        fast: FastModel,
+        fast: FastModel | NetworkFastModel,
         recordings: Sequence[Recording],
-        fixed: Mapping[str, float] | None = None,
+        use: Sequence[NDArray[np.bool_]] | None = None,
         effects: ActiveEffects = NO_EFFECTS,
+        *,
+        step: float = STEP,
+        at_stamps: bool = False,
+        drives: Sequence[Drive] | None = None,
+        same_within: float = 0.0,
     ) -> None:
         self.fast, self.effects = fast, effects
+        self.same_within, self.step, self.at_stamps = same_within, step, at_stamps
         self.recordings = tuple(recordings)
-        self.fixed = dict(fixed or {})
-        self.priors = tuple(
+        self.use = tuple(np.ones(r.times.size, dtype=bool) for r in recordings) if use is None else tuple(use)
+        self.is_network = isinstance(fast, NetworkFastModel)
+        self.drives = tuple(self._drive(item) for item in self.recordings) if drives is None else drives
+        left_open = not (self.is_network or at_stamps)
+        self._initial = [fast.initial_parameters(item) if self.is_network else () for item in self.recordings]
+        self._jumps = [
+            unseen_jumps(item, drive) if left_open else ()
+            for item, drive in zip(self.recordings, self.drives, strict=True)
+        ]
+        self._gaps = [gap_pieces(item) if left_open else () for item in self.recordings]
+        self._hidden = [
+            hidden_in(recording, gaps, [group.name for group in fast.spec.bearing_set]) if gaps else ()
+            for recording, gaps in zip(self.recordings, self._gaps, strict=True)
+        ]
+        self._slopes: dict[tuple[str, int], Array] = {}
+        self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
+        self.observations = self._observe(self.use)
+        self.heldout = self._observe([~mask for mask in self.use])
+
+    def _drive(self, recording: Recording) -> Drive:
+        """Inputs of a recording, and the times at which its channels are told."""
+        if self.at_stamps:
+            own = self.fast.drive(recording) if self.is_network else None
+            return drive_of_recording(self.fast.spec, recording) if own is None else own
+        if self.is_network:
+            drive = even_drive(self.fast, recording)
+        else:
+            drive = coarse_drive(self.fast.spec, recording, self.step)
+        return replace(drive, times=drive.grid)
+
+    def _observe(self, masks: Sequence[NDArray[np.bool_]]) -> tuple[Observation, ...]:
+        coarse = self.is_network and not self.at_stamps
+        widths = [
+            min(LONGEST_BIN, float(r.times[-1] - r.times[0]) / BINS) if coarse else None
+            for r in self.recordings
+        ]
+        grids = [None if self.at_stamps else drive.grid for drive in self.drives]
+        return observe(self.recordings, masks, grids, widths)
+
+    def with_model(self, fast: FastModel, same_within: float = 0.0) -> Predictor:
+        """The same recordings on another reduction of the same machine."""
+        return Predictor(
+            fast,
+            self.recordings,
+            self.use,
+            self.effects,
+            step=self.step,
+            drives=self.drives,
+            same_within=same_within,
+        )
+
+    # ------------------------------------------------------------------ what is uncertain
+    def uncertain(self) -> tuple[Prior, ...]:
+        """The machine's uncertain parameters."""
+        if self.is_network:
+            known = self.fast.network.parameters
+            return tuple(Prior(p.name, p.value, p.sigma_log, p.unit) for p in known if p.sigma_log > 0.0)
+        return tuple(
             Prior(
                 item.name,
                 item.value,
                 item.sigma_log,
                 item.unit,
-                0.999 / item.value if item.name == INNER_SHARE else np.inf,
+                LARGEST_SHARE / item.value if item.name == INNER_SHARE else np.inf,
             )
-            for item in uncertain_parameters(fast.spec)
-            if item.name not in self.fixed
+            for item in uncertain_parameters(self.fast.spec)
         )
-        self.drives: tuple[Drive, ...] = tuple(drive_of_recording(fast.spec, r) for r in self.recordings)
-        self.columns = [fast.require_channels(r.probes, r.source) for r in self.recordings]
 
-    def initial_temperature(self, number: int) -> float:
-        """Uniform temperature at the start of a recording, K."""
-        recording = self.recordings[number]
+    def starts(self) -> tuple[Prior, ...]:
+        """Uncertain temperatures at the start of each recording of a network."""
+        if not self.is_network or self.fast.spec.initial != "first_reading":
+            return ()
+        return tuple(
+            Prior(f"{START_PREFIX}{number}.{item.name}", item.value, item.sigma_log, item.unit)
+            for number, items in enumerate(self._initial)
+            for item in items
+        )
+
+    def jumps(self) -> list[tuple[str, float, float]]:
+        """Changes of inputs that fell into gaps: name; least and most that they were earlier [s]."""
+        return [
+            (f"{JUMP_PREFIX}{number}.{index}", least, most)
+            for number, items in enumerate(self._jumps)
+            for index, (_, least, most) in enumerate(items)
+        ]
+
+    def gaps(self) -> list[str]:
+        """Names of what may have happened within gaps."""
+        return [
+            f"{GAP_PREFIX}{number}.{index}"
+            for number, items in enumerate(self._hidden)
+            for index in range(len(items))
+        ]
+
+    def gap_intervals(self, number: int) -> tuple[tuple[float, float], ...]:
+        """Pieces of the gaps of one recording in which something may have happened, [s]."""
+        return self._gaps[number]
+
+    def displacements(self) -> tuple[str, ...]:
+        """Names of the displacements of every point probe that is read."""
+        model = self.fast.model
+        if not model.probe_gradients.size:
+            return ()
+        read = {probe for recording in self.recordings for probe in recording.probes}
+        return tuple(
+            f"{PROBE_PREFIX}{probe}.{direction}"
+            for probe in model.probe_names
+            if probe in read
+            for direction in DIRECTIONS
+        )
+
+    # ------------------------------------------------------------------ simulation
+    def start(
+        self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
+    ) -> float | Start:
+        """Where a recording begins: a uniform temperature [K], or that of every node of a network."""
+        if self.is_network:
+            return self.fast.start(
+                self.recordings[number],
+                self.drives[number],
+                self._factors(number, values, (), ()),
+                derivatives,
+                kind=self.fast.spec.initial,
+                initial=self._initial[number],
+            )
         if self.fast.spec.initial == "ambient":
             return self.drives[number].first("ambient")
-        return float(np.mean(list(recording.first_readings().values())))
+        return float(np.mean(list(self.recordings[number].first_readings().values())))
 
-    def predict(self, log_factors: Array, *, derivatives: bool = True) -> list[tuple[Array, Array]]:
-        """Prediction and derivatives for every recording."""
-        names = tuple(prior.name for prior in self.priors)
-        factors = self.fixed | {
-            name: float(value) for name, value in zip(names, np.exp(log_factors), strict=True)
+    def _run_name(self, number: int, name: str, outside: Sequence[str]) -> str | None:
+        """What a coordinate is called in the run of one recording; None where it does not enter."""
+        if name in outside or name.startswith((PROBE_PREFIX, JUMP_PREFIX, GAP_PREFIX)):
+            return None
+        if name.startswith(START_PREFIX):
+            owner, _, own = name.removeprefix(START_PREFIX).partition(".")
+            return own if int(owner) == number else None
+        return name.removeprefix(EFFECT_PREFIX)
+
+    def _factors(
+        self, number: int, values: Mapping[str, float], known: Sequence[str], readings: Sequence[str]
+    ) -> dict[str, float]:
+        """Factors of the machine's parameters in the run of one recording."""
+        factors: dict[str, float] = dict(self.effects.factors)
+        for name, value in values.items():
+            own = None if name in known else self._run_name(number, name, readings)
+            if own is not None:
+                factors[own] = factors.get(own, 1.0) * value
+        return factors
+
+    def _physics(
+        self, number: int, values: Mapping[str, float], candidates: Sequence[Candidate]
+    ) -> tuple[dict[str, float], tuple[Term, ...]]:
+        """Factors and term parameters by name, and terms, of one recording's run."""
+        candidates, idle = _acting(candidates, number)
+        values = {name: value for name, value in values.items() if name not in idle}
+        terms = (*self.effects.terms, *(term for candidate in candidates for term in candidate.terms))
+        known = {
+            name: values.get(name, item.value)
+            for candidate in candidates
+            for term in candidate.terms
+            for name, item in term.names().items()
         }
-        found = []
-        for number, drive in enumerate(self.drives):
-            run = simulate_fast(
-                self.fast,
-                drive,
-                self.initial_temperature(number),
-                parameters=self.effects.times_parameters(factors),
-                derivatives=names if derivatives else (),
-                terms=self.effects.terms,
-            )
-            found.append(_readings(run, drive, self.recordings[number], self.columns[number], self.effects))
-        return found
+        readings = {f"{r.name}.{item.name}" for r in _readings(candidates) for item in r.parameters}
+        return self._factors(number, values, known, readings) | known, terms
 
-
-def _readings(
-    run: FastTransient, drive: Drive, recording: Recording, columns: NDArray[np.int64], effects: ActiveEffects
-) -> tuple[Array, Array]:
-    """What the channels of a recording tell, and derivatives."""
-    temperature, sensitivity = run.temperature[:, columns], run.sensitivity[:, columns]
-    if not effects.readings:
-        return temperature, sensitivity
-    inputs = inputs_at(drive, recording.times)
-    return effects.read(recording.temperature_names, recording.times, temperature, sensitivity, inputs)
-
-
-class NetworkPredictor:
-    """A network that the user wrote.
-
-    The temperatures at the start of each recording are free, with the noise of
-    their readings as prior; nodes that nothing reads are known to a few kelvin.
-
-    Parameters
-    ----------
-    network : ThermalNetwork
-    recordings : sequence of Recording
-    initial : str
-        As the machine's ``initial``.
-    effects : ActiveEffects
-        Physics beyond the network's own, as its definition has it.
-    """
-
-    def __init__(
+    def transient(
         self,
-        network: ThermalNetwork,
-        recordings: Sequence[Recording],
-        initial: str = "first_reading",
-        effects: ActiveEffects = NO_EFFECTS,
+        number: int,
+        values: Mapping[str, float],
+        candidates: Sequence[Candidate] = (),
+        derivatives: Sequence[str] = (),
+        like: TransientRun | None = None,
+    ) -> TransientRun:
+        """A run of one recording that is ready to march.
+
+        Parameters
+        ----------
+        number : int
+            Recording.
+        values : mapping of str to float
+            Factors of the machine's parameters, ``effect:<name>`` for factors of
+            candidates, values of term parameters; of readings, which the run ignores.
+        candidates : sequence of Candidate
+        derivatives : sequence of str
+            Names of the machine or of terms.
+        like : TransientRun, optional
+            Another run of this recording; what both have in common is taken from it.
+        """
+        parameters, terms = self._physics(number, values, candidates)
+        drive = self.drives[number]
+        return TransientRun(
+            self.fast,
+            drive,
+            parameters,
+            tuple(derivatives),
+            (*self.fast.own_terms(drive), *terms),
+            like=like,
+            same_within=self.same_within,
+        )
+
+    def predict(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        candidates: Sequence[Candidate] = (),
+        derivatives: Sequence[str] = (),
+        near: Prediction | None = None,
+    ) -> Prediction:
+        """What every channel of one recording should read.
+
+        Parameters as for :meth:`transient`; ``derivatives`` may also name
+        factors of candidates (``effect:<name>``) and parameters of readings.
+        Derivatives are to logarithms, to values for parameters that say so.
+        ``near`` is a prediction of the recording for values that are near: it begins there.
+        """
+        acting, idle = _acting(candidates, number)
+        values = {name: value for name, value in values.items() if name not in idle}
+        # A reading may share a parameter with its term: a bypass that joins before the outlet's sensor.
+        shared = {name for c in acting for term in c.terms for name in term.names()}
+        of_readings = {f"{r.name}.{item.name}" for r in _readings(acting) for item in r.parameters}
+        outside = (of_readings - shared) | idle
+        inner = [self._run_name(number, name, outside) for name in derivatives]
+        of_run = tuple(dict.fromkeys(own for own in inner if own is not None))
+        initial = self.start(number, values, of_run)
+        if self.at_stamps:
+            parameters, terms = self._physics(number, values, acting)
+            run, found = (
+                None,
+                simulate_fast(
+                    self.fast,
+                    self.drives[number],
+                    initial,
+                    parameters=parameters,
+                    derivatives=of_run,
+                    terms=terms,
+                ),
+            )
+        else:
+            run = self.transient(number, values, acting, of_run, None if near is None else near.run)
+            found = run.solve(initial, None if near is None else near.states)
+        owners = np.array([-1 if own is None else of_run.index(own) for own in inner], dtype=np.int64)
+        columns = self.columns[number]
+        temperature = found.temperature[:, columns]
+        sensitivity = np.zeros((*temperature.shape, len(derivatives)))
+        sensitivity[:, :, owners >= 0] = found.sensitivity[:, columns][:, :, owners[owners >= 0]]
+        told = Prediction(temperature, sensitivity, found.states, run, found.tangents, owners)
+        self._displace(number, told, values, derivatives)
+        self._unseen(number, told, values, derivatives)
+        for reading in self.effects.readings:
+            self._read(number, reading, told, {}, ())
+        for reading in _readings(acting):
+            self._read(number, reading, told, values, derivatives)
+        return told
+
+    def _displace(
+        self, number: int, told: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
-        self.network, self.effects = network, effects
-        self.recordings = tuple(recordings)
-        self.initial = initial
-        self.free = tuple(p for p in network.parameters if p.sigma_log > 0.0)
-        starts = [
-            initial_parameters(network, r) if initial == "first_reading" else () for r in self.recordings
-        ]
-        self.starts: tuple[tuple[Parameter, ...], ...] = tuple(starts)
-        priors = [Prior(p.name, p.value, p.sigma_log, p.unit) for p in self.free]
-        for number, items in enumerate(starts):
-            label = f"[{number + 1}]" if len(starts) > 1 else ""
-            priors += [Prior(f"{p.name}{label}", p.value, p.sigma_log, p.unit) for p in items]
-        self.priors = tuple(priors)
+        """Read each probe where it sits, to first order in its displacement, in place."""
+        model, probes = self.fast.model, self.recordings[number].probes
+        for name in {name for name in (*values, *derivatives) if name.startswith(PROBE_PREFIX)}:
+            probe, _, direction = name.removeprefix(PROBE_PREFIX).rpartition(".")
+            if probe not in probes:
+                continue
+            gradient = model.probe_gradients[model.probe_names.index(probe), DIRECTIONS.index(direction)]
+            slope = told.states @ gradient
+            column = probes.index(probe)
+            told.temperature[:, column] += values.get(name, 0.0) * slope
+            if name in derivatives:
+                told.sensitivity[:, column, derivatives.index(name)] += slope
 
-    def predict(self, log_factors: Array, *, derivatives: bool = True) -> list[tuple[Array, Array]]:
-        """Prediction and derivatives for every recording."""
-        if self.effects.candidates:
-            return self._predict_with_effects(log_factors, derivatives=derivatives)
-        factors = np.exp(log_factors)
-        own = {p.name: p.value * f for p, f in zip(self.free, factors, strict=False)}
-        network = self.network.with_values(own)
-        position = len(self.free)
-        found = []
-        for recording, items in zip(self.recordings, self.starts, strict=True):
-            moved = tuple(replace(p, value=own[p.name]) for p in self.free)
-            begun = tuple(
-                replace(p, value=p.value * f) for p, f in zip(items, factors[position:], strict=False)
-            )
-            run = simulate_on_recording(network, recording, parameters=moved + begun, initial=self.initial)
-            sensitivity = np.zeros((*run.predicted.shape, len(self.priors)))
-            sensitivity[:, :, : len(moved)] = run.sensitivity[:, :, : len(moved)]
-            sensitivity[:, :, position : position + len(begun)] = run.sensitivity[:, :, len(moved) :]
-            position += len(begun)
-            found.append((run.predicted, sensitivity))
-        return found
+    def _unseen(
+        self, number: int, told: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
+    ) -> None:
+        """What happened in gaps of the recording, to first order, in place."""
+        for kind in (JUMP_PREFIX, GAP_PREFIX):
+            prefix = f"{kind}{number}."
+            for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
+                slope = self._slopes_of(kind, number)[:, :, int(name.removeprefix(prefix))]
+                told.temperature[:] += values.get(name, 0.0) * slope
+                if name in derivatives:
+                    told.sensitivity[:, :, derivatives.index(name)] += slope
 
-    def _predict_with_effects(self, log_factors: Array, *, derivatives: bool) -> list[tuple[Array, Array]]:
-        """By the fast model, which takes terms."""
-        fast = NetworkFastModel(self.network)
-        own = tuple(p.name for p in self.free)
-        factors = np.exp(log_factors)
-        position = len(own)
-        found = []
-        for recording, items in zip(self.recordings, self.starts, strict=True):
-            begun = tuple(p.name for p in items)
-            places = [*range(len(own)), *range(position, position + len(begun))]
-            names = (*own, *begun)
-            position += len(begun)
-            values = dict(zip(names, factors[places].tolist(), strict=True))
-            values = self.effects.times_parameters(values)
-            asked = names if derivatives else ()
-            drive = fast.drive(recording)
-            start = fast.start(recording, drive, values, asked, kind=self.initial, initial=items)
-            run = simulate_fast(
-                fast, drive, start, parameters=values, derivatives=asked, terms=self.effects.terms
-            )
-            columns = fast.require_channels(recording.probes, recording.source)
-            predicted, part = _readings(run, drive, recording, columns, self.effects)
-            sensitivity = np.zeros((*predicted.shape, len(self.priors)))
-            if derivatives:
-                sensitivity[:, :, places] = part
-            found.append((predicted, sensitivity))
-        return found
+    def _slopes_of(self, kind: str, number: int) -> Array:
+        """Change of the channels (G + 1, c, n): K for each second that an input changed earlier, or K."""
+        if (kind, number) not in self._slopes:
+            run = self.transient(number, {})
+            states, tracks = run.march(self.start(number))
+            if kind == JUMP_PREFIX:
+                forcing = jump_forcing(run, states, self._jumps[number])
+            else:
+                forcing = hidden_forcing(run, self.fast, self._hidden[number])
+            tangent = run.tangents(forcing, tracks)
+            owner = np.append(run.drive.step_class, run.drive.step_class[-1])
+            outputs = np.array([item.outputs[self.columns[number]] for item in run.operators])
+            self._slopes[kind, number] = np.einsum("gcr,grm->gcm", outputs[owner], tangent, optimize=True)
+        return self._slopes[kind, number]
+
+    def read(
+        self, number: int, candidates: Sequence[Candidate], values: Mapping[str, float], temperature: Array
+    ) -> Array:
+        """What the channels tell where their places have the temperatures (G + 1, c)."""
+        told = Prediction(temperature.copy(), np.zeros((*temperature.shape, 0)), np.zeros(0))
+        for reading in _readings(candidates):
+            self._read(number, reading, told, values, ())
+        return told.temperature
+
+    def _read(
+        self,
+        number: int,
+        reading: Reading,
+        told: Prediction,
+        values: Mapping[str, float],
+        derivatives: Sequence[str],
+    ) -> None:
+        """Pass one channel through a sensor effect, in place."""
+        names = self.recordings[number].temperature_names
+        if reading.channel not in names:
+            return
+        column, drive = names.index(reading.channel), self.drives[number]
+        own = {f"{reading.name}.{item.name}": item.name for item in reading.parameters}
+        asked = {own[name]: position for position, name in enumerate(derivatives) if name in own}
+        told.temperature[:, column], told.sensitivity[:, column], by = reading.told(
+            drive.times,
+            told.temperature[:, column],
+            told.sensitivity[:, column],
+            inputs_at(drive, drive.times),
+            {inner: values[outer] for outer, inner in own.items() if outer in values},
+            tuple(asked),
+        )
+        told.sensitivity[:, column, list(asked.values())] += by
+
+
+def _readings(candidates: Sequence[Candidate]) -> list[Reading]:
+    return [c.reading for c in candidates if c.reading is not None]
+
+
+def _acting(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candidate, ...], set[str]]:
+    """Candidates that act in a recording, and names that belong to the others only."""
+    acting = tuple(c for c in candidates if c.recording in (None, number))
+    idle = {
+        EFFECT_PREFIX + name if name in {f.name for f in c.factors} else name
+        for c in candidates
+        if c.recording not in (None, number)
+        for name in c.parameters
+    }
+    return acting, idle

@@ -59,7 +59,7 @@ class ChannelBins:
     spacing : (b,) ndarray, [s]
         Mean distance of the readings in each; 0 where there is one.
     white : float, [K]
-        Of a single reading, rounding included.
+        Noise of a single reading, rounding included.
     """
 
     channel: int

@@ -1,4 +1,9 @@
-"""What nobody recorded: pieces of gaps, what may have happened in them, inputs that changed in them."""
+"""Gaps of a recording: what may have happened in them unseen, and what that does to the temperatures.
+
+Two things are left open to first order: when, within a gap, an input changed
+that is another after it; and friction or an input temperature that differed
+within a piece of the gap.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +12,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spindle_fem.model.reduced.drive import Drive
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.reduced_transient import TransientRun
 from spindle_fem.recordings.align import Recording
 
-# Of the usual spacing of a recording: more is a gap.
+Array = NDArray[np.float64]
+
+# A distance of stamps above this many usual ones is a gap.
 GAP_STEPS = 1.5
-# Shorter gaps, s, and smaller changes, K, hide nothing that matters.
+# Shorter gaps [s] and smaller changes of an input temperature over one [K] move no reading by its noise.
 SHORTEST_GAP, LEAST_CHANGE = 120.0, 1.0
-# Length of a piece, s.
+# Length of a piece [s], and the most pieces of one gap: each is a further coordinate of every fit.
 GAP_PIECE, MOST_PIECES = 150.0, 8
 # Input temperatures, by the name of their load.
 WARMTH = ("ambient", "coolant_inlet")
@@ -97,3 +107,51 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
         if last - first > GAP_STEPS * usual:
             found.append((int(step), float(time - last), float(time - first)))
     return tuple(found)
+
+
+def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, float, float]]) -> Array:
+    """What the states of a run gain for each second that an input changed earlier, (G, r, n).
+
+    Parameters
+    ----------
+    run : TransientRun
+    states : (G + 1, r) ndarray, [K]
+        States of the run.
+    jumps : sequence of (int, float, float)
+        As :func:`unseen_jumps` gives them.
+    """
+    forcing = np.zeros((len(run.drive.steps), states.shape[1], len(jumps)))
+    for index, (step, _, _) in enumerate(jumps):
+        before, after = (int(run.drive.step_class[i]) for i in (step - 1, step))
+        gained = run.loads[after] @ run.start[step] - run.loads[before] @ run.end[step - 1]
+        gained -= (run.operators[after].conduction - run.operators[before].conduction) @ states[step]
+        forcing[step - 1, :, index] = np.linalg.solve(run.built.storage, gained)
+    return forcing
+
+
+def hidden_forcing(run: TransientRun, fast: FastModel, hidden: Sequence[Hidden]) -> Array:
+    """What the states of a run gain from what happened in pieces of gaps, (G, r, n) K.
+
+    Parameters
+    ----------
+    run : TransientRun
+    fast : FastModel
+        Whose run it is.
+    hidden : sequence of Hidden
+    """
+    highest = run.start.max(axis=0)
+    members = {
+        group.name: [row for item in group.bearing for row in fast.heat_rows(item.name)]
+        for group in fast.spec.bearing_set
+    }
+    forcing = np.zeros((len(run.drive.steps), fast.model.size, len(hidden)))
+    for key, rows in run.groups.items():
+        propagator, loads = run.propagators[key], run.loads[key[0]]
+        along = {name: loads[:, own] @ highest[own] for name, own in members.items()}
+        along |= {name: loads[:, fast.load_names.index(name)] for name in WARMTH}
+        middles = 0.5 * (run.drive.grid[rows] + run.drive.grid[rows + 1])
+        for index, item in enumerate(hidden):
+            inside = rows[(middles > item.begin) & (middles < item.end)]
+            answer = (propagator.from_start + propagator.from_end) @ along[item.what]
+            forcing[inside, :, index] = item.size * answer
+    return forcing

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun, Variant
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.linearised_fit import BoxedColumns, LinearProblem
@@ -17,16 +18,8 @@ from spindle_fem.inference.worker_processes import Workers
 
 Array = NDArray[np.float64]
 
-# An effect more must make the data so much likelier (natural logarithm) to be looked at.
-SMALLEST_GAIN = 3.0
-KEPT_FOR_TRIPLES = 40
-# In which variants are screened.
+# Shares of the variants whose answers are worked out side by side.
 PIECES = 2
-# Where bounds matter: sets of several effects that are solved within them, by their gain without bounds, and
-# the single effects whose pairs all are.
-WITHIN_BOUNDS, GOOD_MEMBERS = 120, 24
-# Places of one effect (of one combination of effects) that are looked at together.
-MOST_PLACES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +34,7 @@ class Screened:
     data : (m,) ndarray
         With the data.
     total : float
-        Of the data.
+        Inner product of the data with themselves.
     spread : (m,) ndarray
         Prior standard deviation of each amplitude in units of its reference.
     signs : (m,) ndarray
@@ -66,7 +59,7 @@ class Screened:
     families: Mapping[str, str] = field(default_factory=dict)
     boxed: BoxedColumns | None = None
     base: float = 0.0
-    # Of sets of one size: what was evaluated and its gains, asked for several times and dear within bounds.
+    # Sets of each size that were evaluated, and their gains: asked for several times and slow within bounds.
     _known: dict[int, tuple[NDArray[np.int64], Array]] = field(default_factory=dict, repr=False)
 
     def singles(self) -> Array:
@@ -86,12 +79,12 @@ class Screened:
         return spread[:, :, None] * gram * spread[:, None, :] + np.eye(sets.shape[1])
 
     def _price(self, sets: NDArray[np.int64], scaled: Array) -> Array:
-        """What the amplitudes' room and the priors cost."""
+        """Complexity of sets: half the logarithm of the determinant, less that of the priors."""
         _, log_det = np.linalg.slogdet(scaled)
         return 0.5 * log_det - np.log(2.0) * self.signs[sets].sum(axis=1) - self.log_prior[sets].sum(axis=1)
 
     def _gain(self, sets: NDArray[np.int64]) -> Array:
-        """Gain of sets (k, s) of equal size, whatever the machine's coordinates have to do for it."""
+        """Gain of sets (k, s) of equal size, the machine's coordinates free of their bounds."""
         scaled = self._scaled(sets)
         right = self.spread[sets] * self.data[sets]
         solution = np.linalg.solve(scaled, right[:, :, None])[:, :, 0]
@@ -125,7 +118,7 @@ class Screened:
             key = frozenset(self.variants[i].key for i in members)
             effects = tuple(sorted(self.variants[i].candidate.effect for i in members))
             # One effect at many places must not crowd out the others.
-            if key not in found and places.get(effects, 0) < MOST_PLACES:
+            if key not in found and places.get(effects, 0) < tuned.PLACES_OF_ONE_EFFECT:
                 found[key] = (members, float(gain[index]))
                 places[effects] = places.get(effects, 0) + 1
             if len(found) == number:
@@ -153,7 +146,7 @@ class Screened:
         if size == 2:
             sets = np.column_stack(np.triu_indices(count, 1))
         else:
-            pairs = [members for members, _ in self.best(2, KEPT_FOR_TRIPLES)]
+            pairs = [members for members, _ in self.best(2, tuned.PAIRS_FOR_TRIPLES)]
             sets = np.array(
                 [(*pair, third) for pair in pairs for third in range(count) if third not in pair], dtype=int
             ).reshape(-1, 3)
@@ -162,9 +155,9 @@ class Screened:
     def _promising(self, sets: NDArray[np.int64], gain: Array) -> NDArray[np.int64]:
         """Sets worth a bounded solution: the best without bounds, and those of good members."""
         good = np.zeros(len(self.variants), dtype=bool)
-        good[np.argsort(-self.singles())[:GOOD_MEMBERS]] = True
+        good[np.argsort(-self.singles())[: tuned.SINGLES_WITHIN_BOUNDS]] = True
         chosen = np.zeros(len(sets), dtype=bool)
-        chosen[np.argsort(-gain, kind="stable")[:WITHIN_BOUNDS]] = True
+        chosen[np.argsort(-gain, kind="stable")[: tuned.SETS_WITHIN_BOUNDS]] = True
         if sets.shape[1] == 2:
             chosen |= good[sets].all(axis=1)
         return sets[chosen]
@@ -242,7 +235,7 @@ def screen(
         Fit without the variants that gains count from, and whose residuals tell which readings went
         astray; None for the first one.
     workers : Workers or None
-        Who work out the answers; the result does not depend on it.
+        Processes that work out the answers; the result does not depend on it.
     """
     # As many pieces whether or not there are workers for them, so that the result is the same.
     pieces = [tuple(variants[first::PIECES]) for first in range(PIECES)]
@@ -271,8 +264,8 @@ def _answers(problem: Problem, fit: Fit, variants: Sequence[Variant]) -> Array:
     """Whitened answers of all recordings to variants, (n, m)."""
     return problem.whitened(
         [
-            BaseRun(problem.plant, number, fit.values, fit.candidates).responses(variants)
-            for number in range(len(problem.plant.recordings))
+            BaseRun(problem.predictor, number, fit.values, fit.candidates).responses(variants)
+            for number in range(len(problem.predictor.recordings))
         ]
     )
 

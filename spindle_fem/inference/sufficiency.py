@@ -6,14 +6,15 @@ import numpy as np
 from scipy.linalg import eigh
 
 from spindle_fem.inference.opened_machine import DiagnosedMachine
-from spindle_fem.inference.prepared_problem import all_stamps
-from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.predictor import Predictor
 
-# Readings must move by so many times their noise, by measurement or by the model's word.
+# Readings, or what the model predicts, must move by this many times the noise.
 EXCITED_SIGMAS = 6.0
+# Readings that the best channel must have.
 FEWEST_READINGS = 30
+# One-sided 95 % of a normal distribution.
 ONE_SIDED_SIGMAS = 1.645
-# Share of the quickest time constant that heat from the bearings follows to a probe.
+# Share of the final answer to a step after one time constant, 1 - 1/e.
 REACHED = 0.632
 
 
@@ -34,10 +35,10 @@ def says_too_little(machine: DiagnosedMachine) -> str:
                 f"at least {FEWEST_READINGS} are needed."
             )
             continue
-        plant = Plant(machine.fast, [recording], all_stamps([recording]), machine.effects)
+        predictor = Predictor(machine.fast, [recording], effects=machine.effects)
         duration = float(recording.times[-1] - recording.times[0])
         # A network whose values are guesses may be that much quicker than its nominal values say.
-        needed = response_time(plant) / prior_factor(plant)
+        needed = response_time(predictor) / prior_factor(predictor)
         if duration < needed:
             reasons.append(
                 f'"{recording.name}" lasts {duration / 60.0:.3g} min, but the machine needs '
@@ -45,7 +46,7 @@ def says_too_little(machine: DiagnosedMachine) -> str:
                 "causes that act at different speeds cannot be told apart."
             )
             continue
-        predicted = plant.predict(0, {}).temperature
+        predicted = predictor.predict(0, {}).temperature
         moved = float((np.ptp(predicted, axis=0) / recording.sigma).max())
         spread = [
             np.ptp(np.quantile(recording.temperature[recording.usable[:, k], k], [0.02, 0.98]))
@@ -61,30 +62,30 @@ def says_too_little(machine: DiagnosedMachine) -> str:
     return " ".join(reasons) if len(reasons) == len(machine.recordings) else ""
 
 
-def prior_factor(plant: Plant) -> float:
+def prior_factor(predictor: Predictor) -> float:
     """How much quicker than nominal the priors allow a machine to be (95 % bound), 1 for what is known."""
     sigmas: dict[str, list[float]] = {"capacity": [], "conductance": []}
-    if plant.is_network:
-        for name, sigma, _ in plant.uncertain():
-            kind = name.partition(".")[0]
+    if predictor.is_network:
+        for prior in predictor.uncertain():
+            kind = prior.name.partition(".")[0]
             if kind in sigmas:
-                sigmas[kind].append(sigma)
+                sigmas[kind].append(prior.sigma_log)
     # A time constant is a capacity over a conductance.
     variance = sum(float(np.median(values)) ** 2 for values in sigmas.values() if values)
     return float(np.exp(ONE_SIDED_SIGMAS * np.sqrt(variance)))
 
 
-def response_time(plant: Plant) -> float:
+def response_time(predictor: Predictor) -> float:
     """Time in which the probes answer a step of all heat by 63 %, the median over the probes [s].
 
     From the modes of the machine at its mean operating point.
     """
-    run = plant.transient(0, {})
-    counts = np.bincount(plant.drives[0].step_class, weights=plant.drives[0].steps)
+    run = predictor.transient(0, {})
+    counts = np.bincount(predictor.drives[0].step_class, weights=predictor.drives[0].steps)
     operators = run.operators[int(np.argmax(counts))]
     rates, modes = eigh(operators.conduction, run.built.storage)
-    heat = operators.loads[:, : len(plant.fast.heat_places)].sum(axis=1)
-    gains = (operators.outputs[plant.columns[0]] @ modes) * (modes.T @ heat)
+    heat = operators.loads[:, : len(predictor.fast.heat_places)].sum(axis=1)
+    gains = (operators.outputs[predictor.columns[0]] @ modes) * (modes.T @ heat)
     found = []
     for gain in gains:
         final = float(np.sum(gain / rates))

@@ -11,50 +11,14 @@ from scipy.stats import chi2, norm
 
 from spindle_fem.effects.framework.effect import Candidate, in_intervals
 from spindle_fem.effects.registry import effect_of
-from spindle_fem.inference.hypothesis_fit import EFFECT_PREFIX, Fit, amplitude_name
-from spindle_fem.inference.hypothesis_search import Hypothesis
+from spindle_fem.inference import tuned
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
 
-# Laws of the catalogue are simpler than nature: differences of likelihood count for less than they say.
-# What one effect more gains counts less the more a set explains already: an inexact law of a strong
-# effect leaves a residual that grows with the effect, and which any other effect may fit a little. It never
-# counts less than a quarter of that, or a second effect beside a strong one would stay unseen however clear
-# it is. Sets of one size all carry that residual, and two thirds of their differences count at any strength.
-# (Of the values tried, those under which the truth was likeliest over seeds 14 to 17 of the concealed study,
-# where the likelihood is flat. Of temperatures from 1 to 3, most sets are right at 2 and at 1.5 over
-# seeds 20, 22 and a third of 19: 164 of 178, 162 at 3. At 2 fewer single effects get a second.)
-TEMPERATURE = 2.0
-INEXACT_BEYOND = 4000.0
-LEAST_TEMPERATURE_RATIO = 4.0
-TEMPERATURE_OF_A_SIZE = 1.5
-# Of what the best set gains on a consistent recording, where no law is wrong but the machine's own: its level
-# by Wilks' theorem counts as its power 1 / 2.2, and so many candidates, which answer much alike, as one trial
-# more. (Most likely over the 100 consistent recordings of seeds 14 and 15 of the concealed study, where the
-# levels are even with 0.98 by Kolmogorov and Smirnov; on the 30 of seed 16 with 0.5.)
-CHANCE_TEMPERATURE, CANDIDATES_A_TRIAL = 2.2, 64.0
-# When sets are compared, amplitudes from this share of their usual size up to it are as likely in every
-# decade: what a normal prior says of an effect a tenth as large is a convention, and another one for each
-# effect. Beyond the usual size the normal prior holds.
-SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
-# Below this the most probable set is named together with what else may be.
-DECIDED = 0.75
-# Sets of as many effects are named together where in every channel their readings differ by less than this
-# share of the noise (root mean square), their misfits by less than that, and evidence gives the other at
-# least so much: both explain the data to within the noise, and what tells them apart is how exact their laws
-# are. A richer law that only repeats what the simple one does has less.
-NEAR, NEAR_MISFIT, NEAR_PROBABILITY = 0.22, 14.0, 0.01
-LISTED = 0.02
-SIGNIFICANT = 0.01
-# Below this nothing missing is ruled out, however much any one set pays for its complexity. Between both it
-# is no likelier than something is, whatever evidence says: the p-value is even on consistent recordings.
-RULED_OUT, STILL_POSSIBLE = 0.001, 0.5
-# A residual this much above the noise after the best set: something else is there.
-UNEXPLAINED_MISFIT = 1.6
-# Right sets leave what the noise does, to a few hundredths (concealed study); a best set that leaves more
-# may be one for something that is not in the catalogue, and loses so much of its probability.
-EXACT_MISFIT, OTHER_RANGE, LARGEST_OTHER = 1.04, 0.2, 0.5
 SEVERAL_REASON = "several sets explain the data"
 NOTHING_REASON = (
     "few recordings without anything missing are like this one, and no set is much likelier than nothing"
@@ -92,7 +56,7 @@ class Judgement:
     ----------
     verdict : str
     p_value : float
-        Of the recording if nothing were missing.
+        Probability of so large a mismatch if nothing were missing.
     chosen : Ranked
     alternatives : tuple of Ranked
         What the data cannot rule out, the chosen set apart.
@@ -102,7 +66,7 @@ class Judgement:
     evidence : float
         Probability of the chosen set by evidence alone.
     share_of_last : float
-        Of its gain, what no set with fewer effects has.
+        Share of its gain that no set with fewer effects has.
     gain_of_more : float
         What the best set with more effects gains beyond it.
     """
@@ -154,7 +118,7 @@ def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
             + h.fit.log_evidence
             + 0.5 * h.fit.misfit_with_prior
             + any_magnitude(h.fit)
-            + gain / TEMPERATURE_OF_A_SIZE
+            + gain / tuned.GAIN_DIVISOR_IN_A_SIZE
         )
         for h, gain in zip(hypotheses, gains, strict=True)
     ]
@@ -164,7 +128,7 @@ def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
         if size not in best or scores[index] > scores[best[size]]:
             best[size] = index
     less = {
-        size: counted(gains[index]) / TEMPERATURE - gains[index] / TEMPERATURE_OF_A_SIZE
+        size: counted(gains[index]) / tuned.GAIN_DIVISOR - gains[index] / tuned.GAIN_DIVISOR_IN_A_SIZE
         for size, index in best.items()
     }
     return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]
@@ -175,25 +139,26 @@ def any_magnitude(fit: Fit) -> float:
 
     Two effects that leave the same then have the same complexity, whatever widths
     their priors were given. What is less than ``SEEN_FROM`` of its own standard
-    deviations may be as large as that: nothing is not made likely by its smallness.
+    deviations counts as that large, so that a small fitted amplitude is no
+    evidence for its effect.
     """
-    width = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / SMALLEST_SIZE))
+    width = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / tuned.SMALLEST_SIZE))
     places = {c.name: index for index, c in enumerate(fit.coordinates)}
     found = 0.0
     for candidate in fit.candidates:
         place = places[amplitude_name(candidate)]
-        least = SEEN_FROM * float(np.sqrt(fit.covariance[place, place]))
+        least = tuned.SEEN_FROM * float(np.sqrt(fit.covariance[place, place]))
         size = max(abs(fit.position[place]), least)
-        found += float(np.log(width / np.clip(size, SMALLEST_SIZE, 1.0)))
+        found += float(np.log(width / np.clip(size, tuned.SMALLEST_SIZE, 1.0)))
     return found
 
 
 def counted(gain: float) -> float:
     """What a gain of likelihood counts for: all of it while small, a quarter of what comes on top later."""
-    ends = INEXACT_BEYOND * (LEAST_TEMPERATURE_RATIO - 1.0)
+    ends = tuned.INEXACT_BEYOND * (tuned.LARGEST_INEXACT_DIVISOR - 1.0)
     inside = min(max(gain, 0.0), ends)
-    beyond = max(gain - ends, 0.0) / LEAST_TEMPERATURE_RATIO
-    return float(INEXACT_BEYOND * np.log1p(inside / INEXACT_BEYOND) + beyond + min(gain, 0.0))
+    beyond = max(gain - ends, 0.0) / tuned.LARGEST_INEXACT_DIVISOR
+    return float(tuned.INEXACT_BEYOND * np.log1p(inside / tuned.INEXACT_BEYOND) + beyond + min(gain, 0.0))
 
 
 def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
@@ -221,8 +186,8 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
             lowest = min(lowest, float(chi2.logsf(gain, freedom)))
     if lowest == 0.0:
         return 1.0
-    single = min(float(np.exp(lowest / CHANCE_TEMPERATURE)), 1.0 - 1e-16)
-    return float(-np.expm1((1.0 + trials / CANDIDATES_A_TRIAL) * np.log1p(-single)))
+    single = min(float(np.exp(lowest / tuned.CHANCE_DIVISOR)), 1.0 - 1e-16)
+    return float(-np.expm1((1.0 + trials / tuned.CANDIDATES_A_TRIAL) * np.log1p(-single)))
 
 
 def within_prior(fit: Fit, calibrated: bool) -> bool:
@@ -279,27 +244,29 @@ def judge(
     p_value = detection_p_value(hypotheses, trials)
     empty = next(item for item in ranked if not item.fit.candidates)
     nothing = 0.0
-    if p_value <= SIGNIFICANT:
-        nothing = min(empty.probability, STILL_POSSIBLE) if p_value >= RULED_OUT else 0.0
+    if p_value <= tuned.SIGNIFICANT:
+        nothing = min(empty.probability, tuned.STILL_POSSIBLE) if p_value >= tuned.RULED_OUT else 0.0
         ranked = _without(ranked, empty)
     chosen = ranked[0]
-    if p_value > SIGNIFICANT or not chosen.fit.candidates or within_prior(chosen.fit, calibrated):
-        if np.sqrt(empty.fit.reduced_misfit) <= UNEXPLAINED_MISFIT or within_prior(chosen.fit, calibrated):
+    if p_value > tuned.SIGNIFICANT or not chosen.fit.candidates or within_prior(chosen.fit, calibrated):
+        if np.sqrt(empty.fit.reduced_misfit) <= tuned.UNEXPLAINED_MISFIT or within_prior(
+            chosen.fit, calibrated
+        ):
             return Judgement("consistent", p_value, empty, (), 0.0, "")
         # The residual is there, and no set of the catalogue makes it likelier.
         left_over = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
         reason = "the readings differ from the model by more than the noise, and no effect explains it"
         return Judgement("unexplained", left_over, empty, (), 1.0, reason)
     misfit = float(np.sqrt(chosen.fit.reduced_misfit))
-    inexact = float(np.clip((misfit - EXACT_MISFIT) / OTHER_RANGE, 0.0, LARGEST_OTHER))
+    inexact = float(np.clip((misfit - tuned.EXACT_MISFIT) / tuned.OTHER_RANGE, 0.0, tuned.LARGEST_OTHER))
     known_as_one = overlapping or {}
     near = [
         item
         for item in ranked[1:]
-        if item.probability >= NEAR_PROBABILITY
+        if item.probability >= tuned.NEAR_PROBABILITY
         and may_stand_for(item.fit, chosen.fit, known_as_one)
-        and item.fit.misfit_with_prior < chosen.fit.misfit_with_prior + NEAR_MISFIT
-        and apart(chosen.fit, item.fit) < NEAR
+        and item.fit.misfit_with_prior < chosen.fit.misfit_with_prior + tuned.NEAR_MISFIT
+        and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
     # Which bearing of a set it is does not matter for the decision; the best stands for all.
     alike = [item for item in ranked if _alike(item.fit, chosen.fit, known_as_one)]
@@ -311,12 +278,14 @@ def judge(
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in ranked[1:]
-        if (known * item.probability >= LISTED or item in near) and item.fit.candidates and item not in alike
+        if (known * item.probability >= tuned.LISTED or item in near)
+        and item.fit.candidates
+        and item not in alike
     )
-    decided = evidence * (1.0 - nothing) >= DECIDED and not near
+    decided = evidence * (1.0 - nothing) >= tuned.DECIDED and not near
     if decided:
         reason = ""
-    elif nothing > 1.0 - DECIDED:
+    elif nothing > 1.0 - tuned.DECIDED:
         reason = NOTHING_REASON
     else:
         reason = NEAR_REASON if near else SEVERAL_REASON

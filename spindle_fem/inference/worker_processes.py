@@ -23,7 +23,7 @@ class FitOrder:
     start : mapping of str to float
         Values to begin from, by name.
     shares : tuple of float
-        Of the amplitudes at the start, tried one after the other until the set can be simulated.
+        Factors on the amplitudes at the start, tried one after the other until the set can be simulated.
     hopeless : float
         As :meth:`Problem.fit` takes it.
     iterations : int
@@ -56,7 +56,7 @@ def _on_problem(problem: Shared[Problem], job: Callable[[Problem], Any]) -> Any:
 
 
 class Workers:
-    """Who fit: this process alone, or several with it.
+    """Processes that fit: this one alone, or several with it.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ GAP_STEPS = 1.5
 UNIFORM_TOLERANCE = 0.01
 LONG_GAP_SECONDS = 1800.0
 LONG_GAP_STEPS = 60.0
-# Of a channel without declared noise, in K: no sensor on a machine is better than a millikelvin.
+# Least noise of a channel that declares none, K: no sensor on a machine is better than a millikelvin.
 SMALLEST_SIGMA = 1.0e-3
 
 

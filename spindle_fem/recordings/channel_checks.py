@@ -288,7 +288,7 @@ def stale_readings(
     inputs_missing : (n,) bool ndarray
         Whether no input has a reading.
     coarse_step : float
-        Of the channel, see :class:`ChannelNoise`.
+        Noise of the channel, see :class:`ChannelNoise`.
 
     Returns
     -------

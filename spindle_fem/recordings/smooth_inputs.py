@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 LAGS = 20
 FEWEST = 60
-# Of the square of a standard normal number.
+# Median of the square of a standard normal number.
 MEDIAN_OF_SQUARE = 0.4549
 # Readings at most, to either side; weights below exp(-4) do not count.
 LONGEST_REACH, NEGLIGIBLE = 60, 4.0

@@ -46,7 +46,7 @@ def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequ
     """
     import xarray as xr
 
-    recordings = diagnosis.plant.recordings
+    recordings = diagnosis.predictor.recordings
     variables: dict[str, Any] = {}
     variables |= _readings(diagnosis, before, after)
     variables |= _inputs(recordings)
@@ -62,7 +62,7 @@ def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequ
         },
         attrs={
             "schema": DATA_SCHEMA,
-            "machine": getattr(diagnosis.plant.fast.spec, "name", ""),
+            "machine": getattr(diagnosis.predictor.fast.spec, "name", ""),
             "kind": diagnosis.view.kind,
             "verdict": diagnosis.judgement.verdict,
             "heldout": diagnosis.heldout,
@@ -93,7 +93,7 @@ def _joined(
 
 
 def _readings(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Array]) -> dict[str, Any]:
-    recordings = diagnosis.plant.recordings
+    recordings = diagnosis.predictor.recordings
     names = _channels(recordings)
     celsius = {"units": "degC"}
     sigma = np.full((len(recordings), len(names)), np.nan)
@@ -115,7 +115,7 @@ def _readings(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Arr
         "recording_index": ("stamp", np.repeat(range(len(recordings)), [r.times.size for r in recordings])),
         "held_out": (
             "stamp",
-            np.concatenate([~mask for mask in diagnosis.plant.use]).astype(np.int8),
+            np.concatenate([~mask for mask in diagnosis.predictor.use]).astype(np.int8),
             {"long_name": "1 where the fit did not see the readings"},
         ),
         "measured": table([item.temperature for item in recordings], "reading"),

@@ -14,9 +14,10 @@ from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.load import find_machine, load_machine, read_definition, write_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import with_parameters
-from spindle_fem.inference.least_squares import Calibration, prediction_interval
-from spindle_fem.inference.least_squares import calibrate as fit_parameters
-from spindle_fem.inference.predictor import MachinePredictor, NetworkPredictor, Predictor
+from spindle_fem.inference.calibration import Calibration, prediction_interval
+from spindle_fem.inference.calibration import calibrate as fit_parameters
+from spindle_fem.inference.coordinate_names import START_PREFIX
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.model.lumped.written_network import build_network, value_in_definition
 from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
@@ -41,7 +42,7 @@ class Simulation:
     recording : Recording
     predicted : (N, c) ndarray, [K]
     half_width : (N, c) ndarray, [K]
-        Of the 90 % interval of a reading: noise, slow error and parameters,
+        Half of the 90 % interval of a reading: noise, slow error and parameters,
         these as the calibration left them or as their priors say.
     comparison : Comparison
     calibration : Calibration or None
@@ -101,18 +102,18 @@ def _simulate_geometry(
     effects = effects_on(spec.effects, fast, recording)
     result = None
     if calibration:
-        result = fit_parameters(MachinePredictor(fast, calibration, effects=effects), progress=progress)
-    predictor = MachinePredictor(fast, [recording], effects=effects)
+        earlier = Predictor(fast, calibration, effects=effects, at_stamps=True)
+        result = fit_parameters(earlier, progress=progress)
+    predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
     factors = {} if result is None else result.factors
     outside = _outside_range(predictor, factors)
     if outside:
         progress("reduced model: outside its range, made anew")
         fast = recentred_model(fast, factors, options_for(spec, (recording, *calibration)), progress)
-        predictor = MachinePredictor(fast, [recording], effects=effects)
+        predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
         outside = _outside_range(predictor, factors)
     progress("simulation")
-    log_factors = np.zeros(len(predictor.priors)) if result is None else result.log_factors
-    predicted, sensitivity = predictor.predict(log_factors)[0]
+    predicted, half_width = _prediction(predictor, result)
     notes = [*predictor.drives[0].notes, *_effect_notes(effects)]
     if fast.extra_terms:
         what = (
@@ -130,17 +131,25 @@ def _simulate_geometry(
             f"{len(recording.segments) - 1} gaps above {recording.defects.long_gap_s:g} s: "
             "the inputs are bridged and the temperatures go on through them"
         )
-    text = None if result is None else write_machine(with_parameters(spec, result.factors))
-    model = {
-        "basis": fast.model.size,
-        "full_unknowns": fast.model.n_full,
-        "checked_error_K": dict(fast.model.errors),
-        "mesh_preset": spec.mesh.preset,
-    }
-    return _simulation(spec.name, recording, predictor, predicted, sensitivity, result, text, notes, model)
+    return Simulation(
+        spec.name,
+        recording,
+        predicted,
+        half_width,
+        compare(recording, predicted),
+        result,
+        None if result is None else write_machine(with_parameters(spec, result.factors)),
+        tuple(notes),
+        {
+            "basis": fast.model.size,
+            "full_unknowns": fast.model.n_full,
+            "checked_error_K": dict(fast.model.errors),
+            "mesh_preset": spec.mesh.preset,
+        },
+    )
 
 
-def _outside_range(predictor: MachinePredictor, parameters: Mapping[str, float]) -> tuple[str, ...]:
+def _outside_range(predictor: Predictor, parameters: Mapping[str, float]) -> tuple[str, ...]:
     fast = predictor.fast
     factors = fast.table.factors(predictor.effects.times_parameters(parameters))
     found: dict[str, None] = {}
@@ -159,23 +168,15 @@ def _simulate_network(
 ) -> Simulation:
     spec = network_spec.load_network_machine(machine, overrides)
     network = build_network(spec.network)
-    effects = effects_on(spec.effects, NetworkFastModel(network, spec), recording)
+    fast = NetworkFastModel(network, spec)
+    effects = effects_on(spec.effects, fast, recording)
     result, text = None, None
     if calibration:
-        result = fit_parameters(
-            NetworkPredictor(network, calibration, spec.initial, effects), progress=progress
-        )
-    predictor = NetworkPredictor(network, [recording], spec.initial, effects)
+        earlier = Predictor(fast, calibration, effects=effects, at_stamps=True)
+        result = fit_parameters(earlier, progress=progress)
+    predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
     progress("simulation")
-    # Starting temperatures belong to each recording: those of the calibration say nothing here.
-    learned = {} if result is None else result.factors
-    log_factors = np.array(
-        [
-            np.log(learned.get(p.name, 1.0)) if not p.name.startswith("initial.") else 0.0
-            for p in predictor.priors
-        ]
-    )
-    predicted, sensitivity = predictor.predict(log_factors)[0]
+    predicted, half_width = _prediction(predictor, result)
     if result is not None:
         own = {p.name for p in network.parameters}
         values = {
@@ -184,48 +185,34 @@ def _simulate_network(
             if e.name in own
         }
         text = network_spec.write_network_machine(network_spec.with_parameters(spec, values))
-    notes = _effect_notes(effects)
-    return _simulation(spec.name, recording, predictor, predicted, sensitivity, result, text, notes, {})
+    notes = tuple(_effect_notes(effects))
+    comparison = compare(recording, predicted)
+    return Simulation(spec.name, recording, predicted, half_width, comparison, result, text, notes, {})
 
 
 def _effect_notes(effects: ActiveEffects) -> list[str]:
     return [f"with {candidate.label}, as the definition says" for candidate in effects.candidates]
 
 
-def _simulation(
-    machine: str,
-    recording: Recording,
-    predictor: Predictor,
-    predicted: Array,
-    sensitivity: Array,
-    result: Calibration | None,
-    text: str | None,
-    notes: Sequence[str],
-    model: Mapping[str, Any],
-) -> Simulation:
-    half_width = _half_width(recording, predictor, sensitivity, result)
-    comparison = compare(recording, predicted)
-    return Simulation(
-        machine, recording, predicted, half_width, comparison, result, text, tuple(notes), model
-    )
+def _prediction(predictor: Predictor, result: Calibration | None) -> tuple[Array, Array]:
+    """What one recording should read, and half the width of the interval of a reading, both (N, c) K.
 
-
-def _half_width(
-    recording: Recording, predictor: Predictor, sensitivity: Array, result: Calibration | None
-) -> Array:
-    names = [prior.name for prior in predictor.priors]
-    sigma = np.array([prior.sigma_log for prior in predictor.priors])
-    covariance = np.diag(sigma**2)
-    slow = SlowError()
+    Starting temperatures belong to each recording: what a calibration learned of its own says nothing here.
+    """
+    priors = (*predictor.uncertain(), *predictor.starts())
+    learned = {} if result is None else result.factors
+    factors = {
+        prior.name: learned.get(prior.name, 1.0)
+        for prior in priors
+        if not prior.name.startswith(START_PREFIX)
+    }
+    told = predictor.predict(0, factors, (), [prior.name for prior in priors])
+    covariance = np.diag([prior.sigma_log**2 for prior in priors])
     if result is not None:
-        slow = result.slow
         known = {prior.name: i for i, prior in enumerate(result.priors)}
-        shared = [
-            (i, known[name])
-            for i, name in enumerate(names)
-            if name in known and not name.startswith("initial.")
-        ]
-        mine = [i for i, _ in shared]
-        theirs = [j for _, j in shared]
+        mine = [i for i, prior in enumerate(priors) if prior.name in known]
+        theirs = [known[priors[i].name] for i in mine]
         covariance[np.ix_(mine, mine)] = result.covariance[np.ix_(theirs, theirs)]
-    return prediction_interval(covariance, slow, sensitivity, recording.sigma)
+    slow = SlowError() if result is None else result.slow
+    white = predictor.recordings[0].sigma
+    return told.temperature, prediction_interval(covariance, slow, told.sensitivity, white)

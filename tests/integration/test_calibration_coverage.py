@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 
 from spindle_fem.definition.load import load_machine
-from spindle_fem.inference.coverage import coverage_study
-from spindle_fem.inference.predictor import MachinePredictor
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.recordings.align import read_recording
+from validation.calibration_coverage import coverage_study
 
 PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
 INPUTS = ("speed", "thrust", "ambient", "coolant_inlet")
@@ -34,7 +34,7 @@ def recording(recorded_in, tmp_path_factory):
 def test_a_hundred_spindles_drawn_from_their_prior(recording, record_property):
     """Nine in ten intervals of all parameters, and no parameter far from that."""
     fast = fast_model_for(load_machine("recorded_spindle", ["mesh.preset=coarse"]), [recording])
-    found = coverage_study(lambda items: MachinePredictor(fast, items), (recording,), 100, seed=6)
+    found = coverage_study(lambda items: Predictor(fast, items, at_stamps=True), (recording,), 100, seed=6)
     for name, share in found.by_parameter().items():
         narrower = np.median(found.sigma_share[:, found.names.index(name)])
         record_property(name, share)

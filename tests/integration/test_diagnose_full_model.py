@@ -11,7 +11,7 @@ from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.registry import candidates_for, effect_of
 from spindle_fem.inference import full_model_check as full_model
 from spindle_fem.inference.full_model_check import full_model_errors, inputs_of_drive, options_for, spec_on
-from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import read_recording
@@ -64,21 +64,21 @@ def test_the_full_model_confirms_what_was_found(tmp_path, monkeypatch):
     # The truth: parameters in the definition itself, the term beside it, the offset added by hand.
     coarse = prepare_machine(spec_on(spec, "coarse"))
     true = prepare_machine(with_parameters(coarse.spec, MACHINE))
-    plant = Plant(fast, [blank], [np.ones(TIMES.size, dtype=bool)])
-    drive = plant.drives[0]
+    predictor = Predictor(fast, [blank], [np.ones(TIMES.size, dtype=bool)])
+    drive = predictor.drives[0]
     physics = Physics(source.terms, {source.amplitude: HEAT}, {})
     run = simulate_full(
-        true, inputs_of_drive(drive), sample_times=TIMES, options=options_for(plant), physics=physics
+        true, inputs_of_drive(drive), sample_times=TIMES, options=options_for(predictor), physics=physics
     )
     readings = np.column_stack([run.reading(name) for name in PROBES]) - 273.15
     readings[:, 1] += OFFSET
     held = (TIMES > 600.0) & (TIMES < 900.0)
-    plant = Plant(fast, [recorded_as(tmp_path, readings)], [~held])
+    predictor = Predictor(fast, [recorded_as(tmp_path, readings)], [~held])
 
     monkeypatch.setattr(full_model, "prepare_machine", lambda own: coarse)
     monkeypatch.setattr(full_model, "thread_count", lambda: 1)
     diagnosis = SimpleNamespace(
-        plant=plant,
+        predictor=predictor,
         null=SimpleNamespace(candidates=(), values=MACHINE),
         final=SimpleNamespace(candidates=(source, lying), values={**MACHINE, **effects}),
     )

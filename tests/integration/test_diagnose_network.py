@@ -16,9 +16,9 @@ from spindle_fem.inference.candidate_response import variants_of
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.missing_heat import Pattern, onset_answers
 from spindle_fem.inference.opened_machine import open_machine
-from spindle_fem.inference.prepared_problem import all_stamps, calibrate
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import calibrate
 from spindle_fem.inference.screening import screen
-from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.inference.worker_processes import FitOrder, Workers, fit_order
 from spindle_fem.parallel import worker_pool
 from spindle_fem.recordings.align import read_recording
@@ -226,9 +226,9 @@ def test_the_improved_machine_simulates_what_the_diagnosis_predicts(heated, tmp_
 def test_fits_abreast_are_those_of_one_process(machine, tmp_path):
     folder = record(tmp_path / "r", 5, extra=hot)
     opened = open_machine(machine, (), [read_recording(folder)], [])
-    plant = Plant(opened.fast, opened.recordings, all_stamps(opened.recordings), opened.effects)
-    calibrated = calibrate(None, plant)
-    problem = Problem(plant, calibrated.belief, calibrated.slow, plant.observations)
+    predictor = Predictor(opened.fast, opened.recordings, effects=opened.effects)
+    calibrated = calibrate(None, predictor)
+    problem = Problem(predictor, calibrated.belief, calibrated.slow, predictor.observations)
     chosen = [c for c in candidates_for(opened.view) if c.effect in ("sensor_offset", "heat_scale")][:3]
     orders = [FitOrder((candidate,), {}, iterations=3) for candidate in chosen]
     alone, abreast = (Workers(number).fits(problem, orders) for number in (1, 2))
@@ -241,9 +241,9 @@ def test_fits_abreast_are_those_of_one_process(machine, tmp_path):
 def test_screening_is_that_of_one_process(machine, tmp_path):
     folder = record(tmp_path / "r", 5, extra=hot)
     opened = open_machine(machine, (), [read_recording(folder)], [])
-    plant = Plant(opened.fast, opened.recordings, all_stamps(opened.recordings), opened.effects)
-    calibrated = calibrate(None, plant)
-    problem = Problem(plant, calibrated.belief, calibrated.slow, plant.observations)
+    predictor = Predictor(opened.fast, opened.recordings, effects=opened.effects)
+    calibrated = calibrate(None, predictor)
+    problem = Problem(predictor, calibrated.belief, calibrated.slow, predictor.observations)
     null = problem.fit(iterations=3)
     variants = variants_of(candidates_for(opened.view))
     weights = dict.fromkeys((variant.candidate.effect for variant in variants), 1.0)
@@ -268,9 +268,11 @@ def test_screening_is_that_of_one_process(machine, tmp_path):
 def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine, tmp_path, monkeypatch):
     folder = record(tmp_path / "r", 5, extra=hot)
     opened = open_machine(machine, (), [read_recording(folder)], [])
-    plant = Plant(opened.fast, opened.recordings, all_stamps(opened.recordings), opened.effects)
-    calibrated = calibrate(None, plant)
-    problems = [Problem(plant, calibrated.belief, calibrated.slow, plant.observations) for _ in range(2)]
+    predictor = Predictor(opened.fast, opened.recordings, effects=opened.effects)
+    calibrated = calibrate(None, predictor)
+    problems = [
+        Problem(predictor, calibrated.belief, calibrated.slow, predictor.observations) for _ in range(2)
+    ]
     offsets = [c for c in candidates_for(opened.view) if c.effect == "sensor_offset"][:2]
     orders = [FitOrder((candidate,), {}, iterations=1) for candidate in offsets]
     sent, here = [], []
@@ -301,9 +303,9 @@ def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine
 def test_a_set_that_cannot_be_simulated_begins_milder(machine, tmp_path, monkeypatch):
     folder = record(tmp_path / "r", 5)
     opened = open_machine(machine, (), [read_recording(folder)], [])
-    plant = Plant(opened.fast, opened.recordings, all_stamps(opened.recordings), opened.effects)
-    calibrated = calibrate(None, plant)
-    problem = Problem(plant, calibrated.belief, calibrated.slow, plant.observations)
+    predictor = Predictor(opened.fast, opened.recordings, effects=opened.effects)
+    calibrated = calibrate(None, predictor)
+    problem = Problem(predictor, calibrated.belief, calibrated.slow, predictor.observations)
     candidate = next(c for c in candidates_for(opened.view) if c.terms)
     tried = []
 

@@ -10,7 +10,8 @@ from scipy.sparse.linalg import splu, spsolve
 
 from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
-from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.search_basis import on_search_basis
 from spindle_fem.machine.view.place_names import ACROSS, UP
 from spindle_fem.model.reduced import build_reduced as building
 from spindle_fem.model.reduced.build_reduced import ReductionOptions, reduced_model_of
@@ -239,17 +240,20 @@ def test_simulate_writes_what_every_channel_should_have_read(fast, made, tmp_pat
 
 def test_the_basis_of_a_search_holds_what_a_single_seat_changes(fast, made):
     recording = read_recording(made)
-    plant = Plant(fast, [recording], [np.ones(recording.times.size, dtype=bool)])
-    parameters = [name for name, *_ in plant.uncertain()]
+    predictor = Predictor(fast, [recording], [np.ones(recording.times.size, dtype=bool)])
+    parameters = [prior.name for prior in predictor.uncertain()]
     places = [name for name in fast.model.place_names if name.endswith("_raceway")]
     seats = [f"joint.{name}.outer_ring|housing" for name in ("R1", "R2")]
-    with_seats, without = plant.compressed(parameters, places, seats), plant.compressed(parameters, places)
+    with_seats, without = (
+        on_search_basis(predictor, parameters, places, seats),
+        on_search_basis(predictor, parameters, places),
+    )
     assert without.fast.model.size < with_seats.fast.model.size < fast.model.size
     errors = []
     for seat in seats:
         change, found, missed = (
             own.predict(0, {seat: 0.05}).temperature - own.predict(0, {}).temperature
-            for own in (plant, with_seats, without)
+            for own in (predictor, with_seats, without)
         )
         assert np.abs(change).max() > 0.1
         errors.append([np.abs(found - change).max(), np.abs(missed - change).max()])

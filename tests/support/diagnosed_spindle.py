@@ -8,14 +8,14 @@ import pandas as pd
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.registry import candidates_for, effect_of
 from spindle_fem.inference.diagnosis import Diagnosis
+from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Problem
-from spindle_fem.inference.hypothesis_search import Hypothesis
 from spindle_fem.inference.missing_heat import Pattern, explain, onset_answers
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import (
     EXPECTED_SLOW,
     calibrate,
 )
-from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.inference.verdict import Judgement, Ranked
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.fast_model import FastModel
@@ -90,20 +90,20 @@ class Case:
     def diagnosis(self, truth, amplitude, verdict, rivals):
         """Fits and judgement about a recording with an effect, as the search would hand them on."""
         candidate = self.candidates[truth] if truth else None
-        plant = Plant(self.fast, [self.blank], [np.ones(TIMES.size, dtype=bool)])
+        predictor = Predictor(self.fast, [self.blank], [np.ones(TIMES.size, dtype=bool)])
         values, chosen = {}, ()
         if candidate is not None:
             factors = {item.name for item in candidate.factors}
             name = candidate.amplitude
             values, chosen = {f"effect:{name}" if name in factors else name: amplitude}, (candidate,)
-        on_grid = plant.predict(0, values, chosen).temperature
-        true = np.array([np.interp(TIMES, plant.drives[0].grid, column) for column in on_grid.T]).T
+        on_grid = predictor.predict(0, values, chosen).temperature
+        true = np.array([np.interp(TIMES, predictor.drives[0].grid, column) for column in on_grid.T]).T
         noise = np.random.default_rng(7).normal(0.0, 0.1, true.shape)
         recording = written(self.folder, true - 273.15 + noise)
         held = (TIMES > 4000.0) & (TIMES < 5000.0)
-        plant = Plant(self.fast, [recording], [~held])
-        calibrated = calibrate(None, plant)
-        problem = Problem(plant, calibrated.belief, EXPECTED_SLOW, plant.observations)
+        predictor = Predictor(self.fast, [recording], [~held])
+        calibrated = calibrate(None, predictor)
+        problem = Problem(predictor, calibrated.belief, EXPECTED_SLOW, predictor.observations)
         sets = [(self.candidates[key],) for key in ((truth,) if truth else ()) + rivals]
         null = problem.fit()
         found = [Hypothesis(problem.fit(members), -3.0) for members in sets]
@@ -115,7 +115,7 @@ class Case:
         patterns = [Pattern(spot, places) for spot, places in self.view.spots.items()]
         tracks = [explain(item) for item in onset_answers(problem, null, patterns, 0)]
         return Diagnosis(
-            plant,
+            predictor,
             self.view,
             calibrated,
             hypotheses,

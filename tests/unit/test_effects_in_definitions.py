@@ -13,7 +13,7 @@ from spindle_fem.definition.network_load import validate_network_machine, write_
 from spindle_fem.effects.framework.effect import Candidate, Reading
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.errors import FaultsError
-from spindle_fem.inference.predictor import MachinePredictor
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.defined_effects import (
     NO_EFFECTS,
     ActiveEffects,
@@ -210,15 +210,16 @@ class Halved(Reading):
 
 
 def test_readings_and_their_derivatives_go_through_the_sensor():
-    candidate = Candidate("x", "T", "", "sensor", "halved.gain", 1.0, 1.0, reading=Halved())
-    effects = ActiveEffects((candidate,))
     times, rng = np.arange(5.0), np.random.default_rng(1)
-    temperature, by = 300.0 + rng.normal(size=(5, 2)), rng.normal(size=(5, 2, 3))
-    told, told_by = effects.read(("other", "T"), times, temperature, by, {"ambient": np.full(5, 290.0)})
-    np.testing.assert_allclose(told[:, 0], temperature[:, 0])
-    np.testing.assert_allclose(told[:, 1], 290.0 + 0.5 * (temperature[:, 1] - 290.0))
-    np.testing.assert_allclose(told_by[:, 1], 0.5 * by[:, 1])
-    np.testing.assert_allclose(told_by[:, 0], by[:, 0])
+    temperature, by = 300.0 + rng.normal(size=5), rng.normal(size=(5, 3))
+    inputs = {"ambient": np.full(5, 290.0)}
+    told, told_by, own = Halved().told(times, temperature, by, inputs, {}, ("gain",))
+    np.testing.assert_allclose(told, 290.0 + 0.5 * (temperature - 290.0))
+    np.testing.assert_allclose(told_by, 0.5 * by)
+    np.testing.assert_allclose(own[:, 0], temperature - 290.0)
+    told, _, own = Halved().told(times, temperature, by[:, :0], inputs, {"gain": 2.0})
+    np.testing.assert_allclose(told, 290.0 + 2.0 * (temperature - 290.0))
+    assert own.shape == (5, 0)
 
 
 def test_factors_of_effects_multiply_those_of_the_machine():
@@ -320,10 +321,8 @@ def test_a_machine_that_was_improved_on_one_recording_runs_on_a_shorter_one(tmp_
     assert [candidate.effect for candidate in effects.candidates] == [e.effect for e in spec.effects]
     if not flow:
         return  # a channel without flow has no film to simulate with
-    plain = MachinePredictor(fast, [recording])
-    start = np.zeros(len(plain.priors))
-    nominal = plain.predict(start, derivatives=False)[0][0]
-    improved = MachinePredictor(fast, [recording], effects=effects).predict(start, derivatives=False)[0][0]
+    nominal = Predictor(fast, [recording], at_stamps=True).predict(0, {}).temperature
+    improved = Predictor(fast, [recording], effects=effects, at_stamps=True).predict(0, {}).temperature
     assert np.isfinite(improved).all()
     assert np.abs(improved - nominal).max() > 0.2
     # A lag of 1500 s lets little of the first 20 s through.

@@ -21,7 +21,7 @@ from spindle_fem.inference.full_model_check import (
     require_choice,
     spec_on,
 )
-from spindle_fem.inference.simulated_plant import Plant
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.parallel import WorkerPool
@@ -46,7 +46,7 @@ channel = [
 
 
 @pytest.fixture(scope="module")
-def plant(tmp_path_factory):
+def predictor(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lumped")
     times = np.arange(0.0, 3601.0, 50.0)
     columns = {
@@ -60,12 +60,12 @@ def plant(tmp_path_factory):
     (folder / "steps.toml").write_text(MANIFEST, encoding="utf-8")
     recording = read_recording(folder / "steps.toml")
     spec = load_machine("recorded_spindle")
-    return Plant(FastModel(lumped_model(spec), spec), [recording], [np.ones(times.size, dtype=bool)])
+    return Predictor(FastModel(lumped_model(spec), spec), [recording], [np.ones(times.size, dtype=bool)])
 
 
 @pytest.fixture(scope="module")
-def candidates(plant):
-    view = view_of(plant.fast.names, plant.recordings[0])
+def candidates(predictor):
+    view = view_of(predictor.fast.names, predictor.recordings[0])
     found = {(c.effect, c.component): c for c in reversed(candidates_for(view))}
     heat = effect_of("unrecorded_heat_source").over(view, "housing", [(900.0, 2000.0)])
     return found | {(heat.effect, heat.component): heat}
@@ -75,11 +75,11 @@ def fit_of(members, values):
     return SimpleNamespace(candidates=tuple(members), values=values)
 
 
-def diagnosis_of(plant, null, final):
-    return SimpleNamespace(plant=plant, null=null, final=final)
+def diagnosis_of(predictor, null, final):
+    return SimpleNamespace(predictor=predictor, null=null, final=final)
 
 
-def test_a_fit_becomes_terms_values_and_factors(plant, candidates):
+def test_a_fit_becomes_terms_values_and_factors(predictor, candidates):
     scale = candidates["heat_scale", "front_bearings"]
     source = candidates["unrecorded_heat_source", "housing"]
     lying = candidates["sensor_offset", "SP05"]
@@ -87,28 +87,28 @@ def test_a_fit_becomes_terms_values_and_factors(plant, candidates):
     offset = next(name for name in lying.parameters if name.startswith(lying.reading.name))
     values = {factor: 1.1, f"effect:{factor}": 1.5, "film.outside": 0.8, source.amplitude: 80.0, offset: 2.0}
     values |= {"probe.SP01.r": 1e-3, "jump.0.0": 10.0, "within_gap.0.0": 0.4}
-    physics = physics_of_fit(plant, 0, fit_of((scale, source, lying), values))
+    physics = physics_of_fit(predictor, 0, fit_of((scale, source, lying), values))
     assert physics.terms == source.terms
     assert physics.values[source.amplitude] == 80.0
     assert physics.values.keys() == {name for term in source.terms for name in term.names()}
     assert physics.factors == pytest.approx({factor: 1.65, "film.outside": 0.8})
 
 
-def test_what_acts_in_another_recording_stays_out(plant, candidates):
+def test_what_acts_in_another_recording_stays_out(predictor, candidates):
     elsewhere = replace(candidates["heat_scale", "front_bearings"], recording=1)
     factor = elsewhere.factors[0].name
     fit = fit_of((elsewhere,), {factor: 1.1, f"effect:{factor}": 1.5})
-    assert physics_of_fit(plant, 0, fit).factors == {factor: 1.1}
-    assert physics_of_fit(plant, 1, fit).factors == pytest.approx({factor: 1.65})
+    assert physics_of_fit(predictor, 0, fit).factors == {factor: 1.1}
+    assert physics_of_fit(predictor, 1, fit).factors == pytest.approx({factor: 1.65})
 
 
-def test_inputs_are_those_of_the_reduced_model_at_every_instant(plant):
-    drive = plant.drives[0]
+def test_inputs_are_those_of_the_reduced_model_at_every_instant(predictor):
+    drive = predictor.drives[0]
     inputs = inputs_of_drive(drive)
     held = dict(zip(inputs.names, inputs.held.tolist(), strict=True))
     assert held["speed"]
     assert not held["ambient"]
-    history = OperatingHistory.of(plant.fast.spec, inputs)
+    history = OperatingHistory.of(predictor.fast.spec, inputs)
     middle = 0.5 * (drive.grid[:-1] + drive.grid[1:])
     mean = 0.5 * (drive.start + drive.end)
     points = [history.at(time) for time in middle]
@@ -126,98 +126,98 @@ def test_the_coarse_mesh_is_linear_and_without_sizes_of_its_own():
     assert spec_on(spec, "own") is spec
 
 
-def test_off_runs_nothing_and_leaves_no_section(plant):
-    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
-    found = full_model_errors(diagnosis_of(plant, fit_of((), {}), fit_of((), {})), machine, mesh="off")
+def test_off_runs_nothing_and_leaves_no_section(predictor):
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    found = full_model_errors(diagnosis_of(predictor, fit_of((), {}), fit_of((), {})), machine, mesh="off")
     assert found == {"mesh": "off", "reason": "It was not asked for."}
     assert full_model_sections({"fit": {"full_model": found}}) == []
 
 
-def test_a_network_has_no_full_model(plant):
+def test_a_network_has_no_full_model(predictor):
     machine = SimpleNamespace(is_network=True, spec=None)
-    found = full_model_errors(diagnosis_of(plant, fit_of((), {}), fit_of((), {})), machine, mesh="coarse")
+    found = full_model_errors(diagnosis_of(predictor, fit_of((), {}), fit_of((), {})), machine, mesh="coarse")
     assert found["reason"] == "The machine is a network: it has no finite-element model."
     (section,) = full_model_sections({"fit": {"full_model": found}})
     assert section.blocks[0].text == found["reason"]
 
 
-def test_unasked_a_network_says_nothing_of_a_full_model(plant):
+def test_unasked_a_network_says_nothing_of_a_full_model(predictor):
     machine = SimpleNamespace(is_network=True, spec=None)
-    found = full_model_errors(diagnosis_of(plant, fit_of((), {}), fit_of((), {})), machine, mesh="auto")
+    found = full_model_errors(diagnosis_of(predictor, fit_of((), {}), fit_of((), {})), machine, mesh="auto")
     assert found == {"mesh": "off", "reason": "The machine is a network: it has no finite-element model."}
 
 
-def test_time_is_followed_as_well_as_the_quietest_channel_can_tell(plant):
-    options = options_for(plant)
+def test_time_is_followed_as_well_as_the_quietest_channel_can_tell(predictor):
+    options = options_for(predictor)
     assert (options.error, options.coupling_tolerance, options.input_resolution) == pytest.approx(
         (1.0, 0.01, 0.2), rel=1e-3
     )
-    recording = plant.recordings[0]
+    recording = predictor.recordings[0]
     loud = SimpleNamespace(recordings=(replace(recording, sigma=10.0 * recording.sigma),))
     assert options_for(loud).error == 2.0
     quiet = SimpleNamespace(recordings=(recording, replace(recording, sigma=0.3 * recording.sigma)))
     assert options_for(quiet).error == pytest.approx(0.3, rel=0.01)
 
 
-def test_unasked_a_full_model_of_very_many_steps_is_not_run(plant, monkeypatch):
+def test_unasked_a_full_model_of_very_many_steps_is_not_run(predictor, monkeypatch):
     """Two jumps, an oscillation of the ambient; a limit below what these need."""
-    steps = expected_steps(plant, options_for(plant))
+    steps = expected_steps(predictor, options_for(predictor))
     assert steps >= 8
     monkeypatch.setattr(full_model, "MOST_STEPS", steps - 1)
-    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
-    found = full_model_errors(diagnosis_of(plant, fit_of((), {}), fit_of((), {})), machine, mesh="auto")
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    found = full_model_errors(diagnosis_of(predictor, fit_of((), {}), fit_of((), {})), machine, mesh="auto")
     assert found["mesh"] == "auto"
     assert found["reason"] == f"It would take some {steps} time steps a fit; --full-model coarse runs them."
 
 
-def test_a_mesh_that_fails_is_said_and_costs_no_diagnosis(plant, monkeypatch):
+def test_a_mesh_that_fails_is_said_and_costs_no_diagnosis(predictor, monkeypatch):
     def fail(spec):
         raise MeshQualityError("mesh", "inverted.", "Mesh finer.")
 
     monkeypatch.setattr(full_model, "prepare_machine", fail)
-    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
-    found = full_model_errors(diagnosis_of(plant, fit_of((), {}), fit_of((), {})), machine)
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    found = full_model_errors(diagnosis_of(predictor, fit_of((), {}), fit_of((), {})), machine)
     assert found == {"mesh": "coarse", "reason": "It could not be run: mesh: inverted. Mesh finer."}
 
 
-def test_where_nothing_was_found_one_run_is_both(plant, monkeypatch):
+def test_where_nothing_was_found_one_run_is_both(predictor, monkeypatch):
     runs, kept = [], {}
 
-    def run_fit(machine, plant, fit, options):
+    def run_fit(machine, predictor, fit, options):
         runs.append(fit)
-        return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7, 1.0)
+        return full_model.FullFit(tuple(predictions_at_stamps(predictor, fit)), 7, 1.0)
 
-    prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
     monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model, "run_fit", run_fit)
     monkeypatch.setattr(full_model, "thread_count", lambda: 1)
-    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
     nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
-    same = full_model_errors(diagnosis_of(plant, nothing, nothing), machine, keep=kept.__setitem__)
+    same = full_model_errors(diagnosis_of(predictor, nothing, nothing), machine, keep=kept.__setitem__)
     assert len(runs) == 1
     assert kept.keys() == {"before", "after"}
     assert same["after"]["channels"] == same["before"]["channels"]
     assert all(row["before_K"] == row["after_K"] == row["change_K"] == 0.0 for row in same["differences"])
-    other = full_model_errors(diagnosis_of(plant, nothing, heat), machine)
+    other = full_model_errors(diagnosis_of(predictor, nothing, heat), machine)
     assert len(runs) == 3
     assert other["after"]["train_rmse_K"] != other["before"]["train_rmse_K"]
 
 
-def test_a_balance_that_asks_for_a_better_fixed_point_gets_it(plant, monkeypatch):
+def test_a_balance_that_asks_for_a_better_fixed_point_gets_it(predictor, monkeypatch):
     tried = []
 
-    def run_fit(machine, plant, fit, options):
+    def run_fit(machine, predictor, fit, options):
         tried.append(options.coupling_tolerance)
         if options.coupling_tolerance > needed:
             raise EnergyBalanceError("transient", "heat stored, in and out differ.", "Lower it.")
-        return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7, 1.0)
+        return full_model.FullFit(tuple(predictions_at_stamps(predictor, fit)), 7, 1.0)
 
-    prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
     monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model, "run_fit", run_fit)
-    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
-    asked = options_for(plant).coupling_tolerance
-    both = diagnosis_of(plant, fit_of((), {}), fit_of((), {}))
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    asked = options_for(predictor).coupling_tolerance
+    both = diagnosis_of(predictor, fit_of((), {}), fit_of((), {}))
     needed = 0.3 * asked
     found = full_model_errors(both, machine)
     assert found["reason"] is None
@@ -227,48 +227,50 @@ def test_a_balance_that_asks_for_a_better_fixed_point_gets_it(plant, monkeypatch
     assert len(tried) == 4
 
 
-def test_a_process_that_ends_before_its_time_is_said_and_done_without(plant, monkeypatch):
+def test_a_process_that_ends_before_its_time_is_said_and_done_without(predictor, monkeypatch):
     def killed(self, jobs, names):
         assert len(jobs) == self.size() == 2
         raise WorkerDiedError(names[1], "its worker process ended before its time.")
 
-    def run_fit(machine, plant, fit, options):
-        return full_model.FullFit(tuple(predictions_at_stamps(plant, fit)), 7, 1.0)
+    def run_fit(machine, predictor, fit, options):
+        return full_model.FullFit(tuple(predictions_at_stamps(predictor, fit)), 7, 1.0)
 
-    prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
     monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model, "run_fit", run_fit)
     monkeypatch.setattr(full_model, "thread_count", lambda: 2)
     monkeypatch.setattr(WorkerPool, "map", killed)
-    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
     nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
     said = []
-    found = full_model_errors(diagnosis_of(plant, nothing, heat), machine, progress=said.append)
+    found = full_model_errors(diagnosis_of(predictor, nothing, heat), machine, progress=said.append)
     assert "full model: after: its worker process ended before its time." in said
     assert said[-2:] == ["full model: before", "full model: after"]
     assert found["after"]["train_rmse_K"] != found["before"]["train_rmse_K"]
 
 
-def test_a_difference_of_the_meshes_is_not_one_of_what_was_found(plant, monkeypatch):
+def test_a_difference_of_the_meshes_is_not_one_of_what_was_found(predictor, monkeypatch):
     """A full model that reads 0.4 K more throughout, and 0.1 K more of what the fits differ by."""
     nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
 
-    def run_fit(machine, plant, fit, options):
+    def run_fit(machine, predictor, fit, options):
         beside = 0.4 if fit is nothing else 0.5
-        return full_model.FullFit(tuple(item + beside for item in predictions_at_stamps(plant, fit)), 7, 1.0)
+        return full_model.FullFit(
+            tuple(item + beside for item in predictions_at_stamps(predictor, fit)), 7, 1.0
+        )
 
-    prepared = SimpleNamespace(spec=plant.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
     monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model, "run_fit", run_fit)
     monkeypatch.setattr(full_model, "thread_count", lambda: 1)
-    machine = SimpleNamespace(is_network=False, spec=plant.fast.spec)
-    found = full_model_errors(diagnosis_of(plant, nothing, heat), machine)
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    found = full_model_errors(diagnosis_of(predictor, nothing, heat), machine)
     for row in found["differences"]:
         assert [row[f"{key}_K"] for key in ("before", "after", "change")] == pytest.approx([0.4, 0.5, 0.1])
 
 
-def test_recorded_heat_goes_into_the_full_model(plant):
-    drive = plant.drives[0]
+def test_recorded_heat_goes_into_the_full_model(predictor):
+    drive = predictor.drives[0]
     heat = np.full((len(drive.start), 1), 40.0)
     heated = replace(
         drive,
@@ -276,14 +278,14 @@ def test_recorded_heat_goes_into_the_full_model(plant):
         start=np.hstack((drive.start, heat)),
         end=np.hstack((drive.end, heat)),
     )
-    history = OperatingHistory.of(plant.fast.spec, inputs_of_drive(heated))
+    history = OperatingHistory.of(predictor.fast.spec, inputs_of_drive(heated))
     (term,) = history.given_heat()
     assert term.heat_places == ("housing",)
     assert history.at(0.0).extra_heat == {"housing": 40.0}
 
 
-def test_a_covariate_reaches_the_full_model_where_a_term_follows_it(plant):
-    drive = plant.drives[0]
+def test_a_covariate_reaches_the_full_model_where_a_term_follows_it(predictor):
+    drive = predictor.drives[0]
     load = np.linspace(10.0, 70.0, len(drive.start))[:, None]
     beside = replace(
         drive,
@@ -294,7 +296,7 @@ def test_a_covariate_reaches_the_full_model_where_a_term_follows_it(plant):
     inputs = inputs_of_drive(beside, {"covariate.load"})
     assert inputs.names == (*drive.names, "covariate.load")
     assert inputs_of_drive(beside).names == drive.names
-    history = OperatingHistory.of(plant.fast.spec, inputs)
+    history = OperatingHistory.of(predictor.fast.spec, inputs)
     middle = 0.5 * (drive.grid[5] + drive.grid[6])
     seen = inputs_of(history.at(middle))
     assert seen["covariate.load"] == pytest.approx(load[5, 0])

@@ -13,6 +13,7 @@ from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.effects.registry import candidates_for, interval_effects
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.inference.candidate_response import BaseRun, Variant
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.drive_steps import even_drive
 from spindle_fem.inference.hypothesis_fit import (
     Belief,
@@ -21,9 +22,9 @@ from spindle_fem.inference.hypothesis_fit import (
     candidate_coordinates,
 )
 from spindle_fem.inference.linearised_fit import LinearProblem
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates, slow_error_of
 from spindle_fem.inference.reading_noise import SlowError
-from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, Plant
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
@@ -119,17 +120,17 @@ def fast():
 def blank(fast, tmp_path_factory):
     """The machine on a recording that says nothing yet."""
     recording = written(tmp_path_factory.mktemp("blank"), np.arange(0.0, 9000.0, 30.0))
-    return Plant(fast, [recording], [np.ones(recording.times.size, dtype=bool)])
+    return Predictor(fast, [recording], [np.ones(recording.times.size, dtype=bool)])
 
 
-def synthetic(plant, folder, seed, values=None, candidates=()):
+def synthetic(predictor, folder, seed, values=None, candidates=()):
     """The machine on readings of its own with white noise of 0.1 K."""
-    on_grid = plant.predict(0, values or {}, candidates).temperature
-    times = plant.recordings[0].times
-    true = np.column_stack([np.interp(times, plant.drives[0].grid, column) for column in on_grid.T])
+    on_grid = predictor.predict(0, values or {}, candidates).temperature
+    times = predictor.recordings[0].times
+    true = np.column_stack([np.interp(times, predictor.drives[0].grid, column) for column in on_grid.T])
     noise = np.random.default_rng(seed).normal(0.0, 0.1, true.shape)
     recording = written(folder, times, true + noise)
-    return Plant(plant.fast, [recording], [np.ones(times.size, dtype=bool)])
+    return Predictor(predictor.fast, [recording], [np.ones(times.size, dtype=bool)])
 
 
 @pytest.fixture(scope="module")
@@ -146,9 +147,9 @@ def candidates(view):
     return found
 
 
-# ------------------------------------------------------------------------ plant
+# ------------------------------------------------------------------------ predictor
 def test_derivatives_to_machine_and_start_of_a_network(blank):
-    names = [name for name, *_ in blank.uncertain()] + [name for name, _ in blank.starts()]
+    names = [prior.name for prior in blank.uncertain()] + [prior.name for prior in blank.starts()]
     assert len(names) == 5 + 3
     found = blank.predict(0, TRUTH, (), names)
     for column, name in enumerate(names):
@@ -164,8 +165,8 @@ def test_derivatives_to_machine_and_start_of_a_network(blank):
 
 def test_a_start_belongs_to_its_own_recording(fast, blank):
     recording = blank.recordings[0]
-    both = Plant(fast, [recording, recording], [blank.use[0]] * 2)
-    names = [name for name, _ in both.starts()]
+    both = Predictor(fast, [recording, recording], [blank.use[0]] * 2)
+    names = [prior.name for prior in both.starts()]
     assert len(names) == 6
     first, second = (both.predict(number, {}, (), names).sensitivity for number in (0, 1))
     assert np.abs(first[:, :, 3:]).max() == 0.0
@@ -235,9 +236,9 @@ def test_known_parameters_lie_within_their_intervals(blank, tmp_path):
     for seed in range(5):
         folder = tmp_path / str(seed)
         folder.mkdir()
-        plant = synthetic(blank, folder, seed, TRUTH)
-        belief = Belief.prior(calibrate(None, plant).belief.coordinates)
-        fit = Problem(plant, belief, QUIET, plant.observations).fit()
+        predictor = synthetic(blank, folder, seed, TRUTH)
+        belief = Belief.prior(calibrate(None, predictor).belief.coordinates)
+        fit = Problem(predictor, belief, QUIET, predictor.observations).fit()
         own = [i for i, c in enumerate(fit.coordinates) if c.name in TRUTH]
         true = np.array([fit.coordinates[i].of(TRUTH[fit.coordinates[i].name]) for i in own])
         apart = fit.position[own] - true
@@ -252,8 +253,8 @@ def test_known_parameters_lie_within_their_intervals(blank, tmp_path):
 
 
 def test_a_fit_does_not_depend_on_where_it_starts(blank, tmp_path):
-    plant = synthetic(blank, tmp_path, 1, TRUTH)
-    problem = Problem(plant, calibrate(None, plant).belief, QUIET, plant.observations)
+    predictor = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
     near = problem.fit((), TRUTH)
     far = problem.fit((), {name: 1.0 / value for name, value in TRUTH.items()})
     assert far.misfit_with_prior == pytest.approx(near.misfit_with_prior, abs=0.1)
@@ -262,8 +263,8 @@ def test_a_fit_does_not_depend_on_where_it_starts(blank, tmp_path):
 
 
 def test_steps_that_are_refused_cost_no_derivatives_and_are_not_tried_again(blank, tmp_path, monkeypatch):
-    plant = synthetic(blank, tmp_path, 1, TRUTH)
-    problem = Problem(plant, calibrate(None, plant).belief, QUIET, plant.observations)
+    predictor = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
     asked = []
     plain = Problem.predict
 
@@ -288,8 +289,8 @@ def test_steps_that_are_refused_cost_no_derivatives_and_are_not_tried_again(blan
 
 
 def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeypatch):
-    plant = synthetic(blank, tmp_path, 1, TRUTH)
-    problem = Problem(plant, calibrate(None, plant).belief, QUIET, plant.observations)
+    predictor = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
     asked = []
     plain = Problem.predict
 
@@ -311,9 +312,9 @@ def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeyp
 
 
 def test_a_prediction_without_derivatives_is_the_same(blank):
-    plant = blank
-    belief = calibrate(None, plant).belief
-    problem = Problem(plant, belief, QUIET, plant.observations)
+    predictor = blank
+    belief = calibrate(None, predictor).belief
+    problem = Problem(predictor, belief, QUIET, predictor.observations)
     at = belief.mean + 0.3
     whole = problem.predict((), belief.coordinates, at)
     bare = problem.predict((), belief.coordinates, at, slopes=False, near=whole)
@@ -334,20 +335,20 @@ def test_a_sensor_offset_has_the_evidence_of_its_exact_gaussian(blank, candidate
     # Gaussian tails: nothing is an outlier.
     monkeypatch.setattr("spindle_fem.inference.hypothesis_fit.OUTLIER_SIGMAS", 1e9)
     offset = sensor(candidates, "sensor_offset")
-    plant = synthetic(blank, tmp_path, 5, {offset.amplitude: 0.06}, (offset,))
+    predictor = synthetic(blank, tmp_path, 5, {offset.amplitude: 0.06}, (offset,))
     nothing = Belief.prior(())
     slow = SlowError(0.02, 900.0)
-    problem = Problem(plant, nothing, slow, plant.observations)
+    problem = Problem(predictor, nothing, slow, predictor.observations)
     empty, with_offset = problem.fit(), problem.fit((offset,))
     sigma = offset.parameters[offset.amplitude].sigma
     exact = {}
-    predicted = plant.predict(0, {}).temperature
+    predicted = predictor.predict(0, {}).temperature
     for spread in (0.0, sigma):
         total = 0.0
-        for item in plant.observations:
+        for item in predictor.observations:
             factor = item.bins.factor(slow)
             covariance = factor @ factor.T
-            if plant.recordings[0].temperature_names[item.channel] == "T_body":
+            if predictor.recordings[0].temperature_names[item.channel] == "T_body":
                 covariance = covariance + spread**2
             residual = item.values - item.at(predicted[:, item.channel])
             total += multivariate_normal.logpdf(residual, np.zeros(len(residual)), covariance)
@@ -363,15 +364,15 @@ def test_an_amplitude_of_one_sign_counts_the_half_prior_twice(blank, candidates,
     (coordinate,) = candidate_coordinates(lag)
     assert coordinate.low == 0.0
     assert not coordinate.logarithmic
-    plant = synthetic(blank, tmp_path, 6, {lag.amplitude: 150.0}, (lag,))
-    problem = Problem(plant, Belief.prior(()), QUIET, plant.observations)
+    predictor = synthetic(blank, tmp_path, 6, {lag.amplitude: 150.0}, (lag,))
+    problem = Problem(predictor, Belief.prior(()), QUIET, predictor.observations)
     fit = problem.fit((lag,), {lag.amplitude: 60.0})
     assert fit.values[lag.amplitude] == pytest.approx(150.0, abs=5.0)
     # By quadrature over the half normal.
     values = np.linspace(120.0, 180.0, 121)
     misfits = []
     for value in values:
-        read = problem.whitened([plant.predict(0, {lag.amplitude: value}, (lag,)).temperature])
+        read = problem.whitened([predictor.predict(0, {lag.amplitude: value}, (lag,)).temperature])
         misfits.append(float(np.sum(_huber(problem.data - read))))
     prior = 2.0 * np.exp(-0.5 * (values / coordinate.sigma) ** 2) / (np.sqrt(2.0 * np.pi) * coordinate.sigma)
     likelihood = np.exp(-0.5 * (np.array(misfits) - min(misfits)))
@@ -380,13 +381,13 @@ def test_an_amplitude_of_one_sign_counts_the_half_prior_twice(blank, candidates,
 
 
 def test_marginal_likelihood_of_columns_is_that_of_the_whole_covariance(blank, tmp_path):
-    plant = synthetic(blank, tmp_path, 8, TRUTH)
-    calibrated = calibrate(None, plant)
+    predictor = synthetic(blank, tmp_path, 8, TRUTH)
+    calibrated = calibrate(None, predictor)
     coordinates = calibrated.belief.coordinates
     generator = np.random.default_rng(0)
     root = np.triu(generator.normal(0.0, 0.3, (len(coordinates),) * 2)) + 1.5 * np.eye(len(coordinates))
     belief = Belief(coordinates, 0.2 * generator.normal(size=len(coordinates)), root)
-    problem = Problem(plant, belief, QUIET, plant.observations)
+    problem = Problem(predictor, belief, QUIET, predictor.observations)
     fit = problem.fit()
     linear = LinearProblem.about(problem, fit)
     # One reading went astray: it counts less.
@@ -430,11 +431,11 @@ def test_slow_error_of_white_readings_is_small_and_of_drifting_ones_is_not(blank
     for name in names:
         folder = tmp_path / name
         folder.mkdir()
-        plant = synthetic(blank, folder, 12)
+        predictor = synthetic(blank, folder, 12)
         if name == "drifting":
-            wander = 0.8 * np.sin(plant.recordings[0].times / 400.0)[:, None]
-            plant = synthetic_with(blank, folder, plant.recordings[0].temperature + wander)
-        problem = Problem(plant, Belief.prior(()), SlowError(0.1, 300.0), plant.observations)
+            wander = 0.8 * np.sin(predictor.recordings[0].times / 400.0)[:, None]
+            predictor = synthetic_with(blank, folder, predictor.recordings[0].temperature + wander)
+        problem = Problem(predictor, Belief.prior(()), SlowError(0.1, 300.0), predictor.observations)
         found[name] = slow_error_of(problem, problem.fit())
     # A tenth of a per cent of what the temperatures move is the least that a network is off.
     moved = np.ptp(np.quantile(blank.predict(0, {}).temperature, [0.05, 0.95], axis=0), axis=0)
@@ -443,9 +444,9 @@ def test_slow_error_of_white_readings_is_small_and_of_drifting_ones_is_not(blank
     assert found["drifting"].sigma == pytest.approx(0.8 / np.sqrt(2.0), rel=1.0)
 
 
-def synthetic_with(plant, folder, temperatures):
-    recording = written(folder, plant.recordings[0].times, temperatures)
-    return Plant(plant.fast, [recording], [np.ones(recording.times.size, dtype=bool)])
+def synthetic_with(predictor, folder, temperatures):
+    recording = written(folder, predictor.recordings[0].times, temperatures)
+    return Predictor(predictor.fast, [recording], [np.ones(recording.times.size, dtype=bool)])
 
 
 # ------------------------------------------------------------------- coordinates

@@ -12,8 +12,8 @@ from spindle_fem.inference.findings import predictions_at_stamps, reported_param
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate, expected_slow_error
-from spindle_fem.inference.simulated_plant import Plant
 from spindle_fem.inference.sufficiency import response_time, says_too_little
 from spindle_fem.recordings.align import read_recording
 
@@ -72,9 +72,9 @@ def opened(tmp_path_factory):
     return open_machine(folder / "machine.toml", (), [written(folder)], ())
 
 
-def plant_of(machine, recording=None):
+def predictor_of(machine, recording=None):
     chosen = machine.recordings[0] if recording is None else recording
-    return Plant(machine.fast, [chosen], [np.ones(chosen.times.size, dtype=bool)], machine.effects)
+    return Predictor(machine.fast, [chosen], [np.ones(chosen.times.size, dtype=bool)], machine.effects)
 
 
 def candidate_of(opened, effect):
@@ -94,7 +94,7 @@ def candidate_of(opened, effect):
 def found(request, opened, tmp_path_factory):
     """A fit that found an effect, as the outcome of a diagnosis."""
     candidate = candidate_of(opened, request.param)
-    blank = plant_of(opened)
+    blank = predictor_of(opened)
     factors = {item.name for item in candidate.factors}
     own = {("effect:" + n if n in factors else n): item.value for n, item in candidate.free.items()}
     name = candidate.amplitude
@@ -103,11 +103,13 @@ def found(request, opened, tmp_path_factory):
     true = predictions_at_stamps(blank, SimpleNamespace(values=truth, candidates=(candidate,)))[0]
     noise = np.random.default_rng(1).normal(0.0, 0.1, true.shape)
     folder = tmp_path_factory.mktemp("run")
-    plant = plant_of(opened, written(folder, true + noise))
-    calibrated = calibrate(None, plant)
-    problem = Problem(plant, calibrated.belief, expected_slow_error(plant), plant.observations)
+    predictor = predictor_of(opened, written(folder, true + noise))
+    calibrated = calibrate(None, predictor)
+    problem = Problem(predictor, calibrated.belief, expected_slow_error(predictor), predictor.observations)
     fit = problem.fit((candidate,), own)
-    outcome = SimpleNamespace(final=fit, plant=plant, plant_coordinates=calibrated.belief.coordinates)
+    outcome = SimpleNamespace(
+        final=fit, predictor=predictor, machine_coordinates=calibrated.belief.coordinates
+    )
     return outcome, folder
 
 
@@ -115,12 +117,12 @@ def test_the_written_machine_predicts_what_the_fit_did(found, opened):
     outcome, folder = found
     path = folder / "improved.toml"
     path.write_text(improved_machine(outcome, opened))
-    again = open_machine(path, (), outcome.plant.recordings, ())
+    again = open_machine(path, (), outcome.predictor.recordings, ())
     assert len(again.effects.factors) + len(again.effects.terms) + len(again.effects.readings) == 1
     nothing = SimpleNamespace(values={}, candidates=())
-    expected = predictions_at_stamps(outcome.plant, outcome.final)[0]
-    plain = predictions_at_stamps(plant_of(opened, outcome.plant.recordings[0]), nothing)[0]
-    told = predictions_at_stamps(plant_of(again), nothing)[0]
+    expected = predictions_at_stamps(outcome.predictor, outcome.final)[0]
+    plain = predictions_at_stamps(predictor_of(opened, outcome.predictor.recordings[0]), nothing)[0]
+    told = predictions_at_stamps(predictor_of(again), nothing)[0]
     assert np.abs(plain - expected).max() > 0.3
     assert told == pytest.approx(expected, abs=2e-3)
 
@@ -129,7 +131,7 @@ def test_what_is_switched_on_is_not_found_again(found, opened):
     outcome, folder = found
     path = folder / "again.toml"
     path.write_text(improved_machine(outcome, opened))
-    again = open_machine(path, (), outcome.plant.recordings, ())
+    again = open_machine(path, (), outcome.predictor.recordings, ())
     (candidate,) = outcome.final.candidates
     offered = {(c.effect, c.component, c.form) for c in candidates_for(again.view)}
     assert (candidate.effect, candidate.component, candidate.form) not in offered
@@ -139,9 +141,9 @@ def test_parameters_keep_what_is_left_of_their_uncertainty(found, opened):
     outcome, folder = found
     path = folder / "kept.toml"
     path.write_text(improved_machine(outcome, opened))
-    again = open_machine(path, (), outcome.plant.recordings, ())
-    before = {name: sigma for name, sigma, _ in plant_of(opened).uncertain()}
-    after = {name: sigma for name, sigma, _ in plant_of(again).uncertain()}
+    again = open_machine(path, (), outcome.predictor.recordings, ())
+    before = {prior.name: prior.sigma_log for prior in predictor_of(opened).uncertain()}
+    after = {prior.name: prior.sigma_log for prior in predictor_of(again).uncertain()}
     assert set(after) == set(before)
     fit = outcome.final
     for index, coordinate in enumerate(fit.coordinates[: len(before)]):
@@ -186,7 +188,7 @@ def test_the_response_time_is_that_of_the_slow_mode(opened):
         times = np.arange(0.0, 6000.0, 5.0)
         share = np.array([1.0 - (expm(matrix * time) @ final)[node] / final[node] for time in times[::20]])
         crossed.append(float(np.interp(0.632, share, times[::20])))
-    assert response_time(plant_of(opened)) == pytest.approx(np.median(crossed), rel=0.02)
+    assert response_time(predictor_of(opened)) == pytest.approx(np.median(crossed), rel=0.02)
 
 
 def test_a_recording_that_says_enough_is_not_refused(opened):

@@ -13,12 +13,15 @@ import xarray as xr
 from spindle_fem.definition.load import write_machine
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.errors import BadInputError
+from spindle_fem.inference import search_course, tuned
 from spindle_fem.inference.diagnosis import _overlapping
 from spindle_fem.inference.findings import findings_of, noise_level, predictions_at_stamps, rmse
 from spindle_fem.inference.further_tests import AGAIN, answer, reachable_places, trials_of
+from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Problem
-from spindle_fem.inference.hypothesis_search import OTHER_SPOTS, Hypothesis, Search
+from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.mismatch_place import significant_stretches, smoothed_scores, where_of
+from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged
 from spindle_fem.inference.next_measurement import (
     EXISTING,
     expected_information,
@@ -26,9 +29,7 @@ from spindle_fem.inference.next_measurement import (
     pairwise_distances,
 )
 from spindle_fem.inference.prepared_problem import (
-    COMMON_RADIAL_SIGMA,
     EXPECTED_SLOW,
-    PROBE_PLACE_SIGMA,
     known_before,
 )
 from spindle_fem.inference.worker_processes import Workers
@@ -94,13 +95,13 @@ def test_a_decision_does_not_wait_for_which_part_of_a_component_it_is(case):
 
 
 def test_probes_of_a_part_are_off_along_the_radius_together(heated):
-    belief = known_before(heated.plant)
+    belief = known_before(heated.predictor)
     names = [c.name for c in belief.coordinates]
     sigmas = np.array([c.sigma for c in belief.coordinates])
     covariance = np.linalg.inv(belief.root.T @ belief.root) * np.outer(sigmas, sigmas)
     radial = [names.index(f"probe.{name}.r") for name in ("SP01", "SP05")]
     along = [names.index(f"probe.{name}.z") for name in ("SP01", "SP05")]
-    own, common = PROBE_PLACE_SIGMA**2, COMMON_RADIAL_SIGMA**2
+    own, common = tuned.PROBE_PLACE_SIGMA**2, tuned.COMMON_RADIAL_SIGMA**2
     assert covariance[np.ix_(radial, radial)] == pytest.approx(own * np.eye(2) + common, rel=1e-9)
     assert covariance[np.ix_(along, along)] == pytest.approx(own * np.eye(2), rel=1e-9, abs=1e-18)
     # What the probes share is no matter of the machine's parameters.
@@ -111,7 +112,7 @@ def test_probes_of_a_part_are_off_along_the_radius_together(heated):
 # ---------------------------------------------------------------------- search
 def search_over(case, diagnosis, kind=Search):
     problem = Problem(
-        diagnosis.plant, diagnosis.calibrated.belief, EXPECTED_SLOW, diagnosis.plant.observations
+        diagnosis.predictor, diagnosis.calibrated.belief, EXPECTED_SLOW, diagnosis.predictor.observations
     )
     effects = catalogue()
     weights = dict.fromkeys(effects, 1.0)
@@ -125,45 +126,43 @@ def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
     search.found = {}
     wrong = effect_of("unrecorded_heat_source").over(case.view, "rear_bearings", [(FROM, UNTIL)])
     for candidates in ((), (wrong,)):
-        search._keep(Hypothesis(problem.fit(candidates), -1.0))
+        search.keep(Hypothesis(problem.fit(candidates), -1.0))
     found = max(search.ranked(), key=lambda h: len(h.fit.candidates))
-    (first, start), *others = search._at_other_spots(found.fit, wrong, ())
+    (first, start), *others = at_other_spots(search, found.fit, wrong, ())
     assert [c.component for c in first] == ["front_bearings"]
     assert start[first[0].amplitude] == pytest.approx(HEAT, rel=0.3)
     assert wrong.component not in {c.component for members, _ in others for c in members}
-    assert len(others) < OTHER_SPOTS
-    search._exchange()
+    assert len(others) < tuned.OTHER_SPOTS
+    exchanged(search)
     assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings")}
 
 
 def test_laws_are_extended_beside_a_way_out(case, heated):
     search = search_over(case, heated)
     out, law = heated.hypotheses[:2]
-    assert search._to_extend([out, law], 1) == [out, law]
-    assert search._to_extend([law, out], 1) == [law]
+    assert search_course.to_extend(search, [out, law], 1) == [out, law]
+    assert search_course.to_extend(search, [law, out], 1) == [law]
 
 
 class Tabled(Search):
     """A search whose fits have the evidence of a table."""
 
-    def _fit_all(self, tasks):
+    def fit_all(self, tasks):
         for candidates, values in tasks:
             keys = frozenset((c.effect, c.component) for c in candidates)
             fit = SimpleNamespace(
                 candidates=candidates, values=values, keys=keys, log_evidence=EVIDENCE.get(keys, -1e3)
             )
-            self._keep(Hypothesis(fit, 0.0))
-
-    def _exchange(self):
-        pass
+            self.keep(Hypothesis(fit, 0.0))
 
 
-def test_what_a_single_bearing_needed_beside_it_is_left_out_beside_its_set(case, heated):
+def test_what_a_single_bearing_needed_beside_it_is_left_out_beside_its_set(case, heated, monkeypatch):
+    monkeypatch.setattr(search_course, "exchanged", lambda search: None)
     search = search_over(case, heated, Tabled)
     search.found = {}
     for keys in ((DRY_BEARING, LOOSE), (DRY_BEARING, LOOSE, SEAT)):
-        search._fit_all([(tuple(case.candidates[key] for key in keys), {})])
-    search._improve()
+        search.fit_all([(tuple(case.candidates[key] for key in keys), {})])
+    search_course.improve(search)
     assert search.ranked()[0].keys == {DRY_SET, LOOSE}
 
 
@@ -172,7 +171,7 @@ def test_missing_heat_is_found_where_and_when_it_is(heated):
     where = where_of(heated)
     assert where.component == "front_bearings"
     assert where.credible[0] == "front_bearings"
-    assert (where.radius, where.axial) == centre_of(heated.plant.fast.spec, "front_bearings")
+    assert (where.radius, where.axial) == centre_of(heated.predictor.fast.spec, "front_bearings")
     heat = where.missing_heat["front_bearings"]
     assert heat.peak == pytest.approx(HEAT, rel=0.25)
     assert heat.mean == pytest.approx(HEAT * (UNTIL - FROM) / TIMES[-1], rel=0.5)
@@ -206,7 +205,7 @@ def test_a_lying_sensor_is_the_place_itself(lying):
 
 
 def test_noise_alone_is_not_significant(consistent):
-    own = significant_stretches(consistent.plant, consistent.null)
+    own = significant_stretches(consistent.predictor, consistent.null)
     # What is told comes near the largest departure, which itself is small.
     assert sum(item.end - item.start for item in own) < 0.25 * TIMES[-1]
 
@@ -281,32 +280,32 @@ def test_without_a_rival_there_is_nothing_to_tell_apart(consistent):
 
 
 def test_slopes_of_a_trial_are_differences(heated):
-    plant, fit = heated.plant, heated.final
-    trial = trials_of(plant, heated.view)[1]
-    places = reachable_places(plant.fast.spec, plant.fast.model.place_names)
-    told = answer(plant, fit, trial, places, 600.0)
+    predictor, fit = heated.predictor, heated.final
+    trial = trials_of(predictor, heated.view)[1]
+    places = reachable_places(predictor.fast.spec, predictor.fast.model.place_names)
+    told = answer(predictor, fit, trial, places, 600.0)
     position = [c.name for c in fit.coordinates].index("film.outside")
     step = 1e-4
     moved = replace(fit, position=fit.position + step * np.eye(len(fit.position))[position])
-    difference = (answer(plant, moved, trial, places, 600.0).readings - told.readings) / step
+    difference = (answer(predictor, moved, trial, places, 600.0).readings - told.readings) / step
     assert told.slopes[:, :, position] == pytest.approx(difference, abs=2e-3 * np.abs(difference).max())
 
 
 def test_sensors_go_where_a_hand_can_reach(heated):
-    spec = heated.plant.fast.spec
-    names = [place.name for place in reachable_places(spec, heated.plant.fast.model.place_names)]
+    spec = heated.predictor.fast.spec
+    names = [place.name for place in reachable_places(spec, heated.predictor.fast.model.place_names)]
     assert "F1.outer_ring" in names
     assert not any("inner" in name or "balls" in name or "spacer" in name for name in names)
 
 
 # ----------------------------------------------------------------------- report
 def content_of(diagnosis, before, after, proposal):
-    plant, judgement = diagnosis.plant, diagnosis.judgement
+    predictor, judgement = diagnosis.predictor, diagnosis.judgement
 
     def errors(predicted):
         return {
-            "train_rmse_K": rmse(plant, predicted, heldout=False),
-            "heldout_rmse_K": rmse(plant, predicted, heldout=True),
+            "train_rmse_K": rmse(predictor, predicted, heldout=False),
+            "heldout_rmse_K": rmse(predictor, predicted, heldout=True),
         }
 
     channels = [{"channel": n, "rmse_K": 0.2, "noise_K": 0.1, "max_K": 1.0} for n in PROBES]
@@ -326,20 +325,24 @@ def content_of(diagnosis, before, after, proposal):
         "fit": {
             "before": errors(before),
             "after": errors(after),
-            "noise_K": noise_level(plant),
+            "noise_K": noise_level(predictor),
             "heldout": diagnosis.heldout,
         },
         "next_measurement": proposal,
-        "defects": [recording.defects.to_json() for recording in plant.recordings],
+        "defects": [recording.defects.to_json() for recording in predictor.recordings],
     }
 
 
 def folder_of(diagnosis, folder, proposal):
-    before, after = (predictions_at_stamps(diagnosis.plant, fit) for fit in (diagnosis.null, diagnosis.final))
+    before, after = (
+        predictions_at_stamps(diagnosis.predictor, fit) for fit in (diagnosis.null, diagnosis.final)
+    )
     diagnosis_dataset(diagnosis, before, after).to_netcdf(folder / "diagnosis.nc")
     content = content_of(diagnosis, before, after, proposal)
     (folder / "diagnosis.json").write_text(json.dumps(content), encoding="utf-8")
-    (folder / "improved_machine.toml").write_text(write_machine(diagnosis.plant.fast.spec), encoding="utf-8")
+    (folder / "improved_machine.toml").write_text(
+        write_machine(diagnosis.predictor.fast.spec), encoding="utf-8"
+    )
     return content
 
 
@@ -380,7 +383,7 @@ def test_the_sentence_names_rivals_and_errors(reported):
 def test_the_dataset_keeps_readings_and_what_was_held_out(reported, heated):
     folder, content, _ = reported
     data = xr.load_dataset(folder / "diagnosis.nc")
-    recording = heated.plant.recordings[0]
+    recording = heated.predictor.recordings[0]
     assert data["measured"].values == pytest.approx(recording.temperature - 273.15, abs=1e-4)
     held = data["held_out"].values == 1
     assert data["time"].values[held].min() > 4000.0

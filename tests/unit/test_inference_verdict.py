@@ -10,29 +10,16 @@ from scipy.stats import chi2
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.errors import SpecError
+from spindle_fem.inference import tuned
 from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Coordinate, Fit
-from spindle_fem.inference.hypothesis_search import Hypothesis
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 from spindle_fem.inference.verdict import (
-    CANDIDATES_A_TRIAL,
-    CHANCE_TEMPERATURE,
-    DECIDED,
-    LEAST_TEMPERATURE_RATIO,
-    LISTED,
-    NEAR,
-    NEAR_MISFIT,
     NEAR_REASON,
     NOTHING_REASON,
     PRIOR_SIGMAS,
-    RULED_OUT,
-    SEEN_FROM,
-    SIGNIFICANT,
-    SMALLEST_SIZE,
-    STILL_POSSIBLE,
-    TEMPERATURE,
-    TEMPERATURE_OF_A_SIZE,
     any_magnitude,
     counted,
     detection_p_value,
@@ -43,7 +30,7 @@ from spindle_fem.inference.verdict import (
 )
 
 # Where a prior that is even in the logarithm has the density of the normal one.
-AS_NORMAL = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / SMALLEST_SIZE))
+AS_NORMAL = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / tuned.SMALLEST_SIZE))
 HEAT = Coordinate("heat.front", 1.0, 0.2, True, -4.0, 4.0)
 DATA = 400
 
@@ -122,13 +109,13 @@ def test_differences_of_likelihood_count_by_the_temperature():
     worse = hypothesis(CHURNING, misfit=408.0)
     ranked = rank([worse, better, hypothesis(misfit=420.0, evidence=-1e4)])
     odds = ranked[0].probability / ranked[1].probability
-    assert odds == pytest.approx(np.exp(4.0 / TEMPERATURE_OF_A_SIZE))
+    assert odds == pytest.approx(np.exp(4.0 / tuned.GAIN_DIVISOR_IN_A_SIZE))
 
 
 def test_a_gain_counts_less_beside_a_large_one_but_never_nothing():
     small, large = counted(1.0) - counted(0.0), counted(20_001.0) - counted(20_000.0)
     assert small == pytest.approx(1.0, rel=2e-3)
-    assert large == pytest.approx(1.0 / LEAST_TEMPERATURE_RATIO, rel=1e-6)
+    assert large == pytest.approx(1.0 / tuned.LARGEST_INEXACT_DIVISOR, rel=1e-6)
     gains = np.linspace(-5.0, 6000.0, 400)
     values = np.array([counted(gain) for gain in gains])
     assert np.all(np.diff(values) > 0.0)
@@ -154,7 +141,7 @@ def test_amplitudes_of_any_magnitude_are_as_likely():
     # Beyond its usual size the normal prior has it.
     assert weight(3.0) == weight(30.0) == pytest.approx(np.log(AS_NORMAL))
     # Nothing, to within so much, is not likelier than so much is.
-    assert weight(1e-3, sigma=0.1) == weight(0.0, sigma=0.1) == pytest.approx(weight(SEEN_FROM * 0.1))
+    assert weight(1e-3, sigma=0.1) == weight(0.0, sigma=0.1) == pytest.approx(weight(tuned.SEEN_FROM * 0.1))
     # Known to a fifth and a fiftieth of priors that differ by ten, both to a tenth of themselves: the same.
     wide = known(hypothesis(CHURNING, misfit=400.0, evidence=-200.0 - np.log(10.0), position=(0.0, 0.05)))
     narrow = known(hypothesis(PRELOAD, misfit=400.0, evidence=-200.0, position=(0.0, 0.5)))
@@ -173,11 +160,11 @@ def test_what_a_strong_effect_leaves_counts_less_for_one_more():
     single = hypothesis(PRELOAD, misfit=420.0)
     pair, rival = hypothesis(PRELOAD, CHURNING, misfit=400.0), hypothesis(CHURNING, misfit=400.0)
     weak, strong = (counted(x + 10.0) - counted(x) for x in (90.0, 24790.0))
-    assert strong == pytest.approx(10.0 / LEAST_TEMPERATURE_RATIO)
+    assert strong == pytest.approx(10.0 / tuned.LARGEST_INEXACT_DIVISOR)
     assert weak > 1.5 * strong
     ratio = odds(600.0, pair, single) / odds(50000.0, pair, single)
-    assert ratio == pytest.approx(np.exp((weak - strong) / TEMPERATURE))
-    assert odds(50000.0, rival, single) == pytest.approx(np.exp(10.0 / TEMPERATURE_OF_A_SIZE))
+    assert ratio == pytest.approx(np.exp((weak - strong) / tuned.GAIN_DIVISOR))
+    assert odds(50000.0, rival, single) == pytest.approx(np.exp(10.0 / tuned.GAIN_DIVISOR_IN_A_SIZE))
 
 
 def test_the_most_probable_set_of_a_size_stands_for_it():
@@ -198,9 +185,9 @@ CHURNING_KEY = frozenset({("grease_churning", "front_bearings")})
 # ---------------------------------------------------------------------- detection
 def test_the_p_value_corrects_for_the_number_of_trials():
     null, better = hypothesis(misfit=430.0), hypothesis(PRELOAD, misfit=400.0)
-    alone = chi2.sf(30.0, 1) ** (1.0 / CHANCE_TEMPERATURE)
+    alone = chi2.sf(30.0, 1) ** (1.0 / tuned.CHANCE_DIVISOR)
     assert detection_p_value([null, better], 0) == pytest.approx(alone)
-    few = detection_p_value([null, better], 2 * CANDIDATES_A_TRIAL)
+    few = detection_p_value([null, better], 2 * tuned.CANDIDATES_A_TRIAL)
     assert few == pytest.approx(1.0 - (1.0 - alone) ** 3, rel=1e-9)
 
 
@@ -259,10 +246,10 @@ def test_what_few_consistent_recordings_show_is_ambiguous_where_evidence_prefers
     found = [none, hypothesis(dear, misfit=400.0, evidence=-200.0 - 30.0)]
     assert rank(found)[0].fit is none.fit
     said = verdict(*found)
-    assert RULED_OUT < said.p_value < SIGNIFICANT
+    assert tuned.RULED_OUT < said.p_value < tuned.SIGNIFICANT
     assert (said.verdict, said.reason) == ("ambiguous", NOTHING_REASON)
     assert said.chosen.fit.candidates == (dear,)
-    assert said.chosen.probability <= STILL_POSSIBLE
+    assert said.chosen.probability <= tuned.STILL_POSSIBLE
     assert said.chosen.probability + said.other == pytest.approx(1.0)
     # Where evidence prefers something as well, it is said.
     clear = [none, hypothesis(dear, misfit=400.0, evidence=-200.0, log_prior=-0.5)]
@@ -298,13 +285,13 @@ LIKE = (hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0), hypothesis
 
 
 def test_sets_that_read_alike_are_named_together_however_probable_one_is():
-    found = verdict(*LIKE, apart=lambda one, other: 0.9 * NEAR)
+    found = verdict(*LIKE, apart=lambda one, other: 0.9 * tuned.NEAR_READINGS)
     assert (found.verdict, found.reason) == ("ambiguous", NEAR_REASON)
-    assert found.evidence > DECIDED
+    assert found.evidence > tuned.DECIDED
     assert found.chosen.fit is LIKE[1].fit
     (other,) = found.alternatives
     assert other.fit is LIKE[2].fit
-    assert other.probability < LISTED < found.chosen.probability
+    assert other.probability < tuned.LISTED < found.chosen.probability
 
 
 def test_a_richer_law_that_repeats_a_simple_one_is_no_rival():
@@ -318,11 +305,11 @@ def test_sets_that_read_apart_or_fit_apart_are_decided_by_their_likelihood():
 
     def apart(one, other):
         asked.append((one, other))
-        return 1.01 * NEAR
+        return 1.01 * tuned.NEAR_READINGS
 
     assert verdict(*LIKE, apart=apart).verdict == "missing_physics"
     assert asked == [(LIKE[1].fit, LIKE[2].fit)]
-    worse = hypothesis(CHURNING, misfit=400.0 + 1.01 * NEAR_MISFIT)
+    worse = hypothesis(CHURNING, misfit=400.0 + 1.01 * tuned.NEAR_MISFIT)
     found = verdict(*LIKE[:2], worse, apart=lambda one, other: 0.0)
     assert (found.verdict, found.alternatives) == ("missing_physics", ())
 
@@ -333,7 +320,7 @@ def test_the_same_elsewhere_in_a_set_and_sets_of_another_size_are_no_rivals():
     one = {"front_bearings": frozenset({"front_bearings", "F1"})}
     found = verdict(*LIKE[:2], elsewhere, pair, overlapping=one, apart=lambda one, other: 0.0)
     assert found.verdict == "missing_physics"
-    assert all(item.probability >= LISTED for item in found.alternatives)
+    assert all(item.probability >= tuned.LISTED for item in found.alternatives)
 
 
 def test_physics_comes_before_parameters_before_sensors():

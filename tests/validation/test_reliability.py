@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from spindle_fem.inference import reliability as stated
-from validation.reliability import (
-    LARGEST_PROBABILITY,
-    SMALLEST_SHARE,
-    experience,
-    features,
-    fitted,
-    log_loss,
-)
+from spindle_fem.inference import tuned
+from spindle_fem.inference.reliability import features, reliable
+from validation.reliability import experience, fitted, log_loss
 
 
 def test_the_regression_finds_what_made_the_experience():
@@ -22,7 +16,7 @@ def test_the_regression_finds_what_made_the_experience():
     true = np.array([0.5, 0.3, -1.2, 0.9, -0.8])
     rows = np.array(
         [
-            features(int(size), float(p), float(share), float(more))
+            features(float(p), int(size), float(share), float(more))
             for size, p, share, more in zip(
                 generator.integers(1, 4, 20_000),
                 expit(generator.uniform(-2.0, 9.0, 20_000)),
@@ -37,13 +31,11 @@ def test_the_regression_finds_what_made_the_experience():
     assert log_loss(expit(rows @ true), right) < log_loss(expit(rows[:, 1]), right)
 
 
-def test_features_are_those_that_are_stated_by():
-    assert (LARGEST_PROBABILITY, SMALLEST_SHARE) == (stated.LARGEST_PROBABILITY, stated.SMALLEST_SHARE)
-    own = [stated.CONSTANT, stated.BY_LOGIT, stated.BY_FURTHER, stated.BY_SHARE, stated.BY_MORE]
-    for told in ((1, 0.99, 1.0, 30.0), (2, 0.999, 0.04, 0.0), (3, 1.0, 0.0, 2.0)):
-        size, probability, share, more = told
-        seen = expit(np.dot(own, features(*told)))
-        assert stated.reliable(probability, size, share, more) == pytest.approx(min(probability, seen))
+def test_experience_never_raises_what_evidence_says():
+    own = [tuned.RELIABILITY_CONSTANT, tuned.BY_LOGIT, tuned.BY_FURTHER, tuned.BY_SHARE, tuned.BY_MORE]
+    for probability, size, share, more in ((0.99, 1, 1.0, 30.0), (0.999, 2, 0.04, 0.0), (1.0, 3, 0.0, 2.0)):
+        seen = expit(np.dot(own, features(probability, size, share, more)))
+        assert reliable(probability, size, share, more) == pytest.approx(min(probability, seen))
 
 
 def test_only_diagnoses_that_name_something_count(tmp_path):

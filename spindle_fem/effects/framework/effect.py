@@ -25,6 +25,8 @@ from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
+# Of a derivative by a complex argument: exact to rounding, as nothing is subtracted.
+COMPLEX_STEP = 1e-30
 Kind = Literal["missing_physics", "parameter", "sensor"]
 
 
@@ -83,6 +85,49 @@ class Reading(ABC):
         parameters : mapping of str to (k,) ndarray
             By inner name.
         """
+
+    def told(
+        self,
+        times: Array,
+        temperature: Array,
+        slopes: Array,
+        inputs: Mapping[str, Array],
+        values: Mapping[str, float],
+        asked: Sequence[str] = (),
+    ) -> tuple[Array, Array, Array]:
+        """What the sensor tells, and derivatives.
+
+        Parameters
+        ----------
+        times : (N,) ndarray, [s]
+        temperature : (N,) ndarray, [K]
+            At the sensor's place.
+        slopes : (N, p) ndarray
+            Derivatives of it.
+        inputs : mapping of str to (N,) ndarray
+        values : mapping of str to float
+            Own parameters by inner name; nominal where absent.
+        asked : sequence of str
+            Own parameters to differentiate by: to the logarithm where they are logarithmic.
+
+        Returns
+        -------
+        (N,) ndarray, (N, p) ndarray and, to own parameters, (N, len(asked)) ndarray
+        """
+        width = slopes.shape[1]
+        columns = 1 + width + len(asked)
+        own = {item.name: values.get(item.name, item.value) for item in self.parameters}
+        # Affine in the temperature: differences of whole columns; complex steps for own parameters.
+        series = np.repeat(temperature[:, None].astype(complex), columns, axis=1)
+        series[:, 1 : 1 + width] += slopes
+        parameters = {name: np.full(columns, value, dtype=complex) for name, value in own.items()}
+        for item in self.parameters:
+            if item.name in asked:
+                scale = own[item.name] if item.logarithmic else 1.0
+                parameters[item.name][1 + width + asked.index(item.name)] += 1j * COMPLEX_STEP * scale
+        found = self.read(times, series, inputs, parameters)
+        by = (found[:, 1 : 1 + width] - found[:, :1]).real
+        return found[:, 0].real, by, found[:, 1 + width :].imag / COMPLEX_STEP
 
 
 @dataclass(frozen=True, slots=True)

@@ -201,7 +201,10 @@ def _sides(layout: Layout, spots: Mapping[str, tuple[str, ...]]) -> dict[str, tu
 def _focal(
     layout: Layout, spots: Mapping[str, tuple[str, ...]], sets: Mapping[str, tuple[str, ...]]
 ) -> dict[str, str]:
-    """Of a ring through a probe the probe's own spot, of a single bearing its outer raceway."""
+    """Place where a share of a spot's heat may be concentrated.
+
+    A ring through a probe has the probe's own patch, a single bearing its outer raceway.
+    """
     rings = {spot: NEAR + spot.removeprefix(AROUND) for spot in spots if spot.startswith(AROUND)}
     bearings = {key: f"{key}.outer_raceway" for key, members in sets.items() if members == (key,)}
     found = {**rings, **bearings}

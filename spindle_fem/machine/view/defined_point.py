@@ -49,7 +49,7 @@ def defined_recording(
     inputs : mapping of str to (float, float)
         Value at the start and at the end, SI.
     units : mapping of str to str
-        Of the inputs that need one.
+        Units of the inputs that need one.
     """
     times = np.array([0.0, DAY])
     noise = ChannelNoise(0.0, 0.0, 0.0, 0.0)

@@ -104,7 +104,7 @@ class Layout:
             found["shaft"] = (self.shaft.name,)
             ahead = [s for s in self.shaft.segment if s.z[1] <= self.first + 1e-9]
             behind = [s for s in self.shaft.segment if s.z[0] >= self.last - 1e-9]
-            # Of several segments the outermost: what rubs or drives sits at the end.
+            # The outermost of several segments: what rubs or drives sits at the end.
             if ahead:
                 found["nose"] = (self.segment_place(self.shaft, min(ahead, key=lambda s: s.z[0]).name),)
             if behind:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 # Channels rise at least this much, K, and heat is at least this much, W, for usual sizes of effects.
 LEAST_RISE = 2.0
 LEAST_HEAT = 1.0
-# Above this share of its largest a quantity is on; its levels are told by so many quantiles.
+# A quantity is on above this share of its largest value; number of quantiles that tell its levels.
 LEAST_ON, QUANTILES = 0.05, 32
 # Units that have a name, by what they come out as from SI base units.
 NAMED = {"kg*m/s**2": "N", "kg*m**2/s**3": "W"}

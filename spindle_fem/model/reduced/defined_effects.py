@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate, Reading
@@ -26,10 +23,6 @@ from spindle_fem.operation.named_places import named_places
 from spindle_fem.recordings.align import Recording
 from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics
 from spindle_fem.solvers.prepared_machine import PreparedMachine
-
-Array = NDArray[np.float64]
-
-COMPLEX_STEP = 1e-30
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,46 +61,6 @@ class ActiveEffects:
         return dict(parameters) | {
             name: value * parameters.get(name, 1.0) for name, value in self.factors.items()
         }
-
-    def read(
-        self,
-        columns: Sequence[str],
-        times: Array,
-        temperature: Array,
-        sensitivity: Array,
-        inputs: Mapping[str, Array],
-    ) -> tuple[Array, Array]:
-        """What the sensors tell of temperatures, and derivatives.
-
-        Parameters
-        ----------
-        columns : sequence of str
-            Channels of the recording.
-        times : (N,) ndarray, [s]
-        temperature : (N, c) ndarray, [K]
-        sensitivity : (N, c, p) ndarray
-        inputs : mapping of str to (N,) ndarray
-
-        Returns
-        -------
-        (N, c) ndarray, (N, c, p) ndarray
-        """
-        told, by = temperature, sensitivity
-        for reading in self.readings:
-            if reading.channel not in columns:
-                continue
-            if told is temperature:
-                told, by = temperature.copy(), sensitivity.copy()
-            column = columns.index(reading.channel)
-            values = np.empty((len(times), 1 + by.shape[2]), dtype=complex)
-            values[:, 0] = told[:, column]
-            values[:, 1:] = told[:, column, None] + 1j * COMPLEX_STEP * by[:, column]
-            width = values.shape[1]
-            own = {item.name: np.full(width, item.value, dtype=complex) for item in reading.parameters}
-            answer = reading.read(times, values, inputs, own)
-            told[:, column] = answer[:, 0].real
-            by[:, column] = answer[:, 1:].imag / COMPLEX_STEP
-        return told, by
 
 
 NO_EFFECTS = ActiveEffects()

@@ -9,8 +9,10 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.registry import candidates_for, effect_of, interval_effects
 from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, PROBE_PREFIX
 from spindle_fem.inference.drive_steps import coarse_drive
-from spindle_fem.inference.simulated_plant import EFFECT_PREFIX, PROBE_PREFIX, Plant
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.search_basis import on_search_basis
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.drive import drive_of_recording
 from spindle_fem.model.reduced.fast_model import FastModel
@@ -53,19 +55,19 @@ def recording(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def plant(recording):
+def predictor(recording):
     spec = load_machine("recorded_spindle")
     model = lumped_model(spec)
     slopes = np.random.default_rng(5).normal(0.0, 20.0, (len(model.probe_names), 2, model.size))
     # A uniform field has no gradient.
     slopes -= slopes.mean(axis=2, keepdims=True)
     fast = FastModel(replace(model, probe_gradients=slopes), spec)
-    return Plant(fast, [recording], [np.ones(recording.times.size, dtype=bool)], step=60.0)
+    return Predictor(fast, [recording], [np.ones(recording.times.size, dtype=bool)], step=60.0)
 
 
 @pytest.fixture(scope="module")
-def view(plant, recording):
-    return view_of(plant.fast.names, recording)
+def view(predictor, recording):
+    return view_of(predictor.fast.names, recording)
 
 
 @pytest.fixture(scope="module")
@@ -91,17 +93,17 @@ def values_of(candidate):
     return {EFFECT_PREFIX + name if name in factors else name: value for name, value in values.items()}
 
 
-def require_derivatives(plant, values, candidates, steps):
+def require_derivatives(predictor, values, candidates, steps):
     """Compare with central differences; ``steps`` of values, or None for a logarithm."""
     names = list(steps)
-    found = plant.predict(0, values, candidates, names)
+    found = predictor.predict(0, values, candidates, names)
     for column, (name, step) in enumerate(steps.items()):
         value = values.get(name, 0.0 if name.startswith(PROBE_PREFIX) else 1.0)
         if step is None:
             ends, width = [value * np.exp(sign * 1e-6) for sign in (1.0, -1.0)], 2e-6
         else:
             ends, width = [value + step, value - step], 2.0 * step
-        up, down = (plant.predict(0, {**values, name: end}, candidates).temperature for end in ends)
+        up, down = (predictor.predict(0, {**values, name: end}, candidates).temperature for end in ends)
         difference = (up - down) / width
         size = np.abs(difference).max()
         assert size > 0.0, f"{name} does nothing"
@@ -115,24 +117,24 @@ def steps_of(candidate):
     return {name: None if item.logarithmic else 1e-4 * item.sigma for name, item in items}
 
 
-def test_machine_parameters_and_places_of_probes(plant, candidates):
+def test_machine_parameters_and_places_of_probes(predictor, candidates):
     preload = candidates["thermal_preload", ""]
-    names = [name for name, *_ in plant.uncertain()]
-    places = list(plant.displacements())
+    names = [prior.name for prior in predictor.uncertain()]
+    places = list(predictor.displacements())
     assert len(places) == 10
     values = {**NOW, **values_of(preload)}
     shifts = dict.fromkeys(places, 1e-6)
-    require_derivatives(plant, values, [preload], dict.fromkeys(names) | shifts)
+    require_derivatives(predictor, values, [preload], dict.fromkeys(names) | shifts)
     moved = {"probe.SP02.r": 1e-3, "probe.SP03.z": -5e-4}
-    require_derivatives(plant, {**values, **moved}, [preload], shifts)
+    require_derivatives(predictor, {**values, **moved}, [preload], shifts)
 
 
-def test_a_displaced_probe_reads_the_gradient(plant):
-    run = plant.transient(0, {}, ())
-    states, _ = run.march(plant.start(0))
-    model = plant.fast.model
-    there = plant.predict(0, {}).temperature
-    moved = plant.predict(0, {"probe.SP02.r": 2e-3}).temperature - there
+def test_a_displaced_probe_reads_the_gradient(predictor):
+    run = predictor.transient(0, {}, ())
+    states, _ = run.march(predictor.start(0))
+    model = predictor.fast.model
+    there = predictor.predict(0, {}).temperature
+    moved = predictor.predict(0, {"probe.SP02.r": 2e-3}).temperature - there
     slope = states @ model.probe_gradients[model.probe_names.index("SP02"), 0]
     assert moved[:, 1] == pytest.approx(2e-3 * slope, abs=1e-9)
     assert np.abs(np.delete(moved, 1, axis=1)).max() == 0.0
@@ -159,27 +161,27 @@ def test_a_displaced_probe_reads_the_gradient(plant):
         "unrecorded_cooling",
     ],
 )
-def test_parameters_of_terms(plant, candidates, effect):
+def test_parameters_of_terms(predictor, candidates, effect):
     for candidate in (c for (name, _), c in candidates.items() if name == effect):
         values = {**NOW, **values_of(candidate)}
-        require_derivatives(plant, values, [candidate], {"heat.front": None, **steps_of(candidate)})
+        require_derivatives(predictor, values, [candidate], {"heat.front": None, **steps_of(candidate)})
 
 
 @pytest.mark.parametrize("effect", ["heat_scale", "heat_split", "coolant_film", "joint_conductance"])
-def test_factors_of_an_effect_multiply_those_of_the_machine(plant, candidates, effect):
+def test_factors_of_an_effect_multiply_those_of_the_machine(predictor, candidates, effect):
     candidate = next(c for (name, _), c in candidates.items() if name == effect and c.factors)
     (own,) = (item.name for item in candidate.factors)
     values = {own: 1.2, EFFECT_PREFIX + own: 0.7}
-    together = plant.predict(0, {own: 1.2 * 0.7}).temperature
-    assert plant.predict(0, values, [candidate]).temperature == pytest.approx(together, abs=1e-9)
-    found = require_derivatives(plant, values, [candidate], {own: None, EFFECT_PREFIX + own: None})
+    together = predictor.predict(0, {own: 1.2 * 0.7}).temperature
+    assert predictor.predict(0, values, [candidate]).temperature == pytest.approx(together, abs=1e-9)
+    found = require_derivatives(predictor, values, [candidate], {own: None, EFFECT_PREFIX + own: None})
     assert found.sensitivity[:, :, 0] == pytest.approx(found.sensitivity[:, :, 1], abs=1e-12)
 
 
 @pytest.mark.parametrize(
     "effect", ["sensor_lag", "sensor_gain", "sensor_offset", "sensor_drift", "sensor_detached", "clock_shift"]
 )
-def test_parameters_of_readings_and_what_passes_through_them(plant, candidates, effect):
+def test_parameters_of_readings_and_what_passes_through_them(predictor, candidates, effect):
     for candidate in (c for (name, _), c in candidates.items() if name == effect):
         values = {**NOW, **values_of(candidate)}
         if effect == "clock_shift":
@@ -189,23 +191,25 @@ def test_parameters_of_readings_and_what_passes_through_them(plant, candidates, 
         places = [] if channel == "COOLANT_OUT" else [f"probe.{channel}.r"]
         steps = {"heat.front": None, "coolant.film_factor": None, **dict.fromkeys(places, 1e-6)}
         steps |= steps_of(candidate)
-        found = require_derivatives(plant, values, [candidate], steps)
+        found = require_derivatives(predictor, values, [candidate], steps)
         others = [i for i, name in enumerate(PROBES) if name != channel]
         own = slice(len(steps) - len(candidate.free), None)
         assert np.abs(found.sensitivity[:, others, own]).max() == 0.0
 
 
-def test_two_terms_on_the_same_friction(plant, candidates):
+def test_two_terms_on_the_same_friction(predictor, candidates):
     pair = [candidates["thermal_preload", ""], candidates["starvation", ""]]
     values = NOW | values_of(pair[0]) | values_of(pair[1])
-    require_derivatives(plant, values, pair, {"heat.front": None, **steps_of(pair[0]), **steps_of(pair[1])})
+    require_derivatives(
+        predictor, values, pair, {"heat.front": None, **steps_of(pair[0]), **steps_of(pair[1])}
+    )
 
 
-def test_slopes_of_states_lead_to_runs_nearby_and_to_places(plant, candidates):
+def test_slopes_of_states_lead_to_runs_nearby_and_to_places(predictor, candidates):
     closing = candidates["gap_closure", "ring over start"]
     values = {**NOW, **values_of(closing)}
-    names = [name for name, *_ in plant.uncertain()] + coordinate_names(closing) + ["probe.SP01.r"]
-    found = plant.predict(0, values, [closing], names)
+    names = [prior.name for prior in predictor.uncertain()] + coordinate_names(closing) + ["probe.SP01.r"]
+    found = predictor.predict(0, values, [closing], names)
     logarithmic = {**dict.fromkeys(names, True), "probe.SP01.r": False}
     logarithmic |= {n: closing.free[n].logarithmic for n in coordinate_names(closing) if n in closing.free}
     move = np.array([0.02 if logarithmic[name] else -0.005 for name in names])
@@ -213,30 +217,30 @@ def test_slopes_of_states_lead_to_runs_nearby_and_to_places(plant, candidates):
         name: values.get(name, 1.0) * np.exp(step) if logarithmic[name] else values.get(name, 0.0) + step
         for name, step in zip(names, move, strict=True)
     }
-    exact = plant.predict(0, values | there, [closing]).states
+    exact = predictor.predict(0, values | there, [closing]).states
     away = np.abs(exact - found.states).max()
     assert away > 0.1
     assert np.abs(exact - found.moved(move).states).max() < 0.05 * away
-    model = plant.fast.model
+    model = predictor.fast.model
     rows = [model.probe_names.index(name) for name in PROBES if name in model.probe_names]
     columns = [PROBES.index(model.probe_names[row]) for row in rows]
     slopes = found.slopes_at(model.probes[rows])
     assert not slopes[:, :, -1].any()
     assert slopes[:, :, :-1] == pytest.approx(found.sensitivity[:, columns, :-1], abs=1e-9)
     # From there the run is the same, whatever it begins from.
-    again = plant.predict(0, values | there, [closing], near=found.moved(move))
+    again = predictor.predict(0, values | there, [closing], near=found.moved(move))
     assert np.abs(again.states - exact).max() < 1e-5
 
 
-def test_two_recordings_do_not_know_of_one_another(plant, recording):
-    both = Plant(plant.fast, [recording, recording], [plant.use[0]] * 2, step=60.0)
-    assert both.predict(1, NOW).temperature == pytest.approx(plant.predict(0, NOW).temperature, abs=1e-12)
+def test_two_recordings_do_not_know_of_one_another(predictor, recording):
+    both = Predictor(predictor.fast, [recording, recording], [predictor.use[0]] * 2, step=60.0)
+    assert both.predict(1, NOW).temperature == pytest.approx(predictor.predict(0, NOW).temperature, abs=1e-12)
     assert [item.recording for item in both.observations] == [0] * 6 + [1] * 6
 
 
-def test_steps_end_where_inputs_jump_and_keep_their_course(plant, recording):
-    drive = coarse_drive(plant.fast.spec, recording, 100.0)
-    fine = drive_of_recording(plant.fast.spec, recording)
+def test_steps_end_where_inputs_jump_and_keep_their_course(predictor, recording):
+    drive = coarse_drive(predictor.fast.spec, recording, 100.0)
+    fine = drive_of_recording(predictor.fast.spec, recording)
     assert drive.steps.max() <= 100.0 + 1e-9
     for name in ("speed", "ambient", "coolant_inlet"):
         column = drive.names.index(name)
@@ -249,7 +253,7 @@ def test_steps_end_where_inputs_jump_and_keep_their_course(plant, recording):
     assert np.isin(jumps, drive.grid).all()
 
 
-def test_covariates_are_means_over_the_steps_and_end_none(plant, recording):
+def test_covariates_are_means_over_the_steps_and_end_none(predictor, recording):
     """What is recorded beside the inputs flickers as it likes: it costs no steps and keeps its integral."""
     flicker = np.random.default_rng(3).uniform(0.0, 80.0, recording.times.size)
     flicker[::7] = np.nan
@@ -259,7 +263,7 @@ def test_covariates_are_means_over_the_steps_and_end_none(plant, recording):
         covariates=np.column_stack((flicker, np.full(flicker.size, np.nan))),
         covariate_units=("", "watt"),
     )
-    drive, without = (coarse_drive(plant.fast.spec, item, 100.0) for item in (beside, recording))
+    drive, without = (coarse_drive(predictor.fast.spec, item, 100.0) for item in (beside, recording))
     assert drive.grid == pytest.approx(without.grid)
     assert drive.names == (*without.names, "covariate.load")
     assert drive.start[:, -1] == pytest.approx(drive.end[:, -1])
@@ -267,7 +271,7 @@ def test_covariates_are_means_over_the_steps_and_end_none(plant, recording):
     exact = np.trapezoid(flicker[read], recording.times[read])
     exact += flicker[read][0] * recording.times[read][0]
     assert float(drive.start[:, -1] @ drive.steps) == pytest.approx(exact, rel=1e-9)
-    quantities = {item.name: item for item in view_of(plant.fast.names, beside).quantities}
+    quantities = {item.name: item for item in view_of(predictor.fast.names, beside).quantities}
     assert list(quantities) == ["change of speed", "load"]
     assert (quantities["load"].input, quantities["load"].beside) == ("covariate.load", True)
     assert quantities["load"].highest == np.nanmax(flicker)
@@ -278,7 +282,7 @@ def test_covariates_are_means_over_the_steps_and_end_none(plant, recording):
     assert quantities["change of speed"].levels == pytest.approx(turned)
 
 
-def test_what_happens_in_a_gap_is_open_for_each_set_and_for_inputs_that_changed(plant, recording):
+def test_what_happens_in_a_gap_is_open_for_each_set_and_for_inputs_that_changed(predictor, recording):
     """Friction of each bearing set in every piece, the coolant where it is another afterwards; no air."""
     kept = (recording.times <= 1500.0) | (recording.times > 2000.0)
     column = recording.input_names.index("coolant_inlet")
@@ -292,11 +296,11 @@ def test_what_happens_in_a_gap_is_open_for_each_set_and_for_inputs_that_changed(
         inputs=inputs[kept],
         covariates=recording.covariates[kept],
     )
-    own = Plant(plant.fast, [gap], [np.ones(gap.times.size, dtype=bool)], step=60.0)
+    own = Predictor(predictor.fast, [gap], [np.ones(gap.times.size, dtype=bool)], step=60.0)
     pieces = own.gap_intervals(0)
     assert pieces[0][0] == 1500.0
     assert pieces[-1][1] == 2050.0
-    sets = len(plant.fast.spec.bearing_set)
+    sets = len(predictor.fast.spec.bearing_set)
     names = own.gaps()
     assert len(names) == (sets + 1) * len(pieces)
     still = own.predict(0, {}).temperature
@@ -313,14 +317,14 @@ def test_what_happens_in_a_gap_is_open_for_each_set_and_for_inputs_that_changed(
     assert (change[last][after:] > 0.0).all()
 
 
-def test_the_small_basis_reads_what_the_large_one_does(plant, candidates):
-    places = [name for name in plant.fast.model.place_names if "raceway" in name]
-    small = plant.compressed([name for name, *_ in plant.uncertain()], places)
-    assert small.fast.model.size < plant.fast.model.size
+def test_the_small_basis_reads_what_the_large_one_does(predictor, candidates):
+    places = [name for name in predictor.fast.model.place_names if "raceway" in name]
+    small = on_search_basis(predictor, [prior.name for prior in predictor.uncertain()], places)
+    assert small.fast.model.size < predictor.fast.model.size
     preload = candidates["thermal_preload", ""]
     values = {**NOW, **values_of(preload), "probe.SP02.r": 1e-3}
     names = ["heat.front", "probe.SP02.r", *coordinate_names(preload)]
-    small_read, read = (item.predict(0, values, [preload], names) for item in (small, plant))
+    small_read, read = (item.predict(0, values, [preload], names) for item in (small, predictor))
     assert np.ptp(read.temperature) > 10.0
     assert small_read.temperature == pytest.approx(read.temperature, abs=0.02)
     size = np.abs(read.sensitivity).max(axis=(0, 1))
@@ -336,20 +340,20 @@ def weak(candidate, share=1e-3):
 
 
 @pytest.mark.parametrize("held", [False, True], ids=["linear machine", "machine with a term"])
-def test_answers_are_differences_of_full_runs_at_small_amplitude(plant, candidates, held):
+def test_answers_are_differences_of_full_runs_at_small_amplitude(predictor, candidates, held):
     closing = candidates["gap_closure", "ring over start"]
     present = (closing,) if held else ()
     values = NOW | (values_of(closing) if held else {})
     chosen = [weak(c) for c in candidates.values() if not (held and c.effect == "gap_closure")]
     assert len(chosen) > 35
     variants = [Variant(c, c.starts[0]) for c in chosen]
-    base = BaseRun(plant, 0, values, present)
+    base = BaseRun(predictor, 0, values, present)
     answers = base.responses(variants)
-    nothing = plant.predict(0, values, present).temperature
+    nothing = predictor.predict(0, values, present).temperature
     for column, variant in enumerate(variants):
         candidate = variant.candidate
         own = values_of(candidate)
-        told = plant.predict(0, values | own, (*present, candidate)).temperature
+        told = predictor.predict(0, values | own, (*present, candidate)).temperature
         difference = told - nothing
         size = np.abs(difference).max()
         assert size > 1e-6, candidate.label
@@ -357,10 +361,10 @@ def test_answers_are_differences_of_full_runs_at_small_amplitude(plant, candidat
         assert np.abs(answers[:, :, column] - difference).max() < 0.01 * size, candidate.label
 
 
-def test_answers_do_not_depend_on_their_company(plant, candidates):
+def test_answers_do_not_depend_on_their_company(predictor, candidates):
     variants = variants_of([candidates[key] for key in (("windage", ""), ("heat_scale", ""))])
     variants += variants_of([candidates["sensor_lag", ""], candidates["grease_churning", ""]])
-    base = BaseRun(plant, 0, NOW)
+    base = BaseRun(predictor, 0, NOW)
     together = base.responses(variants)
     for column, variant in enumerate(variants):
         assert base.responses([variant])[:, :, 0] == pytest.approx(together[:, :, column], abs=1e-10)

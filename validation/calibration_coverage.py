@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from spindle_fem.inference.least_squares import BOUND_SIGMAS, LEVEL, calibrate
+from spindle_fem.inference.calibration import BOUND_SIGMAS, LEVEL, calibrate
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.recordings.align import Recording
@@ -21,7 +21,7 @@ from spindle_fem.recordings.align import Recording
 Array = NDArray[np.float64]
 PredictorOf = Callable[[tuple[Recording, ...]], Predictor]
 
-# Of the slow error that a case is made with.
+# Ranges of the slow error that a case is made with: size [K] and correlation time [s].
 SLOW_SIGMA = (0.02, 0.05)
 SLOW_TIME = (600.0, 2400.0)
 
@@ -61,7 +61,7 @@ def coverage_study(
     Parameters
     ----------
     predictor_of : callable
-        Makes the predictor of some recordings, such as :class:`MachinePredictor` with its fast model.
+        Makes the predictor of some recordings, a :class:`Predictor` at the stamps with some fast model.
     recordings : tuple of Recording
         Inputs, stamps, channels, flags and noise of every case; their readings do not matter.
     cases : int
@@ -73,22 +73,26 @@ def coverage_study(
     """
     rng = np.random.default_rng(seed)
     truth_of = predictor_of(recordings)
-    sigma = np.array([prior.sigma_log for prior in truth_of.priors])
-    highest = np.log([prior.highest for prior in truth_of.priors])
+    priors = (*truth_of.uncertain(), *truth_of.starts())
+    sigma = np.array([prior.sigma_log for prior in priors])
+    highest = np.log([prior.highest for prior in priors])
     deviations, shares = [], []
     for _ in range(cases):
         truth = _drawn(rng, sigma, highest)
         slow = SlowError(float(rng.uniform(*SLOW_SIGMA)), float(rng.uniform(*SLOW_TIME)))
-        exact = truth_of.predict(truth, derivatives=False)
+        factors = {prior.name: float(np.exp(value)) for prior, value in zip(priors, truth, strict=True)}
         made = tuple(
-            replace(recording, temperature=predicted + _errors(rng, recording, slow))
-            for recording, (predicted, _) in zip(recordings, exact, strict=True)
+            replace(
+                recording,
+                temperature=truth_of.predict(number, factors).temperature + _errors(rng, recording, slow),
+            )
+            for number, recording in enumerate(recordings)
         )
         found = calibrate(predictor_of(made))
         stated = np.sqrt(np.diag(found.covariance))
         deviations.append((found.log_factors - truth) / stated)
         shares.append(stated / sigma)
-    names = tuple(prior.name for prior in truth_of.priors)
+    names = tuple(prior.name for prior in priors)
     return Coverage(names, np.array(deviations), np.array(shares))
 
 

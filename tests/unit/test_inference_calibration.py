@@ -8,11 +8,13 @@ import pytest
 
 from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.errors import RecordingError
-from spindle_fem.inference.least_squares import BOUND_SIGMAS, calibrate, prediction_interval
-from spindle_fem.inference.predictor import NetworkPredictor, Prior
+from spindle_fem.inference.calibration import BOUND_SIGMAS, calibrate, prediction_interval
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError, channel_bins, likely_slow_error, whiten
 from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.recordings.align import read_recording
+from tests.support.straight_line import Line
 
 NETWORK = {
     "schema": "spindle-fem/machine/1",
@@ -50,6 +52,22 @@ def network():
     return build_network(validate_network_machine(NETWORK, "made").network)
 
 
+def at_stamps(network, recordings, initial="ambient", use=None):
+    spec = validate_network_machine({**NETWORK, "initial": initial}, "made")
+    return Predictor(NetworkFastModel(network, spec), recordings, use, at_stamps=True)
+
+
+def priors_of(predictor):
+    return (*predictor.uncertain(), *predictor.starts())
+
+
+def predicted(predictor, log_factors):
+    """Readings of the first recording and their derivatives to all logarithms."""
+    names = [prior.name for prior in priors_of(predictor)]
+    told = predictor.predict(0, dict(zip(names, np.exp(log_factors), strict=True)), (), names)
+    return told.temperature, told.sensitivity
+
+
 def slow_error(rng, times, sigma, time):
     values = np.empty(times.size)
     values[0] = sigma * rng.normal()
@@ -61,13 +79,13 @@ def slow_error(rng, times, sigma, time):
 
 def made(network, recording, truth, rng, *, slow=(0.03, 1200.0)):
     """The recording that a machine with given parameters would have made."""
-    exact = NetworkPredictor(network, [recording], "ambient").predict(truth, derivatives=False)[0][0]
+    exact, _ = predicted(at_stamps(network, [recording]), truth)
     errors = np.stack([slow_error(rng, recording.times, *slow) for _ in range(2)], axis=1)
     return replace(recording, temperature=exact + errors + rng.normal(0.0, 0.1, exact.shape))
 
 
 def sigmas(predictor):
-    return np.array([prior.sigma_log for prior in predictor.priors])
+    return np.array([prior.sigma_log for prior in priors_of(predictor)])
 
 
 # ------------------------------------------------------------------------ noise
@@ -118,15 +136,15 @@ def test_the_slow_error_is_found_from_residuals(recording, sigma):
 # -------------------------------------------------------------------------- fit
 def test_the_truth_is_found_within_its_uncertainty(network, recording):
     rng = np.random.default_rng(11)
-    predictor = NetworkPredictor(network, [recording], "ambient")
+    predictor = at_stamps(network, [recording])
     truth = np.array([0.3, -0.25, 0.5, -0.4, 0.0])
     data = made(network, recording, truth, rng)
-    found = calibrate(NetworkPredictor(network, [data], "ambient"))
+    found = calibrate(at_stamps(network, [data]))
     deviation = (found.log_factors - truth) / np.sqrt(np.diag(found.covariance))
     assert np.abs(deviation).max() < 3.0
     assert found.chi_square == pytest.approx(1.0, abs=0.15)
     # A gain and what carries the heat away scale together: only the prior tells them apart.
-    names = [prior.name for prior in predictor.priors]
+    names = [prior.name for prior in priors_of(predictor)]
     assert {frozenset(pair[:2]) for pair in found.cannot_tell_apart()} >= {
         frozenset(("conductance.body|ambient", "gain.winding.power"))
     }
@@ -136,7 +154,7 @@ def test_the_truth_is_found_within_its_uncertainty(network, recording):
 
 def test_readings_that_say_nothing_leave_the_prior(network, recording):
     silent = replace(recording, sigma=np.full(2, 1e4))
-    found = calibrate(NetworkPredictor(network, [silent], "ambient"), slow=SlowError(1e4, 600.0))
+    found = calibrate(at_stamps(network, [silent]), slow=SlowError(1e4, 600.0))
     assert np.abs(found.log_factors).max() < 1e-3
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx(
         [prior.sigma_log for prior in found.priors], rel=1e-3
@@ -150,10 +168,8 @@ def test_a_few_wild_readings_hardly_move_the_fit(network, recording):
     data = made(network, recording, truth, rng)
     wild = data.temperature.copy()
     wild[np.arange(7, 350, 50), 0] += 25.0
-    clean = calibrate(NetworkPredictor(network, [data], "ambient"), slow=SlowError(0.03, 1200.0))
-    spoiled = calibrate(
-        NetworkPredictor(network, [replace(data, temperature=wild)], "ambient"), slow=SlowError(0.03, 1200.0)
-    )
+    clean = calibrate(at_stamps(network, [data]), slow=SlowError(0.03, 1200.0))
+    spoiled = calibrate(at_stamps(network, [replace(data, temperature=wild)]), slow=SlowError(0.03, 1200.0))
     assert spoiled.outlier_share > 0.0
     moved = np.abs(spoiled.log_factors - clean.log_factors) / np.sqrt(np.diag(clean.covariance))
     assert moved.max() < 2.0
@@ -164,7 +180,7 @@ def test_parameters_stay_within_three_sigma(network, recording):
     far = np.zeros(5)
     far[3] = 3.0
     data = made(network, recording, far, rng)
-    predictor = NetworkPredictor(network, [data], "ambient")
+    predictor = at_stamps(network, [data])
     found = calibrate(predictor)
     assert np.all(np.abs(found.log_factors) <= BOUND_SIGMAS * sigmas(predictor) + 1e-12)
     assert found.log_factors[3] == pytest.approx(BOUND_SIGMAS * 0.5, rel=0.02)
@@ -175,8 +191,8 @@ def test_two_recordings_know_more_than_one(network, recording):
     truth = np.array([0.1, 0.1, 0.1, 0.1, 0.1])
     first, second = (made(network, recording, truth, rng) for _ in range(2))
     slow = SlowError(0.03, 1200.0)
-    one = calibrate(NetworkPredictor(network, [first], "ambient"), slow=slow)
-    both = calibrate(NetworkPredictor(network, [first, second], "ambient"), slow=slow)
+    one = calibrate(at_stamps(network, [first]), slow=slow)
+    both = calibrate(at_stamps(network, [first, second]), slow=slow)
     assert np.all(np.diag(both.covariance) < np.diag(one.covariance))
 
 
@@ -187,60 +203,55 @@ def test_held_out_readings_do_not_touch_the_fit_and_lie_within_the_interval(netw
     spoiled = data.temperature.copy()
     spoiled[~use] += 50.0
     slow = SlowError(0.03, 1200.0)
-    found = calibrate(NetworkPredictor(network, [data], "ambient"), use=[use], slow=slow)
-    other = calibrate(
-        NetworkPredictor(network, [replace(data, temperature=spoiled)], "ambient"), use=[use], slow=slow
-    )
+    found = calibrate(at_stamps(network, [data], use=[use]), slow=slow)
+    other = calibrate(at_stamps(network, [replace(data, temperature=spoiled)], use=[use]), slow=slow)
     assert np.array_equal(found.log_factors, other.log_factors)
-    predicted, sensitivity = NetworkPredictor(network, [data], "ambient").predict(found.log_factors)[0]
+    told, sensitivity = predicted(at_stamps(network, [data]), found.log_factors)
     half_width = prediction_interval(found.covariance, slow, sensitivity, data.sigma)
-    inside = np.abs(predicted - data.temperature)[~use] <= half_width[~use]
+    inside = np.abs(told - data.temperature)[~use] <= half_width[~use]
     assert 0.82 < inside.mean() < 0.98
 
 
 def test_starting_temperatures_are_fitted_with_the_noise_of_their_reading(network, recording):
-    predictor = NetworkPredictor(network, [recording], "first_reading")
-    starts = [prior for prior in predictor.priors if prior.name.startswith("initial.")]
+    predictor = at_stamps(network, [recording], "first_reading")
+    priors = priors_of(predictor)
+    starts = [prior for prior in priors if prior.name.startswith("start.")]
+    assert [prior.name for prior in starts] == ["start.0.initial.winding", "start.0.initial.body"]
     assert [prior.sigma_log * prior.value for prior in starts] == pytest.approx([0.1, 0.1], rel=1e-6)
-    values, slopes = predictor.predict(np.zeros(len(predictor.priors)))[0]
-    moved = np.zeros(len(predictor.priors))
-    place = [prior.name for prior in predictor.priors].index(starts[0].name)
+    values, slopes = predicted(predictor, np.zeros(len(priors)))
+    moved = np.zeros(len(priors))
+    place = priors.index(starts[0])
     moved[place] = 1e-6
-    difference = (predictor.predict(moved)[0][0] - values) / 1e-6
+    difference = (predicted(predictor, moved)[0] - values) / 1e-6
     assert slopes[:, :, place] == pytest.approx(difference, rel=1e-3, abs=1e-2)
+
+
+def test_starting_temperatures_are_told_by_node_and_number_of_recording(network, recording):
+    one, two = (calibrate(at_stamps(network, [recording] * n, "first_reading"), rounds=1) for n in (1, 2))
+    assert [p.name for p in one.priors[-2:]] == ["initial.winding", "initial.body"]
+    assert [p.name for p in two.priors[-2:]] == ["initial.winding[2]", "initial.body[2]"]
 
 
 def test_a_recording_without_a_usable_reading_is_refused(network, recording):
     empty = replace(recording, flags=np.ones_like(recording.flags))
     with pytest.raises(RecordingError, match="no usable reading"):
-        calibrate(NetworkPredictor(network, [empty], "ambient"))
-
-
-class Line:
-    """A straight line through the readings: everything about the optimum is known."""
-
-    def __init__(self, recording, slope_sigma):
-        self.recordings = (recording,)
-        self.priors = (Prior("level", 1.0, 0.5, "K"), Prior("slope", 1.0, slope_sigma, "K"))
-        self.shapes = np.stack([np.ones(recording.times.size), recording.times / recording.times[-1]], axis=1)
-
-    def predict(self, log_factors, *, derivatives=True):
-        values = (self.shapes @ log_factors)[:, None] + np.array([[290.0, 300.0]])
-        return [(values, np.repeat(self.shapes[:, None], 2, axis=1))]
+        calibrate(at_stamps(network, [empty]))
 
 
 def test_a_linear_model_gets_the_posterior_of_linear_regression(recording):
     rng = np.random.default_rng(16)
-    exact = Line(recording, 0.4).predict(np.array([0.2, -0.3]))[0][0]
+    offsets = (290.0, 300.0)
+    truth = {"level": np.exp(0.2), "slope": np.exp(-0.3)}
+    exact = Line([recording], offsets=offsets).predict(0, truth).temperature
     data = replace(recording, temperature=exact + rng.normal(0.0, 0.1, exact.shape))
     slow = SlowError(0.05, 900.0)
-    line = Line(data, 0.4)
+    line = Line([data], offsets=offsets)
     found = calibrate(line, slow=slow)
     precision, right = np.diag([0.5**-2, 0.4**-2]), np.zeros(2)
     for column, bins in enumerate(channel_bins(data)):
         factor = bins.factor(slow)
-        shape = whiten(factor, bins.average(line.shapes))
-        rest = whiten(factor, bins.average(data.temperature[:, column] - (290.0, 300.0)[column]))
+        shape = whiten(factor, bins.average(line.shapes(0)))
+        rest = whiten(factor, bins.average(data.temperature[:, column] - offsets[column]))
         precision += shape.T @ shape
         right += shape.T @ rest
     # No whitened residual lies beyond three sigma with this seed, so the loss is quadratic.
@@ -252,15 +263,13 @@ def test_a_linear_model_gets_the_posterior_of_linear_regression(recording):
 def coverage(network, recording, cases, seed):
     """Share of true values inside their 90 % interval, parameters drawn from the prior."""
     rng = np.random.default_rng(seed)
-    predictor = NetworkPredictor(network, [recording], "ambient")
+    predictor = at_stamps(network, [recording])
     sigma = sigmas(predictor)
     inside = []
     for _ in range(cases):
         truth = np.clip(rng.normal(size=sigma.size), -2.0, 2.0) * sigma
         slow = (rng.uniform(0.02, 0.05), rng.uniform(600.0, 2400.0))
-        found = calibrate(
-            NetworkPredictor(network, [made(network, recording, truth, rng, slow=slow)], "ambient")
-        )
+        found = calibrate(at_stamps(network, [made(network, recording, truth, rng, slow=slow)]))
         deviation = (found.log_factors - truth) / np.sqrt(np.diag(found.covariance))
         inside.append(np.abs(deviation) < 1.6449)
     return np.array(inside)

@@ -1,34 +1,34 @@
-"""Regularised, robust nonlinear least squares over one or several recordings."""
+"""A machine's uncertain parameters fitted to recordings: a diagnosis without candidates.
+
+Minimises ``Σ ρ(whitened residual) + Σ (ln factor / σ)²`` with Huber's ρ
+(:mod:`spindle_fem.inference.hypothesis_fit`), within 3 σ of the prior. The
+size of the slow error is found from the residuals and the fit repeated.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.stats import norm
 
-from spindle_fem.errors import ConvergenceError, RecordingError
+from spindle_fem.errors import RecordingError
+from spindle_fem.inference.coordinate_names import START_PREFIX
+from spindle_fem.inference.hypothesis_fit import OUTLIER_SIGMAS, Belief, Coordinate, Fit, Problem
 from spindle_fem.inference.predictor import Predictor, Prior
-from spindle_fem.inference.reading_noise import (
-    ChannelBins,
-    SlowError,
-    channel_bins,
-    likely_slow_error,
-    whiten,
-)
+from spindle_fem.inference.reading_noise import SlowError, likely_slow_error
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-# Whitened residuals beyond this count linearly.
-OUTLIER_SIGMAS = 3.0
+# Largest departure of a parameter from its prior, in the prior's standard deviations.
 BOUND_SIGMAS = 3.0
 LEVEL = 0.90
 # A posterior narrower than this share of the prior was told something by the data.
 LEARNED_BELOW = 0.8
+# Parameters are called inseparable above this correlation.
 CORRELATED_ABOVE = 0.9
 
 
@@ -73,10 +73,12 @@ class Calibration:
     Attributes
     ----------
     priors : tuple of Prior
+        Temperatures at the start of a network's recording are named ``initial.<node>``, with the number of
+        the recording (``[2]``) where there are several.
     log_factors : (p,) ndarray
         Logarithm of the factor on each prior value.
     covariance : (p, p) ndarray
-        Of ``log_factors``.
+        Covariance of ``log_factors``.
     slow : SlowError
         As the covariance of the readings used it.
     chi_square : float
@@ -151,137 +153,68 @@ class Calibration:
 def calibrate(
     predictor: Predictor,
     *,
-    use: Sequence[NDArray[np.bool_] | None] | None = None,
     slow: SlowError | None = None,
-    start: Array | None = None,
     rounds: int = 2,
     progress: Progress = lambda stage: None,
 ) -> Calibration:
     """Most probable parameters and their uncertainty.
 
-    Minimises ``Σ ρ(whitened residual) + Σ (ln factor / σ)²`` with Huber's ρ,
-    within 3 σ of the prior. The magnitude of the slow error is found from the
-    residuals and the fit repeated.
-
     Parameters
     ----------
     predictor : Predictor
-    use : sequence of (N,) bool ndarray or None, optional
-        Stamps to use in each recording; the others are held out.
+        At the stamps of its recordings; what it holds out is not fitted.
     slow : SlowError, optional
         Known slow error; found from the data when absent.
-    start : (p,) ndarray, optional
-        Where to begin; the prior when absent.
     rounds : int
         Fits, the slow error found anew between them.
     progress : callable
-
-    Returns
-    -------
-    Calibration
 
     Raises
     ------
     RecordingError
         No usable reading.
     ConvergenceError
-        The optimiser gives up.
+        The machine cannot be simulated with any parameters near its prior.
     """
-    kept = use if use is not None else [None] * len(predictor.recordings)
-    bins = [channel_bins(recording, mask) for recording, mask in zip(predictor.recordings, kept, strict=True)]
-    if not any(bins):
+    if not predictor.observations:
         raise RecordingError("calibration", "the recordings have no usable reading.")
-    sigma = np.array([prior.sigma_log for prior in predictor.priors])
-    highest = np.log([prior.highest for prior in predictor.priors])
-    scaled = np.zeros(len(sigma)) if start is None else np.asarray(start, dtype=float) / sigma
-    upper = np.minimum(BOUND_SIGMAS, highest / sigma)
-    scaled = np.clip(scaled, -BOUND_SIGMAS + 1e-6, upper - 1e-6)
-    error = slow or SlowError()
-    evaluations = 0
+    priors = (*predictor.uncertain(), *predictor.starts())
+    belief = Belief.prior([coordinate_of(prior, BOUND_SIGMAS) for prior in priors])
+    error, evaluations = slow or SlowError(), 0
+    problem: Problem | None = None
+    fit: Fit | None = None
     for attempt in range(1 if slow is not None else rounds):
-        problem = _Problem(predictor, bins, error, sigma)
+        if problem is not None and fit is not None:
+            error = likely_slow_error(problem.binned_residuals(fit), prior=SlowError())
         progress(f"calibration: fit {attempt + 1}")
-        found = least_squares(
-            problem.residuals,
-            scaled,
-            jac=problem.jacobian,
-            bounds=(-BOUND_SIGMAS, upper),
-            loss="huber",
-            f_scale=OUTLIER_SIGMAS,
-            xtol=1e-5,
-            ftol=1e-6,
-            gtol=1e-6,
-            max_nfev=40,
-        )
-        if found.status < 0 or not np.all(np.isfinite(found.x)):
-            raise ConvergenceError("calibration", f"the optimiser gave up: {found.message}")
-        evaluations += found.nfev
-        scaled = found.x
-        if slow is None and attempt + 1 < rounds:
-            error = likely_slow_error(problem.binned_residuals(scaled), prior=SlowError())
-    residual, jacobian = problem.residuals(scaled), problem.jacobian(scaled)
-    number = problem.n_data
-    # Huber's weights: what counts linearly also informs less.
-    weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
-    precision = jacobian.T @ (weight[:, None] * jacobian)
-    covariance = np.linalg.inv(precision) * np.outer(sigma, sigma)
+        problem = Problem(predictor, belief, error, predictor.observations)
+        fit = problem.fit((), None if fit is None else fit.values, exact=True)
+        evaluations += fit.evaluations
+    sigma = np.array([prior.sigma_log for prior in priors])
     return Calibration(
-        predictor.priors,
-        scaled * sigma,
-        0.5 * (covariance + covariance.T),
+        tuple(_told(prior, len(predictor.recordings)) for prior in priors),
+        fit.position * sigma,
+        fit.covariance * np.outer(sigma, sigma),
         error,
-        float(np.mean(residual[:number] ** 2)),
-        float(found.cost),
+        float(np.mean(fit.residual**2)),
+        0.5 * fit.misfit_with_prior,
         evaluations,
-        float(np.mean(np.abs(residual[:number]) > OUTLIER_SIGMAS)),
+        float(np.mean(np.abs(fit.residual) > OUTLIER_SIGMAS)),
     )
 
 
-class _Problem:
-    """Whitened residuals and their Jacobian in units of the prior's standard deviations."""
+def coordinate_of(prior: Prior, bound: float) -> Coordinate:
+    """Factor on a parameter as a coordinate; ``bound`` limits it, in standard deviations of its prior."""
+    highest = min(bound, float(np.log(prior.highest)) / prior.sigma_log)
+    return Coordinate(prior.name, 1.0, prior.sigma_log, True, -bound, highest)
 
-    def __init__(
-        self, predictor: Predictor, bins: Sequence[tuple[ChannelBins, ...]], slow: SlowError, sigma: Array
-    ) -> None:
-        self.predictor, self.bins, self.sigma = predictor, bins, sigma
-        self.factor = [[item.factor(slow) for item in items] for items in bins]
-        self.n_data = sum(len(item.times) for items in bins for item in items)
-        self._at: Array | None = None
-        self._runs: list[tuple[Array, Array]] = []
 
-    def _predict(self, scaled: Array) -> list[tuple[Array, Array]]:
-        if self._at is None or not np.array_equal(self._at, scaled):
-            self._runs = self.predictor.predict(scaled * self.sigma)
-            self._at = scaled.copy()
-        return self._runs
-
-    def binned_residuals(self, scaled: Array) -> list[tuple[ChannelBins, Array]]:
-        """Predicted minus read, averaged over the bins."""
-        found = []
-        for recording, (predicted, _), items in zip(
-            self.predictor.recordings, self._predict(scaled), self.bins, strict=True
-        ):
-            for item in items:
-                difference = predicted[:, item.channel] - recording.temperature[:, item.channel]
-                found.append((item, item.average(difference)))
-        return found
-
-    def residuals(self, scaled: Array) -> Array:
-        factors = [factor for items in self.factor for factor in items]
-        blocks = [
-            whiten(factor, values)
-            for factor, (_, values) in zip(factors, self.binned_residuals(scaled), strict=True)
-        ]
-        return np.concatenate([*blocks, scaled])
-
-    def jacobian(self, scaled: Array) -> Array:
-        blocks = []
-        for (_, sensitivity), items, factors in zip(
-            self._predict(scaled), self.bins, self.factor, strict=True
-        ):
-            for item, factor in zip(items, factors, strict=True):
-                blocks.append(whiten(factor, item.average(sensitivity[:, item.channel]) * self.sigma))
-        return np.vstack([*blocks, np.eye(len(self.sigma))])
+def _told(prior: Prior, recordings: int) -> Prior:
+    """A prior by the name that a result gives it."""
+    if not prior.name.startswith(START_PREFIX):
+        return prior
+    number, _, name = prior.name.removeprefix(START_PREFIX).partition(".")
+    return replace(prior, name=f"{name}[{int(number) + 1}]" if recordings > 1 else name)
 
 
 def prediction_interval(
@@ -292,10 +225,10 @@ def prediction_interval(
     Parameters
     ----------
     covariance : (p, p) ndarray
-        Of the parameters' logarithms.
+        Covariance of the parameters' logarithms.
     slow : SlowError
     sensitivity : (N, c, p) ndarray, [K]
-        Of the prediction to the same logarithms.
+        Derivatives of the prediction to the same logarithms.
     white : (c,) ndarray, [K]
         Noise of the channels.
     level : float

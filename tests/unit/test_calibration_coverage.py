@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.inference.coverage import coverage_study
-from spindle_fem.inference.predictor import Prior
 from spindle_fem.recordings.align import read_recording
+from tests.support.straight_line import NAMES, Line
+from validation.calibration_coverage import coverage_study
 
 
 @pytest.fixture(scope="module")
@@ -20,22 +20,6 @@ def recording(recorded_in, tmp_path_factory):
     folder = recorded_in(tmp_path_factory.mktemp("made"), frame, {"A": "A"}, {"room": "ambient"})
     found = read_recording(folder)
     return replace(found, flags=np.zeros_like(found.flags))
-
-
-class Line:
-    """Level and slope over the recording, in which everything is linear."""
-
-    def __init__(self, recordings, *, stretch=1.0, highest=np.inf):
-        self.recordings = tuple(recordings)
-        self.priors = (Prior("level", 1.0, 0.5, "K", highest), Prior("slope", 1.0, 0.4, "K"))
-        self.stretch = stretch
-
-    def predict(self, log_factors, *, derivatives=True):
-        found = []
-        for item in self.recordings:
-            shapes = np.stack([np.ones(item.times.size), item.times / item.times[-1]], axis=1)
-            found.append((290.0 + (shapes @ log_factors)[:, None], self.stretch * shapes[:, None]))
-        return found
 
 
 def test_a_linear_model_is_covered_as_stated(recording):
@@ -63,15 +47,19 @@ def test_the_same_seed_makes_the_same_study(recording):
 
 
 def test_no_machine_is_drawn_that_a_fit_could_not_reach(recording):
-    drawn = []
+    drawn, made = [], []
 
     class Remembered(Line):
-        def predict(self, log_factors, *, derivatives=True):
-            if not derivatives:
-                drawn.append(log_factors)
-            return super().predict(log_factors)
+        def predict(self, number, values, candidates=(), derivatives=(), near=None):
+            if self is made[0]:
+                drawn.append(np.log([values[name] for name in NAMES]))
+            return super().predict(number, values, candidates, derivatives)
 
-    coverage_study(lambda items: Remembered(items, highest=1.2), (recording,), 30, seed=3)
+    def predictor_of(items):
+        made.append(Remembered(items, highest=1.2))
+        return made[-1]
+
+    coverage_study(predictor_of, (recording,), 30, seed=3)
     drawn = np.array(drawn)
     assert drawn[:, 0].max() <= np.log(1.2)
     assert np.all(np.abs(drawn) <= 3.0 * np.array([0.5, 0.4]))

@@ -1,0 +1,25 @@
+"""Names of the free numbers of a fit that are no parameters of the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+# Factor of a candidate on a parameter of the machine: ``effect:<parameter>``. The machine's own factor on the
+# same parameter is another coordinate, and both multiply.
+EFFECT_PREFIX = "effect:"
+# Displacement of a probe from its nominal place, m: ``probe.<probe>.<direction>``.
+PROBE_PREFIX = "probe."
+DIRECTIONS = ("r", "z")
+# Temperature of a node at the start of one recording: ``start.<recording>.initial.<node>``.
+START_PREFIX = "start."
+# How long before the middle of a gap an input had changed, s: ``jump.<recording>.<number>``.
+JUMP_PREFIX = "jump."
+# What happened within a piece of a gap beyond what the inputs beside it say,
+# ``within_gap.<recording>.<number>``: friction of a bearing set, as a share of the highest that it gives; an
+# input temperature that is another after the gap, as a share of its change.
+GAP_PREFIX = "within_gap."
+# Coordinates that say nothing about other recordings.
+OF_ONE_RECORDING = (START_PREFIX, JUMP_PREFIX, GAP_PREFIX)
+
+NO_VALUES: Mapping[str, float] = MappingProxyType({})

@@ -1,0 +1,39 @@
+"""A hypothesis: a set of candidates at their most probable values, with how probable the set is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference.hypothesis_fit import Fit
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """A fitted set of candidates.
+
+    Attributes
+    ----------
+    fit : Fit
+    log_prior : float
+        Logarithm of the prior of the set and of the choice of its intervals.
+    """
+
+    fit: Fit
+    log_prior: float
+
+    @property
+    def score(self) -> float:
+        """Logarithm of evidence times prior."""
+        return self.fit.log_evidence + self.log_prior
+
+    @property
+    def keys(self) -> frozenset[tuple[str, str]]:
+        """Effects and places."""
+        return self.fit.keys
+
+
+def identity(candidates: Iterable[Candidate]) -> frozenset:
+    """What tells a set of candidates from others: effects, places, forms and numbers of free parameters."""
+    return frozenset((c.effect, c.component, c.form, len(c.free)) for c in candidates)

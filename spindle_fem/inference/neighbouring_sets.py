@@ -1,0 +1,122 @@
+"""Sets that differ from the best ones by one member: left out, exchanged, or of a whole bearing set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference import tuned
+from spindle_fem.inference.candidate_response import Variant
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.hypothesis import identity
+from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.hypothesis_search import Search, Task
+
+
+def widened(search: Search) -> None:
+    """Try the whole set where one of its bearings was found."""
+    tasks: list[Task] = []
+    for hypothesis in search.ranked()[: tuned.SETS_REDUCED]:
+        for position, candidate in enumerate(hypothesis.fit.candidates):
+            for wider in _sets_of(search, candidate):
+                members = list(hypothesis.fit.candidates)
+                members[position] = wider
+                if len({(c.effect, c.component) for c in members}) < len(members):
+                    continue
+                # What the bearing had is a start for the set; its own names differ.
+                values = hypothesis.fit.values
+                start = values | _renamed_values(candidate, wider, values)
+                tasks.append((tuple(members), start))
+    search.fit_all(tasks)
+
+
+def reduced(search: Search) -> None:
+    """Leave out what came first: each of the best sets without each of its members."""
+    search.fit_all(
+        [
+            (tuple(c for c in hypothesis.fit.candidates if c is not left_out), hypothesis.fit.values)
+            for hypothesis in [h for h in search.ranked() if len(h.fit.candidates) > 1][: tuned.SETS_REDUCED]
+            for left_out in hypothesis.fit.candidates
+        ]
+    )
+
+
+def exchanged(search: Search) -> None:
+    """Try other effects in the place of each member of the best sets.
+
+    The linearised screening misjudges a large effect, so that the right one
+    may not have passed it. Unrecorded heat in intervals fits almost anything:
+    it is tried at other spots, and beside other effects any effect that
+    follows a law is tried in its place.
+    """
+    tasks: list[Task] = []
+    for hypothesis in [h for h in search.ranked() if h.fit.candidates][: tuned.SETS_EXCHANGED]:
+        for member in hypothesis.fit.candidates:
+            rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
+            if search.in_intervals(member):
+                tasks += at_other_spots(search, hypothesis.fit, member, rest)
+                own = {effect.name for effect in search.interval_effects}
+                tasks += _with_laws(search, rest, lambda c, own=own, rest=rest: bool(rest) or c.effect in own)
+            else:
+                places = {member.component, *_groups_of(search, member.component)}
+                tasks += _with_laws(
+                    search,
+                    rest,
+                    lambda c, places=places, member=member: (
+                        c.component in places and c.effect != member.effect
+                    ),
+                )
+    search.fit_all(tasks)
+
+
+def _with_laws(
+    search: Search, rest: tuple[Candidate, ...], allowed: Callable[[Candidate], bool]
+) -> list[Task]:
+    """Fits with the best of the candidates allowed, no intervals among them, beside a set."""
+    base = search.found.get(identity(rest))
+    if base is None:
+        return []
+    if identity(rest) not in search.screenings:
+        search.screened(base.fit)
+    screened = search.screenings[identity(rest)]
+    found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), tuned.EFFECTS_EXCHANGED)
+    return [search.task(base.fit, [(screened.variants[index], amplitude)], {}) for index, amplitude in found]
+
+
+def at_other_spots(search: Search, fit: Fit, member: Candidate, rest: tuple[Candidate, ...]) -> list[Task]:
+    """Fits with intervals at other spots, sought in what a set without one member leaves as it is."""
+    kept = {name: value for name, value in fit.values.items() if name not in member.parameters}
+    left = search.problem.fit(rest, kept, iterations=0)
+    tasks: list[Task] = []
+    for found, candidate in search.interval_candidates(left, None):
+        if len(tasks) == tuned.OTHER_SPOTS:
+            break
+        if identity((*rest, candidate)) not in search.found:
+            tasks.append(search.task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found}))
+    return tasks
+
+
+def _groups_of(search: Search, component: str) -> list[str]:
+    """Bearing sets that a bearing belongs to."""
+    return [g for g in search.view.groups if component in search.view.sets[g]]
+
+
+def _sets_of(search: Search, candidate: Candidate) -> list[Candidate]:
+    """The same effect in the same form at the sets that a bearing belongs to."""
+    groups = _groups_of(search, candidate.component)
+    return [
+        item
+        for item in search.candidates
+        if item.effect == candidate.effect and item.component in groups and item.form == candidate.form
+    ]
+
+
+def _renamed_values(candidate: Candidate, other: Candidate, values: Mapping[str, float]) -> dict[str, float]:
+    """Values of a candidate's parameters under the names of the same candidate elsewhere."""
+
+    def outer(item: Candidate) -> list[str]:
+        factors = {f.name for f in item.factors}
+        return [EFFECT_PREFIX + name if name in factors else name for name in item.parameters]
+
+    names = zip(outer(candidate), outer(other), strict=False)
+    return {theirs: values[own] for own, theirs in names if own in values}

@@ -1,0 +1,58 @@
+"""What every channel of one recording should read, with derivatives and the states it comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.model.reduced.reduced_transient import TransientRun
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Readings of all channels of one recording, on the model's grid or at the stamps.
+
+    Attributes
+    ----------
+    temperature : (G + 1, c) ndarray, [K]
+        In the order of the recording's channels, sensor effects included.
+    sensitivity : (G + 1, c, p) ndarray
+        To the coordinates asked for.
+    states : (G + 1, r) ndarray
+        Unknowns of the model.
+    run : TransientRun or None
+        Whose states they are; None at the stamps.
+    tangents : (G + 1, r, q) ndarray or None
+        Derivatives of the states to the coordinates that enter the run; None where none were asked for.
+    columns : (p,) int ndarray
+        Which of them each coordinate asked for is, -1 for none.
+    """
+
+    temperature: Array
+    sensitivity: Array
+    states: Array
+    run: TransientRun | None = None
+    tangents: Array | None = None
+    columns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def moved(self, move: Array) -> Prediction:
+        """The same run with its states moved to first order with the coordinates (p,)."""
+        if self.tangents is None or self.run is None or self.run.dynamic is None:
+            # A linear run is solved in one go: a nearer start gains nothing.
+            return self
+        inside = self.columns >= 0
+        own = np.zeros(self.tangents.shape[2])
+        np.add.at(own, self.columns[inside], move[inside])
+        return replace(self, states=self.states + self.tangents @ own, tangents=None)
+
+    def slopes_at(self, places: Array) -> Array:
+        """Derivatives (G + 1, n, p) of the temperatures of places (n, r) to the coordinates asked for."""
+        found = np.zeros((len(self.states), len(places), len(self.columns)))
+        if self.tangents is not None:
+            inside = self.columns >= 0
+            found[:, :, inside] = (places @ self.tangents)[:, :, self.columns[inside]]
+        return found

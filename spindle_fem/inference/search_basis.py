@@ -1,0 +1,98 @@
+"""The smaller basis on which hypotheses are searched: what the diagnosed recordings themselves can excite."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.model.reduced.reduced_transient import TransientRun
+
+Array = NDArray[np.float64]
+
+# Draws of the machine's parameters whose states join the basis, the nominal one among them.
+DRAWS = 4
+# Standard deviations of the prior to either side of which they are drawn.
+DRAWN_SIGMAS = 2.0
+# Sensitivities join the basis at every fourth step: neighbours are alike.
+EVERY_TANGENT = 4
+# Rates of change of the heat at a place, 1/s: steady, and over about an hour and five minutes.
+PLACE_RATES = (0.0, 3e-4, 3e-3)
+# Heat at a place, W: what makes its temperatures weigh as much as the states.
+PLACE_HEAT = 50.0
+
+
+def on_search_basis(
+    predictor: Predictor, names: Sequence[str], places: Sequence[str], contacts: Sequence[str] = ()
+) -> Predictor:
+    """The same recordings on the smaller basis that they need.
+
+    States and their sensitivities of every recording, with the machine's
+    parameters at their prior values and two standard deviations to either
+    side in a few combinations, what heat at every place leaves, and states
+    with each contact all but opened.
+
+    Parameters
+    ----------
+    predictor : Predictor
+    names : sequence of str
+        Parameters of the machine.
+    places : sequence of str
+        Where candidates put heat.
+    contacts : sequence of str
+        Coefficients that candidates scale one by one; parameters scale them together.
+    """
+    model = predictor.fast.model
+    snapshots = []
+    generator = np.random.default_rng(0)
+    priors = predictor.fast.sigmas(names)
+    for number in range(len(predictor.recordings)):
+        initial = predictor.start(number)
+        for draw in range(DRAWS):
+            factors = {}
+            if draw:
+                signs = generator.choice((-DRAWN_SIGMAS, DRAWN_SIGMAS), len(names))
+                factors = {n: float(np.exp(s * priors[n])) for n, s in zip(names, signs, strict=True)}
+            wanted = tuple(names) if draw == 0 else ()
+            run = predictor.transient(number, factors, (), wanted)
+            states, tracks = run.march(initial)
+            snapshots.append((states - initial * model.one).T)
+            if draw == 0:
+                usual = states
+            if wanted:
+                tangent = run.tangents(run.forcing_of(states, tracks), tracks)
+                snapshots.append(tangent[::EVERY_TANGENT].transpose(1, 0, 2).reshape(model.size, -1))
+                if number == 0:
+                    snapshots.append(_place_snapshots(predictor, run, places))
+        for contact in contacts if number == 0 else ():
+            opened, _ = predictor.transient(number, {contact: tuned.OPENED_CONTACT}).march(initial)
+            # States less those of the machine as it is: a share of them would drown the rest.
+            snapshots.append((opened - usual).T)
+    # The uniform field stays exactly: a share of it would be a share of 293 K.
+    uniform = model.one / np.linalg.norm(model.one)
+    rest = np.hstack([_scaled(item) for item in snapshots])
+    rest -= np.outer(uniform, uniform @ rest)
+    vectors, values, _ = np.linalg.svd(rest, full_matrices=False)
+    kept = int(np.sum(values > tuned.BASIS_TOLERANCE * values[0]))
+    basis = np.column_stack((uniform, vectors[:, :kept]))
+    spread = np.concatenate((values[:1], values[:kept]))
+    return predictor.with_model(predictor.fast.projected(basis, spread), tuned.SAME_OPERATORS_WITHIN)
+
+
+def _place_snapshots(predictor: Predictor, run: TransientRun, places: Sequence[str]) -> Array:
+    """Temperatures that heat at each place leaves, steady and while it changes, (r, n)."""
+    loads = np.array([predictor.fast.model.place(name) for name in places]).T
+    found = []
+    for key in run.groups:
+        conduction = run.operators[key[0]].conduction
+        for rate in PLACE_RATES:
+            found.append(np.linalg.solve(conduction + rate * run.built.storage, PLACE_HEAT * loads))
+    return np.hstack(found)
+
+
+def _scaled(columns: Array) -> Array:
+    """Columns divided by the root of their number: snapshots of each kind weigh the same together."""
+    return columns / np.sqrt(max(columns.shape[1], 1))

@@ -1,0 +1,100 @@
+"""A search from single effects to triples: from the screening, then by a beam, then among neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
+from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
+
+
+def run_search(search: Search) -> list[Hypothesis]:
+    """All hypotheses that were fitted, the most probable first.
+
+    A beam search: the most promising additions to the best hypotheses of one
+    size are fitted; then sets that differ from the best by one member.
+    """
+    search.found = {}
+    null = search.problem.fit()
+    search.keep(Hypothesis(null, float(np.log(tuned.NUMBER_PRIOR[0]))))
+    search.progress("diagnosis: screening")
+    starts = [(null, *search.screened(null))]
+    if null.reduced_misfit > tuned.DISTORTED**2:
+        # What is missing has pulled the parameters far off; as they are known they are nearer the truth.
+        known = search.problem.fit(iterations=0)
+        starts.append((known, *search.screened(known, null)))
+    # The last start is the best one.
+    for fit, screened, intervals in reversed(starts):
+        search.extend(
+            fit,
+            screened,
+            intervals,
+            1,
+            tuned.SINGLES_FITTED[len(starts) - 1],
+            always=tuned.SINGLES_ALWAYS_FITTED,
+        )
+    if not search.is_explained(search.ranked()[0]):
+        search.progress("diagnosis: 2 effects")
+        for fit, screened, intervals in reversed(starts):
+            search.extend(fit, screened, intervals, 2, tuned.PAIRS_FITTED)
+            search.extend(fit, screened, intervals, 3, tuned.TRIPLES_FITTED)
+    for size in range(1, LARGEST_SET):
+        best = search.ranked()[0]
+        worst = best.score - search.reach(size)
+        ranked = [h for h in search.ranked() if len(h.keys) == size and h.score > worst]
+        search.progress(f"diagnosis: {size + 1} effects")
+        # A third effect is rare: it is looked for only where two leave something.
+        beam = int(size == 1) if search.is_explained(best) else tuned.BEAM
+        for hypothesis in to_extend(search, ranked, beam):
+            screened, intervals = search.screened(hypothesis.fit)
+            search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS)
+    improve(search)
+    return search.ranked()
+
+
+def improve(search: Search) -> None:
+    """Take whole sets for their bearings, leave members out and exchange them, as long as that helps."""
+    for _ in range(tuned.IMPROVEMENT_ROUNDS):
+        best = search.ranked()[0]
+        # Wider first: beside a whole set other members may be too many than beside one of its bearings.
+        widened(search)
+        reduced(search)
+        exchanged(search)
+        if search.ranked()[0] is best:
+            break
+    else:
+        widened(search)
+        reduced(search)
+
+
+def to_extend(search: Search, ranked: Sequence[Hypothesis], number: int) -> list[Hypothesis]:
+    """The best hypothesis of each of the ``number`` best combinations of effects.
+
+    Where all of them hold unrecorded heat, which fits almost anything, also the best that follows laws alone.
+    """
+    different = _different(search, ranked)
+    chosen = different[:number]
+    if chosen and not any(_only_laws(search, h) for h in chosen):
+        chosen += [h for h in different if _only_laws(search, h)][:1]
+    return chosen
+
+
+def _different(search: Search, ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The best hypothesis of each combination of effects.
+
+    One effect at several places, and what is on in intervals as heat or as
+    loss, are much the same start for a search.
+    """
+    found: dict[tuple[str, ...], Hypothesis] = {}
+    for item in ranked:
+        names = ("intervals" if search.in_intervals(c) else c.effect for c in item.fit.candidates)
+        found.setdefault(tuple(sorted(names)), item)
+    return list(found.values())
+
+
+def _only_laws(search: Search, hypothesis: Hypothesis) -> bool:
+    return not any(search.in_intervals(c) for c in hypothesis.fit.candidates)
