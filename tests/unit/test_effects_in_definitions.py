@@ -216,7 +216,8 @@ def test_readings_and_their_derivatives_go_through_the_sensor():
     told, told_by, own = Halved().told(times, temperature, by, inputs, {}, ("gain",))
     np.testing.assert_allclose(told, 290.0 + 0.5 * (temperature - 290.0))
     np.testing.assert_allclose(told_by, 0.5 * by)
-    np.testing.assert_allclose(own[:, 0], temperature - 290.0)
+    # To the logarithm of the gain.
+    np.testing.assert_allclose(own[:, 0], 0.5 * (temperature - 290.0))
     told, _, own = Halved().told(times, temperature, by[:, :0], inputs, {"gain": 2.0})
     np.testing.assert_allclose(told, 290.0 + 2.0 * (temperature - 290.0))
     assert own.shape == (5, 0)
