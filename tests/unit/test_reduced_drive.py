@@ -8,12 +8,11 @@ from spindle_fem.errors import RecordingError
 from spindle_fem.model.reduced.drive import (
     STANDARD,
     WALL_BIN,
-    heat_of_table,
     inputs_at,
     make_drive,
     with_walls,
 )
-from spindle_fem.operation.bearing_heat import table_heat
+from spindle_fem.operation.bearing_heat import heat_of_table, table_heat
 from spindle_fem.operation.operating_point import OperatingPoint
 
 HELD = np.array([True, True, False, False, True])

@@ -9,11 +9,11 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
-from spindle_fem.model.reduced.drive import heat_of_table, with_walls
+from spindle_fem.model.reduced.drive import with_walls
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
-from spindle_fem.operation.bearing_heat import BearingMechanics
+from spindle_fem.operation.bearing_heat import BearingMechanics, heat_of_table
 from spindle_fem.operation.friction_map import CONDUCTANCES, MOMENT, tabulate_friction, thrusts_between
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import Uncertain

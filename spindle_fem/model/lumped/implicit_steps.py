@@ -1,14 +1,6 @@
 """Implicit second-order steps of any network: TR-BDF2 with analytic Jacobians.
 
-One step from T_n, with ``g = 2 - sqrt(2)`` and ``d = g / 2``:
-
-    C (T_2 - T_n) = dt d (F_n + F_2)
-    C (T_3 - T_n) = dt (w F_n + w F_2 + d F_3),   w = sqrt(2) / 4
-
-Both stages have the same matrix ``C - dt d J``; the scheme is L-stable and an
-embedded third-order quadrature gives the error of each step.
-
-Source: Hosea and Shampine (1996), Applied Numerical Mathematics 20, 21-37.
+The scheme is that of :mod:`spindle_fem.model.trbdf2`.
 """
 
 from __future__ import annotations
@@ -22,16 +14,17 @@ from spindle_fem.errors import ConvergenceError
 from spindle_fem.model.lumped.driven_inputs import boundary_history, source_history
 from spindle_fem.model.lumped.node_balance import NetworkBalance, explicit_derivative
 from spindle_fem.model.lumped.thermal_network import Array, Parameter, ThermalNetwork
+from spindle_fem.model.trbdf2 import (
+    DIAGONAL,
+    GAMMA,
+    OUTER_WEIGHT,
+    error_defect,
+    extrapolated_end,
+    right_of_end,
+    right_of_middle,
+)
 from spindle_fem.recordings.input_samples import InputHistory
 
-GAMMA = 2.0 - np.sqrt(2.0)
-DIAGONAL = 0.5 * GAMMA
-WEIGHT = np.sqrt(2.0) / 4.0
-ERROR_WEIGHTS = (
-    WEIGHT - (1.0 - WEIGHT) / 3.0,
-    WEIGHT - (3.0 * WEIGHT + 1.0) / 3.0,
-    DIAGONAL - DIAGONAL / 3.0,
-)
 NEWTON_TOLERANCE = 1.0e-11
 SLOW_CONTRACTION = 0.1
 ROUNDING_UNITS = 4.0
@@ -219,19 +212,18 @@ class _Stepper:
         first_net = self.balance.net_heat(state, *self.forcing.at(interval, fraction))
         capacity = self.network.capacity
         guess = state + GAMMA * step * self._rate
-        stage = self._solve(capacity * state + step * DIAGONAL * first_net, step, interval, middle, guess)
+        stage = self._solve(right_of_middle(capacity * state, step, first_net), step, interval, middle, guess)
         if stage is None:
             return None
         two, two_net = stage
-        known = capacity * state + step * WEIGHT * (first_net + two_net)
-        stage = self._solve(known, step, interval, end, state + (two - state) / GAMMA)
+        known = right_of_end(capacity * state, step, first_net, two_net)
+        stage = self._solve(known, step, interval, end, extrapolated_end(state, two))
         if stage is None:
             return None
         three, three_net = stage
         error = 0.0
         if self.step_error is not None:
-            weights = ERROR_WEIGHTS
-            defect = step * (weights[0] * first_net + weights[1] * two_net + weights[2] * three_net)
+            defect = error_defect(step, (first_net, two_net, three_net))
             # the filter by the step matrix keeps the estimate bounded for stiff modes (Hosea and Shampine)
             error = float(np.abs(self._inverse @ defect).max(initial=0.0))
         return ((two, two_net, first_net), (three, three_net)), error
@@ -273,7 +265,7 @@ class _Stepper:
     def _account(self, step, stages) -> None:
         (two, two_net, first_net), (three, three_net) = stages
         del two, three
-        received = step * (WEIGHT * (first_net + two_net) + DIAGONAL * three_net)
+        received = step * (OUTER_WEIGHT * (first_net + two_net) + DIAGONAL * three_net)
         self.counts.steps += 1
         self.counts.heat_in += float(received.sum())
         self.counts.heat_exchanged += float(np.abs(received).sum())
@@ -296,7 +288,7 @@ class _Stepper:
         slope_two = np.linalg.solve(matrix, known)
         second = jacobians[1] @ slope_two + rates[1]
         matrix = np.diag(self.network.capacity) - step * DIAGONAL * jacobians[2]
-        known = capacity * slope - inertia[1] + step * (WEIGHT * (first + second) + DIAGONAL * rates[2])
+        known = capacity * slope - inertia[1] + step * (OUTER_WEIGHT * (first + second) + DIAGONAL * rates[2])
         return np.linalg.solve(matrix, known)
 
     def _inertia(self, change: Array) -> Array:

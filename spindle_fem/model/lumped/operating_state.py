@@ -15,7 +15,6 @@ from spindle_fem.model.lumped.ball_contacts import BallContactLaw, ContactFaces
 from spindle_fem.model.lumped.friction_table import FrictionTables, film_temperature
 from spindle_fem.model.lumped.heat_laws import CoolantLaw, FrictionLaw, WallFilmLaw, faces_by_cell
 from spindle_fem.model.lumped.machine_network import MachineNetwork
-from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.coefficients import ball_conductances, film_coefficient, gap_coefficient
 from spindle_fem.operation.heat_shares import heat_shares
@@ -98,41 +97,6 @@ class OperatingNetwork:
     def n_nodes(self) -> int:
         """Number of unknown temperatures."""
         return self.machine.n_nodes
-
-    def thermal_network(self) -> ThermalNetwork:
-        """The same equations for the general solvers (dense; for the paper's size).
-
-        Laws without temperature dependence become plain links.
-        """
-        n, names = self.n_nodes, self.machine.node_names
-
-        def as_function(law: Law):
-            def heat(nodes: Array, boundaries: Array, inputs: Mapping[str, float]) -> tuple[Array, Array]:
-                del boundaries, inputs
-                value, (rows, columns, entries) = law(nodes)
-                return value, np.bincount(rows * n + columns, entries, n * n).reshape(n, n)
-
-            return heat
-
-        sources = np.flatnonzero(self.heat)
-        return ThermalNetwork(
-            node_names=names,
-            capacity=self.machine.capacity,
-            link_first=self.first,
-            link_second=self.second,
-            link_conductance=self.conductance,
-            link_names=tuple(f"link{i}" for i in range(len(self.first))),
-            boundary_names=self.boundary_names,
-            boundary_temperature=self.boundary_temperature,
-            source_node=sources,
-            source_input=(None,) * len(sources),
-            source_gain=self.heat[sources],
-            source_exponent=np.ones(len(sources)),
-            stream_upstream=self.streams[0],
-            stream_downstream=self.streams[1],
-            stream_rate=np.full(len(self.streams[0]), self.stream_rate),
-            heat_laws=tuple(as_function(law) for law in self.laws),
-        )
 
     def raceway_temperatures(self, temperature: Array, name: str) -> tuple[float, float]:
         """Mean temperature of the inner and the outer raceway of a bearing, K."""

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from spindle_fem.model.thermal_model import ThermalModel
+from spindle_fem.physics.coolant.linear_march import march_maps
 
 Array = NDArray[np.float64]
 
@@ -60,11 +62,11 @@ def coolant_maps(
     pumping_heat : float, [W]
         Friction heat of all starts, spread over the wetted area.
     """
-    shape = model.cell_area.shape
-    area = model.cell_area.ravel()
-    bulk_wall, bulk_inlet, bulk_friction, outlet = _march(
-        film.reshape(shape), model.cell_area, capacity_rate, pumping_heat
-    )
+    area, wetted = model.cell_area.ravel(), model.cell_area
+    starts = len(wetted)
+    friction = pumping_heat / starts * wetted / wetted.sum(axis=1, keepdims=True)
+    maps = march_maps(capacity_rate, wetted, film.reshape(wetted.shape), friction)
+    bulk_wall = block_diag(*maps.bulk_from_wall)
     load = model.cell_load
     weighted = film[:, None] * load
     conduction = np.tensordot(film, model.cell_film, axes=1) - weighted.T @ (
@@ -72,11 +74,11 @@ def coolant_maps(
     )
     return CoolantMaps(
         conduction,
-        weighted.T @ bulk_inlet,
-        weighted.T @ bulk_friction,
-        (outlet[0] / area) @ load,
-        outlet[1],
-        outlet[2],
+        weighted.T @ maps.bulk_from_inlet.ravel(),
+        weighted.T @ maps.bulk_from_friction.ravel(),
+        (maps.outlet_from_wall.ravel() / starts / area) @ load,
+        maps.outlet_from_inlet.mean(),
+        maps.outlet_from_friction.mean(),
     )
 
 
@@ -178,40 +180,3 @@ def _lagrange_slope(at: float) -> Array:
     True
     """
     return (at - _BUT_TWO).prod(axis=2).sum(axis=1) / _SCALE
-
-
-def _march(
-    film: Array, area: Array, capacity_rate: complex, pumping_heat: float
-) -> tuple[Array, Array, Array, tuple[Array, complex, complex]]:
-    """Plug flow with exponential cells: bulk from wall, inlet and friction; the same for the mixed outlet."""
-    n_starts, n = film.shape
-    kind = np.result_type(film, np.asarray(capacity_rate))
-    bulk_wall = np.zeros((n_starts * n, n_starts * n), kind)
-    bulk_inlet = np.zeros(n_starts * n, kind)
-    bulk_friction = np.zeros(n_starts * n, kind)
-    outlet_wall = np.zeros(n_starts * n, kind)
-    outlet_inlet = outlet_friction = 0.0
-    for start in range(n_starts):
-        units = film[start] * area[start] / capacity_rate
-        # The mean of e^-x over a cell; a cell with no area passes the coolant on unchanged.
-        reached = 1.0 - np.exp(-units)
-        mean = np.where(np.abs(units) > 1e-8, reached / np.where(units == 0.0, 1.0, units), 1.0 - 0.5 * units)
-        second = np.where(
-            np.abs(units) > 1e-4, (1.0 - mean) / np.where(units == 0.0, 1.0, units), 0.5 - units / 6.0
-        )
-        friction = pumping_heat / n_starts * area[start] / area[start].sum() / capacity_rate
-        passed = np.cumsum(units)
-        before = passed - units
-        own = slice(start * n, (start + 1) * n)
-        lower = np.tril(np.ones((n, n)), -1)
-        # What is left at the inlet of cell i of what the coolant took up in cell j < i.
-        left = lower * np.exp(lower * (passed[None, :] - before[:, None]))
-        bulk_wall[own, own] = mean[:, None] * left * reached + np.diag(1.0 - mean)
-        at_inlet = np.exp(-before)
-        bulk_inlet[own] = mean * at_inlet
-        bulk_friction[own] = mean * (left @ (mean * friction)) + second * friction
-        to_end = np.exp(passed - passed[-1])
-        outlet_wall[own] = to_end * reached / n_starts
-        outlet_inlet = outlet_inlet + np.exp(-passed[-1]) / n_starts
-        outlet_friction = outlet_friction + (to_end * mean * friction).sum() / n_starts
-    return bulk_wall, bulk_inlet, bulk_friction, (outlet_wall, outlet_inlet, outlet_friction)

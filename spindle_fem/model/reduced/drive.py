@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.errors import RecordingError
-from spindle_fem.machine.view.friction_tables import friction_tables
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.standard_inputs import standard_inputs
@@ -290,18 +289,6 @@ def with_walls(drive: Drive, walls: Array) -> Drive:
         own = {name: getattr(point, name) for name in OperatingPoint.__slots__}
         points.append(WarmedPoint(**own, channel_wall=middle[label == number].mean(axis=0)))
     return replace(drive, step_class=label, points=tuple(points))
-
-
-def heat_of_table(spec: MachineSpec, speed: Array, thrust: Array) -> Array:
-    """Heat of every bearing by the table over time, (n, n_bearings) W, in the order of ``spec.bearings``.
-
-    Parameters
-    ----------
-    speed : (n,) ndarray, [rad/s]
-    thrust : (n,) ndarray, [N]
-    """
-    tables = friction_tables(spec)
-    return np.column_stack([tables[bearing.name].heat_at(speed, thrust) for _, bearing in spec.bearings])
 
 
 def inputs_at(drive: Drive, times: Array) -> Mapping[str, Array]:

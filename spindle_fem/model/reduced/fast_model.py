@@ -17,10 +17,11 @@ from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.model.reduced.coefficient_directions import ConductingDirections
 from spindle_fem.model.reduced.coolant_maps import CoolantMaps, UniformFilmMaps, coolant_maps, film_derivative
-from spindle_fem.model.reduced.drive import Drive, WarmedPoint, heat_of_table
+from spindle_fem.model.reduced.drive import Drive, WarmedPoint
 from spindle_fem.model.reduced.natural_films import natural_film_terms
 from spindle_fem.model.reduced.trbdf2_matrices import build_propagator
 from spindle_fem.model.thermal_model import ThermalModel, project
+from spindle_fem.operation.bearing_heat import heat_of_table
 from spindle_fem.operation.channel_cells import cells_of_model
 from spindle_fem.operation.coefficient_table import (
     INNER_SHARE,
@@ -28,6 +29,7 @@ from spindle_fem.operation.coefficient_table import (
     build_coefficient_table,
 )
 from spindle_fem.operation.coolant_loop import CoolantLoop
+from spindle_fem.operation.heat_shares import BODIES, heat_share_slopes, heat_shares
 from spindle_fem.operation.operating_point import OperatingPoint
 
 Array = NDArray[np.float64]
@@ -535,8 +537,11 @@ class FastModel:
         inner = settings.inner_share.value * factors.get(INNER_SHARE, 1.0)
         if not 0.0 <= inner <= 1.0:
             raise SpecError(INNER_SHARE, f"the share becomes {inner:g}.", "Allowed: 0 to 1.")
-        balls = settings.ball_share
-        shares = np.array([(1.0 - balls) * inner, (1.0 - balls) * (1.0 - inner), balls])
+        factor = factors.get(INNER_SHARE, 1.0)
+        shares, moved = (
+            np.array([found[body] for body in BODIES])
+            for found in (heat_shares(settings, factor), heat_share_slopes(settings, factor))
+        )
         scales = np.array(
             [np.prod([factors.get(name, 1.0) for name in self.table.heat_groups(b)]) for b in self.bearings]
         )
@@ -550,7 +555,6 @@ class FastModel:
             if touched.any():
                 found += (np.where(touched, scaled, 0.0)[:, :, None] * shares).reshape(len(heat), -1)
             if INNER_SHARE in targets:
-                moved = (1.0 - balls) * inner * np.array([1.0, -1.0, 0.0])
                 found += (scaled[:, :, None] * moved).reshape(len(heat), -1)
             if touched.any() or INNER_SHARE in targets:
                 by[parameter] = found
