@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 # Module of each public name, and its name there where that is another.
 _PLACES = {
     "load_machine": "spindle_fem.definition.load",
+    "validate": "spindle_fem.definition.load",
     "solve": "spindle_fem.studies.solve_machine",
     "run_machine": "spindle_fem.commands.machine_commands",
     "check_machine": "spindle_fem.commands.machine_commands",
@@ -23,6 +24,7 @@ _PLACES = {
     "sweep": "spindle_fem.commands.sweep_command:sweep_machine",
     "transient": "spindle_fem.commands.transient_command:run_transient_study",
     "simulate": "spindle_fem.commands.simulate_command:simulate_machine",
+    "simulate_recordings": "spindle_fem.studies.simulate",
     "diagnose": "spindle_fem.commands.diagnose_command",
     "diagnose_without_report": "spindle_fem.commands.diagnose_command",
     "bearing": "spindle_fem.physics.bearings.bearing_file:bearing_report",

@@ -52,13 +52,13 @@ def run_machine(
         Bad input, a failed solve, or a failed self-check (after writing).
     """
     from spindle_fem.report.run_outputs import OutputHelpers, write_outputs
-    from spindle_fem.results.output_folder import output_folder
+    from spindle_fem.results.output_folder import output_folder, read_content
 
     started = time.perf_counter()
     spec = load_buildable(machine, overrides)
     with output_folder(folder) as place, stages(progress) as tell, OutputHelpers() as helpers:
         # loaded after the helpers start, which load their own at the same time
-        from spindle_fem.report.run_report import read_summary
+        from spindle_fem.results.run_summary import SUMMARY_SCHEMA
         from spindle_fem.solvers.prepared_machine import prepare_machine
         from spindle_fem.studies.run_checks import require_checks
         from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared, with_heat_study
@@ -73,7 +73,7 @@ def run_machine(
         tell("heat over speed")
         write_outputs(with_heat_study(result), place, started=started, notify=tell, helpers=helpers)
     require_checks(result.checks, spec.name)
-    return read_summary(place / "summary.json")
+    return read_content(place / "summary.json", SUMMARY_SCHEMA, "run")
 
 
 def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict[str, Any]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.errors import BadInputError
 from spindle_fem.report.block_page import (
     Bullets,
     Cards,
@@ -19,8 +17,9 @@ from spindle_fem.report.block_page import (
 )
 from spindle_fem.report.crosscheck_charts import CAPTIONS
 from spindle_fem.report.run_tables import column, number, rows_of, significant
-from spindle_fem.results.output_folder import replace_text
+from spindle_fem.results.output_folder import read_content, replace_text
 from spindle_fem.studies.crosscheck.causes import CAUSES, CHECKS
+from spindle_fem.studies.crosscheck.crosscheck_study import SCHEMA
 
 _SHOWN_LINKS = 20
 
@@ -34,14 +33,7 @@ def write_crosscheck_report(folder: str | Path) -> Path:
         The file is missing or of a version that this program does not know.
     """
     folder = Path(folder)
-    path = folder / "crosscheck.json"
-    if not path.is_file():
-        raise BadInputError(str(path), "there is no such file.", "Run spindle-fem crosscheck.")
-    content = json.loads(path.read_text(encoding="utf-8"))
-    if content.get("schema") != "spindle-fem/crosscheck/1":
-        raise BadInputError(
-            str(path), f"schema {content.get('schema')!r} is not known.", "Run the command again."
-        )
+    content = read_content(folder / "crosscheck.json", SCHEMA, "crosscheck")
     return replace_text(folder / "report.html", render(content, folder / "figures"))
 
 

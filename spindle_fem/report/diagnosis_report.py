@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import BadInputError, SpindleFemError
+from spindle_fem.inference.diagnosis_content import SCHEMA
 from spindle_fem.report.block_page import (
     Bullets,
     Illustration,
@@ -44,12 +44,11 @@ from spindle_fem.report.diagnosis_words import (
 )
 from spindle_fem.report.figure_style import save_png
 from spindle_fem.report.read_against_predicted import before_after
-from spindle_fem.results.output_folder import replace_text
+from spindle_fem.results.output_folder import read_content, replace_text
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SCHEMA = "spindle-fem/diagnosis/1"
 CAPTIONS = {
     "before_after": "Readings, model before and after, and what each leaves; shaded: not fitted.",
     "residual_map": "Root mean square residual by channel and condition, before and after.",
@@ -113,27 +112,9 @@ def write_diagnosis_report(
         ``diagnosis.json`` is missing or of a version that this program does not know.
     """
     folder = Path(folder)
-    content = read_diagnosis(folder)
+    content = read_content(folder / "diagnosis.json", SCHEMA, "diagnose")
     pictures = draw_figures(folder, content) if pictures is None else pictures
     return replace_text(folder / "report.html", render(content, pictures))
-
-
-def read_diagnosis(folder: Path) -> dict[str, Any]:
-    """Content of ``diagnosis.json``.
-
-    Raises
-    ------
-    BadInputError
-    """
-    path = folder / "diagnosis.json"
-    if not path.is_file():
-        raise BadInputError(str(path), "there is no such file.", "Run spindle-fem diagnose.")
-    content = json.loads(path.read_text(encoding="utf-8"))
-    if content.get("schema") != SCHEMA:
-        raise BadInputError(
-            str(path), f"schema {content.get('schema')!r} is not known.", f"Allowed: {SCHEMA}."
-        )
-    return content
 
 
 def _read_data(path: Path) -> xr.Dataset | None:

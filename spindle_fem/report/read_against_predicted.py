@@ -108,7 +108,6 @@ def draw_course(upper: Axes, lower: Axes, course: Course, scale: float) -> None:
         upper.plot(times[thin], drawn, color=colour, linestyle=style, linewidth=1.5, zorder=3)
         at, mean = _bin_means(times[usable], (course.read - values)[usable])
         lower.plot(at, mean, color=colour, linewidth=1.3, linestyle=style, zorder=3)
-    upper.set_title(course.name)
     upper.tick_params(labelbottom=False)
     upper.margins(x=0.01)
     upper.set_ylabel("°C")
@@ -152,7 +151,7 @@ def courses_figure(courses: list[Course], title: str, notes: str, band: str) -> 
     scale, unit = time_scale(float(first.times[-1] - first.times[0]))
     columns = min(2, len(courses))
     rows = math.ceil(len(courses) / columns)
-    top, cell, foot = 178.0, 470.0, 50.0
+    top, cell, foot = (178.0 if columns == 2 else 145.0), 470.0, 50.0
     width = 655.0 if columns == 2 else 1450.0
     figure = new_figure(top + rows * cell + foot)
     for position, course in enumerate(courses):
@@ -161,6 +160,7 @@ def courses_figure(courses: list[Course], title: str, notes: str, band: str) -> 
         upper = pixel_axes(figure, left, top + row * cell, width, 235.0)
         lower = pixel_axes(figure, left, top + row * cell + 260.0, width, 130.0, sharex=upper)
         draw_course(upper, lower, course, scale)
+        upper.set_title(course.name if len(courses) > 1 else "")
         for axes in (upper, lower):
             # Beyond the widest tick label, in every row alike.
             axes.yaxis.set_label_coords(-84.0 / width, 0.5)

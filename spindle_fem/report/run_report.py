@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import resource
 import sys
 import tomllib
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from spindle_fem.errors import BadInputError
 from spindle_fem.report import run_tables as tables
 from spindle_fem.report.block_page import (
     Bullets,
@@ -30,7 +28,7 @@ from spindle_fem.report.block_page import (
     render_document,
 )
 from spindle_fem.report.definition_tables import input_groups
-from spindle_fem.results.output_folder import replace_text, require_complete
+from spindle_fem.results.output_folder import read_content, replace_text, require_complete
 from spindle_fem.results.run_summary import SUMMARY_SCHEMA
 
 if TYPE_CHECKING:
@@ -124,35 +122,11 @@ def rebuild_report(folder: str | Path) -> Path:
     from spindle_fem.results.dataset import read_dataset
 
     folder = require_complete(folder)
-    summary = read_summary(folder / "summary.json")
+    summary = read_content(folder / "summary.json", SUMMARY_SCHEMA, "run")
     dataset = read_dataset(folder / "result.nc")
     surface = read_dataset(folder / "result.nc", group=SURFACE_GROUP)
     html = render_run_report(summary, dataset, surface, embedded_figures(folder / FIGURE_FOLDER))
     return replace_text(folder / "report.html", html)
-
-
-def read_summary(path: Path) -> dict[str, Any]:
-    """Content of ``summary.json``.
-
-    Raises
-    ------
-    BadInputError
-        No such file, no JSON, or another schema.
-    """
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadInputError(
-            str(path), f"cannot be read ({error.strerror}).", "Give the folder of a run."
-        ) from error
-    except json.JSONDecodeError as error:
-        raise BadInputError(
-            str(path), f"is not valid JSON: {error}.", "Run again to write it anew."
-        ) from error
-    schema = summary.get("schema") if isinstance(summary, dict) else None
-    if schema != SUMMARY_SCHEMA:
-        raise BadInputError(str(path), f"schema is {schema!r}.", f'Known: "{SUMMARY_SCHEMA}".')
-    return summary
 
 
 def render_run_report(

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from spindle_fem.definition.load import validate
+from spindle_fem.definition.load import read_toml, validate
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.errors import BadInputError
 from spindle_fem.report import sweep_charts, sweep_film
 from spindle_fem.report.block_page import (
     Bullets,
@@ -29,7 +26,7 @@ from spindle_fem.report.figure_style import save_png
 from spindle_fem.report.run_tables import column, rows_of
 from spindle_fem.report.sweep_best import best_designs
 from spindle_fem.report.sweep_scales import Scale, scale_of_column
-from spindle_fem.results.output_folder import replace_text, require_complete
+from spindle_fem.results.output_folder import read_content, replace_text, require_complete
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.studies.sweep.file_names import MACHINE_FILE, SUMMARY_FILE, SWEEP_SCHEMA
 from spindle_fem.studies.sweep.film_study import FilmChart, film_study, pump_limits
@@ -114,14 +111,8 @@ def rebuild_sweep_report(folder: str | Path) -> Path:
         The folder is missing or incomplete, or a file is missing or unknown.
     """
     folder = require_complete(folder)
-    path = folder / SUMMARY_FILE
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-        machine = tomllib.loads((folder / MACHINE_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BadInputError(str(path), f"cannot be read ({error}).", "Give the folder of a sweep.") from error
-    if not isinstance(summary, dict) or summary.get("schema") != SWEEP_SCHEMA:
-        raise BadInputError(str(path), "is not of a known schema.", f'Known: "{SWEEP_SCHEMA}".')
+    summary = read_content(folder / SUMMARY_FILE, SWEEP_SCHEMA, "sweep")
+    machine = read_toml(folder / MACHINE_FILE)
     return write_sweep_report(folder, summary, read_results(folder), validate(machine, MACHINE_FILE))
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from spindle_fem.errors import BadInputError
 
@@ -115,3 +117,25 @@ def replace_text(path: Path, text: str) -> Path:
     partial.write_text(text, encoding="utf-8")
     os.replace(partial, path)
     return path
+
+
+def read_content(path: Path, schema: str, command: str) -> dict[str, Any]:
+    """Content of the JSON file in which a command keeps what it found.
+
+    Raises
+    ------
+    BadInputError
+        No such file, no JSON, or another schema.
+    """
+    if not path.is_file():
+        raise BadInputError(str(path), "there is no such file.", f"Run spindle-fem {command}.")
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise BadInputError(
+            str(path), f"is not valid JSON: {error}.", f"Run spindle-fem {command} again."
+        ) from error
+    found = content.get("schema") if isinstance(content, dict) else None
+    if found != schema:
+        raise BadInputError(str(path), f"schema {found!r} is not known.", f"Allowed: {schema}.")
+    return content
