@@ -3,6 +3,7 @@
 The recording is made here by integrating the equations of pump.toml with an extra 45 W in the casing.
 """
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -11,19 +12,6 @@ import pandas as pd
 from scipy.integrate import solve_ivp
 
 import spindle_fem
-
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "shift"
-data = "data.csv"
-time = {column = "t", unit = "s"}
-channel = [
-    {column = "T1", role = "temperature", probe = "motor", unit = "degC", sigma = 0.1},
-    {column = "T2", role = "temperature", probe = "casing", unit = "degC", sigma = 0.1},
-    {column = "room", role = "input", drives = "ambient", unit = "degC"},
-    {column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
-]
-"""
 
 
 def power(time):
@@ -45,7 +33,7 @@ exact = solve_ivp(slope, (0.0, times[-1]), [22.0, 22.0], t_eval=times, max_step=
 read = exact + np.random.default_rng(2).normal(0.0, 0.1, exact.shape)
 data = pd.DataFrame({"t": times, "T1": read[0], "T2": read[1], "room": 22.0, "P": [power(t) for t in times]})
 data.to_csv(folder / "data.csv", index=False)
-(folder / "recording.toml").write_text(MANIFEST, encoding="utf-8")
+shutil.copy(Path(__file__).with_name("pump_recording.toml"), folder / "recording.toml")
 
 machine = Path(__file__).with_name("pump.toml")
 answer = spindle_fem.diagnose_without_report(machine, [folder / "recording.toml"], folder / "answer")
