@@ -47,15 +47,14 @@ ENTRY = '\n[[effect]]\neffect = "cold_floor"\ncomponent = "casing"\nparameters =
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/own_effect_example")
 folder.mkdir(parents=True, exist_ok=True)
-# At rest 60 W = 2 W/K (T - 22 °C) + 1 W/K (T - 10 °C), so the casing has 38 °C; without the floor 52 °C.
+# At rest 60 W = 2 W/K (T - 22 °C) + 1 W/K (T - 10 °C): 38 °C, and 52 °C without the floor.
 times = np.arange(0.0, 20001.0, 50.0)
 data = pd.DataFrame({"t": times, "T1": 58.0, "T2": 38.0, "room": 22.0, "P": 60.0})
 data.to_csv(folder / "data.csv", index=False)
-here = Path(__file__).parent
-shutil.copy(here / "pump_recording.toml", folder / "recording.toml")
-text = (here / "pump.toml").read_text(encoding="utf-8")
-(folder / "machine.toml").write_text(text + ENTRY, encoding="utf-8")
-spindle_fem.simulate_machine(folder / "machine.toml", folder / "recording.toml", folder / "answer")
+shutil.copy(Path(__file__).with_name("pump_recording.toml"), folder / "recording.toml")
+text = Path(__file__).with_name("pump.toml").read_text(encoding="utf-8") + ENTRY
+(folder / "machine.toml").write_text(text, encoding="utf-8")
+spindle_fem.simulate(folder / "machine.toml", folder / "recording.toml", folder / "answer")
 end = pd.read_csv(folder / "answer" / "simulated.csv")["T2"].iloc[-1]
 print(f"casing {end:.2f} degC at the end; by hand 38 degC")
 assert abs(end - 38.0) < 0.05
