@@ -208,7 +208,9 @@ def facets_in_bulk(points: NDArray[np.float64], facets: NDArray[np.int64], order
     """
     table = triangle_table(order)
     rows, columns = upper_pairs(table.values.shape[1])
-    nodes, gradients = points[facets], triangle_table(1 if facets.shape[1] == 3 else 2).gradients
+    # a straight triangle has one area element at all points
+    gradients = triangle_table(1).gradients[:1] if facets.shape[1] == 3 else triangle_table(2).gradients
+    nodes = points[facets]
     first, second = ((nodes.transpose(0, 2, 1) @ gradients[:, :, k].T) for k in range(2))
     area_element = np.linalg.norm(np.cross(first, second, axis=1), axis=1)
     products = table.values[:, rows] * table.values[:, columns]
