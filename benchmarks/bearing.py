@@ -30,6 +30,7 @@ from spindle_fem.physics.bearings.bearing_set import (
 )
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.hertz import INNER
+from spindle_fem.physics.bearings.mounting import ExternalLoad
 
 FRONT = BearingGeometry(
     14.2875e-3, 30, 165e-3, math.radians(15.0), 0.52, 0.52, bore_diameter=0.14, outer_diameter=0.19
@@ -45,17 +46,16 @@ REAR = replace(
 GREASE = Lubricant(21e-6, 4.7e-6)
 SPEED = 3000.0 * math.pi / 30.0
 AXIAL, RADIAL = 1137.2, 300.0
+LOAD = ExternalLoad(AXIAL, RADIAL)
 WARM = 313.15
 
 
 def main() -> None:
     """Measure, compare, print one JSON object."""
     timings = {
-        "without_friction_s": best(
-            lambda: solve_bearing(FRONT, SPEED, AXIAL, radial_load=RADIAL, control="outer")
-        ),
+        "without_friction_s": best(lambda: solve_bearing(FRONT, SPEED, LOAD, control="outer")),
         "with_friction_s": best(
-            lambda: solve_bearing(FRONT, SPEED, AXIAL, radial_load=RADIAL, lubricant=GREASE, temperature=WARM)
+            lambda: solve_bearing(FRONT, SPEED, LOAD, lubricant=GREASE, temperature=WARM)
         ),
         "axial_load_only_s": best(lambda: solve_bearing(FRONT, SPEED, AXIAL, lubricant=GREASE)),
         "five_bearings_ten_speeds_s": best(sweep, repeats=3),
@@ -68,7 +68,7 @@ def main() -> None:
     plain.friction(displacement, SPEED)
     timings["plain_friction_of_one_state_s"] = time.perf_counter() - begin
 
-    ours = solve_bearing(FRONT, SPEED, AXIAL, radial_load=RADIAL, control="outer")
+    ours = solve_bearing(FRONT, SPEED, LOAD, control="outer")
     difference = float(np.max(np.abs(ours.balls.load[:, INNER] / loads - 1.0)))
     if difference > 5e-3:
         raise SystemExit(f"the two solvers differ by {difference:.2g} of the inner load: no ratio")

@@ -90,8 +90,10 @@ def test_heat_is_drag_torque_times_speed(bearing: BearingGeometry) -> None:
     film = lubricant_state(GREASE, np.array([313.15]), None)
     solved = solve_equilibrium(
         system, speed, np.array([load]), "equilibrium",
-        start=np.array([axial_state(bearing, load).approach]),
-        ball_load=load / bearing.ball_count / math.sin(bearing.contact_angle),
+        at_rest=(
+            np.array([axial_state(bearing, load).approach]),
+            load / bearing.ball_count / math.sin(bearing.contact_angle),
+        ),
         lubricant=film, options=options,
     )  # fmt: skip
     patch = build_patch(system, solved.contacts, film, options)
@@ -153,7 +155,7 @@ def test_hertz_two_thirds_power() -> None:
 @settings(max_examples=10, deadline=None, derandomize=True)
 @given(st.floats(0.0, 1.0))
 def test_symmetry_about_the_radial_load(share: float) -> None:
-    state = solve_bearing(BEARING, turn(3000), 1137.2, radial_load=500.0 * share + 1.0, control="outer")
+    state = solve_bearing(BEARING, turn(3000), ExternalLoad(1137.2, 500.0 * share + 1.0), control="outer")
     load = state.balls.load
     # ball j and ball Z - j mirror one another
     assert load[1:] == pytest.approx(load[1:][::-1], rel=1e-8)
@@ -163,7 +165,7 @@ def test_symmetry_about_the_radial_load(share: float) -> None:
 
 def test_axial_load_alone_equals_all_balls_solved() -> None:
     one = solve_bearing(BEARING, turn(3000), 1137.2, lubricant=GREASE)
-    all_balls = solve_bearing(BEARING, turn(3000), 1137.2, radial_load=1e-9, lubricant=GREASE)
+    all_balls = solve_bearing(BEARING, turn(3000), ExternalLoad(1137.2, 1e-9), lubricant=GREASE)
     assert len(all_balls.balls.weight) == 30
     assert all_balls.balls.load == pytest.approx(np.repeat(one.balls.load, 30, axis=0), rel=1e-8)
     assert all_balls.heat_W == pytest.approx(one.heat_W, rel=1e-8)

@@ -70,8 +70,7 @@ def _static(geometry: BearingGeometry, free: int, load: float, axial_centre: boo
         # beyond the clearance, so that balls touch
         np.array([2e-5 + abs(offset) * (free == 0)]),
         np.array([load]),
-        row_scale=np.ones((system.number, 0)),
-        load_scale=np.array([load]),
+        scales=(np.ones((system.number, 0)), np.array([load])),
         step_limit=1e-4,
     )
     assert solution.converged

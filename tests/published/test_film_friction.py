@@ -193,7 +193,7 @@ def tangential_balance():
     options = TractionOptions(thermal_film="none", nodes_across=40, nodes_along=10, creep_ratio=0.0)
     speeds = np.array([SPEED])
     control = solve_equilibrium(
-        system, SPEED, np.array([1137.2]), "outer", start=np.array([17e-6]), ball_load=130.0
+        system, SPEED, np.array([1137.2]), "outer", at_rest=(np.array([17e-6]), 130.0)
     )
     distance = system.groove_distances(control.displacement)
     guess = start_from_race_control(system, speeds, control.centre, distance)[0, 2:]

@@ -294,7 +294,7 @@ def test_heat_terms_of_cage_seal_and_one_rolling_surface() -> None:
 
 
 def test_terms_add_up_ball_by_ball() -> None:
-    state = solve_bearing(BEARING, turn(3000), 1137.2, radial_load=400.0, lubricant=GREASE)
+    state = solve_bearing(BEARING, turn(3000), ExternalLoad(1137.2, 400.0), lubricant=GREASE)
     assert sum(state.terms_W.values()) == pytest.approx(state.heat_W)
     for label in ("sliding", "transverse", "rolling", "hysteresis"):
         for side, ring in ((INNER, "inner"), (OUTER, "outer")):

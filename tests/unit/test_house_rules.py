@@ -22,11 +22,6 @@ BUSY_FUNCTIONS = {
     "spindle_fem/model/lumped/network_transient.py:simulate_transient",
     "spindle_fem/model/mesh/time_stepper.py:integrate",
     "spindle_fem/model/reduced/dynamic_terms.py:evaluate",
-    "spindle_fem/physics/bearings/ball_system.py:build_ball_rows",
-    "spindle_fem/physics/bearings/ball_system.py:solve_bordered",
-    "spindle_fem/physics/bearings/bearing_set.py:solve_bearing",
-    "spindle_fem/physics/bearings/equilibrium.py:solve_equilibrium",
-    "spindle_fem/physics/bearings/state_records.py:build_states",
     "spindle_fem/physics/coolant/march.py:march_channel",
     "spindle_fem/solvers/machine_transient.py:simulate_full",
 }

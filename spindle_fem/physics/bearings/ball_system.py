@@ -22,6 +22,10 @@ from spindle_fem.physics.bearings.rings import RingCompliance, RingLaw
 
 FloatArray = NDArray[np.float64]
 
+# Of the Newton method: residual below which an answer counts, and where iteration ends.
+_ACCEPTED = 1e-7
+_MOST_ITERATIONS = 60
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BallSystem:
@@ -90,8 +94,7 @@ def build_ball_rows(
     ball_rise: float = 0.0,
     radial_growth: float = 0.0,
     axial_offset: float = 0.0,
-    orientation: int = 1,
-    axial_position: float = 0.0,
+    place: tuple[int, float] = (1, 0.0),
 ) -> dict[str, FloatArray]:
     """Arrays of one bearing for ``BallSystem``, with five displacements of the inner ring.
 
@@ -107,10 +110,9 @@ def build_ball_rows(
         Of the inner raceway, from rotation and fit.
     axial_offset : float, [m]
         Axial approach of the rings at zero displacement (preload).
-    orientation : {+1, -1}
-        +1: displacement towards +z loads the bearing.
-    axial_position : float, [m]
-        Bearing centre from the point that the displacements refer to.
+    place : (orientation, axial position [m])
+        Orientation +1: displacement towards +z loads the bearing. Position of the bearing's centre
+        from the point that the displacements refer to.
 
     Returns
     -------
@@ -119,6 +121,7 @@ def build_ball_rows(
         positive tilt moves the ring towards +z at the azimuth it is named by.
     """
     n = len(azimuth)
+    orientation, axial_position = place
     alpha0, ball = geometry.contact_angle, geometry.ball_diameter
     curvature = np.array([geometry.groove_curvature_inner, geometry.groove_curvature_outer])
     expansion, ball_expansion = geometry.thermal_expansion, geometry.ball_thermal_expansion
@@ -288,12 +291,9 @@ def solve_bordered(
     displacement: FloatArray,
     load: FloatArray,
     *,
-    row_scale: FloatArray,
-    load_scale: FloatArray,
+    scales: tuple[FloatArray, FloatArray],
     step_limit: float,
     tolerance: float = 1e-11,
-    accept: float = 1e-7,
-    max_iterations: int = 60,
 ) -> BorderedSolution:
     """Damped Newton method for all balls and the ring displacements at once.
 
@@ -307,15 +307,14 @@ def solve_bordered(
         unknowns of a ball are X1 and X2 when p > 0.
     load : (m,) ndarray, [N, N m]
         External load conjugate to each displacement.
-    row_scale : (n, p) ndarray
-        Size of each residual row that counts as 1.
-    load_scale : (m,) ndarray
+    scales : (rows (n, p) ndarray, loads (m,) ndarray)
+        Size of each residual row, and of each load, that counts as 1.
     step_limit : float, [m]
         Largest change of a length in one step.
-    tolerance, accept : float
-        Iteration goes on to ``tolerance`` while it gains; the answer counts
-        as converged below ``accept``.
+    tolerance : float
+        Iteration goes on to it while it gains; the answer counts as converged below 1e-7 already.
     """
+    row_scale, load_scale = scales
     weight = system.weight[:, None]
     lever = np.maximum(np.abs(system.axial_map).max(axis=0), np.abs(system.radial_map).max(axis=0))
     x, q = unknowns.copy(), displacement.copy()
@@ -324,7 +323,7 @@ def solve_bordered(
     merit = _merit(current, ring, row_scale, load_scale)
     iterations, fresh = 0, True
     tangent = _tangent(system, current, q)[0]
-    while iterations < max_iterations and merit > tolerance:
+    while iterations < _MOST_ITERATIONS and merit > tolerance:
         iterations += 1
         tangent, solved_residual, solved_distance = _tangent(system, current, q)
         if len(q):
@@ -358,7 +357,7 @@ def solve_bordered(
         x, q = x + fraction * step_x, q + fraction * step_q
         current, ring, merit = trial, trial_ring, trial_merit
     tangent = _tangent(system, current, q)[0]
-    return BorderedSolution(x, q, merit, bool(merit < accept), iterations, tangent)
+    return BorderedSolution(x, q, merit, bool(merit < max(_ACCEPTED, tolerance)), iterations, tangent)
 
 
 def _solve_rings(tangent: FloatArray, right: FloatArray) -> FloatArray:

@@ -30,7 +30,13 @@ from spindle_fem.physics.bearings.set_problem import (
     side_by_side,
     start_displacement,
 )
-from spindle_fem.physics.bearings.state_records import build_states, lubricant_state, require_seated
+from spindle_fem.physics.bearings.state_records import (
+    Lubrication,
+    SolvedBearings,
+    build_states,
+    lubricant_state,
+    require_seated,
+)
 from spindle_fem.physics.bearings.traction import LubricantState, TractionOptions
 from spindle_fem.validity import CodedWarning
 
@@ -141,12 +147,13 @@ def solve_states(
     require_seated(solved, names, shoulders, speed)
     width = problems[0].system.axial_map.shape[1]
     number = len(bearing_set.bearings)
+    columns = np.repeat(width * np.arange(len(problems)), number)
     states = build_states(
-        bearings, rows, system, solved, speed,
-        lubricant=lubricant, film=film, options=options, heat=heat, control=control,
-        film_temperatures=films, roughness=(bearing_set.raceway_roughness, bearing_set.ball_roughness),
-        shaft_columns=np.repeat(width * np.arange(len(problems)), number),
-    )  # fmt: skip
+        SolvedBearings(bearings, rows, system, solved, speed, control, columns),
+        Lubrication(lubricant, film, films, (bearing_set.raceway_roughness, bearing_set.ball_roughness)),
+        options,
+        heat,
+    )
     return tuple(states[first : first + number] for first in range(0, len(states), number))
 
 
@@ -237,24 +244,21 @@ def _with_preloads(
 def solve_bearing(
     geometry: BearingGeometry,
     speed: float,
-    axial_load: float,
+    load: float | ExternalLoad,
     *,
-    radial_load: float = 0.0,
-    moment: float = 0.0,
     temperature: float = 313.15,
     lubricant: Lubricant | None = None,
     control: RacewayControl = "equilibrium",
     heat: HeatOptions | None = None,
     options: TractionOptions | None = None,
-    name: str = "bearing",
 ) -> BearingState:
     """One bearing under axial load, radial load and moment, all parts at one temperature.
 
     Parameters
     ----------
     speed : float, [rad/s]
-    axial_load, radial_load : float, [N]
-    moment : float, [N m]
+    load : float [N] or ExternalLoad
+        A plain number is an axial load.
     temperature : float, [K]
 
     Source: Jones (1960); golden values of the 218 bearing in the published tests.
@@ -264,9 +268,10 @@ def solve_bearing(
     >>> round(math.degrees(state.contact_angle_inner), 3)
     18.345
     """
-    single = BearingSet((MountedBearing(name, geometry),))
+    single = BearingSet((MountedBearing("bearing", geometry),))
+    given = load if isinstance(load, ExternalLoad) else ExternalLoad(load)
     return solve_bearing_set(
-        single, speed, ExternalLoad(axial_load, radial_load, moment), uniform_temperatures(1, temperature),
+        single, speed, given, uniform_temperatures(1, temperature),
         lubricant=lubricant, control=control, heat=heat, options=options,
     )[0]  # fmt: skip
 
@@ -306,7 +311,7 @@ def _solve(
     start = np.concatenate([start_displacement(problem, where) for problem in problems])
     load = np.concatenate([problem.load for problem in problems])
     return solve_equilibrium(
-        system, speed, load, control, start=start, ball_load=ball_load, lubricant=film, options=options,
+        system, speed, load, control, at_rest=(start, ball_load), lubricant=film, options=options,
         where=where,
     )  # fmt: skip
 

@@ -81,17 +81,15 @@ def solve_equilibrium(
     load: FloatArray,
     control: RacewayControl,
     *,
-    start: FloatArray,
-    ball_load: float,
+    at_rest: tuple[FloatArray, float],
     lubricant: LubricantState | None = None,
     options: TractionOptions | None = None,
     where: str = "bearing",
-    warm: Equilibrium | None = None,
 ) -> Equilibrium:
     """Equilibrium of all balls and rings at a shaft speed.
 
-    Tries the asked speed from the state at rest (or a warm start), and goes
-    there in adaptive steps of speed where that fails.
+    Tries the asked speed from the state at rest, and goes there in adaptive
+    steps of speed where that fails.
 
     Parameters
     ----------
@@ -100,16 +98,12 @@ def solve_equilibrium(
     load : (m,) ndarray, [N, N m]
         Conjugate to the displacements.
     control : {"outer", "inner", "equilibrium"}
-    start : (m,) ndarray
-        First guess of the displacements at rest.
-    ball_load : float, [N]
-        Size of the ball loads at rest, for scaling.
+    at_rest : (displacement (m,) ndarray, ball load [N])
+        First guess of the displacements at rest, and the size of the ball loads for scaling.
     lubricant, options
         Needed for ``"equilibrium"``.
     where : str
         Name for messages.
-    warm : Equilibrium, optional
-        Of the same system at a nearby state.
 
     Raises
     ------
@@ -117,11 +111,8 @@ def solve_equilibrium(
         No state found; the message says from which speed on.
     """
     magnitude = abs(speed)
+    start, ball_load = at_rest
     solver = _Solver(system, load, control, ball_load, lubricant, options or TractionOptions())
-    if warm is not None and magnitude > 0.0:
-        attempt = solver.moving(magnitude, warm.centre, warm.displacement, warm.ball_speeds)
-        if attempt.converged:
-            return solver.finish(attempt.solution, magnitude, attempt.carried)
     rest = solver.rest(start)
     if not rest.converged:
         raise NoEquilibriumError(
@@ -287,8 +278,8 @@ class _Solver:
         size = max(size, _SMALLEST_FORCE)
         return solve_bordered(
             system, evaluate, unknowns, displacement, self.load,
-            row_scale=rows, load_scale=np.maximum(size * balls * lever / 10.0, np.abs(self.load)),
-            step_limit=0.1 * stretch, tolerance=tolerance, accept=max(1e-7, tolerance),
+            scales=(rows, np.maximum(size * balls * lever / 10.0, np.abs(self.load))),
+            step_limit=0.1 * stretch, tolerance=tolerance,
         )  # fmt: skip
 
     def _forces(self, speed: float) -> FloatArray:

@@ -82,8 +82,7 @@ def build_problem(
                 radial_growth=rotation_growth(geometry, speed, bearing_set.shaft_bore_diameter)
                 if law is None else 0.0,
                 axial_offset=approach + thermal,
-                orientation=sign,
-                axial_position=position,
+                place=(sign, position),
             )
             | {"azimuth": azimuth}
         )  # fmt: skip

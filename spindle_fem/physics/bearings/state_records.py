@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,26 +88,59 @@ def require_seated(solved: Equilibrium, names: Sequence[str], shoulder: FloatArr
         raise NoEquilibriumError(" ".join(dict.fromkeys(names)), "the ball loads are not finite.")
 
 
-def build_states(
-    bearings: Sequence,
-    rows: Sequence[dict[str, FloatArray]],
-    system: BallSystem,
-    solved: Equilibrium,
-    speed: float,
-    *,
-    lubricant: Lubricant | None,
-    film: LubricantState | None,
-    options: TractionOptions,
-    heat: HeatOptions,
-    control: str,
-    film_temperatures: Sequence[float],
-    roughness: tuple[float, float],
-    shaft_columns: NDArray[np.int64],
-) -> tuple[BearingState, ...]:
-    """Records of every bearing of a solved system, in order.
+@dataclass(frozen=True, slots=True, eq=False)
+class SolvedBearings:
+    """Bearings, the system of their balls, and its equilibrium.
 
-    ``shaft_columns`` (n_bearings,) is where the displacements of each bearing's shaft begin.
+    Attributes
+    ----------
+    bearings : sequence of MountedBearing
+    rows : sequence of dict
+        Arrays of each bearing's balls.
+    system : BallSystem
+    equilibrium : Equilibrium
+    speed : float, [rad/s]
+    control : {"outer", "inner", "equilibrium"}
+    shaft_columns : (n_bearings,) ndarray
+        Where the displacements of each bearing's shaft begin.
     """
+
+    bearings: Sequence
+    rows: Sequence[dict[str, FloatArray]]
+    system: BallSystem
+    equilibrium: Equilibrium
+    speed: float
+    control: str
+    shaft_columns: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lubrication:
+    """Lubricant of the bearings, and what it is like in each.
+
+    Attributes
+    ----------
+    lubricant : Lubricant or None
+    film : LubricantState or None
+        At every ball.
+    temperatures : sequence of float, [K]
+        Of each bearing's film.
+    roughness : (raceway, ball), [m]
+    """
+
+    lubricant: Lubricant | None
+    film: LubricantState | None
+    temperatures: Sequence[float]
+    roughness: tuple[float, float]
+
+
+def build_states(
+    solved_bearings: SolvedBearings, lubrication: Lubrication, options: TractionOptions, heat: HeatOptions
+) -> tuple[BearingState, ...]:
+    """Records of every bearing of a solved system, in order."""
+    bearings, rows, system = solved_bearings.bearings, solved_bearings.rows, solved_bearings.system
+    solved, speed, control = solved_bearings.equilibrium, solved_bearings.speed, solved_bearings.control
+    lubricant, film = lubrication.lubricant, lubrication.film
     compliance = np.diagonal(np.linalg.pinv(solved.tangent))
     patch = traction = drag = None
     if film is not None and speed > 0.0:
@@ -138,7 +171,7 @@ def build_states(
             _cut(system, part), solved.ball_speeds[part],
         )  # fmt: skip
         bearing_heat_record: BearingHeat | None = None
-        temperature = float(film_temperatures[index])
+        temperature = float(lubrication.temperatures[index])
         cage = int(np.sum(weight[solved.carried[part]]))
         grooves = (distance[0][part], distance[1][part])
         warnings = _load_warnings(bearing.name, balls, contacts, grooves, control, speed, _cut(system, part))
@@ -154,7 +187,7 @@ def build_states(
                     float(lubricant.kinematic_viscosity(temperature)), axial_force, radial_force,
                 )  # fmt: skip
                 bearing_heat_record = bearing_heat(local, heat)
-                balls, film_warnings = _with_films(bearing.name, balls, local, options, roughness)
+                balls, film_warnings = _with_films(bearing.name, balls, local, options, lubrication.roughness)
                 warnings += film_warnings
                 warnings += _heat_warnings(bearing.name, geometry, heat)
             else:
@@ -163,9 +196,9 @@ def build_states(
         free = geometry.curvature_centre_distance * math.sin(geometry.contact_angle)
         radial_shift = 0.0
         if len(weight) > 1:
-            own = slice(shaft_columns[index], shaft_columns[index] + 5)
+            own = slice(solved_bearings.shaft_columns[index], solved_bearings.shaft_columns[index] + 5)
             radial_shift = float(system.radial_map[part][0, own] @ solved.displacement[own])
-        soft = float(compliance[shaft_columns[index]])
+        soft = float(compliance[solved_bearings.shaft_columns[index]])
         stiffness = 1.0 / soft if soft > 0.0 else 0.0
         states.append(
             BearingState(
@@ -348,4 +381,11 @@ def _cut(record, part: slice):
     )
 
 
-__all__ = ["ContactPatch", "build_states", "lubricant_state", "require_seated"]
+__all__ = [
+    "ContactPatch",
+    "Lubrication",
+    "SolvedBearings",
+    "build_states",
+    "lubricant_state",
+    "require_seated",
+]
