@@ -207,11 +207,20 @@ def _heat(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
     names = declared.names["bearing"]
     if spec.heat is None:
         return
-    if spec.heat.model != "table" and names and "grease" not in declared.tables:
+    by_contact = [group.name for group in spec.bearing_set if group.ball_row.kind == "contact"]
+    if "grease" in declared.tables:
+        pass
+    elif spec.heat.model != "table" and names:
         yield SpecError(
             "grease",
             f'is missing, heat.model = "{spec.heat.model}" needs it.',
             'Add [grease], or heat.model = "table".',
+        )
+    elif by_contact:
+        yield SpecError(
+            "grease",
+            f'is missing, the contacts of the balls of "{by_contact[0]}" need it.',
+            'Add [grease], or ball_row = {kind = "constant", conductance = "..."}.',
         )
     if spec.heat.table is None:
         return

@@ -13,7 +13,7 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.duct_friction import PressureDrop, channel_pressure_drop
 from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
-from spindle_fem.physics.coolant.march import ChannelMarch, march_channel
+from spindle_fem.physics.coolant.march import ChannelMarch, FilmChoice, march_channel
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
 
@@ -92,10 +92,7 @@ class CoolantLoop:
             inlet,
             wall_temperature,
             self.cells.cell_area,
-            model=settings.film_model,
-            properties_at="local" if local else "inlet",
-            wall_correction=local,
-            film_factor=factor,
+            FilmChoice(settings.film_model, "local" if local else "inlet", local, factor),
             pumping_power=pressure.pumping_power if settings.pumping_heat else 0.0,
         )
         shape = self.cells.cell_area.shape

@@ -9,7 +9,7 @@ from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
 from spindle_fem.physics.coolant.coolants.water import Water
 from spindle_fem.physics.coolant.linear_march import MarchMaps, linearise_march, march_maps, outlet_stretch
-from spindle_fem.physics.coolant.march import march_channel, march_enthalpy
+from spindle_fem.physics.coolant.march import FilmChoice, march_channel, march_enthalpy
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
 OIL = OilIsoVg32()
@@ -186,8 +186,10 @@ class TestMarchChannel:
 
     def march(self, **changes):
         options = {"model": "sieder_tate", "properties_at": "inlet", "wall_correction": False} | changes
-        coolant = options.pop("coolant", OIL)
-        return march_channel(CHANNEL, coolant, FLOW, INLET, self.WALL, self.AREA, **options)
+        coolant, power = options.pop("coolant", OIL), options.pop("pumping_power", 0.0)
+        return march_channel(
+            CHANNEL, coolant, FLOW, INLET, self.WALL, self.AREA, FilmChoice(**options), power
+        )
 
     def test_inlet_properties_are_those_of_the_recorded_machine(self):
         # h = 243 W/(m²K) everywhere, mass flow from the density at the inlet.
@@ -202,9 +204,7 @@ class TestMarchChannel:
             INLET,
             np.full(30, 300.0),
             self.AREA,
-            model="sieder_tate",
-            properties_at="inlet",
-            wall_correction=False,
+            FilmChoice("sieder_tate", "inlet", wall_correction=False),
         )
         exact = INLET + (300.0 - INLET) * -np.expm1(-units)
         assert uniform.march.mixed_outlet_temperature == pytest.approx(exact, abs=1e-4)
@@ -230,7 +230,7 @@ class TestMarchChannel:
         assert local.film.value[-1] > local.film.value[0]
 
     def test_film_factor_scales_the_film(self):
-        plain, fouled = self.march(), self.march(film_factor=0.5)
+        plain, fouled = self.march(), self.march(factor=0.5)
         direct = march_enthalpy(
             INLET,
             plain.mass_flow,
@@ -249,9 +249,11 @@ class TestMarchChannel:
     def test_two_starts_share_flow_and_pumping_power(self):
         double = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0, starts=2)
         wall, area = np.stack([self.WALL, self.WALL]), np.stack([self.AREA, self.AREA])
-        both = march_channel(double, OIL, 2 * FLOW, INLET, wall, area, model="helical", pumping_power=80.0)
+        both = march_channel(
+            double, OIL, 2 * FLOW, INLET, wall, area, FilmChoice("helical"), pumping_power=80.0
+        )
         one = march_channel(
-            CHANNEL, OIL, FLOW, INLET, self.WALL, self.AREA, model="helical", pumping_power=40.0
+            CHANNEL, OIL, FLOW, INLET, self.WALL, self.AREA, FilmChoice("helical"), pumping_power=40.0
         )
         assert both.mass_flow == pytest.approx(one.mass_flow, rel=1e-14)
         np.testing.assert_allclose(both.march.heat[1], one.march.heat, rtol=1e-12)
@@ -261,14 +263,14 @@ class TestMarchChannel:
         )
         # One start given stands for both and reports its own share.
         twin = march_channel(
-            double, OIL, 2 * FLOW, INLET, self.WALL, self.AREA, model="helical", pumping_power=80.0
+            double, OIL, 2 * FLOW, INLET, self.WALL, self.AREA, FilmChoice("helical"), pumping_power=80.0
         )
         assert twin.march.pumping_heat.sum() == pytest.approx(40.0, rel=1e-12)
 
     def test_unequal_starts_mix_by_enthalpy(self):
         double = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0, starts=2)
         wall, area = np.stack([self.WALL, self.WALL + 20.0]), np.stack([self.AREA, self.AREA])
-        found = march_channel(double, OIL, 0.2 * FLOW, INLET, wall, area, model="helical")
+        found = march_channel(double, OIL, 0.2 * FLOW, INLET, wall, area, FilmChoice("helical"))
         mixed = OIL.specific_enthalpy(found.march.mixed_outlet_temperature)
         assert float(mixed) == pytest.approx(
             OIL.specific_enthalpy(found.march.outlet_temperature).mean(), rel=1e-13

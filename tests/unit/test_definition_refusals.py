@@ -8,6 +8,8 @@ other faults: one mistake must not bring up a crowd.
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from spindle_fem.definition.load import load_machine
@@ -289,6 +291,18 @@ def test_all_faults_of_one_range_and_one_prior_are_named(tmp_path):
         faults_of(tmp_path, text),
         ("bearing_set.pair.bearing.B1.z[1]", "bare number 24"),
         ("bearing_set.pair.bearing.B1.z[2]", '"40 kg"', "wrong dimension"),
+    )
+
+
+def test_balls_that_follow_their_contacts_need_grease_with_a_table_of_heat_too(tmp_path):
+    text = VALID.replace('model = "palmgren"', 'model = "table"')
+    text = re.sub(r"\[grease\].*?\n\n", "", text, flags=re.DOTALL)
+    sound = tmp_path / "sound.toml"
+    sound.write_text(text)
+    assert load_machine(sound).grease is None
+    text = re.sub(r"ball_row = .*\n", "", text)
+    require(
+        faults_of(tmp_path, text), ("grease", "is missing", 'the contacts of the balls of "pair" need it')
     )
 
 

@@ -18,11 +18,9 @@ LONG_FILES = {
     "validation/laws.py",
 }
 BUSY_FUNCTIONS = {
-    "spindle_fem/effects/framework/effect.py:candidate",
     "spindle_fem/model/lumped/network_transient.py:simulate_transient",
     "spindle_fem/model/mesh/time_stepper.py:integrate",
     "spindle_fem/model/reduced/dynamic_terms.py:evaluate",
-    "spindle_fem/physics/coolant/march.py:march_channel",
     "spindle_fem/solvers/machine_transient.py:simulate_full",
 }
 

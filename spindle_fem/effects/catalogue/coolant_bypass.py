@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -87,16 +88,10 @@ class CoolantBypass(Effect):
         found = [self.candidate("channel", BypassTerm(name), amplitude="fraction", reference=0.3)]
         if machine.outlets:
             mixed = self.term_name("channel", MIXED)
-            found.append(
-                self.candidate(
-                    "channel",
-                    BypassTerm(mixed),
-                    amplitude="fraction",
-                    reference=0.3,
-                    form=MIXED,
-                    reading=MixedOutlet(machine.outlets[0], mixed),
-                )
+            other = self.candidate(
+                "channel", BypassTerm(mixed), amplitude="fraction", reference=0.3, form=MIXED
             )
+            found.append(replace(other, reading=MixedOutlet(machine.outlets[0], mixed)))
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

@@ -80,7 +80,6 @@ class JointConductance(Effect):
                         amplitude="factor",
                         reference=REFERENCE,
                         form=seat.form,
-                        null=1.0,
                     )
                 )
         return tuple(found)

@@ -258,30 +258,28 @@ class Effect(ABC):
     def candidate(
         self,
         component: str,
-        term: Term | None = None,
+        owner: Term | Reading,
         *,
         amplitude: str,
         reference: float,
         form: str = "",
-        null: float = 0.0,
         starts: Sequence[Mapping[str, float]] = ({},),
-        reading: Reading | None = None,
         constants: Mapping[str, float] | None = None,
         likelihood: float = 1.0,
     ) -> Candidate:
         """Candidate of one term or reading; ``amplitude`` and ``starts`` by inner names."""
-        owner = term.name if term is not None else reading.name
+        own = {item.name: item for item in owner.parameters}
         return Candidate(
             self.name,
             component,
             form,
             self.kind,
-            f"{owner}.{amplitude}",
-            null,
+            f"{owner.name}.{amplitude}",
+            own[amplitude].value,
             reference,
-            terms=() if term is None else (term,),
-            reading=reading,
-            starts=tuple({f"{owner}.{name}": value for name, value in start.items()} for start in starts),
+            terms=(owner,) if isinstance(owner, Term) else (),
+            reading=owner if isinstance(owner, Reading) else None,
+            starts=tuple({f"{owner.name}.{key}": value for key, value in start.items()} for start in starts),
             constants=constants or {},
             likelihood=likelihood,
         )

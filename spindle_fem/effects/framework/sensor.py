@@ -49,11 +49,10 @@ class SensorEffect(Effect):
                 found.append(
                     self.candidate(
                         machine.probes.get(channel, channel),
-                        reading=reading,
+                        reading,
                         amplitude=parameters[0].name,
                         reference=reference,
                         form=form,
-                        null=parameters[0].value,
                         starts=starts,
                     )
                 )

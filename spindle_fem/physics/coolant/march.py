@@ -188,6 +188,41 @@ class ChannelMarch:
     mass_flow: float
 
 
+@dataclass(frozen=True, slots=True)
+class FilmChoice:
+    """Which film coefficient a march takes.
+
+    Attributes
+    ----------
+    model : str
+        One of ``FILM_MODELS``.
+    properties_at : {"local", "inlet"}
+        Bulk temperature of each cell, or the inlet's everywhere.
+    wall_correction : bool
+        Whether the viscosity at the wall corrects the film coefficient.
+    factor : (..., n) array_like or float, [-]
+        Multiplies the film coefficient (fouling, calibration, ports).
+
+    Raises
+    ------
+    OutOfValidityError
+        An unknown option.
+    """
+
+    model: str = "helical"
+    properties_at: str = "local"
+    wall_correction: bool = True
+    factor: ArrayLike = 1.0
+
+    def __post_init__(self) -> None:
+        if self.properties_at not in ("local", "inlet"):
+            raise OutOfValidityError(
+                "coolant march",
+                f'properties_at is "{self.properties_at}".',
+                did_you_mean(self.properties_at, ("local", "inlet")),
+            )
+
+
 def march_channel(
     section: ChannelSection,
     coolant: Coolant,
@@ -195,11 +230,7 @@ def march_channel(
     inlet_temperature: float,
     wall_temperature: ArrayLike,
     wetted_area: ArrayLike,
-    *,
-    model: str = "helical",
-    properties_at: str = "local",
-    wall_correction: bool = True,
-    film_factor: ArrayLike = 1.0,
+    choice: FilmChoice | None = None,
     pumping_power: float = 0.0,
 ) -> ChannelMarch:
     """March with film coefficients by a named model, at given wall temperatures.
@@ -216,14 +247,8 @@ def march_channel(
         one counts the starts. Without it the result is that of one start.
     wetted_area : (..., n) array_like, [m²]
         Of each cell.
-    model : str
-        One of ``coolant.regimes.FILM_MODELS``.
-    properties_at : {"local", "inlet"}
-        Bulk temperature of each cell, or the inlet's everywhere.
-    wall_correction : bool
-        Whether the viscosity at the wall corrects the film coefficient.
-    film_factor : (..., n) array_like or float, [-]
-        Multiplies the film coefficient (fouling, calibration, ports).
+    choice : FilmChoice, optional
+        The helical model without it.
     pumping_power : float, [W]
         Friction heat of all starts, spread over the wetted area.
 
@@ -240,18 +265,12 @@ def march_channel(
 
     >>> from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
     >>> channel = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
-    >>> result = march_channel(
-    ...     channel, OilIsoVg32(), 20e-3 / 60, 288.15, [295.0] * 20, [0.1562 / 20] * 20, model="sieder_tate"
-    ... )
+    >>> wall, area, film = [295.0] * 20, [0.1562 / 20] * 20, FilmChoice("sieder_tate")
+    >>> result = march_channel(channel, OilIsoVg32(), 20e-3 / 60, 288.15, wall, area, film)
     >>> result.march.imbalance_relative < 1e-12
     True
     """
-    if properties_at not in ("local", "inlet"):
-        raise OutOfValidityError(
-            "coolant march",
-            f'properties_at is "{properties_at}".',
-            did_you_mean(properties_at, ("local", "inlet")),
-        )
+    choice = choice or FilmChoice()
     wall, area = np.broadcast_arrays(
         np.atleast_1d(np.asarray(wall_temperature, dtype=np.float64)),
         np.asarray(wetted_area, dtype=np.float64),
@@ -269,16 +288,16 @@ def march_channel(
     pumping = pumping_power / section.starts * area / area.sum(axis=-1, keepdims=True)
 
     def film_at(bulk: ArrayLike) -> FilmCoefficient:
-        state = ChannelState(coolant, volume_flow, bulk, wall if wall_correction else None)
-        return select_film(model, section, state)
+        state = ChannelState(coolant, volume_flow, bulk, wall if choice.wall_correction else None)
+        return select_film(choice.model, section, state)
 
     bulk: ArrayLike = inlet_temperature
     capacity: ArrayLike = at_inlet.specific_heat_capacity
     for _ in range(_ITERATIONS):
         film = film_at(bulk)
-        coefficient = np.asarray(film_factor, dtype=np.float64) * np.asarray(film.value)
+        coefficient = np.asarray(choice.factor, dtype=np.float64) * np.asarray(film.value)
         march = march_enthalpy(inlet_temperature, mass_flow, capacity, wall, area, coefficient, pumping)
-        if properties_at == "inlet":
+        if choice.properties_at == "inlet":
             break
         change = float(np.max(np.abs(march.bulk_temperature - bulk)))
         if change <= _TEMPERATURE_TOLERANCE_K:
