@@ -30,7 +30,6 @@ def validation_faults(
 
     Parameters
     ----------
-    error : ValidationError
     source : str
         File for the message; ``""`` leaves it out.
     model : type

@@ -209,7 +209,6 @@ Radius = quantity_field("m", at_least=0.0)
 Angle = quantity_field("rad")
 Temperature = quantity_field("K", "temperature")
 AmbientOrTemperature = quantity_field("K", "temperature", words=("ambient",))
-TemperatureDifference = quantity_field("K", "temperature_difference")
 Pressure = quantity_field("Pa", above=0.0)
 Density = quantity_field("kg/m**3", above=0.0)
 Conductivity = quantity_field("W/m/K", above=0.0)
@@ -298,12 +297,7 @@ class RangeRule:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChoiceRule:
-    """What a field may be that names a registered thing; also the source of the reference page.
-
-    Attributes
-    ----------
-    things : Registry
-    """
+    """What a field may be that names a registered thing; also the source of the reference page."""
 
     things: Registry
 

@@ -92,7 +92,6 @@ def with_parameters(spec: NetworkMachineSpec, values: Mapping[str, Uncertain]) -
 
     Parameters
     ----------
-    spec : NetworkMachineSpec
     values : mapping of str to Uncertain
         By the names that :func:`spindle_fem.model.lumped.written_network.build_network` gives
         its parameters, in the units of the definition: a gain with a reference

@@ -145,7 +145,6 @@ def with_parameters(spec: MachineSpec, factors: Mapping[str, float]) -> MachineS
 
     Parameters
     ----------
-    spec : MachineSpec
     factors : mapping of str to float
         Factor (1 leaves the value) by the name that
         :func:`uncertain_parameters` gives, or by the name of any coefficient

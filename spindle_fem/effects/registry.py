@@ -121,7 +121,6 @@ def build(
         Text with a unit, or SI; by inner name (without ``<term>.``).
         Parameters that are missing keep their nominal values, but for the
         amplitude, which must be given.
-    view : MachineView
     intervals : sequence of pairs, [s]
         For effects of intervals, text with a unit or SI.
     where : str
@@ -209,7 +208,6 @@ def definition_entry(candidate: Candidate, values: Mapping[str, float]) -> dict[
 
     Parameters
     ----------
-    candidate : Candidate
     values : mapping of str to float
         By outer name, SI.
     """

@@ -14,79 +14,9 @@ from spindle_fem.physics.bearings.rough_surface import (
     SurfaceRoughness,
     contact_area_ratio,
     exceedance_integral,
-    profile_moments,
-    read_profile,
     roughness_from_rms,
-    weierstrass_mandelbrot_moments,
-    weierstrass_mandelbrot_profile,
 )
 from spindle_fem.physics.bearings.traction import ellipse_quadrature
-
-FRACTAL = (1e-11, 1.4, 22, 30)
-
-
-def test_profile_moments_meet_the_closed_form() -> None:
-    # incommensurate wave lengths: the record must span many of the longest
-    x = np.arange(400_000) * 2.0e-8
-    height = weierstrass_mandelbrot_profile(x, *FRACTAL)
-    sampled = profile_moments(x, height)
-    closed = weierstrass_mandelbrot_moments(*FRACTAL)
-    assert sampled[0] == pytest.approx(closed[0], rel=0.01)
-    # second differences of the shortest wave, 25 samples long, lose (kh)²/12
-    assert sampled[1] == pytest.approx(closed[1], rel=0.03)
-    assert sampled[2] == pytest.approx(closed[2], rel=0.03)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((1e-9, 2.0, 1, 5), "fractal_dimension: it is 2. Allowed: between 1 and 2."),
-        ((1e-9, 1.5, 6, 5), "highest mode 5 lies below the lowest 6"),
-    ],
-)
-def test_fractals_that_do_not_exist(arguments: tuple, message: str) -> None:
-    with pytest.raises(SpecError) as caught:
-        weierstrass_mandelbrot_moments(*arguments)
-    assert message in str(caught.value)
-
-
-def test_profile_from_file(tmp_path) -> None:
-    file = tmp_path / "race.csv"
-    file.write_text("x_um,z_nm\n0,10\n0.5,-20\n1.0,30\n")
-    position, height = read_profile(file)
-    assert position == pytest.approx([0.0, 5e-7, 1e-6])
-    assert height == pytest.approx([1e-8, -2e-8, 3e-8])
-    with pytest.raises(SpecError, match="Give at least 16 positions"):
-        profile_moments(position, height)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("x,z\n0,1\n", "Write it as x_um,z_nm"),
-        ("x_um,z_inch\n0,1\n", "Write it as x_um,z_nm"),
-        ("x_um,z_nm\n0,one\n", "line 2: '0,one' is no pair of numbers"),
-        ("", "Write it as x_um,z_nm"),
-    ],
-)
-def test_profile_files_that_cannot_be_read(tmp_path, text: str, message: str) -> None:
-    file = tmp_path / "race.csv"
-    file.write_text(text)
-    with pytest.raises(SpecError) as caught:
-        read_profile(file)
-    assert message in str(caught.value)
-
-
-def test_missing_profile_file(tmp_path) -> None:
-    with pytest.raises(SpecError, match="cannot be read"):
-        read_profile(tmp_path / "absent.csv")
-
-
-def test_unequal_spacing_is_refused() -> None:
-    x = np.arange(40.0)
-    x[20] += 0.3
-    with pytest.raises(SpecError, match="not equally spaced"):
-        profile_moments(x, np.sin(x))
 
 
 def test_exceedance_integral_against_quadrature() -> None:

@@ -32,7 +32,6 @@ class DriftTerm(Term):
 
     Parameters
     ----------
-    name : str
     films : tuple of str
         Whose fluid it is.
     form : str

@@ -28,10 +28,8 @@ class ChillerCyclingTerm(Term):
 
     Parameters
     ----------
-    name : str
     places : tuple of str
         Fluids that swing.
-    sawtooth : bool
     """
 
     def __init__(self, name: str, places: tuple[str, ...], *, sawtooth: bool) -> None:

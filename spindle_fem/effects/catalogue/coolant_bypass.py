@@ -20,12 +20,7 @@ MIXED = "outlet mixed"
 
 
 class BypassTerm(Term):
-    """Less flow through the channel.
-
-    Parameters
-    ----------
-    name : str
-    """
+    """Less flow through the channel."""
 
     def __init__(self, name: str) -> None:
         self.name, self.parameters = name, (FRACTION,)

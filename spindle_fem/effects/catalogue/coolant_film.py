@@ -21,13 +21,7 @@ LEAST_RANGE = 1.1
 
 
 class ReynoldsFilmTerm(Term, ABC):
-    """Factor on the channel's film by the Reynolds number.
-
-    Parameters
-    ----------
-    name : str
-    channel : ChannelFlow
-    """
+    """Factor on the channel's film by the Reynolds number."""
 
     def __init__(self, name: str, channel: ChannelFlow) -> None:
         self.name, self._channel = name, channel

@@ -19,7 +19,6 @@ class CoolantHeatingTerm(Term):
 
     Parameters
     ----------
-    name : str
     links : tuple of str
         Coefficients in the order in which the coolant passes.
     walls : tuple of str

@@ -20,7 +20,6 @@ class GapClosureTerm(Term):
 
     Parameters
     ----------
-    name : str
     seats : tuple of str
         Coefficients.
     rings : tuple of str

@@ -37,7 +37,6 @@ class GreaseChurningTerm(Term):
 
     Parameters
     ----------
-    name : str
     bearings : tuple of str
     speed : str
         Input that tells whether the machine turns.

@@ -27,7 +27,6 @@ class HeatCapacityTerm(Term):
 
     Parameters
     ----------
-    name : str
     places : tuple of str
     usual : float, [J/K]
     """
@@ -49,7 +48,6 @@ class ContactCapacityTerm(Term):
 
     Parameters
     ----------
-    name : str
     places : tuple of str
     usual : float, [J/K]
     sides : tuple of str

@@ -24,7 +24,6 @@ class HeatSplitTerm(Term):
 
     Parameters
     ----------
-    name : str
     tables : mapping of bearing to FrictionTable
     ring_share : float
         Of the heat that enters the rings.

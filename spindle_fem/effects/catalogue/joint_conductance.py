@@ -19,7 +19,6 @@ class JointTerm(Term):
 
     Parameters
     ----------
-    name : str
     scaled : tuple of str
         Coefficients.
     """

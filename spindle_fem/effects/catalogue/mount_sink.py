@@ -23,10 +23,8 @@ class MountSinkTerm(Term):
 
     Parameters
     ----------
-    name : str
     films : tuple of str
         Those to the frame.
-    warming : bool
     """
 
     def __init__(self, name: str, films: tuple[str, ...], *, warming: bool) -> None:

@@ -32,7 +32,6 @@ class DetachedReading(Reading):
 
     Parameters
     ----------
-    channel, name : str
     parameters : tuple of TermParameter
     ambient : float, [K]
         Where no input tells it.

@@ -20,7 +20,6 @@ class ShaftFilmTerm(Term):
 
     Parameters
     ----------
-    name : str
     films : tuple of str
         Coefficients.
     """
@@ -44,7 +43,6 @@ class ShaftLossTerm(Term):
 
     Parameters
     ----------
-    name, place, speed : str
     fluid : str or float
         Input that gives the fluid's temperature, or that temperature [K].
     usual : float, [W/K]

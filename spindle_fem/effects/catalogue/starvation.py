@@ -38,7 +38,6 @@ class StarvationTerm(Term):
 
     Parameters
     ----------
-    name : str
     bearings : tuple of str
     speed : str
         Input.

@@ -24,7 +24,6 @@ class ThermalPreloadTerm(Term):
 
     Parameters
     ----------
-    name : str
     bearings, inner, outer : tuple of str
     """
 

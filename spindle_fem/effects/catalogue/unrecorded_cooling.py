@@ -24,10 +24,6 @@ class CoolingTerm(UnrecordedTerm):
 
     Parameters
     ----------
-    name : str
-    size : TermParameter
-    spread : Spread
-    on : Share
     fluid : str or float
         Input of the surroundings, or their temperature [K].
     """

@@ -48,7 +48,6 @@ class ViscosityHeatTerm(Term):
 
     Parameters
     ----------
-    name : str
     bearings : tuple of str
     places : tuple of tuple of str
         For each bearing, those whose mean temperature its grease has.

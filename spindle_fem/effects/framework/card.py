@@ -26,7 +26,6 @@ class Makes:
     ----------
     way : {"warmer", "colder"}
         On the mean of a run.
-    probe : str
     at : str
         Component where the effect acts.
     """

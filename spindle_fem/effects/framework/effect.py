@@ -139,13 +139,11 @@ class Candidate:
     effect, component, form : str
         Catalogue id; place as :mod:`spindle_fem.effects.framework.machine_view` names it; form,
         empty where there is one only.
-    kind : str
     terms : tuple of Term
         Added to the thermal model.
     factors : tuple of TermParameter
         Factors on the machine's own parameters, named as these
         (``heat.front``, ``joint.flange``); logarithmic, value 1 without effect.
-    reading : Reading or None
     amplitude : str
         Outer name of the parameter that switches the effect on; the response
         is nearly proportional to its distance from ``null``.
@@ -213,7 +211,6 @@ class Effect(ABC):
     ----------
     name : str
         Catalogue id.
-    kind : str
     title : str
         In plain words, for reports: "the grease thins as it warms".
     check : str
@@ -311,7 +308,6 @@ class Effect(ABC):
 
         Parameters
         ----------
-        candidate : Candidate
         times : (N,) ndarray, [s]
         residual : (N, c) ndarray, [K]
             Measured less predicted; NaN where nothing was read.
@@ -323,7 +319,6 @@ class Effect(ABC):
 
         Parameters
         ----------
-        candidate : Candidate
         values : mapping of str to float
             By outer name, SI.
         """
@@ -416,7 +411,6 @@ class IntervalEffect(Effect):
 
         Parameters
         ----------
-        machine : MachineView
         component : str
             One of :meth:`places`.
         intervals : sequence of (float, float), [s]

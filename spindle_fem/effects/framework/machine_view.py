@@ -126,7 +126,6 @@ class RecordedQuantity:
         Range of the magnitude as a share of ``highest``.
     levels : tuple of float
         Magnitudes while it is on, quantiles over time, SI; of changes the sizes of those of the square.
-    unit : str
     changes : bool
         Whether its changes are followed instead of itself.
     beside : bool
@@ -213,7 +212,6 @@ class MachineView:
         All recorded heat at full load.
     typical_rise : float, [K]
         Above the surroundings, in the recording.
-    channel : ChannelFlow or None
     reynolds : (float, float)
         Range that occurs; zeros without a channel.
     friction : mapping of bearing to FrictionTable

@@ -25,7 +25,6 @@ class OutsideFilmTerm(Term):
 
     Parameters
     ----------
-    name : str
     films : tuple of str
     walls : tuple of str
         Place that drives each film.

@@ -26,7 +26,6 @@ def strongest_periods(
     residual : (N, c) ndarray
         NaN where nothing was read.
     shortest, longest : float, [s]
-    number : int
 
     Source: Scargle (1982), Astrophys. J. 263, 835-853.
 

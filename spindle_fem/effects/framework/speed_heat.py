@@ -21,7 +21,6 @@ def turning_places(machine: MachineView, places: tuple[str, ...]) -> Iterator[tu
 
     Parameters
     ----------
-    machine : MachineView
     places : tuple of str
         Of a machine with geometry; in a network every node with something turning.
     """
@@ -36,7 +35,6 @@ class SpeedHeatTerm(Term):
 
     Parameters
     ----------
-    name : str
     places : tuple of str
     speed : str
         Input.

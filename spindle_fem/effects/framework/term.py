@@ -63,7 +63,6 @@ class TermParameter:
     sigma : float
         One standard deviation: of the logarithm when ``logarithmic``, else in
         the value's unit; 0 means fixed.
-    unit : str
     logarithmic : bool
         Whether derivatives are taken to the logarithm.
     low, high : float
@@ -106,7 +105,6 @@ class Term:
 
     Attributes
     ----------
-    name : str
     parameters : tuple of TermParameter
     heat_places : tuple of str
         Places of :class:`spindle_fem.model.thermal_model.ThermalModel`, in W; or

@@ -38,7 +38,6 @@ class Share(Protocol):
     Attributes
     ----------
     parameters : tuple of TermParameter
-    n_states : int
     follows : tuple of str
         Inputs.
     """
@@ -117,10 +116,6 @@ class Followed:
 
     Changes are those of the square: the energy that acceleration and braking
     turn over. A recording begins with what it was at rest.
-
-    Parameters
-    ----------
-    quantity : RecordedQuantity
     """
 
     n_states = 1
@@ -167,11 +162,8 @@ class UnrecordedTerm(Term):
 
     Parameters
     ----------
-    name : str
-    size : TermParameter
     spread : Spread
         Where it acts.
-    on : Share
     """
 
     def __init__(self, name: str, size: TermParameter, spread: Spread, on: Share) -> None:

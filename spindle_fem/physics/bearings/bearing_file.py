@@ -53,7 +53,6 @@ class BearingCase:
 
     Attributes
     ----------
-    bearing_set : BearingSet
     speed : float, [rad/s]
     load : ExternalLoad
         Thrust turned so that a positive axial load of the file loads the
@@ -61,9 +60,6 @@ class BearingCase:
     temperatures : SetTemperatures
         All at the operation's temperature, which is also that of assembly,
         unless ``[temperatures]`` says otherwise.
-    raceway_control : str
-    lubricant : Lubricant or None
-    heat : HeatOptions
     warnings : tuple of CodedWarning
     """
 

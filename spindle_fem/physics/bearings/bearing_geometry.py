@@ -22,7 +22,6 @@ class BearingGeometry:
     Attributes
     ----------
     ball_diameter, pitch_diameter : float, [m]
-    ball_count : int
     contact_angle : float, [rad]
         Free contact angle, before load.
     groove_curvature_inner, groove_curvature_outer : float, [-]

@@ -15,7 +15,6 @@ class BearingKind:
 
     Attributes
     ----------
-    source : str
     largest_free_angle : float, [rad]
         Free contact angle that no bearing of the kind exceeds, where no shoulder angle is given.
     static_radial_factor : float, [-]

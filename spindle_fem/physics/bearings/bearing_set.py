@@ -60,12 +60,10 @@ def solve_bearing_set(
 
     Parameters
     ----------
-    bearing_set : BearingSet
     speed : float, [rad/s]
         Of the shaft.
     load : ExternalLoad or float
         A float is the thrust in N.
-    temperatures : SetTemperatures
     lubricant : Lubricant, optional
         Without it there is no film, no heat, and friction cannot decide.
     control : {"equilibrium", "outer", "inner"}

@@ -90,8 +90,6 @@ class BearingState:
 
     Attributes
     ----------
-    name : str
-    geometry : BearingGeometry
     speed : float, [rad/s]
     axial_displacement : float, [m]
         Axial approach of the rings from touching (thermal and mounting
@@ -106,7 +104,6 @@ class BearingState:
         temperatures; NaN for a bearing without counter bearing.
     axial_stiffness : float, [N/m]
         Of the shaft against the load: of the single bearing, or of its set.
-    balls : BallStates
     heat : BearingHeat or None
         None without lubricant.
     friction_moment : float, [N m]

@@ -54,12 +54,10 @@ class Equilibrium:
         X1, X2 of every ball.
     ball_speeds : (n, 4) ndarray, [rad/s]
         Orbital speed and the components about x', y', z'.
-    contacts : Contacts
     tangent : (m, m) ndarray
         Stiffness of the ring displacements with all balls in equilibrium.
     residual : float, [-]
         Largest force residual over the largest ball load.
-    iterations : int
     carried : (n,) ndarray of bool
         Balls that friction at the inner race is too weak to drive: the cage
         carries them, with the speeds of outer race control.

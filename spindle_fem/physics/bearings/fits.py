@@ -43,7 +43,6 @@ class RingFits:
     inner_ring_outer_diameter, outer_ring_inner_diameter : float or None, [m]
         Cylinders that stand for the grooved faces; None: through the groove bottoms.
     ring_density : float, [kg/m³]
-    shaft, housing : SeatMaterial
 
     Range: mean growth around the axis; a ring bent out of round by radial load
     is not covered. The seats are as long as the ring is wide.
@@ -98,7 +97,6 @@ class SeatedRings:
 
     Attributes
     ----------
-    shaft, inner_ring, outer_ring, housing : Annulus
     width : float, [m]
     """
 
@@ -119,7 +117,6 @@ class SeatedRings:
         ----------
         force : float, [N]
             Sum of the radial ball loads on the inner ring.
-        rise : FitTemperatures
         speed : float, [rad/s]
         centrifugal : float, [N]
             Of all balls: what the outer ring carries beyond ``force``.

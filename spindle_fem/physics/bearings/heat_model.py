@@ -81,9 +81,6 @@ class HeatOptions:
         2 F_R u. Some papers count one.
     hysteresis_loss : float, [-]
         Share of the elastic work lost in a load cycle of hard steel.
-    palmgren_f0, skf_friction_ehl, skf_friction_boundary : float
-    cage : CageGuidance or None
-    seal : ContactSeal or None
     """
 
     level: str = "full"

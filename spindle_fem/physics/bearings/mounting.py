@@ -25,8 +25,6 @@ class MountedBearing:
 
     Attributes
     ----------
-    name : str
-    geometry : BearingGeometry
     orientation : {+1, -1}
         +1: shaft motion towards +z loads it.
     axial_position : float, [m]

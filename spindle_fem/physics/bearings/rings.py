@@ -46,7 +46,6 @@ class Annulus:
     ----------
     inside, outside : float, [m]
         Radii; ``inside`` 0 for a solid shaft.
-    material : SeatMaterial
 
     Source: Lamé (1852); rotating discs: Timoshenko & Goodier, Theory of Elasticity, section 32.
     """

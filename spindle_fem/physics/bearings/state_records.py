@@ -97,8 +97,6 @@ class SolvedBearings:
     bearings : sequence of MountedBearing
     rows : sequence of dict
         Arrays of each bearing's balls.
-    system : BallSystem
-    equilibrium : Equilibrium
     speed : float, [rad/s]
     control : {"outer", "inner", "equilibrium"}
     shaft_columns : (n_bearings,) ndarray
@@ -120,7 +118,6 @@ class Lubrication:
 
     Attributes
     ----------
-    lubricant : Lubricant or None
     film : LubricantState or None
         At every ball.
     temperatures : sequence of float, [K]

@@ -86,7 +86,6 @@ def friction_factor_channel(
     ----------
     reynolds : (n,) array_like, [-]
         On the hydraulic diameter.
-    section : ChannelSection
     critical_reynolds : float, [-]
 
     Returns
@@ -211,7 +210,6 @@ def channel_pressure_drop(
 
     Parameters
     ----------
-    section : ChannelSection
     volume_flow : float, [m³/s]
         Total, all starts.
     properties : CoolantProperties
@@ -222,10 +220,6 @@ def channel_pressure_drop(
         None leaves the ports out.
     port_length : float, [m]
         Length of each drilling.
-
-    Returns
-    -------
-    PressureDrop
 
     Raises
     ------

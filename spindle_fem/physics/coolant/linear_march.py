@@ -154,10 +154,6 @@ def linearise_march(
     film_coefficient : (..., n) array_like or float, [W/(m²·K)]
     pumping_heat : (..., n) array_like or float, [W]
 
-    Returns
-    -------
-    MarchLinearisation
-
     Raises
     ------
     OutOfValidityError

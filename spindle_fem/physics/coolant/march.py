@@ -94,10 +94,6 @@ def march_enthalpy(
     pumping_heat : (..., n) array_like or float, [W]
         Friction heat in each cell.
 
-    Returns
-    -------
-    MarchResult
-
     Raises
     ------
     OutOfValidityError
@@ -175,7 +171,6 @@ class ChannelMarch:
 
     Attributes
     ----------
-    march : MarchResult
     film : FilmCoefficient
         Before ``film_factor``; values of shape (..., n), or floats when
         nothing varies along the channel.
@@ -237,8 +232,6 @@ def march_channel(
 
     Parameters
     ----------
-    section : ChannelSection
-    coolant : Coolant
     volume_flow : float, [m³/s]
         Total, all starts, at inlet temperature; every start takes its share.
     inlet_temperature : float, [K]
@@ -251,10 +244,6 @@ def march_channel(
         The helical model without it.
     pumping_power : float, [W]
         Friction heat of all starts, spread over the wetted area.
-
-    Returns
-    -------
-    ChannelMarch
 
     Raises
     ------

@@ -79,10 +79,6 @@ class Coolant(ABC):
         ----------
         temperature : array_like, [K]
 
-        Returns
-        -------
-        CoolantProperties
-
         Raises
         ------
         OutOfValidityError

@@ -40,7 +40,6 @@ class ChannelState:
 
     Attributes
     ----------
-    coolant : Coolant
     volume_flow : float, [m³/s]
         Total, all starts, at bulk temperature.
     bulk_temperature : (n,) array_like or float, [K]
@@ -100,12 +99,6 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
     model : str
         One of ``FILM_MODELS``: ``helical``, ``paper``, or a correlation alone
         such as ``sieder_tate``.
-    section : ChannelSection
-    state : ChannelState
-
-    Returns
-    -------
-    FilmCoefficient
 
     Raises
     ------

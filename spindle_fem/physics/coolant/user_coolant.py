@@ -19,7 +19,6 @@ class UserCoolant(Coolant):
 
     Attributes
     ----------
-    name : str
     reference_temperature : float, [K]
         Temperature of the three reference values.
     density, specific_heat_capacity, thermal_conductivity : float

@@ -56,10 +56,6 @@ def air_properties(temperature: ArrayLike, pressure: float = ATMOSPHERIC_PRESSUR
     temperature : (n,) array_like, [K]
     pressure : float, [Pa]
 
-    Returns
-    -------
-    AirProperties
-
     Raises
     ------
     OutOfValidityError
