@@ -1,4 +1,4 @@
-"""A projected model made for the designs of a study, and checked against full solves of some of them."""
+"""Make a reduced model for the designs of a study: sampled where its own estimate of the error is largest."""
 
 from __future__ import annotations
 
@@ -27,19 +27,21 @@ Array = NDArray[np.float64]
 
 # Estimated error at which the basis is good enough, K.
 WANTED = 2.0e-3
-FIRST_SAMPLES = 4
-MORE_SAMPLES = 3
-MOST_ROUNDS = 6
+# Designs sampled beside the central one, then in each round, and rounds at most.
+FIRST_SAMPLES, MORE_SAMPLES, MOST_ROUNDS = 4, 3, 6
 # Singular values below this share of the largest are dropped.
 SMALLEST_MODE = 1.0e-6
 MOST_MODES = 110
 SOLVER_TOLERANCE = 1.0e-7
-PROFILE_DEGREE = 5
+# Highest polynomial of the coolant's temperature along the channel, in the central design and in the others.
+CENTRAL_DEGREE, DEGREE = 5, 2
+# Basis vectors from which first guesses are combined.
 GUESS_SIZE = 80
 # Of the walls and films above the ambient, at first, K.
 FIRST_RISE = 15.0
 # The hottest and coldest that tables of the bearings' heat reach to at first.
 FIRST_TABLES = (ZERO_CELSIUS_K + 10.0, ZERO_CELSIUS_K + 75.0)
+# Designs at most that choose the samples.
 TRAINING_SIZE = 400
 
 
@@ -215,12 +217,12 @@ class _Samples:
         self.energy = full.conduction(sample.coefficients, sample.channel_film)
         self.space = SnapshotSpace(self.energy, full.one[:, None], SMALLEST_MODE)
         bearings = [[bearing.name] for _, bearing in self.machine.spec.bearings]
-        self._solve(row, sample, bearings, PROFILE_DEGREE, together=False)
+        self._solve(row, sample, bearings, CENTRAL_DEGREE, together=False)
 
     def add(self, row: int, sample: Sample | None = None) -> None:
         """What heats and cools a design, set by set, at its coefficients."""
         sets = [[bearing.name for bearing in group.bearing] for group in self.machine.spec.bearing_set]
-        self._solve(row, sample or self._first_sample(row), sets, 2, together=True)
+        self._solve(row, sample or self._first_sample(row), sets, DEGREE, together=True)
 
     def _solve(
         self, row: int, sample: Sample, groups: Sequence[Sequence[str]], degree: int, *, together: bool

@@ -82,20 +82,22 @@ class ReductionOptions:
 # Laplace frequencies, 1/s: steady state, hours, minutes, half a minute.
 SHIFTS = (0.0, 3.0e-4, 3.0e-3)
 FAST_SHIFT = 3.0e-2
+# Heat of one place that a diagnosis may find a source in, W.
 PLACE_HEAT = 50.0
+# Basis vectors from which first guesses are combined.
 GUESS_SIZE = 80
-# Of an error itself.
+# To this share an error is itself worked out.
 CHECK_TOLERANCE = 0.05
 # Steps of the series in the change of one contact that the basis holds, and the share of its conductance
 # that is left where all contacts of a group have opened.
 CONTACT_ORDERS, OPENED = 2, 0.05
-# Of the highest speed; the second is the nominal one.
+# Shares of the highest speed; the second is the nominal one.
 SPEED_SHARES = (0.0, 2.0 / 3.0, 0.25, 1.0, 0.45)
 
 
 @dataclass(frozen=True, slots=True)
-class _Workshop:
-    """What building the snapshots needs beside the operators."""
+class _Sampler:
+    """Draws sets of coefficients over the range of a machine's uncertain parameters and speeds."""
 
     machine: PreparedMachine
     full: MeshModel
@@ -105,7 +107,7 @@ class _Workshop:
 
     @property
     def usual_speed(self) -> float:
-        """Of the nominal coefficients, rad/s."""
+        """Speed of the nominal coefficients, rad/s."""
         return SPEED_SHARES[1] * self.options.highest_speed_of(self.machine.spec)
 
     def sample(self, factors: Mapping[str, float], speed: float) -> Sample:
@@ -237,16 +239,16 @@ def build_reduced_model(
     progress("reduced model: operators")
     full = build_mesh_model(machine)
     table = build_coefficient_table(spec, full.contacts, full.gap_radii)
-    workshop = _Workshop(machine, full, table, free_parameters(spec), chosen)
-    nominal = workshop.sample({}, workshop.usual_speed)
+    sampler = _Sampler(machine, full, table, free_parameters(spec), chosen)
+    nominal = sampler.sample({}, sampler.usual_speed)
     progress("reduced model: snapshots")
     energy = (
         full.conduction(nominal.coefficients, nominal.channel_film) + 1e-4 * full.capacity(nominal.capacities)
     ).tocsr()
     space = SnapshotSpace(energy, full.one[:, None], chosen.tolerance)
     _add_nominal(space, full, nominal, spec)
-    opened = [workshop.sample({f"joint.{group.name}": OPENED}, workshop.usual_speed) for group in spec.joint]
-    for sample in (*opened, *workshop.random_samples(chosen.samples, 1, chosen.sigmas)):
+    opened = [sampler.sample({f"joint.{group.name}": OPENED}, sampler.usual_speed) for group in spec.joint]
+    for sample in (*opened, *sampler.random_samples(chosen.samples, 1, chosen.sigmas)):
         # Fields at other coefficients begin as the best combination of those known.
         known = space.basis(GUESS_SIZE)
         loads = physical_loads(full, sample, spec)
@@ -258,13 +260,13 @@ def build_reduced_model(
         basis = space.basis(chosen.largest + 30 * attempt)
         model = replace(
             project(full, basis, basis.T @ (energy @ full.one)),
-            ranges=workshop.ranges(),
+            ranges=sampler.ranges(),
             digest=reduced_digest(spec, chosen.key(spec)),
         )
         progress("reduced model: check")
         worst: dict[str, float] = {}
         # Solutions that have joined can no longer judge: every round draws others.
-        for sample in workshop.random_samples(chosen.checks, seed, 0.9 * chosen.sigmas):
+        for sample in sampler.random_samples(chosen.checks, seed, 0.9 * chosen.sigmas):
             found = _check(full, basis, sample, spec)
             worst = {key: max(value, worst.get(key, 0.0)) for key, value in found.errors.items()}
             if found.errors["probes"] > chosen.error:

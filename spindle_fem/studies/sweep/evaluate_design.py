@@ -40,7 +40,7 @@ from spindle_fem.studies.sweep.designs import Design
 from spindle_fem.studies.sweep.morphing import lattice_assembly, move_mesh, moved_digest
 from spindle_fem.studies.sweep.outputs import derived_values, value_of
 from spindle_fem.studies.sweep.results_table import FAILED, FULL, IMPOSSIBLE, MOVED, NEW, OK, Row
-from spindle_fem.studies.sweep.structure import refusal, structure_digest
+from spindle_fem.studies.sweep.structure import refusal, structure_digest, without_marks
 
 LOGGER = logging.getLogger(__name__)
 
@@ -145,11 +145,11 @@ class TaskBuilder:
         except SpecError as error:
             return self._impossible(design, error)
         dump = spec.model_dump(mode="json", by_alias=True, exclude_none=True)
-        shape = _digest(_without_marks({key: dump.get(key) for key in _SHAPING}))
+        shape = _digest(without_marks({key: dump.get(key) for key in _SHAPING}))
         if shape not in self._geometries:
             self._geometries[shape] = _examine_geometry(spec, self._question.mesh)
         found = self._geometries[shape]
-        machine = _without_marks({key: value for key, value in dump.items() if key not in _NOT_IN_KEY})
+        machine = without_marks({key: value for key, value in dump.items() if key not in _NOT_IN_KEY})
         key = self._key(machine)
         if found.reason:
             return DesignTask(design, key, None, "", found.reason)
@@ -201,12 +201,6 @@ def _digest(content: Any) -> str:
     return hashlib.sha256(
         json.dumps(content, sort_keys=True, separators=(",", ":"), default=str).encode()
     ).hexdigest()
-
-
-def _without_marks(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _without_marks(item) for key, item in value.items() if key != "marks"}
-    return [_without_marks(item) for item in value] if isinstance(value, list) else value
 
 
 def reason_of(error: BaseException) -> str:

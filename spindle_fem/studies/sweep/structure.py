@@ -36,7 +36,7 @@ def structure_digest(dump: Mapping[str, Any]) -> str:
             kept[table] = [_without(item, keys) for item in kept[table]]
     materials = kept.get("materials", {})
     kept["materials"] = {name: _without(item, _FREE_OF_MATERIALS) for name, item in materials.items()}
-    text = json.dumps(_without_marks(kept), sort_keys=True, default=str)
+    text = json.dumps(without_marks(kept), sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -44,10 +44,11 @@ def _without(table: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     return {name: value for name, value in table.items() if name not in keys}
 
 
-def _without_marks(value: Any) -> Any:
+def without_marks(value: Any) -> Any:
+    """Content of a definition without its ``marks``, at every depth."""
     if isinstance(value, Mapping):
-        return {key: _without_marks(item) for key, item in value.items() if key != "marks"}
-    return [_without_marks(item) for item in value] if isinstance(value, list) else value
+        return {key: without_marks(item) for key, item in value.items() if key != "marks"}
+    return [without_marks(item) for item in value] if isinstance(value, list) else value
 
 
 def refusal(spec: MachineSpec) -> str:
