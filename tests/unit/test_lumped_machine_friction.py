@@ -10,11 +10,12 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import NoSteadyStateError
 from spindle_fem.model.lumped.ball_contacts import BallContactLaw
-from spindle_fem.model.lumped.friction_table import film_temperature, tabulate_friction
+from spindle_fem.model.lumped.friction_table import tabulate_friction
 from spindle_fem.model.lumped.machine_balance import SparseBalance
 from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.model.lumped.operating_state import operate
 from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of
+from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
 
@@ -71,7 +72,8 @@ def test_tables_stand_for_the_heat_model(friction_machine):
     state = solve_machine_network(network, point, heat_model=model)
     exact, _ = model(point, state.bearing_temperatures())
     for name, heat in exact.items():
-        kelvin = film_temperature(state.bearing_temperatures()[name])
+        around = state.bearing_temperatures()[name]
+        kelvin = float(film_temperature(around.inner, around.outer, around.ball))
         assert tables.at(name, kelvin).total == pytest.approx(heat.total, rel=1e-4)
         assert tables.at(name, kelvin).conductance_inner == pytest.approx(heat.conductance_inner, rel=1e-4)
         assert state.network.friction_heat(state.temperature)[name] == pytest.approx(heat.total, rel=1e-4)

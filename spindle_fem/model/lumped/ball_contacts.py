@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline
 
 from spindle_fem.model.lumped.heat_laws import FrictionLaw, Triplets
 
@@ -32,7 +32,7 @@ class ContactFaces:
         Of the bearing's heat, given to the face.
     conductance : float, [W/K]
         That links and heat shares of the network were made with.
-    table : CubicSpline
+    table : CubicHermiteSpline
         Conductance (W/K) over film temperature (K), all raceways at the same temperatures.
     """
 
@@ -43,7 +43,7 @@ class ContactFaces:
     resistance: Array
     heat_share: Array
     conductance: float
-    table: CubicSpline
+    table: CubicHermiteSpline
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,17 +7,18 @@ stands for them in every Newton step and time step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.interpolate import CubicHermiteSpline
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
-from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures, FilmCurves, HeatModel
+from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures, HeatModel
+from spindle_fem.operation.friction_map import FilmSeries, chebyshev_nodes
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
 
@@ -26,10 +27,11 @@ Array = NDArray[np.float64]
 TABLES_KEPT = 256
 # About the ambient temperature, K; heat bends most in cold grease.
 HEAT_RANGE = (-15.0, 120.0)
+# Exact states of a table: with 19 the heat between them is right to 1e-5.
 HEAT_POINTS = 19
 FEWEST_HEAT_POINTS = 4
-# Pieces of the cubic that stands for the logarithmic spline between two exact states.
-PIECES = 4
+# Cubic pieces that stand for the polynomials.
+PIECES = 4 * (HEAT_POINTS - 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +41,12 @@ class FrictionTables:
     Attributes
     ----------
     heat : mapping of bearing to CubicHermiteSpline, [W] over [K]
-    conductance : mapping of bearing to (inner, outer) CubicSpline, [W/K] over [K]
+    conductance : mapping of bearing to (inner, outer) CubicHermiteSpline, [W/K] over [K]
         Between raceway and balls.
     """
 
     heat: Mapping[str, CubicHermiteSpline]
-    conductance: Mapping[str, tuple[CubicSpline, CubicSpline]]
+    conductance: Mapping[str, tuple[CubicHermiteSpline, CubicHermiteSpline]]
 
     def at(self, name: str, film_temperature: float) -> BearingHeat:
         """Heat and contacts of a bearing, from the nearest end where a film (K) is beyond the table."""
@@ -58,11 +60,6 @@ class FrictionTables:
 _REMEMBERED: WeakKeyDictionary[BearingMechanics, dict[tuple[float, float, float], FrictionTables]] = (
     WeakKeyDictionary()
 )
-
-
-def film_temperature(around: BearingTemperatures) -> float:
-    """A quarter of each raceway's and half of the balls', K."""
-    return 0.25 * (around.inner + around.outer) + 0.5 * around.ball
 
 
 def tabulate_friction(
@@ -89,68 +86,87 @@ def tabulate_friction(
 
 
 def _tables(spec: MachineSpec, point: OperatingPoint, heat_model: HeatModel, base: float) -> FrictionTables:
-    temperatures = np.linspace(base + HEAT_RANGE[0], base + HEAT_RANGE[1], HEAT_POINTS)
-    curves = _curves(spec, point, heat_model, temperatures)
+    """Cubic pieces through the series of heat and conductances over film temperature."""
+    names = tuple(bearing.name for _, bearing in spec.bearings)
+    kelvin, values = _states(point, heat_model, names, base + HEAT_RANGE[0], base + HEAT_RANGE[1])
+    ends = kelvin[0], kelvin[-1]
+    # The logarithm of the heat bends least; at standstill there is no heat.
+    logarithmic = bool(np.all(values[:, 0] > 0.0))
+    if logarithmic:
+        values[:, 0] = np.log(values[:, 0])
+    series = FilmSeries.through(kelvin, values, *ends)
+    at = np.linspace(*ends, PIECES + 1)
+    films = np.tile(at, (len(names), 1))
+    found, slope = series.at(films), series.slope(films)
+    if logarithmic:
+        found[:, 0] = np.exp(found[:, 0])
+        slope[:, 0] *= found[:, 0]
+    curves = [
+        [CubicHermiteSpline(at, *pair) for pair in zip(*own, strict=True)]
+        for own in zip(found, slope, strict=True)
+    ]
     return FrictionTables(
-        {name: _heat_spline(curve) for name, curve in curves.items()},
-        {
-            name: (
-                CubicSpline(curve.temperature, curve.conductance_inner),
-                CubicSpline(curve.temperature, curve.conductance_outer),
-            )
-            for name, curve in curves.items()
-        },
+        {name: heat for name, (heat, _, _) in zip(names, curves, strict=True)},
+        {name: (inner, outer) for name, (_, inner, outer) in zip(names, curves, strict=True)},
     )
 
 
-def _heat_spline(curve: FilmCurves) -> CubicHermiteSpline:
-    """Spline of the logarithm, which bends least, as cubic pieces."""
-    steps = len(curve.temperature) - 1
-    kelvin = np.interp(np.arange(PIECES * steps + 1) / PIECES, np.arange(steps + 1), curve.temperature)
-    if np.all(curve.heat > 0.0):
-        logarithm = CubicSpline(curve.temperature, np.log(curve.heat))
-        heat = np.exp(logarithm(kelvin))
-        return CubicHermiteSpline(kelvin, heat, heat * logarithm(kelvin, 1))
-    plain = CubicSpline(curve.temperature, curve.heat)
-    return CubicHermiteSpline(kelvin, plain(kelvin), plain(kelvin, 1))
+def _states(
+    point: OperatingPoint, heat_model: HeatModel, names: Sequence[str], low: float, high: float
+) -> tuple[Array, Array]:
+    """Exact heat and conductances at Chebyshev points of the part of a range where the grease is known.
 
+    Returns
+    -------
+    (m,) ndarray, [K]
+        Both ends among them.
+    (n_bearings, 3, m) ndarray
+        Heat [W], conductance to the inner and to the outer raceway [W/K].
 
-def _curves(
-    spec: MachineSpec, point: OperatingPoint, heat_model: HeatModel, temperatures: Array
-) -> Mapping[str, FilmCurves]:
+    Raises
+    ------
+    OutOfValidityError
+        The grease is known at too few of the temperatures.
+    """
     if isinstance(heat_model, BearingMechanics):
-        known = [value for value in temperatures.tolist() if heat_model.knows(value)]
+        asked = np.linspace(low, high, HEAT_POINTS)
+        known = [value for value in asked.tolist() if heat_model.knows(value)]
         if len(known) >= FEWEST_HEAT_POINTS:
+            kelvin = chebyshev_nodes(known[0], known[-1], HEAT_POINTS, ends=True)
             try:
-                return heat_model.over_film_temperature(point, known)
+                curves = heat_model.over_film_temperature(point, kelvin.tolist())
             except NoEquilibriumError:
-                # one state that is hard to reach stops all of them; alone each has its own way
+                # One state that is hard to reach stops all of them; alone each has its own way.
                 pass
-    return _one_by_one(spec, point, heat_model, temperatures)
+            else:
+                rows = [(c.heat, c.conductance_inner, c.conductance_outer) for c in map(curves.get, names)]
+                return kelvin, np.nan_to_num(np.array(rows))
+    kelvin = chebyshev_nodes(low, high, HEAT_POINTS, ends=True)
+    known, values = _one_by_one(point, heat_model, names, kelvin)
+    if len(known) < len(kelvin):
+        # Beyond the grease's own range the law ends: points of the part that is known.
+        kelvin = chebyshev_nodes(known[0], known[-1], HEAT_POINTS, ends=True)
+        _, values = _one_by_one(point, heat_model, names, kelvin)
+    return kelvin, values
 
 
 def _one_by_one(
-    spec: MachineSpec, point: OperatingPoint, heat_model: HeatModel, temperatures: Array
-) -> Mapping[str, FilmCurves]:
-    names = [bearing.name for _, bearing in spec.bearings]
+    point: OperatingPoint, heat_model: HeatModel, names: Sequence[str], temperatures: Array
+) -> tuple[list[float], Array]:
+    """Those of some temperatures that a heat model knows, and its states there, (n_bearings, 3, m)."""
     known: list[float] = []
-    values: dict[str, list[tuple[float, float, float]]] = {name: [] for name in names}
+    states: list[list[tuple[float, float, float]]] = []
     refused: OutOfValidityError | None = None
     for temperature in temperatures.tolist():
         around = {name: BearingTemperatures(*(temperature,) * 5) for name in names}
         try:
             heats, _ = heat_model(point, around)
         except OutOfValidityError as error:
-            # beyond the grease's own range the law ends; a state out there is refused by name
             refused = error
             continue
         known.append(temperature)
-        for name in names:
-            heat = heats[name]
-            values[name].append((heat.total, heat.conductance_inner, heat.conductance_outer))
+        own = [heats[name] for name in names]
+        states.append([(heat.total, heat.conductance_inner, heat.conductance_outer) for heat in own])
     if len(known) < FEWEST_HEAT_POINTS:
         raise refused
-    return {
-        name: FilmCurves(np.array(known), *(np.nan_to_num(column) for column in np.array(rows).T))
-        for name, rows in values.items()
-    }
+    return known, np.nan_to_num(np.array(states)).transpose(1, 2, 0)

@@ -12,11 +12,12 @@ from scipy.interpolate import RectBivariateSpline
 
 from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.model.lumped.ball_contacts import BallContactLaw, ContactFaces
-from spindle_fem.model.lumped.friction_table import FrictionTables, film_temperature
+from spindle_fem.model.lumped.friction_table import FrictionTables
 from spindle_fem.model.lumped.heat_laws import CoolantLaw, FrictionLaw, WallFilmLaw, faces_by_cell
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.coefficients import ball_conductances, film_coefficient, gap_coefficient
+from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -149,7 +150,8 @@ def operate(
     if friction is None:
         heats, _ = heat_model(point, around)
     else:
-        heats = {name: friction.at(name, film_temperature(around[name])) for name in names}
+        films = {name: film_temperature(at.inner, at.outer, at.ball) for name, at in around.items()}
+        heats = {name: friction.at(name, float(films[name])) for name in names}
     boundaries: dict[str, float] = {"ambient": ambient}
     links: list[tuple[NDArray, NDArray, Array, str]] = [
         (machine.links.first, machine.links.second, machine.links.conductance, "solid")
