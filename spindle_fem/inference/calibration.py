@@ -25,6 +25,7 @@ Progress = Callable[[str], None]
 
 # Largest departure of a parameter from its prior, in the prior's standard deviations.
 BOUND_SIGMAS = 3.0
+# Probability of stated intervals.
 LEVEL = 0.90
 # A posterior narrower than this share of the prior was told something by the data.
 LEARNED_BELOW = 0.8

@@ -24,6 +24,7 @@ from spindle_fem.operation.term_memory import remembered
 
 Array = NDArray[np.float64]
 
+# Candidates whose answers are marched together, which bounds the memory of one march.
 CHUNK = 256
 
 

@@ -12,6 +12,7 @@ from spindle_fem.effects.framework.effect import Candidate, Reported, in_interva
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
+from spindle_fem.inference.calibration import LEVEL
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.hypothesis_fit import Fit
@@ -20,7 +21,7 @@ from spindle_fem.inference.verdict import Ranked
 
 Array = NDArray[np.float64]
 
-LEVEL = 0.90
+# Draws of the posterior from which intervals are read.
 DRAWS = 400
 
 

@@ -43,12 +43,15 @@ Progress = Callable[[str], None]
 OFF, AUTO, COARSE, OWN = "off", "auto", "coarse", "own"
 CHOICES = (AUTO, OFF, COARSE, OWN)
 COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
-# A coarse mesh is not as good as the best sensors, and loads must follow the field even for the worst, K.
+# Noise of the quietest channel [K] counts within these: a coarse mesh is not as good as the best sensors, and
+# loads must follow the field even for the worst.
 QUIETEST, LOUDEST = 0.02, 0.2
+# First step of a run, s, and change of films that makes a new matrix, as a share.
 FIRST_STEP = 30.0
 COEFFICIENT_TOLERANCE = 5.0e-3
 # Most time steps of a fit that is run unasked: it then takes about as long as the search.
 MOST_STEPS = 800
+# Further steps that a jump of an input costs.
 STEPS_AFTER_JUMP = 3
 
 #: What the reduced model adds to its readings to first order: places of probes, and what gaps hide.

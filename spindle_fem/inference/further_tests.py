@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.inference.coordinate_names import NO_VALUES, OF_ONE_RECORDING
 from spindle_fem.inference.hypothesis_fit import Fit
@@ -21,11 +22,14 @@ from spindle_fem.model.reduced.run_start import Start
 Array = NDArray[np.float64]
 
 MINUTE = 60.0
+# Longest step of a simulated test, s: tests are compared between hypotheses, not with readings.
 TEST_STEP = 120.0
+# A held level lasts as long as a spindle needs to come near its steady state, s; standstill before it.
 HOLD = 60.0 * MINUTE
 REST = 10.0 * MINUTE
+# Change of the room's or the coolant's temperature that a workshop can make, K.
 TEMPERATURE_STEP = 5.0
-RPM = np.pi / 30.0
+# Name of the test that repeats the recorded operation.
 AGAIN = "the same operation again"
 
 

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 # Whitened residuals beyond this count linearly.
 OUTLIER_SIGMAS = 3.0
+# Steps of a fit at most.
 MOST_ITERATIONS = 30
 # An exact fit ends with a step that lowers the misfit by less than this share: rounding comes next.
 EXACT_SHARE = 1.0e-8

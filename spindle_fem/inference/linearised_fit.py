@@ -14,7 +14,7 @@ from spindle_fem.inference.hypothesis_fit import OUTLIER_SIGMAS, Fit, Problem
 
 Array = NDArray[np.float64]
 
-# In standard deviations.
+# Distance from a bound within which a coordinate is at it, in standard deviations of its prior.
 NEAR = 1e-6
 
 
@@ -22,7 +22,7 @@ def _pressed(fit: Fit, downhill: Array) -> NDArray[np.bool_]:
     """Coordinates at a bound that the data would have beyond it."""
     low = np.array([c.low for c in fit.coordinates])
     high = np.array([c.high for c in fit.coordinates])
-    near = 1e-6 * np.maximum(1.0, np.abs(fit.position))
+    near = NEAR * np.maximum(1.0, np.abs(fit.position))
     return ((fit.position <= low + near) & (downhill < 0.0)) | (
         (fit.position >= high - near) & (downhill > 0.0)
     )

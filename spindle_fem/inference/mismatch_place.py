@@ -28,9 +28,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Places are listed until so much of the probability is told.
+# Places are listed until they hold this probability together.
 CREDIBLE = 0.95
+# A mean residual, or heat, counts beyond this many standard errors.
 SIGNIFICANT_SIGMAS = 3.0
+# Residuals are averaged over a window of this length at least, s, and of a sixtieth of the recording.
 SHORTEST_WINDOW = 600.0
 WINDOWS_A_RECORDING = 60
 

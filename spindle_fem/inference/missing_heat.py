@@ -29,9 +29,9 @@ from spindle_fem.inference.worker_processes import Workers
 
 Array = NDArray[np.float64]
 
-# Answers that are marched together.
+# Answers that are marched together, which bounds the memory of one march.
 COLUMNS = 320
-# Moves of edges that gain less (natural logarithm) are none.
+# An edge of an interval is moved where that gains more than rounding (natural logarithm).
 SMALLEST_SETTLING = 1e-6
 
 

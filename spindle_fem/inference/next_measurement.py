@@ -44,10 +44,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Explanations that a test is to tell apart, the most probable ones.
 MOST_HYPOTHESES = 3
+# Distance of the instants at which tests are compared, s, and their number at least and at most.
 SPACING = 300.0
 FEWEST_INSTANTS, MOST_INSTANTS = 12, 48
-# Options that tell nearly as much as the best are worth as much; the simplest of them is proposed.
+# Options with this share of the best one's information are worth as much; the simplest of them is proposed.
 AS_GOOD = 0.9
 # A test that is expected to tell less than this, bits, does not separate the explanations.
 HARDLY = 0.3

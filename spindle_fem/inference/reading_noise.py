@@ -19,8 +19,10 @@ from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
 
+# Shortest bin over which readings are averaged, s, and most bins of a recording by default.
 SHORTEST_BIN = 60.0
 MOST_BINS = 500
+# Most bins that are whitened by a Cholesky factor, whose cost grows with the cube of their number.
 MOST_DENSE = 700
 
 
