@@ -197,11 +197,11 @@ def test_kept_coefficients_cost_little(quick):
 def test_restart_from_a_saved_state(quick, tmp_path):
     """Saved, read back and gone on: the same end as without the break."""
     names = {"speed": 1500 * RPM, "thrust": 1750.0}
-    whole = simulate_full(quick, held([0.0, 1800.0], **names), breakpoints=[900.0])
-    first = simulate_full(quick, held([0.0, 900.0], **names))
+    whole = simulate_full(quick, held([0.0, 600.0], **names), breakpoints=[300.0])
+    first = simulate_full(quick, held([0.0, 300.0], **names))
     first.state.save(tmp_path / "state.npz")
     second = simulate_full(
-        quick, held([900.0, 1800.0], **names), start=ThermalState.load(tmp_path / "state.npz")
+        quick, held([300.0, 600.0], **names), start=ThermalState.load(tmp_path / "state.npz")
     )
     assert np.abs(second.state.temperature - whole.state.temperature).max() < 5e-3
     total = first.energy + second.energy
@@ -244,7 +244,7 @@ def test_what_terms_remember_is_saved_with_the_state(quick, tmp_path):
 
 def test_a_steady_start_holds_what_terms_remember_then(quick):
     """Nothing moves: all of the heat has been there for long."""
-    run = run_study(quick, of_phase("20 min", start="steady"), physics=Physics((Lagging(),)))
+    run = run_study(quick, of_phase("10 min", start="steady"), physics=Physics((Lagging(),)))
     assert run.memory == pytest.approx(1.0, abs=1e-9)
     assert np.ptp(run.joined("readings"), axis=0).max() < 1e-4
 
@@ -258,10 +258,10 @@ def test_state_of_another_mesh_is_refused(quick):
 # -------------------------------------------------------------------- inputs
 def test_jump_is_right_continuous(quick):
     """Heat before a jump of the speed is the old one's, after it the new one's."""
-    times = [0.0, 600.0, 1200.0]
+    times = [0.0, 300.0, 600.0]
     run = simulate_full(quick, held(times, speed=np.array([0.0, 3000.0, 3000.0]) * RPM))
-    before = run.steps.times <= 600.0
-    assert 600.0 in run.steps.times
+    before = run.steps.times <= 300.0
+    assert 300.0 in run.steps.times
     assert np.all(run.steps.bearing_heat[before] == 0.0)
     assert np.allclose(run.steps.bearing_heat[~before].sum(axis=1), 620.0)
     sizes = run.steps.sizes[~before]

@@ -26,7 +26,6 @@ from spindle_fem.solvers.machine_transient import TransientOptions, simulate_ful
 from spindle_fem.solvers.mesh_terms import Physics, steady_physics, with_capacity, with_factors
 from spindle_fem.solvers.readings import ReadingRows
 
-SMALL = ["mesh.preset=coarse", "mesh.order=1"]
 RPM = np.pi / 30.0
 HOUR = 3600.0
 LITRE_PER_MINUTE = 1e-3 / 60.0

@@ -55,7 +55,6 @@ channel = [
 {column = "n", role = "input", drives = "speed", unit = "rpm", hold = "previous"},
 ]
 """
-NODES = ("winding", "bearing", "body")
 SPREADS = {
     "winding": ("C", 400.0, 0.1),
     "bearing": ("C", 250.0, 0.1),
