@@ -94,7 +94,7 @@ def test_coolant_is_booked_by_its_own_enthalpy(quick, monkeypatch):
         run, "coolant_heat", lambda stages, step: tuple(1.000001 * h for h in true(stages, step))
     )
     with pytest.raises(EnergyBalanceError, match="coolant included"):
-        simulate_full(quick, held([0.0, 600.0], speed=3000 * RPM))
+        simulate_full(quick, held([0.0, 60.0], speed=3000 * RPM))
 
 
 def test_energies_add_up():
