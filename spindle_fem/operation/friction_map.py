@@ -106,21 +106,6 @@ class FilmSeries:
         _, basis = self._basis(film)
         return (2.0 / (self.high - self.low)) * np.matmul(basis[:, :, : own.shape[1]], own).transpose(0, 2, 1)
 
-    def require(self, film: ArrayLike) -> None:
-        """Refuse film temperatures that the series was not made for.
-
-        Raises
-        ------
-        OutOfValidityError
-        """
-        values = np.asarray(film)
-        if values.min() < self.low or values.max() > self.high:
-            raise OutOfValidityError(
-                "friction map: film temperature",
-                f"{values.min():.6g} to {values.max():.6g} K is outside {self.low:.6g} to {self.high:.6g} K.",
-                "Tabulate the friction over a range that holds it.",
-            )
-
     def _basis(self, film: NDArray) -> tuple[NDArray, Array]:
         """What films are beyond the range in its half widths (n_bearings, k), and polynomials inside."""
         scaled = (2.0 * film - self.low - self.high) / (self.high - self.low)

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spindle_fem.definition.load import load_machine
-from spindle_fem.errors import OutOfValidityError
 from spindle_fem.model.reduced.coolant_batch import ChannelBatch, pressure_drops
 from spindle_fem.model.reduced.heat_tables import (
     QUANTITIES,
@@ -36,12 +35,14 @@ def test_tables_are_exact_for_polynomials(coefficients, place):
     assert by_complex_step[0, 0, 0] == pytest.approx(polynomial.deriv()(place), abs=1e-9)
 
 
-def test_a_film_outside_its_series_is_refused_where_asked():
+def test_a_series_of_one_state_is_constant_and_others_go_on_along_their_tangent():
     series = FilmSeries.through(np.array([300.0]), np.ones((1, 1, 1)), 280.0, 320.0)
-    series.require([280.0, 320.0])
     assert series.at(np.array([[300.0, 310.0]])).tolist() == [[[1.0, 1.0]]]
-    with pytest.raises(OutOfValidityError, match="film temperature: 270 to 300 K is outside 280 to 320 K"):
-        series.require([270.0, 300.0])
+    nodes = chebyshev_nodes(280.0, 320.0, 3)
+    parabola = FilmSeries.through(nodes, ((nodes - 280.0) ** 2)[None, None], 280.0, 320.0)
+    assert parabola.at(np.array([[270.0, 330.0]]))[0, 0] == pytest.approx(
+        [0.0, 40.0**2 + 80.0 * 10.0], abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("model", ["palmgren", "full", "table"])
