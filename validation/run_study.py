@@ -14,6 +14,8 @@ import traceback
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
+from .draw import EVERY_EFFECT
+
 MACHINE = "recorded_spindle"
 
 
@@ -51,6 +53,13 @@ def outstanding(inputs: Path, results: Path, only: list[str] | None) -> list[str
     return [n for n in wanted if not (results / n / "timing.json").exists()]
 
 
+def not_concealed() -> list[str]:
+    """Effects of the catalogue that no case conceals, so that a study says nothing of them."""
+    from spindle_fem.effects.registry import catalogue
+
+    return sorted(set(catalogue()) - set(EVERY_EFFECT))
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(
@@ -69,7 +78,8 @@ def main(arguments: list[str] | None = None) -> None:
     inputs = given.study / "inputs"
     names = outstanding(inputs, given.results, given.case)
     overrides = (f"mesh.preset={given.mesh}",)
-    print(f"{len(names)} cases to diagnose", flush=True)
+    left_out = ", ".join(not_concealed()) or "no effect"
+    print(f"{len(names)} cases to diagnose; concealed in none: {left_out}", flush=True)
     if not names:
         return
     # The first case alone: it builds the fast model that all others then read from the cache.

@@ -4,12 +4,14 @@ import json
 import numpy as np
 import pytest
 
+from spindle_fem.effects.registry import catalogue
 from validation.cycles import draw_drive
-from validation.draw import EVERY_EFFECT
+from validation.draw import EVERY_EFFECT, FOREIGN_EFFECTS
 from validation.generate import choose_effects, judge, make_case
 from validation.laws import Intervals, Sensor, Starvation, first_order
 from validation.recorder import Noise, record, slow_error
 from validation.reduction import load_reduced
+from validation.run_study import not_concealed
 from validation.score import changes_unseen, matches, score_case, summarise, undecidable
 from validation.stepping import Moment
 
@@ -291,3 +293,10 @@ def test_judgement_of_what_cannot_be_seen(reduced):
     clear = judge([effect], known, calibrated=True)
     assert clear["clear"]
     assert clear["acceptable_verdicts"] == ["missing_physics"]
+
+
+def test_a_study_says_which_effects_it_conceals_in_no_case():
+    known = set(catalogue())
+    left_out = set(not_concealed())
+    assert left_out == known - set(EVERY_EFFECT)
+    assert set(EVERY_EFFECT) - set(FOREIGN_EFFECTS) <= known
