@@ -55,7 +55,7 @@ class Channel(SpecModel):
     part: Name
     """The standing part that it is milled into."""
     inner_radius: PositiveLength
-    """Of the wall nearer to the axis."""
+    """Radius of the wall nearer to the axis."""
     depth: PositiveLength
     """Radial height of the section."""
     width: PositiveLength
@@ -63,7 +63,7 @@ class Channel(SpecModel):
     pitch: PositiveLength
     """Advance in one turn of one start."""
     turns: PositiveNumber
-    """Of each start; need not be whole."""
+    """Turns of each start; they need not be whole."""
     starts: Annotated[int, Field(ge=1, le=4, strict=True)] = 1
     """Channels side by side, evenly around the axis."""
     hand: Literal["right", "left"] = "right"
@@ -100,7 +100,7 @@ class Coolant(SpecModel):
     inlet_temperature: Temperature
     """Mixed, where the oil enters."""
     flow: VolumeFlow
-    """Of all starts together."""
+    """Volume flow of all starts together."""
     film_model: FilmModel = "helical"
     """Which correlation of the channel's film."""
     film_factor: UncertainNumber = Uncertain(1.0)
@@ -163,7 +163,7 @@ class ConstantFilm(SpecModel):
     coefficient: UncertainFilm
     """Convection and radiation together."""
     temperature: AmbientOrTemperature = "ambient"
-    """Of the surroundings."""
+    """Temperature of the surroundings."""
     name: Name | None = None
     """Needed where a shared factor applies."""
 
@@ -180,11 +180,11 @@ class NaturalFilm(SpecModel):
     orientation: Orientation = "horizontal_cylinder"
     """Which correlation of natural convection."""
     emissivity: Fraction = 0.9
-    """Of the surface, in large grey surroundings."""
+    """Emissivity of the surface, in large grey surroundings."""
     factor: UncertainNumber = Uncertain(1.0)
     """On the coefficient."""
     temperature: AmbientOrTemperature = "ambient"
-    """Of the surroundings."""
+    """Temperature of the surroundings."""
     name: Name | None = None
     """Needed where a shared factor applies."""
 
@@ -199,13 +199,13 @@ class RotatingFilm(SpecModel):
     correlation: RotatingCorrelation = "becker"
     """How the coefficient follows from the speed."""
     diameter: PositiveLength
-    """Of the Reynolds and Nusselt numbers."""
+    """Diameter in the Reynolds and Nusselt numbers."""
     minimum: FilmCoefficient
     """Floor, the coefficient at rest."""
     factor: UncertainNumber = Uncertain(1.0)
     """On the coefficient."""
     temperature: AmbientOrTemperature = "ambient"
-    """Of the surroundings."""
+    """Temperature of the surroundings."""
     name: Name | None = None
     """Needed where a shared factor applies."""
 
@@ -235,7 +235,7 @@ class Gap(SpecModel):
     reference_speed: ReferenceSpeed = 314.159265359
     """3000 rpm where none is given."""
     exponent: PositiveNumber = 0.75
-    """Of the relative speed."""
+    """Exponent of the relative speed."""
     factor: UncertainNumber = Uncertain(1.0)
     """On the coefficient."""
 

@@ -73,11 +73,11 @@ class Operation(SpecModel):
     """Steady operating point."""
 
     speed: RotationalSpeed
-    """Of the shaft."""
+    """Speed of the shaft."""
     thrust: Force
     """External axial force on the shaft, positive towards the rear."""
     ambient_temperature: Temperature
-    """Of the air around the machine."""
+    """Temperature of the air around the machine."""
 
 
 class HeatTable(SpecModel):
@@ -200,7 +200,7 @@ class MeshSettings(SpecModel):
     preset: Literal["coarse", "normal", "fine"] = "normal"
     """Fineness."""
     order: Literal[1, 2] = 2
-    """Of the temperature's polynomials."""
+    """Order of the temperature's polynomials."""
     size_factor: SizeFactor = 1.0
     """On every element size of the preset."""
     size: dict[str, PositiveLength] = Field(default_factory=dict)

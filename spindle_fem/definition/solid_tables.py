@@ -113,11 +113,11 @@ class BearingType(SpecModel):
     kind: BearingKind = "angular_contact_ball"
     """Kind of bearing, for the empirical friction models."""
     bore_diameter: PositiveLength
-    """Of the inner ring."""
+    """Bore of the inner ring."""
     outer_diameter: PositiveLength
-    """Of the outer ring."""
+    """Outside of the outer ring."""
     width: PositiveLength
-    """Of both rings."""
+    """Width of both rings."""
     inner_ring_outer_diameter: PositiveLength
     """Cylinder that stands for the inner ring's outside, where its heat enters."""
     outer_ring_inner_diameter: PositiveLength
@@ -141,9 +141,9 @@ class BearingType(SpecModel):
     ball_material: Name
     """A key of `[materials]`."""
     young_modulus: Pressure = 206.0e9
-    """Of rings and balls."""
+    """Young's modulus of rings and balls."""
     poisson_ratio: PoissonRatio = 0.3
-    """Of rings and balls."""
+    """Poisson's ratio of rings and balls."""
     roughness_raceway: PositiveLength = 0.05e-6
     """Root mean square (Rq)."""
     roughness_ball: PositiveLength = 0.01e-6
@@ -263,11 +263,11 @@ class Fit(SpecModel):
     """
 
     inner_interference: FitDiameter
-    """Of the inner rings on the shaft, on the diameter; negative: clearance."""
+    """Interference of the inner rings on the shaft, on the diameter; negative: clearance."""
     outer_clearance: FitDiameter
-    """Of the outer rings in the housing, on the diameter; negative: interference."""
+    """Clearance of the outer rings in the housing, on the diameter; negative: interference."""
     housing_outer_diameter: PositiveLength | None = None
-    """Of the wall around the outer rings; that of the part they sit in where none is given."""
+    """Outer diameter of the wall around the outer rings; that of the part they sit in where none is given."""
 
 
 class BearingSet(SpecModel):
@@ -321,7 +321,7 @@ class Grease(SpecModel):
     kinematic_viscosity_100: KinematicViscosity
     """Base oil at 100 °C."""
     base_oil_density: Density = 890.0
-    """Of the oil, lighter than the grease."""
+    """Density of the oil, lighter than the grease."""
     pressure_viscosity: PressureViscosity = 1.8e-8
     """Coefficient at ambient pressure."""
     path_fill: PathFill = 0.01
@@ -331,7 +331,7 @@ class Grease(SpecModel):
     wetted_share: Fraction | None = None
     """Share of the balls' surface in grease, half of it to each raceway; the fill where none is given."""
     thermal_conductivity: Conductivity = 0.14
-    """Of the base oil."""
+    """Thermal conductivity of the base oil."""
     temperature_limit: Temperature = 393.15
     """The grease is checked against it."""
     film_starvation: FilmStarvation = 1.0

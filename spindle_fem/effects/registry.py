@@ -22,7 +22,7 @@ from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.units import to_si
 
 Owner = TypeVar("Owner", Term, Reading)
-# Of a channel without flow: any range does, as film laws leave such a channel alone.
+# Reynolds numbers of a channel without flow: any range does, as film laws leave such a channel alone.
 STANDING_REYNOLDS = (100.0, 1000.0)
 
 

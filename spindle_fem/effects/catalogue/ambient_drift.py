@@ -23,7 +23,7 @@ from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
 STEADY, RAMP, STEP, HUMP, WAVE = "steady drift", "ramp", "step", "hump", "wave"
 DAILY, YEARLY = "daily", "yearly"
 CYCLES = {DAILY: 86400.0, YEARLY: 365.25 * 86400.0}
-# Of a ramp's bends, s.
+# Width of a ramp's bends, s.
 BEND = 60.0
 
 

@@ -16,7 +16,7 @@ from spindle_fem.effects.framework.term import COOLANT_INLET, Term, TermContext
 
 SINE, SAWTOOTH = "sine", "sawtooth"
 PERIODS = (100.0, 3000.0)
-# Of the sawtooth's Fourier series: the share that each overtone keeps, which rounds its tip.
+# The sawtooth's Fourier series: share that each overtone keeps, which rounds its tip.
 SHARPNESS = 0.9
 # Its peak, arcsin of the sharpness, where a sine has 1.
 PEAK = float(np.arcsin(SHARPNESS))

@@ -31,7 +31,7 @@ class ReynoldsFilmTerm(Term, ABC):
         """Factor at a Reynolds number."""
 
     def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:
-        """Of the class's operating point."""
+        """Film factor at an operating point; none without flow."""
         if point.coolant_flow <= 0.0:
             return {}
         reynolds = self._channel.reynolds_number(point.coolant_flow, point.coolant_inlet_temperature)

@@ -54,7 +54,7 @@ class GapClosureTerm(Term):
         )
 
     def factor(self, context: TermContext) -> Complex:
-        """Of every seat, (n, k)."""
+        """Factor on the conductance of every seat, (n, k)."""
         closed = np.array([context.state[rings].mean(axis=0) for rings in self._closed_by])
         return rows(context, *(1.0 - context.parameters["opening"] * (1.0 - closed)))
 

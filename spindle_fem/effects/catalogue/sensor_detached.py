@@ -18,7 +18,7 @@ from spindle_fem.effects.framework.term import TermParameter
 LOOSE = "from the start"
 # Width of the edge with which it comes off, s, and 1 σ of its logarithm: a clamp opens, glue creeps.
 EDGE = (30.0, 1.0)
-# Of a small sensor in still air, s: about 4 g of steel on 5 cm² at 6 W/(m²K); and 1 σ of its logarithm.
+# Time constant of a small sensor in still air, s (4 g of steel on 5 cm² at 6 W/(m²K)); 1 σ of its logarithm.
 TIME_IN_AIR = (600.0, 0.8)
 
 
@@ -98,7 +98,7 @@ class SensorDetached(SensorEffect):
         }
 
     def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
-        """Of a channel."""
+        """Reading of a channel; the air has the reference temperature where no input tells it."""
         return DetachedReading(channel, name, parameters, self._ambient)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

@@ -14,7 +14,7 @@ from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.sensor import ChannelReading, Form, SensorEffect
 
 LATER = "from a time on"
-# Of the bend where a drift begins, s.
+# Width of the bend where a drift begins, s.
 BEND = 60.0
 
 

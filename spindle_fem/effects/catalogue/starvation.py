@@ -23,7 +23,7 @@ from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermContext
 
 ONSETS = 8
-# Of the friction change with the speed beyond the onset, before any data: value and standard deviation.
+# Growth of the friction change with the speed beyond the onset before any data: value and 1 σ.
 GROWTH = (0.0, 0.2)
 # Where a recording is all standstill.
 USUAL_SPEED = 3000.0 * RPM

@@ -34,7 +34,7 @@ class CoolingTerm(UnrecordedTerm):
         self._fluid = fluid
 
     def heat(self, context: TermContext) -> Complex:
-        """Of every place, (n, k) W."""
+        """Heat of every place, negative where it is taken away, (n, k) W."""
         size = context.parameters["conductance"] * self.on.share(context)
         fluid = fluid_temperature(context, self._fluid)
         if self.spread.sides:

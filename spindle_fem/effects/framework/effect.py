@@ -25,7 +25,7 @@ from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
-# Of a derivative by a complex argument: exact to rounding, as nothing is subtracted.
+# Imaginary step of a derivative by a complex argument: exact to rounding, as nothing is subtracted.
 COMPLEX_STEP = 1e-30
 Kind = Literal["missing_physics", "parameter", "sensor"]
 

@@ -12,7 +12,7 @@ from spindle_fem.effects.framework.term import Term, TermContext
 
 # Before any data: value and standard deviation.
 SHARE_BESIDE = (0.15, 0.15)
-# Of what runs in: heat beyond the lasting one when new, and its time constant with its logarithm's deviation.
+# What runs in: heat beyond the lasting one when new, and its time constant with its logarithm's deviation.
 RUN_IN, RUN_IN_TIME = (0.3, 0.3), (5000.0, 0.8)
 
 

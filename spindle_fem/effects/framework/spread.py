@@ -49,7 +49,7 @@ class Spread:
         return focus + tuple(linear(name, 0.0, 0.5 * UNEVEN, low=-1.0, high=1.0) for name in names)
 
     def shares(self, context: TermContext) -> Complex:
-        """Of heat at each place, the spot after them, (n, k); they sum to 1."""
+        """Share of the heat at each place, the spot after them, (n, k); they sum to 1."""
         focus = context.parameters["focus"] if self.spot else 0.0
         even = [(1.0 - focus) / len(self.places)] * len(self.places)
         return rows(context, *even, *([focus] if self.spot else ()))

@@ -19,7 +19,7 @@ from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuan
 from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
 
-# Of the edges where the lag is short, s.
+# Width of the edges where the lag is short, s.
 EDGE_WIDTH = 20.0
 # 1 σ of an edge that a search found, s, and of the factors that one interval has beside the common size.
 EDGE_SIGMA = 300.0
@@ -185,7 +185,7 @@ class UnrecordedHeatTerm(UnrecordedTerm):
         self._sign = sign
 
     def heat(self, context: TermContext) -> Complex:
-        """Of every place, (n, k) W."""
+        """Heat of every place, (n, k) W."""
         return self.spread.heat(context, self._sign * context.parameters["heat"] * self.on.share(context))
 
 

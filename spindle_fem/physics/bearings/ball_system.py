@@ -22,7 +22,7 @@ from spindle_fem.physics.bearings.rings import RingCompliance, RingLaw
 
 FloatArray = NDArray[np.float64]
 
-# Of the Newton method: residual below which an answer counts, and where iteration ends.
+# Newton method: residual below which an answer counts, and where iteration ends.
 _ACCEPTED = 1e-7
 _MOST_ITERATIONS = 60
 
