@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.inference.recording_gaps import GAP_STEPS
 from spindle_fem.model.reduced.drive import Drive, classes_of, covariate_columns, drive_of_recording
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
@@ -87,13 +87,13 @@ def _means(fine: Drive, grid: Array) -> Array:
     return means
 
 
-def even_drive(fast: NetworkFastModel, recording: Recording) -> Drive:
+def even_drive(fast: FastModel, recording: Recording) -> Drive:
     """Inputs of a network on equal steps of the recording's usual spacing, means over each step.
 
     The means keep the integral of every input; one length of step makes one
     matrix of the model.
     """
-    fine = fast.drive(recording, largest_step=np.inf)
+    fine = fast.inputs.drive(recording, largest_step=np.inf)
     begins = np.array([0, *fine.restarts])
     ends = np.array([*(begins[1:] - 1), len(fine.grid) - 1])
     inside = np.ones(len(fine.steps), dtype=bool)

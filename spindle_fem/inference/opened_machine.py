@@ -21,7 +21,7 @@ from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
@@ -42,7 +42,7 @@ class DiagnosedMachine:
     ----------
     name : str
     spec : MachineSpec or NetworkMachineSpec
-    fast : FastModel or NetworkFastModel
+    fast : FastModel or FastModel
     effects : ActiveEffects
         Effects of the definition: nominal, not diagnosed.
     view : MachineView
@@ -55,7 +55,7 @@ class DiagnosedMachine:
 
     name: str
     spec: MachineSpec | NetworkMachineSpec
-    fast: FastModel | NetworkFastModel
+    fast: FastModel
     effects: ActiveEffects
     view: MachineView
     recordings: tuple[Recording, ...]
@@ -65,7 +65,7 @@ class DiagnosedMachine:
     @property
     def is_network(self) -> bool:
         """Whether the machine has no geometry."""
-        return isinstance(self.fast, NetworkFastModel)
+        return self.fast.network is not None
 
 
 def open_machine(
@@ -119,7 +119,7 @@ def _open_network(
 ) -> DiagnosedMachine:
     spec = network_spec.load_network_machine(machine, overrides)
     network = build_network(spec.network)
-    fast = NetworkFastModel(network, spec)
+    fast = fast_network(network, spec)
     exponents = {
         name: float(power)
         for name, power in zip(network.source_input, network.source_exponent, strict=True)

@@ -38,7 +38,6 @@ from spindle_fem.inference.recording_gaps import (
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import Drive, drive_of_recording, inputs_at
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.operation.coefficient_table import INNER_SHARE
@@ -82,7 +81,7 @@ class Predictor:
 
     Parameters
     ----------
-    fast : FastModel or NetworkFastModel
+    fast : FastModel or FastModel
     recordings : sequence of Recording
     use : sequence of (N,) bool ndarray, optional
         Stamps that may be fitted, per recording; the rest is held out. All by default.
@@ -101,7 +100,7 @@ class Predictor:
 
     def __init__(
         self,
-        fast: FastModel | NetworkFastModel,
+        fast: FastModel,
         recordings: Sequence[Recording],
         use: Sequence[NDArray[np.bool_]] | None = None,
         effects: ActiveEffects = NO_EFFECTS,
@@ -115,10 +114,10 @@ class Predictor:
         self.same_within, self.step, self.at_stamps = same_within, step, at_stamps
         self.recordings = tuple(recordings)
         self.use = tuple(np.ones(r.times.size, dtype=bool) for r in recordings) if use is None else tuple(use)
-        self.is_network = isinstance(fast, NetworkFastModel)
+        self.is_network = fast.network is not None
         self.drives = tuple(self._drive(item) for item in self.recordings) if drives is None else drives
         left_open = not (self.is_network or at_stamps)
-        self._initial = [fast.initial_parameters(item) if self.is_network else () for item in self.recordings]
+        self._initial = [fast.inputs.initial_parameters(item) if self.is_network else () for item in self.recordings]
         self._jumps = [
             unseen_jumps(item, drive) if left_open else ()
             for item, drive in zip(self.recordings, self.drives, strict=True)
@@ -136,7 +135,7 @@ class Predictor:
     def _drive(self, recording: Recording) -> Drive:
         """Inputs of a recording, and the times at which its channels are told."""
         if self.at_stamps:
-            own = self.fast.drive(recording) if self.is_network else None
+            own = self.fast.inputs.drive(recording) if self.is_network else None
             return drive_of_recording(self.fast.spec, recording) if own is None else own
         if self.is_network:
             drive = even_drive(self.fast, recording)
@@ -231,7 +230,7 @@ class Predictor:
     ) -> float | Start:
         """Where a recording begins: a uniform temperature [K], or that of every node of a network."""
         if self.is_network:
-            return self.fast.start(
+            return self.fast.inputs.start(
                 self.recordings[number],
                 self.drives[number],
                 self._factors(number, values, (), ()),

@@ -21,7 +21,7 @@ from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.model.lumped.written_network import build_network, value_in_definition
 from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for, recentred_model
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import Comparison, compare
@@ -115,7 +115,7 @@ def _simulate_geometry(
     progress("simulation")
     predicted, half_width = _prediction(predictor, result)
     notes = [*predictor.drives[0].notes, *_effect_notes(effects)]
-    if fast.extra_terms:
+    if fast.inputs.extra_terms:
         what = (
             "ball contacts"
             if spec.heat.model == "table"
@@ -168,7 +168,7 @@ def _simulate_network(
 ) -> Simulation:
     spec = network_spec.load_network_machine(machine, overrides)
     network = build_network(spec.network)
-    fast = NetworkFastModel(network, spec)
+    fast = fast_network(network, spec)
     effects = effects_on(spec.effects, fast, recording)
     result, text = None, None
     if calibration:

@@ -4,7 +4,7 @@ import pytest
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.model.reduced.build_reduced import reduced_model_of
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.studies.solve_machine import solve_prepared
 
@@ -40,4 +40,4 @@ def small():
 @pytest.fixture(scope="session")
 def small_fast(small):
     """Its reduced model, which the cache keeps between workers and runs."""
-    return FastModel(reduced_model_of(small.spec), small.spec)
+    return fast_spindle(reduced_model_of(small.spec), small.spec)

@@ -13,7 +13,7 @@ from spindle_fem.inference import full_model_check as full_model
 from spindle_fem.inference.full_model_check import full_model_errors, inputs_of_drive, options_for, spec_on
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.build_view import view_of
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.report.diagnosis_full_model import full_model_sections
 from spindle_fem.solvers.machine_transient import simulate_full
@@ -54,7 +54,7 @@ def recorded_as(folder, temperatures):
 @pytest.mark.slow
 def test_the_full_model_confirms_what_was_found(tmp_path, monkeypatch):
     spec = load_machine("recorded_spindle")
-    fast = FastModel(lumped_model(spec), spec)
+    fast = fast_spindle(lumped_model(spec), spec)
     blank = recorded_as(tmp_path, np.full((TIMES.size, len(PROBES)), 20.0))
     view = view_of(fast.names, blank)
     lying = next(c for c in candidates_for(view) if (c.effect, c.component) == ("sensor_offset", "SP05"))

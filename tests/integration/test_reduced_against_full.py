@@ -112,7 +112,7 @@ def test_its_steady_state_is_that_of_the_coupled_full_model(machine, fast, speed
 def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(machine, fast, seats, factor):
     on_mesh, model = build_mesh_model(machine), fast.model
     point = replace(OperatingPoint.of(machine.spec), speed=3000.0 * RPM)
-    film = fast.channel_film(point, {})[0]
+    film = fast.channel.film(point, {})[0]
     raceways = [f"{name}.{side}_raceway" for name in fast.bearings for side in ("inner", "outer")]
     loads = 80.0 * sum(on_mesh.place(name) for name in raceways)
     reduced_loads = 80.0 * sum(model.place(name) for name in raceways)
@@ -134,7 +134,7 @@ def test_ring_spot_and_sides_stand_for_heat_on_a_part_of_the_housing(machine, fa
     on_mesh = build_mesh_model(machine)
     values = fast.table.base(point := OperatingPoint.of(machine.spec))
     capacity = on_mesh.capacity(fast.table.capacities())
-    conduction = on_mesh.conduction(values, fast.channel_film(point, {})[0])
+    conduction = on_mesh.conduction(values, fast.channel.film(point, {})[0])
     x, y, z = machine.operators.mesh.points[: on_mesh.n_unknowns].T
     on_top = (np.hypot(x, y) > 0.149) & (np.abs(np.arctan2(x, y)) < np.pi / 5) & (abs(z - 0.29) < 0.03)
     heat = np.zeros(on_mesh.size)

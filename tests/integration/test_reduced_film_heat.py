@@ -87,4 +87,4 @@ def test_simulate_takes_it_and_a_calibrated_machine_keeps_its_heat_model(spec, f
     written = load_machine(tmp_path / "out" / "calibrated_machine.toml")
     assert written.heat.model == "full"
     assert {group.ball_row.kind for group in written.bearing_set} == {"contact"}
-    assert isinstance(fast.extra_terms[0], FilmHeat)
+    assert isinstance(fast.inputs.extra_terms[0], FilmHeat)

@@ -18,7 +18,7 @@ from spindle_fem.inference.prepared_problem import (
 )
 from spindle_fem.inference.verdict import Judgement, Ranked
 from spindle_fem.machine.view.build_view import view_of
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording
 from tests.support.lumped_spindle import lumped_model
 
@@ -80,7 +80,7 @@ class Case:
             place_names=(*model.place_names, *(f"near.{name}" for name in model.probe_names)),
             places=np.vstack((model.places, model.probes)),
         )
-        self.fast = FastModel(model, self.spec)
+        self.fast = fast_spindle(model, self.spec)
         self.blank = written(folder, np.tile(20.0, (TIMES.size, len(PROBES))))
         self.view = view_of(self.fast.names, self.blank)
         self.candidates = {(c.effect, c.component): c for c in reversed(candidates_for(self.view))}

@@ -11,8 +11,8 @@ from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.drive import drive_of_recording
-from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
 from tests.support.lumped_spindle import lumped_model
@@ -103,7 +103,7 @@ def _spindle(folder):
         text += INPUT % (column, hold, drives, unit)
     recording = _written(folder, "spindle", columns, text)
     spec = load_machine("recorded_spindle")
-    fast = FastModel(lumped_model(spec), spec)
+    fast = fast_spindle(lumped_model(spec), spec)
     return fast, recording, view_of(fast.names, recording), drive_of_recording(spec, recording)
 
 
@@ -129,8 +129,8 @@ def _network(folder):
         text += INPUT % (name, hold, name, unit)
     recording = _written(folder, "network", columns, text)
     spec = validate_network_machine(tomllib.loads(NETWORK), "motor.toml")
-    fast = NetworkFastModel(build_network(spec.network), spec)
-    return fast, recording, view_of_network(fast.network, recording), fast.drive(recording)
+    fast = fast_network(build_network(spec.network), spec)
+    return fast, recording, view_of_network(fast.network, recording), fast.inputs.drive(recording)
 
 
 def _written(folder, name, columns, text):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import load_machine
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from tests.support.lumped_spindle import drive_of, lumped_model
 
 
@@ -15,7 +15,7 @@ def spec():
 
 @pytest.fixture(scope="session")
 def fast(spec):
-    return FastModel(lumped_model(spec), spec)
+    return fast_spindle(lumped_model(spec), spec)
 
 
 @pytest.fixture(scope="session")

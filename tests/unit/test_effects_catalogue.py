@@ -21,7 +21,6 @@ from spindle_fem.effects.registry import (
     interval_effects,
 )
 from spindle_fem.errors import SpecError, UnitError
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from tests.support.effect_machines import (
     INTERVALS,
@@ -235,8 +234,8 @@ def test_every_candidate_runs_and_moves_the_machine(machines, kind):
 
 def _run(fast, recording, drive, terms, values):
     start = 293.15
-    if isinstance(fast, NetworkFastModel):
-        start = fast.start(recording, drive)
+    if fast.network is not None:
+        start = fast.inputs.start(recording, drive)
     return simulate_fast(fast, drive, start, parameters=values, terms=terms).temperature
 
 

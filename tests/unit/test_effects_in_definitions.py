@@ -21,7 +21,7 @@ from spindle_fem.model.reduced.defined_effects import (
     effects_on,
     require_known_effects,
 )
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.studies.simulate import simulate_recordings
 from tests.support.lumped_spindle import lumped_model
@@ -316,7 +316,7 @@ def test_a_machine_that_was_improved_on_one_recording_runs_on_a_shorter_one(tmp_
     path = tmp_path / "improved_machine.toml"
     path.write_text(IMPROVED)
     spec = load_machine(path)
-    fast = FastModel(lumped_model(spec), spec)
+    fast = fast_spindle(lumped_model(spec), spec)
     recording = half_an_hour(tmp_path, flow=flow)
     effects = effects_on(spec.effects, fast, recording)
     assert [candidate.effect for candidate in effects.candidates] == [e.effect for e in spec.effects]
@@ -332,7 +332,7 @@ def test_a_machine_that_was_improved_on_one_recording_runs_on_a_shorter_one(tmp_
 
 def test_the_physical_limits_of_an_entry_hold_on_every_recording(tmp_path):
     spec = load_machine("recorded_spindle")
-    fast = FastModel(lumped_model(spec), spec)
+    fast = fast_spindle(lumped_model(spec), spec)
     recording = half_an_hour(tmp_path, flow=20.0)
     entries = [
         EffectEntry(effect="coolant_bypass", component="channel", parameters={"fraction": 1.4}),

@@ -12,7 +12,7 @@ from spindle_fem.inference.calibration import BOUND_SIGMAS, calibrate, predictio
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError, channel_bins, likely_slow_error, whiten
 from spindle_fem.model.lumped.written_network import build_network
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.recordings.align import read_recording
 from tests.support.straight_line import Line
 
@@ -54,7 +54,7 @@ def network():
 
 def at_stamps(network, recordings, initial="ambient", use=None):
     spec = validate_network_machine({**NETWORK, "initial": initial}, "made")
-    return Predictor(NetworkFastModel(network, spec), recordings, use, at_stamps=True)
+    return Predictor(fast_network(network, spec), recordings, use, at_stamps=True)
 
 
 def priors_of(predictor):

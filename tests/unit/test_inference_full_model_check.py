@@ -23,7 +23,7 @@ from spindle_fem.inference.full_model_check import (
 )
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.build_view import view_of
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.parallel import WorkerPool
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.report.diagnosis_full_model import full_model_sections
@@ -60,7 +60,7 @@ def predictor(tmp_path_factory):
     (folder / "steps.toml").write_text(MANIFEST, encoding="utf-8")
     recording = read_recording(folder / "steps.toml")
     spec = load_machine("recorded_spindle")
-    return Predictor(FastModel(lumped_model(spec), spec), [recording], [np.ones(times.size, dtype=bool)])
+    return Predictor(fast_spindle(lumped_model(spec), spec), [recording], [np.ones(times.size, dtype=bool)])
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ from spindle_fem.inference.prepared_problem import calibrate, machine_coordinate
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.recordings.align import read_recording
 
 MACHINE = """
@@ -113,7 +113,7 @@ def written(folder, times, temperatures=None):
 @pytest.fixture(scope="module")
 def fast():
     spec = validate_network_machine(tomllib.loads(MACHINE), "test")
-    return NetworkFastModel(build_network(spec.network), spec)
+    return fast_network(build_network(spec.network), spec)
 
 
 @pytest.fixture(scope="module")
@@ -205,7 +205,7 @@ def test_even_steps_keep_the_integral_of_every_input(fast, tmp_path):
     times[150:] += 20000.0
     recording = written(tmp_path, times)
     drive = even_drive(fast, recording)
-    fine = fast.drive(recording, largest_step=np.inf)
+    fine = fast.inputs.drive(recording, largest_step=np.inf)
     assert len(drive.restarts) == len(fine.restarts) == 1
     ordinary = np.delete(drive.steps, np.array(drive.restarts) - 1)
     # Of a length, but for one at the end of each stretch.

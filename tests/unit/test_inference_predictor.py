@@ -15,7 +15,7 @@ from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.search_basis import on_search_basis
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.drive import drive_of_recording
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording
 from tests.support.lumped_spindle import lumped_model
 
@@ -61,7 +61,7 @@ def predictor(recording):
     slopes = np.random.default_rng(5).normal(0.0, 20.0, (len(model.probe_names), 2, model.size))
     # A uniform field has no gradient.
     slopes -= slopes.mean(axis=2, keepdims=True)
-    fast = FastModel(replace(model, probe_gradients=slopes), spec)
+    fast = fast_spindle(replace(model, probe_gradients=slopes), spec)
     return Predictor(fast, [recording], [np.ones(recording.times.size, dtype=bool)], step=60.0)
 
 

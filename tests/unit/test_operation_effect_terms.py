@@ -16,7 +16,7 @@ from spindle_fem.machine.view.defined_point import at_the_defined_point
 from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.defined_effects import active_effects, effects_on, physics_of
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.effect_terms import Derivatives, EffectTerms, Instants
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -191,13 +191,11 @@ def test_two_effects_on_one_film_multiply_in_the_reduced_model(fast, spec, steps
 
 
 def test_two_effects_on_one_link_multiply_in_a_written_network(tmp_path):
-    network = NetworkFastModel(
-        build_network(validate_network_machine(tomllib.loads(MACHINE), "test").network)
-    )
+    network = fast_network(build_network(validate_network_machine(tomllib.loads(MACHINE), "test").network))
     recording = written(tmp_path)
     entries = [entry.model_copy(update={"component": "body|ambient"}) for entry in ENTRIES]
     terms = of_definition(effects_on(entries, network, recording).terms)
-    drive = network.drive(recording)
+    drive = network.inputs.drive(recording)
 
     def simulate(terms):
         return simulate_fast(network, drive, 297.0, terms=terms).temperature

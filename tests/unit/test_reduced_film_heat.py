@@ -10,7 +10,7 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.model.reduced.drive import with_walls
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.bearing_heat import BearingMechanics, heat_of_table
@@ -226,18 +226,18 @@ def test_values_at_an_operating_point_are_remembered_and_do_not_mix(spec, fricti
 @pytest.fixture(scope="module")
 def lumped(spec, friction, table):
     """The tabulated machine with one unknown a part, and a drive through two speeds and a rest."""
-    fast = FastModel(lumped_model(table), table, (FilmHeat(friction, spec, table),))
+    fast = fast_spindle(lumped_model(table), table, (FilmHeat(friction, spec, table),))
     times = np.arange(0.0, 5400.0, 60.0)
     return fast, drive_of(times, np.select([times < 2400, times < 3600], [3000.0, 1000.0], 0.0))
 
 
 def test_given_terms_are_always_there_and_stay_on_a_smaller_basis(lumped):
     fast, drive = lumped
-    [term] = fast.extra_terms
+    [term] = fast.inputs.extra_terms
     assert term in fast.own_terms(drive)
-    assert term not in FastModel(fast.model, fast.spec).own_terms(drive)
+    assert term not in fast_spindle(fast.model, fast.spec).own_terms(drive)
     slopes = np.zeros((len(fast.model.probe_names), 2, fast.model.size))
-    sloped = FastModel(replace(fast.model, probe_gradients=slopes), fast.spec, fast.extra_terms)
+    sloped = fast_spindle(replace(fast.model, probe_gradients=slopes), fast.spec, fast.inputs.extra_terms)
     assert sloped.projected(np.eye(fast.model.size)[:, :-1]).extra_terms == (term,)
 
 
@@ -247,8 +247,8 @@ def test_derivatives_through_the_films_are_those_of_differences(lumped, properti
     given, drive = lumped
     coolant = given.spec.coolant.model_copy(update={"properties_at": properties_at})
     spec = given.spec.model_copy(update={"coolant": coolant})
-    fast = FastModel(given.model, spec, given.extra_terms)
-    assert fast.film_follows_wall == (properties_at == "bulk")
+    fast = fast_spindle(given.model, spec, given.extra_terms)
+    assert fast.channel.film_follows_wall == (properties_at == "bulk")
     names = ("heat.front", "film.outside", "coolant.film_factor", "heat.inner_share")
     run = simulate_fast(fast, drive, 291.0, derivatives=names)
     for column, name in enumerate(names):
@@ -265,14 +265,14 @@ def test_derivatives_through_the_films_are_those_of_differences(lumped, properti
 def test_the_channels_film_is_that_at_its_wall(lumped):
     fast, drive = lumped
     states = np.tile(300.0 * fast.model.one, (len(drive.grid), 1))
-    walls = fast.channel_walls(states)
+    walls = fast.channel.walls(states)
     assert walls == pytest.approx(300.0)
     point = with_walls(drive, walls).points[0]
     shape = fast.model.cell_area.shape
-    expected = fast.loop.at(drive.points[0], np.full(shape, 300.0)).film_coefficient.ravel()
-    film, _, _ = fast.channel_film(point, {})
+    expected = fast.channel.loop.at(drive.points[0], np.full(shape, 300.0)).film_coefficient.ravel()
+    film, _, _ = fast.channel.film(point, {})
     assert film == pytest.approx(expected, rel=1e-12)
-    cold, _, _ = fast.channel_film(drive.points[0], {})
+    cold, _, _ = fast.channel.film(drive.points[0], {})
     # The coolant warms along it.
     assert np.all(np.diff(film) > 0.0)
     assert film[-1] > 1.005 * cold[-1]
@@ -281,6 +281,6 @@ def test_the_channels_film_is_that_at_its_wall(lumped):
 def test_a_warmer_film_makes_less_heat_than_the_table(lumped):
     fast, drive = lumped
     with_films = simulate_fast(fast, drive, 320.0).temperature
-    by_table = simulate_fast(FastModel(fast.model, fast.spec), drive, 320.0).temperature
+    by_table = simulate_fast(fast_spindle(fast.model, fast.spec), drive, 320.0).temperature
     row = fast.channels.index("SP01")
     assert with_films[10, row] < by_table[10, row] - 0.01

@@ -12,7 +12,7 @@ from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.model.lumped.written_network import build_network
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
+from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.recordings.align import read_recording
@@ -94,7 +94,7 @@ def written(folder, *, times=None, manifest=MANIFEST):
 
 @pytest.fixture(scope="module")
 def fast():
-    return NetworkFastModel(build_network(validate_network_machine(tomllib.loads(MACHINE), "test").network))
+    return fast_network(build_network(validate_network_machine(tomllib.loads(MACHINE), "test").network))
 
 
 @pytest.fixture(scope="module")
@@ -130,8 +130,8 @@ def exact(fast, recording, names=FREE):
 @pytest.mark.parametrize("which", ["recording", "broken"])
 def test_equals_the_exact_solution(fast, which, request):
     recording = request.getfixturevalue(which)
-    drive = fast.drive(recording)
-    start = fast.start(recording, drive, derivatives=FREE)
+    drive = fast.inputs.drive(recording)
+    start = fast.inputs.start(recording, drive, derivatives=FREE)
     run = simulate_fast(fast, drive, start, derivatives=FREE)
     rows = fast.require_channels(recording.probes, "test")
     reference = exact(fast, recording)
@@ -173,15 +173,15 @@ class Warming(Term):
 
 
 def by_differences(fast, recording, name, terms, values, logarithmic=True):
-    drive = fast.drive(recording)
-    initial = fast.initial_parameters(recording)
+    drive = fast.inputs.drive(recording)
+    initial = fast.inputs.initial_parameters(recording)
     ends = []
     step = 1e-5
     for sign in (1.0, -1.0):
         base = values.get(name, 1.0)
         moved = base * np.exp(sign * step) if logarithmic else base + sign * step
         given = {**values, name: moved}
-        start = fast.start(recording, drive, given, initial=initial)
+        start = fast.inputs.start(recording, drive, given, initial=initial)
         ends.append(simulate_fast(fast, drive, start, parameters=given, terms=terms).temperature)
     return (ends[0] - ends[1]) / (2.0 * step)
 
@@ -193,10 +193,10 @@ TERM_VALUES = {"warming.heat": 20.0, "warming.slope": 0.01, "warming.shift": 3.0
 def test_derivatives_with_a_term_follow_differences(fast, which, request):
     recording = request.getfixturevalue(which)
     names = (*FREE, "initial.winding", "initial.foot", *TERM_VALUES)
-    drive = fast.drive(recording)
+    drive = fast.inputs.drive(recording)
     values = {**TERM_VALUES, "temperature.bench": 1.01, "gain.body.speed": 1.3}
-    initial = fast.initial_parameters(recording)
-    start = fast.start(recording, drive, values, names, initial=initial)
+    initial = fast.inputs.initial_parameters(recording)
+    start = fast.inputs.start(recording, drive, values, names, initial=initial)
     run = simulate_fast(fast, drive, start, parameters=values, derivatives=names, terms=(Warming(),))
     for column, name in enumerate(names):
         expected = by_differences(fast, recording, name, (Warming(),), values, name != "warming.shift")
@@ -206,11 +206,11 @@ def test_derivatives_with_a_term_follow_differences(fast, which, request):
 
 def test_a_drive_with_gaps_needs_a_state_after_each(fast, broken):
     with pytest.raises(SpecError, match="after each of 2 long gaps"):
-        simulate_fast(fast, fast.drive(broken), 293.15)
+        simulate_fast(fast, fast.inputs.drive(broken), 293.15)
 
 
 def test_starting_states_are_taken_in_every_form(fast, recording):
-    drive = fast.drive(recording)
+    drive = fast.inputs.drive(recording)
     state = np.array([300.0, 296.0, 294.0])
     given = Start(np.zeros(1, dtype=np.int64), state[None, :])
     first = simulate_fast(fast, drive, state)
@@ -245,7 +245,7 @@ def test_steady_changes_are_those_of_the_network_itself(fast, recording):
     changes = Constant(
         factors={"link.winding|body": 1.7}, capacity={"foot": 300.0}, conductance={"body": 0.25}
     )
-    drive = fast.drive(recording)
+    drive = fast.inputs.drive(recording)
     state = np.full(3, 295.0)
     found = simulate_fast(fast, drive, state, terms=(changes,))
     # The body's own link to the surroundings is 0.5 W/K.
@@ -255,7 +255,7 @@ def test_steady_changes_are_those_of_the_network_itself(fast, recording):
 
 
 def test_refusals_name_what_is_allowed(fast, recording):
-    drive = fast.drive(recording)
+    drive = fast.inputs.drive(recording)
     with pytest.raises(SpecError, match=r"no parameter of this network.*winding\|body"):
         simulate_fast(fast, drive, 295.0, parameters={"conductance.winding|bodi": 1.1})
     with pytest.raises(SpecError, match="body"):
@@ -268,9 +268,9 @@ def test_refusals_name_what_is_allowed(fast, recording):
     with pytest.raises(SpecError, match=r"factor of .link\.body.ambient. is nan"):
         simulate_fast(fast, drive, 295.0, terms=(changes,))
     with pytest.raises(FaultsError, match="not a node"):
-        fast.drive(replace(recording, probes=("winding", "bodi")))
+        fast.inputs.drive(replace(recording, probes=("winding", "bodi")))
     pair = replace(fast.network, boundary_names=("room", "bench"), boundary_input=("ambient", None))
-    two = NetworkFastModel(pair)
-    driven = two.drive(recording)
+    two = fast_network(pair)
+    driven = two.inputs.drive(recording)
     with pytest.raises(SpecError, match="no boundary stands for them"):
         simulate_fast(two, driven, 295.0, terms=(Constant(conductance={"body": 1.0}),))

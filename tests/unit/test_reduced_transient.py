@@ -12,7 +12,7 @@ from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.coefficient_table import free_parameters
@@ -38,7 +38,7 @@ def test_steady_state_carries_away_exactly_the_heat_put_in(fast, spec):
         coefficients[name] * (load @ (state - 293.15))
         for name, load in zip(fast.model.fluid_names, fast.model.fluid_load, strict=True)
     )
-    _, capacity_rate, _ = fast.channel_film(point, {})
+    _, capacity_rate, _ = fast.channel.film(point, {})
     taken = capacity_rate * (run.temperature[-1, fast.channels.index("COOLANT_OUT")] - 290.15)
     assert out + taken == pytest.approx(2 * 155 + 140 + 2 * 85, rel=1e-7)
     assert nodes["F1.inner_ring"] > nodes["F1.outer_ring"] > nodes["housing"] > 290.15
@@ -64,7 +64,7 @@ def test_factors_do_what_changed_definitions_do(fast, spec, steps):
         "ball_conductance": 0.6,
     }
     by_factor = simulate_fast(fast, steps, 293.15, parameters=factors).temperature
-    changed = FastModel(fast.model, with_parameters(spec, factors))
+    changed = fast_spindle(fast.model, with_parameters(spec, factors))
     assert simulate_fast(changed, steps, 293.15).temperature == pytest.approx(by_factor, abs=1e-9)
 
 
@@ -113,7 +113,7 @@ def test_a_natural_film_carries_what_its_correlation_says(fast, spec):
     changed = spec.model_copy(update={"film": (film, *others), "factor": spec.factor[1:]})
     keep = [i for i, name in enumerate(fast.model.coefficient_names) if name != "film.cover.outside"]
     fluids = [i for i, name in enumerate(fast.model.fluid_names) if name != "film.cover.outside"]
-    natural = FastModel(
+    natural = fast_spindle(
         replace(
             fast.model,
             coefficient_names=tuple(fast.model.coefficient_names[i] for i in keep),
@@ -126,7 +126,7 @@ def test_a_natural_film_carries_what_its_correlation_says(fast, spec):
     # The lumped model has no surfaces of its own: the housing stands for its outside.
     places = (*natural.model.place_names, "housing.outside")
     rows = np.vstack((natural.model.places, natural.model.place("housing")))
-    natural = FastModel(replace(natural.model, place_names=places, places=rows), changed)
+    natural = fast_spindle(replace(natural.model, place_names=places, places=rows), changed)
     times = np.linspace(0.0, 3.0e6, 2000)
     # Not at the definition's own ambient temperature.
     drive = drive_of(times, 3000.0, ambient=296.15)
@@ -141,7 +141,7 @@ def test_a_natural_film_carries_what_its_correlation_says(fast, spec):
         values[name] * (load @ (run.states[-1] - 296.15))
         for name, load in zip(natural.model.fluid_names, natural.model.fluid_load, strict=True)
     )
-    _, rate, _ = natural.channel_film(point, {})
+    _, rate, _ = natural.channel.film(point, {})
     taken = rate * (run.temperature[-1, natural.channels.index("COOLANT_OUT")] - 290.15)
     assert out + taken == pytest.approx(2 * 155 + 140 + 2 * 85, rel=1e-6)
 
@@ -151,7 +151,7 @@ def test_unknown_parameters_and_other_heat_models_are_refused(fast, spec, steps)
         simulate_fast(fast, steps, 293.15, parameters={"heat.frnt": 1.0})
     with pytest.raises(SpecError, match=r"the share becomes 1.5"):
         simulate_fast(fast, steps, 293.15, parameters={"heat.inner_share": 3.0})
-    other = FastModel(fast.model, load_machine("recorded_spindle", ["heat.model=palmgren"]))
+    other = fast_spindle(fast.model, load_machine("recorded_spindle", ["heat.model=palmgren"]))
     with pytest.raises(SpecError, match=r"takes heat.model"):
         simulate_fast(other, steps, 293.15)
 

@@ -13,7 +13,6 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP
-from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.mesh_model import MeshModel, build_mesh_model
 from spindle_fem.model.reduced.reduced_cache import family_of, reduced_digest, reduced_path
 from spindle_fem.model.reduced.snapshots import (
@@ -21,6 +20,7 @@ from spindle_fem.model.reduced.snapshots import (
     SnapshotSpace,
     shifted_systems,
 )
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads, friction_loads
 from spindle_fem.model.thermal_model import ThermalModel, project
 from spindle_fem.operation.coefficient_table import (
@@ -204,7 +204,7 @@ def reduced_model_of(
 
 def _holds(model: ThermalModel, spec: MachineSpec, highest_speed: float) -> bool:
     """Whether every coefficient of a machine is in the range of a model, from rest to a speed (rad/s)."""
-    fast = FastModel(model, spec)
+    fast = fast_spindle(model, spec)
     values = [fast.table.capacities()]
     for share in SPEED_SHARES:
         point = replace(OperatingPoint.of(spec), speed=share * highest_speed)

@@ -18,7 +18,6 @@ from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.model.lumped.network_view import day_of_a_network, view_of_network
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.network_fast_model import NetworkFastModel
 from spindle_fem.operation.named_places import named_places
 from spindle_fem.recordings.align import Recording
 from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics
@@ -230,9 +229,7 @@ def _possible_speeds(network: ThermalNetwork, form: str) -> list[tuple[str, ...]
     return list(dict.fromkeys(choices))
 
 
-def effects_on(
-    entries: Sequence[EffectEntry], fast: FastModel | NetworkFastModel, recording: Recording
-) -> ActiveEffects:
+def effects_on(entries: Sequence[EffectEntry], fast: FastModel, recording: Recording) -> ActiveEffects:
     """Effects of a definition on a machine that a recording drives.
 
     Raises
@@ -241,7 +238,7 @@ def effects_on(
     """
     if not entries:
         return NO_EFFECTS
-    if isinstance(fast, NetworkFastModel):
+    if fast.network is not None:
         return active_effects(entries, view_of_network(fast.network, recording), fast.channels)
     return active_effects(entries, view_of(fast.names, recording), fast.channels, _outlets(fast.spec))
 

@@ -11,6 +11,7 @@ from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.model.reduced.build_reduced import ReductionOptions, reduced_model_of
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.friction_map import needs_map, tabulate_friction, thrusts_between
 from spindle_fem.recordings.align import Recording
 
@@ -41,7 +42,7 @@ def fast_model_for(
     options = options_for(spec, recordings)
     if not needs_map(spec):
         model = reduced_model_of(spec, options=options, as_given=as_given, progress=progress)
-        return FastModel(model, spec)
+        return fast_spindle(model, spec)
     progress("friction over speed, thrust and film temperature")
     thrusts = thrusts_between(spec, *_recorded_range(recordings, "thrust", spec.operation.thrust))
     friction = tabulate_friction(spec, options.highest_speed_of(spec), thrusts)
@@ -49,7 +50,7 @@ def fast_model_for(
     term = FilmHeat(friction, spec, table)
     made_of = operators_machine(table, term)
     model = reduced_model_of(made_of, options=options, as_given=as_given, progress=progress)
-    return FastModel(model, table, (term,))
+    return fast_spindle(model, table, (term,))
 
 
 def options_for(spec: MachineSpec, recordings: Sequence[Recording]) -> ReductionOptions:
@@ -78,8 +79,8 @@ def recentred_model(
     fast: FastModel, factors: Mapping[str, float], options: ReductionOptions, progress: Progress
 ) -> FastModel:
     """The same machine on a reduced model that was made at some factors."""
-    terms = fast.extra_terms
+    terms = fast.inputs.extra_terms
     film_heat = next((term for term in terms if isinstance(term, FilmHeat)), None)
     made_of = fast.spec if film_heat is None else operators_machine(fast.spec, film_heat)
     model = reduced_model_of(with_parameters(made_of, factors), options=options, progress=progress)
-    return FastModel(model, fast.spec, terms)
+    return fast_spindle(model, fast.spec, terms)

@@ -81,7 +81,7 @@ def simulate_fast(
 
     Parameters
     ----------
-    fast : FastModel or NetworkFastModel
+    fast : FastModel or FastModel
     drive : Drive
     initial : float, (r,) ndarray or Start
         Uniform temperature [K]; unknowns; or unknowns with derivatives, at
@@ -108,11 +108,11 @@ def simulate_fast(
     """
     everything = (*fast.own_terms(drive), *terms)
     given = parameters or {}
-    if fast.film_follows_wall:
+    if fast.channel is not None and fast.channel.film_follows_wall:
         own = drive
         for _ in range(WALL_ROUNDS):
             states, _ = TransientRun(fast, own, given, (), everything).march(initial)
-            own = with_walls(drive, fast.channel_walls(states))
+            own = with_walls(drive, fast.channel.walls(states))
         drive = own
     return TransientRun(fast, drive, given, tuple(derivatives), everything).solve(initial)
 

@@ -20,13 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.model.reduced.exponential_step import ExactPropagator
+from spindle_fem.model.trbdf2 import DIAGONAL, GAMMA, STAGE_WEIGHT, START_WEIGHT
 
 Array = NDArray[np.float64]
-
-GAMMA = 2.0 - np.sqrt(2.0)
-SHARE = 0.5 * GAMMA
-STAGE_WEIGHT = 1.0 / (GAMMA * (2.0 - GAMMA))
-START_WEIGHT = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +51,12 @@ class Propagator:
     @property
     def from_start(self) -> Array:
         """``u_1`` from a load at the start of the step, (r, r) K/W."""
-        return SHARE * self.step * (2.0 - GAMMA) * self.carried
+        return DIAGONAL * self.step * (2.0 - GAMMA) * self.carried
 
     @property
     def from_end(self) -> Array:
         """``u_1`` from a load at the end of the step, (r, r) K/W."""
-        return SHARE * self.step * (GAMMA * self.carried + self.inverse)
+        return DIAGONAL * self.step * (GAMMA * self.carried + self.inverse)
 
 
 def build_propagator(storage: Array, conduction: Array, step: float) -> Propagator:
@@ -71,8 +67,8 @@ def build_propagator(storage: Array, conduction: Array, step: float) -> Propagat
     storage, conduction : (r, r) ndarray, [J/K], [W/K]
     step : float, [s]
     """
-    inverse = np.linalg.inv(storage + SHARE * step * conduction)
-    stage = inverse @ (storage - SHARE * step * conduction)
+    inverse = np.linalg.inv(storage + DIAGONAL * step * conduction)
+    stage = inverse @ (storage - DIAGONAL * step * conduction)
     held = inverse @ storage
     return Propagator(
         step,
@@ -105,7 +101,7 @@ def stage_values(
     """What :func:`sensitivity_forcing` needs of equal steps: ``u_γ`` (n, r); of exact ones, the loads."""
     if isinstance(propagator, ExactPropagator):
         return propagator.load_values(start, end, loads)
-    weight = SHARE * propagator.step
+    weight = DIAGONAL * propagator.step
     matrix = propagator.inverse @ loads
     return before @ propagator.stage.T + weight * ((2.0 - GAMMA) * start + GAMMA * end) @ matrix.T
 
@@ -158,7 +154,7 @@ def sensitivity_forcing(
             for c in changes
         ]
         return np.stack(columns, axis=2) if columns else np.zeros((*before.shape, 0))
-    weight = SHARE * propagator.step
+    weight = DIAGONAL * propagator.step
     # Defects of both halves of the step; all parameters that enter share the products with the inverses.
     entering = [i for i, change in enumerate(changes) if change.enters]
     entered = [changes[i] for i in entering]

@@ -1,4 +1,4 @@
-"""A thermal network that the user wrote, in the clothes of a fast model.
+"""A thermal network that the user wrote, as a fast model.
 
 Its nodes are the unknowns, its links the coefficients, its boundaries the
 fluids and its sources the bearings, so that terms, drives, sensitivities and
@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.network_tables import NetworkMachineSpec
-from spindle_fem.effects.framework.term import COVARIATE, FLUID_PREFIX, RecordedHeat, Term
-from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.effects.framework.term import COVARIATE, RecordedHeat, Term
+from spindle_fem.errors import SpecError
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
-from spindle_fem.model.reduced.coefficient_directions import ConductingDirections
+from spindle_fem.model.reduced.channel_operators import ChannelOperators
+from spindle_fem.model.reduced.class_operators import NO_CHANGES
 from spindle_fem.model.reduced.drive import (
     LARGEST_STEP,
     STANDARD,
@@ -26,7 +28,7 @@ from spindle_fem.model.reduced.drive import (
     level_covariates,
 )
 from spindle_fem.model.reduced.exponential_step import build_exact_propagator
-from spindle_fem.model.reduced.fast_model import NO_CHANGES, ClassOperators
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_operators import (
     LINK,
     NetworkTable,
@@ -35,6 +37,7 @@ from spindle_fem.model.reduced.network_operators import (
     source_power,
 )
 from spindle_fem.model.reduced.run_start import Start
+from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import Recording
 from spindle_fem.solvers.simulate_network import (
@@ -47,12 +50,8 @@ from spindle_fem.solvers.simulate_network import (
 Array = NDArray[np.float64]
 
 
-class NetworkFastModel:
-    """A network as a fast model: see :class:`spindle_fem.model.reduced.fast_model.FastModel`.
-
-    Parameters are factors named ``conductance.<link>``, ``capacity.<node>``,
-    ``gain.<source>``, ``temperature.<boundary>`` (of the absolute temperature
-    of a boundary that no input drives) and ``initial.<node>``.
+def fast_network(network: ThermalNetwork, spec: NetworkMachineSpec | None = None) -> FastModel:
+    """Fast model of a written network: unknowns are the nodes, which are its places and channels.
 
     Parameters
     ----------
@@ -65,12 +64,25 @@ class NetworkFastModel:
     ------
     SpecError
         Laws or streams.
+    """
+    inputs = NetworkInputs(network, spec)
+    return FastModel(network_thermal_model(network, tuple(inputs.boundary_of)), inputs)
+
+
+class NetworkInputs:
+    """What :class:`spindle_fem.model.reduced.fast_model.ModelInputs` asks, of a written network.
+
+    Parameters are factors named ``conductance.<link>``, ``capacity.<node>``,
+    ``gain.<source>``, ``temperature.<boundary>`` (of the absolute temperature
+    of a boundary that no input drives) and ``initial.<node>``.
+
+    Parameters
+    ----------
+    network, spec
+        As :func:`fast_network` takes them.
 
     Attributes
     ----------
-    model : ThermalModel
-        Unknowns are the nodes; places are the nodes, coefficients
-        ``link.<link>``, fluids those of them that end at a boundary.
     bearings : tuple of str
         Sources.
     heat_places : tuple of str
@@ -79,9 +91,14 @@ class NetworkFastModel:
         Nodes.
     load_names : tuple of str
         ``source.<source>``, then ``boundary.<boundary>``.
+    boundary_of : mapping of str to str
+        Boundary of every link that ends at one, by coefficient.
     ambient_boundary : str or None
         Boundary that stands for the surroundings: that named ``ambient``, or the only one.
     """
+
+    inlet = None
+    propagator = staticmethod(build_exact_propagator)
 
     def __init__(self, network: ThermalNetwork, spec: NetworkMachineSpec | None = None) -> None:
         if not network.is_linear or not network.is_symmetric:
@@ -99,167 +116,64 @@ class NetworkFastModel:
         )
         names = network.boundary_names
         self.ambient_boundary = "ambient" if "ambient" in names else names[0] if len(names) == 1 else None
-        self._boundary_of = boundary_of_links(network)
-        self.model = network_thermal_model(network, tuple(self._boundary_of))
-        self.directions = ConductingDirections(self.model)
-        self._conductance = {
-            f"{LINK}{name}": float(value)
-            for name, value in zip(network.link_names, network.link_conductance, strict=True)
-        }
+        self.boundary_of = boundary_of_links(network)
 
-    # ------------------------------------------------------------- operators
-    def storage(self, factors: Mapping[str, float], added: Mapping[str, float] = NO_CHANGES) -> Array:
-        """Capacity matrix, (n, n) J/K; ``added`` is further capacity of nodes, J/K."""
-        names = self.network.node_names
-        scales = np.array([self.table.scale(f"capacity.{name}", factors) for name in names])
-        extra = np.array([added.get(name, 0.0) for name in names])
-        return np.diag(self.network.capacity * scales + extra)
+    def channel_operators(self, model: ThermalModel) -> ChannelOperators | None:
+        """A network has no coolant."""
+        return None
 
-    def storage_by(self, factors: Mapping[str, float], parameters: Sequence[str]) -> dict[str, Array]:
-        """Derivatives of the capacity matrix to logarithms of parameters; absent where zero."""
-        found = {}
-        for parameter in parameters:
-            for i, node in enumerate(self.network.node_names):
-                if self.table.targets(parameter) == self.table.groups[f"capacity.{node}"]:
-                    found[parameter] = np.zeros((self.model.size, self.model.size))
-                    found[parameter][i, i] = self.network.capacity[i] * factors.get(parameter, 1.0)
-        return found
+    # ------------------------------------------------------------- coefficients
+    def operating_key(self, point: OperatingPoint) -> tuple[float, ...]:
+        """Nothing: links conduct as they are written."""
+        return ()
 
-    def coefficients(
-        self, point: OperatingPoint, factors: Mapping[str, float], changes: Mapping[str, float] = NO_CHANGES
-    ) -> dict[str, float]:
-        """Conductance of every link, W/K.
+    def base(self, point: OperatingPoint) -> dict[str, float]:
+        """Conductance of every link, W/K."""
+        names = (f"{LINK}{name}" for name in self.network.link_names)
+        return dict(zip(names, self.network.link_conductance.tolist(), strict=True))
+
+    def capacities(self) -> dict[str, float]:
+        """Capacity of every node, J/K."""
+        names = (f"capacity.{name}" for name in self.network.node_names)
+        return dict(zip(names, self.network.capacity.tolist(), strict=True))
+
+    def sigmas(self) -> dict[str, float]:
+        """1 σ of the logarithm of every uncertain parameter."""
+        return {item.name: item.sigma_log for item in self.network.parameters}
+
+    # ------------------------------------------------------------------- fluids
+    def fluid_input(self, coefficient: str) -> str:
+        """Load input that is the boundary of a link."""
+        return f"boundary.{self.boundary_of[coefficient]}"
+
+    def ambient_input(self, place: str) -> str:
+        """Load input that is the surroundings of a node.
 
         Raises
         ------
         SpecError
-            A change of something else, or one that asks for an input that the
-            recording does not give.
+            No boundary stands for them.
         """
-        for name, factor in changes.items():
-            if name not in self._conductance:
-                raise SpecError(
-                    "changes", f'"{name}" is no link.', did_you_mean(name, tuple(self._conductance))
-                )
-            if not np.isfinite(factor):
-                raise SpecError(
-                    "changes",
-                    f'the factor of "{name}" is {factor}.',
-                    "It may follow only inputs that the recording gives.",
-                )
-        return {
-            name: value * self.table.scale(name, factors) * changes.get(name, 1.0)
-            for name, value in self._conductance.items()
-        }
-
-    def operators(
-        self,
-        point: OperatingPoint,
-        factors: Mapping[str, float],
-        parameters: Sequence[str] = (),
-        *,
-        changes: Mapping[str, float] = NO_CHANGES,
-        conductances: Mapping[str, float] = NO_CHANGES,
-    ) -> ClassOperators:
-        """Operators with factors, and derivatives to some parameters.
-
-        Parameters
-        ----------
-        point : OperatingPoint
-        factors : mapping of str to float
-        parameters : sequence of str
-        changes : mapping of str to float
-            Further factors on single links.
-        conductances : mapping of str to float, [W/K]
-            From nodes to the surroundings, beside the network's own links.
-        """
-        model = self.model
-        found = self.coefficients(point, factors, changes)
-        values = np.array([found[name] for name in model.coefficient_names])
-        conduction = np.tensordot(values, model.operators, axes=1)
-        n_sources = len(self.bearings)
-        loads = np.zeros((model.size, len(self.load_names)))
-        loads[self.network.source_node, np.arange(n_sources)] = 1.0
-        for row, name in enumerate(model.fluid_names):
-            loads[:, self._boundary_column(name)] += found[name] * model.fluid_load[row]
-        for place, conductance in conductances.items():
-            mean = model.place(place)
-            conduction = conduction + conductance * np.outer(mean, mean)
-            loads[:, self._ambient_column(place)] += conductance * mean
-        conduction_by, loads_by = {}, {}
-        for parameter in parameters:
-            targets = self.table.targets(parameter)
-            for row, name in enumerate(model.coefficient_names):
-                if self.table.groups[name] != targets:
-                    continue
-                conduction_by[parameter] = values[row] * model.operators[row]
-                if name in self._boundary_of:
-                    loads_by[parameter] = np.zeros_like(loads)
-                    load = model.fluid_load[model.fluid_names.index(name)]
-                    loads_by[parameter][:, self._boundary_column(name)] = values[row] * load
-        outputs = np.eye(model.size)
-        nothing = np.zeros((model.size, len(self.load_names)))
-        return ClassOperators(conduction, loads, outputs, nothing, conduction_by, loads_by, {}, {})
-
-    def change(
-        self,
-        point: OperatingPoint,
-        factors: Mapping[str, float],
-        changes: tuple[Mapping[str, float], Mapping[str, float]],
-        conductances: tuple[Mapping[str, float], Mapping[str, float]],
-    ) -> ClassOperators:
-        """Operators with the first of two sets of changes less those with the second, no derivatives."""
-        first, second = (
-            self.operators(point, factors, changes=one, conductances=other)
-            for one, other in zip(changes, conductances, strict=True)
-        )
-        names = ("conduction", "loads", "outputs", "output_inputs")
-        return ClassOperators(*(getattr(first, n) - getattr(second, n) for n in names), {}, {}, {}, {})
-
-    @property
-    def film_follows_wall(self) -> bool:
-        """Never: links conduct as they are written."""
-        return False
-
-    def _boundary_column(self, coefficient: str) -> int:
-        return self.load_names.index(f"boundary.{self._boundary_of[coefficient]}")
-
-    def _ambient_column(self, where: str) -> int:
         if self.ambient_boundary is None:
             raise SpecError(
-                where,
+                place,
                 "is joined to the surroundings, but no boundary stands for them.",
                 'Name one of the boundaries "ambient".',
             )
-        return self.load_names.index(f"boundary.{self.ambient_boundary}")
+        return f"boundary.{self.ambient_boundary}"
 
-    # ----------------------------------------------------------------- inputs
-    propagator = staticmethod(build_exact_propagator)
+    def fluid_temperature(self, coefficient: str, inputs: Mapping[str, Any]) -> Any:
+        """Nominal temperature of the boundary that a link ends at, K."""
+        return self._boundary_value(self.boundary_of[coefficient], inputs)
 
-    @property
-    def inlet_column(self) -> None:
-        """A network has no coolant."""
-        return None
-
-    @property
-    def fluid_places(self) -> dict[str, str]:
-        """Link of every boundary temperature that a term may shift, by ``fluid.<link>``."""
-        return {FLUID_PREFIX + name.removeprefix(LINK): name for name in self.model.fluid_names}
-
-    def fluid_temperature(self, coefficient: str, inputs: Mapping[str, float]) -> float:
-        """Nominal temperature of the boundary that a link ends at, K; 0 between nodes."""
-        if coefficient not in self._boundary_of:
-            return 0.0
-        return self._boundary_value(self._boundary_of[coefficient], inputs)
-
-    def _boundary_value(self, boundary: str, inputs: Mapping[str, float]) -> float:
+    def _boundary_value(self, boundary: str, inputs: Mapping[str, Any]) -> Any:
         position = self.network.boundary_names.index(boundary)
         driven = self.network.boundary_input[position]
         return float(self.network.boundary_temperature[position]) if driven is None else inputs[driven]
 
     def fluid_parameters(self, coefficient: str) -> tuple[str, ...]:
         """Names whose factors multiply :meth:`fluid_temperature`."""
-        name = f"temperature.{self._boundary_of.get(coefficient, '')}"
+        name = f"temperature.{self.boundary_of.get(coefficient, '')}"
         return (name,) if name in self.table.names else ()
 
     def own_terms(self, drive: Drive) -> tuple[Term, ...]:
@@ -320,21 +234,6 @@ class NetworkFastModel:
                 by[f"gain.{name}"] = np.zeros_like(loads)
                 by[f"gain.{name}"][:, position] = loads[:, position]
         return loads, by
-
-    def require_channels(self, probes: Sequence[str], where: str) -> NDArray[np.int64]:
-        """Rows of the outputs for the probes of a recording.
-
-        Raises
-        ------
-        SpecError
-            A probe that is no node.
-        """
-        for probe in probes:
-            if probe not in self.channels:
-                raise SpecError(
-                    where, f'reads "{probe}", no node of this network.', did_you_mean(probe, self.channels)
-                )
-        return np.array([self.channels.index(probe) for probe in probes], dtype=np.int64)
 
     # ------------------------------------------------------------- recordings
     def drive(self, recording: Recording, *, largest_step: float = LARGEST_STEP) -> Drive:
