@@ -11,8 +11,8 @@ from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.drive import drive_of_recording
-from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.reduced.network_inputs import fast_network
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
 from tests.support.lumped_spindle import lumped_model

@@ -12,8 +12,8 @@ from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
-from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.coefficient_table import free_parameters
 from spindle_fem.physics.surroundings.still_air import outside_coefficient
