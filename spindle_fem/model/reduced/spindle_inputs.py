@@ -13,12 +13,14 @@ from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.effects.framework.term import RecordedHeat, Term
 from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.channel_operators import ChannelOperators
-from spindle_fem.model.reduced.drive import Drive, heat_of_table
+from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.natural_films import natural_film_terms
 from spindle_fem.model.reduced.trbdf2_matrices import build_propagator
 from spindle_fem.model.thermal_model import ThermalModel
+from spindle_fem.operation.bearing_heat import heat_of_table
 from spindle_fem.operation.coefficient_table import INNER_SHARE, build_coefficient_table
+from spindle_fem.operation.heat_shares import heat_share_slopes, heat_shares
 from spindle_fem.operation.operating_point import OperatingPoint
 
 Array = NDArray[np.float64]
@@ -190,8 +192,11 @@ class SpindleInputs:
         inner = settings.inner_share.value * factors.get(INNER_SHARE, 1.0)
         if not 0.0 <= inner <= 1.0:
             raise SpecError(INNER_SHARE, f"the share becomes {inner:g}.", "Allowed: 0 to 1.")
-        balls = settings.ball_share
-        shares = np.array([(1.0 - balls) * inner, (1.0 - balls) * (1.0 - inner), balls])
+        own = factors.get(INNER_SHARE, 1.0)
+        shares, share_slopes = (
+            np.array(list(found.values()))
+            for found in (heat_shares(settings, own), heat_share_slopes(settings, own))
+        )
         scales = np.array(
             [np.prod([factors.get(name, 1.0) for name in self.table.heat_groups(b)]) for b in self.bearings]
         )
@@ -205,8 +210,7 @@ class SpindleInputs:
             if touched.any():
                 found += (np.where(touched, scaled, 0.0)[:, :, None] * shares).reshape(len(heat), -1)
             if INNER_SHARE in targets:
-                moved = (1.0 - balls) * inner * np.array([1.0, -1.0, 0.0])
-                found += (scaled[:, :, None] * moved).reshape(len(heat), -1)
+                found += (scaled[:, :, None] * share_slopes).reshape(len(heat), -1)
             if touched.any() or INNER_SHARE in targets:
                 by[parameter] = found
         return loads, by
