@@ -117,7 +117,9 @@ class Predictor:
         self.is_network = fast.network is not None
         self.drives = tuple(self._drive(item) for item in self.recordings) if drives is None else drives
         left_open = not (self.is_network or at_stamps)
-        self._initial = [fast.inputs.initial_parameters(item) if self.is_network else () for item in self.recordings]
+        self._initial = [
+            fast.inputs.initial_parameters(item) if self.is_network else () for item in self.recordings
+        ]
         self._jumps = [
             unseen_jumps(item, drive) if left_open else ()
             for item, drive in zip(self.recordings, self.drives, strict=True)

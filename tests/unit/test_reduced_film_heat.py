@@ -10,9 +10,9 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.model.reduced.drive import with_walls
-from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.bearing_heat import BearingMechanics, heat_of_table
 from spindle_fem.operation.friction_map import CONDUCTANCES, MOMENT, tabulate_friction, thrusts_between
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -238,7 +238,7 @@ def test_given_terms_are_always_there_and_stay_on_a_smaller_basis(lumped):
     assert term not in fast_spindle(fast.model, fast.spec).own_terms(drive)
     slopes = np.zeros((len(fast.model.probe_names), 2, fast.model.size))
     sloped = fast_spindle(replace(fast.model, probe_gradients=slopes), fast.spec, fast.inputs.extra_terms)
-    assert sloped.projected(np.eye(fast.model.size)[:, :-1]).extra_terms == (term,)
+    assert sloped.projected(np.eye(fast.model.size)[:, :-1]).inputs.extra_terms == (term,)
 
 
 @pytest.mark.parametrize(("properties_at", "share"), [("inlet", 1e-4), ("bulk", 2e-3)])
@@ -247,7 +247,7 @@ def test_derivatives_through_the_films_are_those_of_differences(lumped, properti
     given, drive = lumped
     coolant = given.spec.coolant.model_copy(update={"properties_at": properties_at})
     spec = given.spec.model_copy(update={"coolant": coolant})
-    fast = fast_spindle(given.model, spec, given.extra_terms)
+    fast = fast_spindle(given.model, spec, given.inputs.extra_terms)
     assert fast.channel.film_follows_wall == (properties_at == "bulk")
     names = ("heat.front", "film.outside", "coolant.film_factor", "heat.inner_share")
     run = simulate_fast(fast, drive, 291.0, derivatives=names)
