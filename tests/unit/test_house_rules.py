@@ -20,7 +20,6 @@ LONG_FILES = {
 BUSY_FUNCTIONS = {
     "spindle_fem/model/lumped/network_transient.py:simulate_transient",
     "spindle_fem/model/mesh/time_stepper.py:integrate",
-    "spindle_fem/model/reduced/dynamic_terms.py:evaluate",
     "spindle_fem/solvers/machine_transient.py:simulate_full",
 }
 

@@ -10,7 +10,6 @@ from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tu
 from spindle_fem.model.mesh.evaluate import (
     extreme,
     facet_means,
-    heat_flux_at_nodes,
     joint_means,
     locate_points,
     mean_matrix,
@@ -106,23 +105,3 @@ def test_linear_temperature_is_interpolated_to_edge_middles():
     np.testing.assert_allclose(
         temperature_at_nodes(operators, field[: operators.n_unknowns]), field, atol=1e-12
     )
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_heat_flux_of_a_linear_field(order):
-    operators = build_operators(build_box((0.1, 0.1, 0.1), (2, 2, 2)), order)
-    field = 300.0 + operators.mesh.points[: operators.n_unknowns] @ np.array([1.0, -2.0, 3.0])
-    flux = heat_flux_at_nodes(operators, field, np.array([40.0]))
-    np.testing.assert_allclose(flux, np.broadcast_to([-40.0, 80.0, -120.0], flux.shape), rtol=0, atol=1e-9)
-
-
-def test_heat_flux_around_the_axis_scales_with_its_factor():
-    operators = build_operators(TUBES, 2)
-    points = TUBES.points
-    angle = np.arctan2(points[:, 1], points[:, 0])
-    chosen = np.abs(angle - 0.5) < 0.3
-    plain = heat_flux_at_nodes(operators, points[:, 1], np.array([1.0, 1.0]))
-    turned = heat_flux_at_nodes(operators, points[:, 1], np.array([1.0, 1.0]), np.array([3.0, 3.0]))
-    along = np.stack((-np.sin(angle), np.cos(angle), 0 * angle), axis=1)
-    ratio = np.einsum("ex,ex->e", turned, along) / np.einsum("ex,ex->e", plain, along)
-    np.testing.assert_allclose(ratio[chosen], 3.0, rtol=1e-9)

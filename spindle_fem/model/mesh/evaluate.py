@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.spatial import KDTree
 from skfem import ElementTetP1, ElementTetP2
 
-from spindle_fem.errors import ConvergenceError, GeometryError, SpecError
+from spindle_fem.errors import GeometryError, SpecError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.element_integrals import evaluate_shape
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, prolongation_from_corners
@@ -238,41 +238,3 @@ def temperature_at_nodes(
     if operators.order == 2:
         return temperature
     return prolongation_from_corners(operators.mesh) @ temperature
-
-
-def heat_flux_at_nodes(
-    operators: ThermalOperators,
-    temperature: NDArray[np.float64],
-    conductivity: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Heat flux vector at every node of the mesh, averaged over its elements, (n_nodes, 3) [W/m²].
-
-    Parameters
-    ----------
-    operators : ThermalOperators
-    temperature : (n_unknowns,) ndarray, [K]
-    conductivity : (n_parts,) ndarray, [W/(m·K)]
-    """
-    mesh = operators.mesh
-    places = ElementTetP2().doflocs
-    _, geometry = quadratic_shape(places)
-    element = ElementTetP1() if operators.order == 1 else ElementTetP2()
-    _, gradients = evaluate_shape(element, places.T)
-    n_local = gradients.shape[1]
-    flux = np.zeros((len(mesh.points), 3))
-    weight = np.zeros(len(mesh.points))
-    k_element = np.asarray(conductivity, dtype=float)[mesh.part_of_element]
-    for local in range(len(places)):
-        nodes = mesh.tetrahedra[:, local]
-        jacobian = np.einsum("enx,nk->exk", mesh.points[mesh.tetrahedra], geometry[local])
-        slope = temperature[mesh.tetrahedra[:, :n_local]] @ gradients[local]
-        gradient = np.linalg.solve(jacobian.transpose(0, 2, 1), slope[:, :, None])[:, :, 0]
-        volume = np.linalg.det(jacobian)
-        for axis in range(3):
-            flux[:, axis] += np.bincount(
-                nodes, weights=-k_element * gradient[:, axis] * volume, minlength=len(flux)
-            )
-        weight += np.bincount(nodes, weights=volume, minlength=len(flux))
-    if np.any(weight <= 0.0):
-        raise ConvergenceError("heat flux", "an element is inverted at a node.", "Optimise the mesh.")
-    return flux / weight[:, None]

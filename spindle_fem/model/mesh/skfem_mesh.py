@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from skfem import Basis, ElementTetP1, ElementTetP2, FacetBasis, MeshTet2
+from skfem.mapping import MappingIsoparametric
 
-from spindle_fem.errors import MeshTagError
+from spindle_fem.errors import MeshQualityError, MeshTagError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 
 # Highest degree that the quadrature integrates exactly. The Jacobian of a
@@ -18,6 +19,38 @@ from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 # element of a curved facet is no polynomial and takes 6.
 ELEMENT_QUADRATURE_DEGREE = 4
 FACET_QUADRATURE_DEGREE = 6
+# Newton's last change of reference coordinates: aimed at, and what rounding may leave in thin elements.
+PLACE_TOLERANCE, PLACE_ROUNDING = 1.0e-12, 1.0e-9
+
+
+class CurvedMapping(MappingIsoparametric):
+    """scikit-fem's mapping of curved elements; its inverse accepts what rounding leaves in thin ones."""
+
+    def invF(  # noqa: N802
+        self,
+        x: NDArray[np.float64],
+        tind: NDArray[np.int64] | None = None,
+        newton_max_iters: int = 25,
+        newton_tol: float = PLACE_TOLERANCE,
+    ) -> NDArray[np.float64]:
+        """Reference coordinates of points, by Newton's method.
+
+        Raises
+        ------
+        MeshQualityError
+            Elements so bent that it does not converge.
+        """
+        found = np.full(x.shape, 0.25)
+        change = np.inf
+        for _ in range(newton_max_iters):
+            step = np.einsum("ijkl,jkl->ikl", self.invDF(found, tind), x - self.F(found, tind))
+            found += step
+            change = np.abs(step).max(initial=0.0)
+            if change < newton_tol:
+                break
+        if not change < PLACE_ROUNDING:
+            raise MeshQualityError("mesh", "elements are bent too far.", "Refine or optimise the mesh.")
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +87,13 @@ class SkfemMesh:
         MeshTagError
             A triangle that is no facet of the mesh.
         """
+        mapping = CurvedMapping(self.mesh, self.mesh.elem(), self.mesh.bndelem)
         return FacetBasis(
-            self.mesh, self.basis.elem, facets=self.find_facets(facets), intorder=FACET_QUADRATURE_DEGREE
+            self.mesh,
+            self.basis.elem,
+            mapping=mapping,
+            facets=self.find_facets(facets),
+            intorder=FACET_QUADRATURE_DEGREE,
         )
 
     def find_facets(self, facets: NDArray[np.int64]) -> NDArray[np.int64]:
