@@ -190,7 +190,9 @@ def _omitted_preload(
         text = f"Thermal expansion is left out; with it there would be no equilibrium here ({error}). {hint}"
         return [CodedWarning("thermal_preload_omitted", text)]
     cold = coupled.loads.bearing_heat
-    name = max(states, key=lambda key: states[key].preload - cold[key].preload)
+    # Bearings of a set grow by the same preload, to rounding: of equals the one that heats most is named.
+    grown = {key: round(state.preload - cold[key].preload, 3) for key, state in states.items()}
+    name = max(states, key=lambda key: (grown[key], states[key].heat.total))
     if not states[name].preload > 1.1 * cold[name].preload:
         return []
     text = (
