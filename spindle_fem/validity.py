@@ -100,7 +100,6 @@ def fold_warnings(warnings: Iterable[CodedWarning], names: Collection[str]) -> t
 
     Parameters
     ----------
-    warnings : iterable of CodedWarning
     names : collection of str
         A text that begins with one of them and a colon is about that thing.
 

@@ -78,7 +78,6 @@ def diagnose(
     full_model : {"auto", "off", "coarse", "own"}
         Mesh on which both fits are run again by the full model; ``auto`` is
         the coarse one unless that would take very many time steps.
-    progress : callable, optional
 
     Returns
     -------

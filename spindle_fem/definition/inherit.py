@@ -135,7 +135,6 @@ def apply_overrides(
     ----------
     content : mapping
         Raw tables of a definition.
-    overrides : iterable of str
     model : type
         Model of the file, whose keys the paths may name.
 

@@ -311,7 +311,6 @@ def load_machine(
 
     Parameters
     ----------
-    machine : str or Path
     overrides : iterable of str
         ``path=value`` texts applied before validation.
     checks : iterable of callable

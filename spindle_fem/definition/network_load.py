@@ -61,7 +61,6 @@ def load_network_machine(machine: str | Path, overrides: Iterable[str] = ()) -> 
 
     Parameters
     ----------
-    machine : str or Path
     overrides : iterable of str
         ``path=value`` texts, such as ``network.node.winding.capacity=50 J/K``.
 

@@ -39,7 +39,6 @@ class Estimate:
 
     Attributes
     ----------
-    name, unit : str
     value : float
         In ``unit``.
     low, high : float
@@ -50,7 +49,6 @@ class Estimate:
         ``value / prior``.
     sigma_log : float
         Posterior standard deviation of the logarithm.
-    prior_sigma_log : float
     learned : bool
         Whether the data say more than the prior did.
     """
@@ -86,7 +84,6 @@ class Calibration:
         Sum of squared whitened residuals over their number.
     cost : float
         Half the robust sum at the optimum, prior included.
-    evaluations : int
     outlier_share : float
         Share of the whitened residuals beyond the robust limit.
     """
@@ -168,7 +165,6 @@ def calibrate(
         Known slow error; found from the data when absent.
     rounds : int
         Fits, the slow error found anew between them.
-    progress : callable
 
     Raises
     ------
@@ -227,12 +223,10 @@ def prediction_interval(
     ----------
     covariance : (p, p) ndarray
         Covariance of the parameters' logarithms.
-    slow : SlowError
     sensitivity : (N, c, p) ndarray, [K]
         Derivatives of the prediction to the same logarithms.
     white : (c,) ndarray, [K]
         Noise of the channels.
-    level : float
     """
     from_parameters = np.einsum("ncp,pq,ncq->nc", sensitivity, covariance, sensitivity, optimize=True)
     total = from_parameters + slow.sigma**2 + np.asarray(white) ** 2

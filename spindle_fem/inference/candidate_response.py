@@ -34,7 +34,6 @@ class Variant:
 
     Attributes
     ----------
-    candidate : Candidate
     shape : mapping of outer name to float
         Values of parameters other than the amplitude.
     """
@@ -63,7 +62,6 @@ class BaseRun:
 
     Parameters
     ----------
-    predictor : Predictor
     number : int
         Recording.
     values : mapping of str to float

@@ -47,11 +47,8 @@ class Diagnosis:
     ----------
     predictor : Predictor
         Machine on the diagnosed recordings, full basis.
-    view : MachineView
-    calibrated : Calibrated
     hypotheses : tuple of Hypothesis
         The most probable first.
-    judgement : Judgement
     null : Fit
         Nothing missing, the machine's own parameters fitted.
     final : Fit
@@ -60,7 +57,6 @@ class Diagnosis:
         Missing heat over time at every spot, if it were the only one.
     heldout : str
         How the held-out readings were chosen.
-    candidates_tried : int
     seconds : mapping of stage to float
     """
 
@@ -101,10 +97,8 @@ def diagnose_recordings(
 
     Parameters
     ----------
-    machine : DiagnosedMachine
     heldout : str
         As :func:`heldout_stamps` takes it.
-    progress : callable
     workers : Workers, optional
         Processes that fit, by default as many as threads are given; the result does not depend on it.
     """
@@ -200,7 +194,6 @@ class _Readings:
 
     Parameters
     ----------
-    predictor : Predictor
     slow : float, [K]
         Slow error of a reading.
     """

@@ -24,8 +24,6 @@ def diagnosis_content(
 
     Parameters
     ----------
-    diagnosis : Diagnosis
-    opened : DiagnosedMachine
     before, after : sequence of (N, c) ndarray, [K]
         Predictions of both fits at the stamps of every recording.
     """

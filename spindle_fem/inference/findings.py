@@ -39,10 +39,8 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
 
     Parameters
     ----------
-    fit : Fit
     candidate : Candidate
         One of the fit's.
-    seed : int
     """
     effect = effect_of(candidate.effect)
     central = effect.report(candidate, candidate_values(candidate, fit.values))

@@ -116,7 +116,6 @@ def full_model_errors(
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     machine : DiagnosedMachine
         The same.
     mesh : {"auto", "off", "coarse", "own"}
@@ -127,7 +126,6 @@ def full_model_errors(
         How accurately time is followed; :func:`options_for` when absent.
     keep : callable
         Gets ``before`` or ``after`` and its predictions.
-    progress : callable
 
     Returns
     -------
@@ -287,10 +285,8 @@ def physics_of_fit(predictor: Predictor, number: int, fit: Fit) -> Physics:
 
     Parameters
     ----------
-    predictor : Predictor
     number : int
         Recording.
-    fit : Fit
     """
     acting = _acting(fit.candidates, number)
     values = fit.values

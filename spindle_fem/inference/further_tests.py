@@ -43,7 +43,6 @@ class Trial:
         In plain words.
     quantity : str
         What is varied.
-    drive : Drive
     effort : int
         0: as it ran anyway; 1: a test of its own; 2: one that needs more than the control panel.
     """
@@ -62,9 +61,6 @@ class Place:
     ----------
     name : str
         Place of the reduced model; a probe where ``is_probe``.
-    words : str
-    component : str
-    is_probe : bool
     """
 
     name: str
@@ -120,10 +116,6 @@ def answer(predictor: Predictor, fit: Fit, trial: Trial, places: Sequence[Place]
 
     Parameters
     ----------
-    predictor : Predictor
-    fit : Fit
-    trial : Trial
-    places : sequence of Place
     spacing : float, [s]
         Distance of the instants at which readings are told.
 
@@ -175,7 +167,6 @@ def reachable_places(spec: MachineSpec, names: Sequence[str]) -> tuple[Place, ..
 
     Parameters
     ----------
-    spec : MachineSpec
     names : sequence of str
         Places of the model.
     """

@@ -32,7 +32,6 @@ def heldout_stamps(recording: Recording, choice: str = "blocks") -> tuple[NDArra
 
     Parameters
     ----------
-    recording : Recording
     choice : str
         ``blocks``: every fourth of twenty equal stretches of time; ``last:0.4``:
         the last 40 % of the time (any share up to 0.8).
@@ -40,7 +39,6 @@ def heldout_stamps(recording: Recording, choice: str = "blocks") -> tuple[NDArra
     Returns
     -------
     (N,) bool ndarray
-    str
 
     Raises
     ------

@@ -15,7 +15,6 @@ class Hypothesis:
 
     Attributes
     ----------
-    fit : Fit
     log_prior : float
         Logarithm of the prior of the set and of the choice of its intervals.
     """

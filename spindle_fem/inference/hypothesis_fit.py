@@ -51,10 +51,8 @@ class Coordinate:
         At zero.
     sigma : float
         1 σ, of the logarithm where ``logarithmic``.
-    logarithmic : bool
     low, high : float
         Bounds of the coordinate.
-    unit : str
     """
 
     name: str
@@ -86,7 +84,6 @@ class Belief:
 
     Attributes
     ----------
-    coordinates : tuple of Coordinate
     mean : (p,) ndarray
     root : (p, p) ndarray
         ``rootᵀ root`` is the precision.
@@ -108,7 +105,6 @@ class Fit:
 
     Attributes
     ----------
-    candidates : tuple of Candidate
     coordinates : tuple of Coordinate
         The machine's, then the candidates'.
     position : (p,) ndarray
@@ -122,7 +118,6 @@ class Fit:
         The same with the squared distance from what was known before.
     residual : (n,) ndarray
         Whitened.
-    slow : SlowError
     evaluations : int
         Predictions that were asked for.
     """
@@ -190,15 +185,7 @@ def amplitude_name(candidate: Candidate) -> str:
 
 @dataclass(slots=True)
 class Problem:
-    """Data, noise and what is known of the machine.
-
-    Attributes
-    ----------
-    predictor : Predictor
-    belief : Belief
-    slow : SlowError
-    observations : tuple of Observation
-    """
+    """Data, noise and what is known of the machine."""
 
     predictor: Predictor
     belief: Belief
@@ -269,11 +256,9 @@ class Problem:
 
         Parameters
         ----------
-        candidates : sequence of Candidate
         start : mapping of str to float
             Values to begin from, by name; what is known of the machine, and the
             candidates' nominal values, where absent.
-        iterations : int
         hopeless : float
             Misfit that must be within reach of the next steps; else the search ends where it is.
         exact : bool

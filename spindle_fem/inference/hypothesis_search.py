@@ -45,10 +45,6 @@ class Search:
 
     Attributes
     ----------
-    problem : Problem
-    view : MachineView
-    candidates : tuple of Candidate
-    interval_effects : tuple of IntervalEffect
     weights : mapping of effect to float
         Prior weight of each.
     workers : Workers

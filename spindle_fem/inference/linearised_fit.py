@@ -85,7 +85,6 @@ class BoxedColumns:
 
         Parameters
         ----------
-        members : sequence of int
         spread : (m,) ndarray
             Prior standard deviation of every amplitude.
         one_sided : (m,) ndarray of bool
@@ -120,7 +119,6 @@ class LinearProblem:
         In coordinates whose prior is a unit normal.
     weight : (n,) ndarray
         Root of what each reading counts.
-    box : Box
     """
 
     data: Array
@@ -134,8 +132,6 @@ class LinearProblem:
 
         Parameters
         ----------
-        problem : Problem
-        fit : Fit
         trust : Fit or None
             Fit whose residuals tell which readings went astray; None for the first one.
         """

@@ -61,8 +61,6 @@ class Stretch:
     ----------
     start, end : float, [s]
         From the start of its recording.
-    condition : str
-    recording : int
     """
 
     start: float
@@ -89,7 +87,6 @@ class Where:
         Spot of each that explains the residual best.
     missing_heat : mapping of component to MissingHeat
         Heat missing at each credible component that heat can come from.
-    when : tuple of Stretch
     stamps : tuple of (start, end, recording)
         The ends of ``when`` as the recordings have them; the recording only where there are several.
     condition : str
@@ -136,10 +133,6 @@ def _millimetres(value: float) -> float | None:
 
 def where_of(diagnosis: Diagnosis) -> Where:
     """Place and time of the mismatch that a diagnosis found.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
 
     Returns
     -------
@@ -330,7 +323,6 @@ def significant_stretches(predictor: Predictor, fit: Fit) -> tuple[Stretch, ...]
 
     Parameters
     ----------
-    predictor : Predictor
     fit : Fit
         Nothing missing.
     """

@@ -41,7 +41,6 @@ class Pattern:
 
     Attributes
     ----------
-    spot : str
     places : tuple of str
         Places of the model, which share the heat evenly.
     cooling : bool
@@ -59,8 +58,6 @@ class Onsets:
 
     Attributes
     ----------
-    pattern : Pattern
-    recording : int
     times : (k,) ndarray, [s]
     gram : (k, k) ndarray
     data : (k,) ndarray
@@ -79,8 +76,6 @@ class Explanation:
 
     Attributes
     ----------
-    spot : str
-    recording : int
     log_evidence : float
         Over no heat.
     times : (k,) ndarray, [s]
@@ -103,8 +98,6 @@ class OnOff:
 
     Attributes
     ----------
-    pattern : Pattern
-    recording : int
     intervals : tuple of (float, float), [s]
     strength : float
         W, or W/K for cooling.
@@ -133,9 +126,6 @@ def onset_answers(
 
     Parameters
     ----------
-    problem : Problem
-    fit : Fit
-    patterns : sequence of Pattern
     recording : int
         The one in which heat comes and goes.
     number : int
@@ -249,7 +239,6 @@ def find_intervals(onsets: Onsets, spread: float, stop: float) -> list[OnOff]:
 
     Parameters
     ----------
-    onsets : Onsets
     spread : float
         Prior standard deviation of the strength, W or W/K; it is positive.
     stop : float, [s]

@@ -62,8 +62,6 @@ class Option:
 
     Attributes
     ----------
-    trial : Trial
-    place : Place or None
     information : float
         Expected, in bits.
     distance : float
@@ -106,10 +104,6 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
 
     Where only one is left, the best is set against the next in rank, both as
     likely: what would confirm it.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
 
     Returns
     -------

@@ -21,10 +21,8 @@ class Observation:
 
     Attributes
     ----------
-    recording : int
     channel : int
         Column of the recording.
-    bins : ChannelBins
     values : (b,) ndarray, [K]
         Mean reading of each bin.
     right : (b,) int ndarray or None
@@ -60,7 +58,6 @@ def observe(
 
     Parameters
     ----------
-    recordings : sequence of Recording
     use : sequence of (N,) bool ndarray or None
         Stamps of each recording that count; all when None.
     grids : sequence of (G + 1,) ndarray or None, [s]

@@ -40,9 +40,6 @@ class DiagnosedMachine:
 
     Attributes
     ----------
-    name : str
-    spec : MachineSpec or NetworkMachineSpec
-    fast : FastModel or FastModel
     effects : ActiveEffects
         Effects of the definition: nominal, not diagnosed.
     view : MachineView

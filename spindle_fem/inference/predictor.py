@@ -59,12 +59,10 @@ class Prior:
 
     Attributes
     ----------
-    name : str
     value : float
         Most likely value before the data, in ``unit``.
     sigma_log : float
         One standard deviation of the natural logarithm.
-    unit : str
     highest : float
         Factor on the value that cannot be passed; 1/0.5 for a share of one half.
     """
@@ -81,8 +79,6 @@ class Predictor:
 
     Parameters
     ----------
-    fast : FastModel or FastModel
-    recordings : sequence of Recording
     use : sequence of (N,) bool ndarray, optional
         Stamps that may be fitted, per recording; the rest is held out. All by default.
     effects : ActiveEffects
@@ -297,7 +293,6 @@ class Predictor:
         values : mapping of str to float
             Factors of the machine's parameters, ``effect:<name>`` for factors of
             candidates, values of term parameters; of readings, which the run ignores.
-        candidates : sequence of Candidate
         derivatives : sequence of str
             Names of the machine or of terms.
         like : TransientRun, optional

@@ -30,8 +30,6 @@ class Calibrated:
 
     Attributes
     ----------
-    belief : Belief
-    slow : SlowError
     fit : Fit or None
         None without calibration recordings.
     """

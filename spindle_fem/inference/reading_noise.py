@@ -104,7 +104,6 @@ def channel_bins(
 
     Parameters
     ----------
-    recording : Recording
     use : (N,) bool ndarray, optional
         Stamps to use; the others are held out.
     width : float, optional, [s]
@@ -143,9 +142,6 @@ class Whitener:
 
     Parameters
     ----------
-    bins : ChannelBins
-    slow : SlowError
-
     Source of the filter: Anderson & Moore (1979), Optimal Filtering, chapter 5.
     """
 

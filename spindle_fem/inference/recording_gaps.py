@@ -69,7 +69,6 @@ def hidden_in(
 
     Parameters
     ----------
-    recording : Recording
     pieces : sequence of (float, float), [s]
     sets : sequence of str
         Bearing sets: friction of each, as a share of the highest that it gives. Input temperatures that
@@ -114,7 +113,6 @@ def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, fl
 
     Parameters
     ----------
-    run : TransientRun
     states : (G + 1, r) ndarray, [K]
         States of the run.
     jumps : sequence of (int, float, float)
@@ -134,10 +132,8 @@ def hidden_forcing(run: TransientRun, fast: FastModel, hidden: Sequence[Hidden])
 
     Parameters
     ----------
-    run : TransientRun
     fast : FastModel
         Whose run it is.
-    hidden : sequence of Hidden
     """
     highest = run.start.max(axis=0)
     members = {

@@ -27,7 +27,6 @@ def share_of_last(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float
     ----------
     hypotheses : sequence of Hypothesis
         The empty one among them.
-    chosen : Hypothesis
     """
     size = len(chosen.fit.candidates)
     smaller = [h.fit.misfit_with_prior for h in hypotheses if len(h.fit.candidates) < size]
@@ -39,13 +38,7 @@ def share_of_last(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float
 
 
 def gain_of_more(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float:
-    """What the best set with more effects makes the data likelier by (natural logarithm), at least 0.
-
-    Parameters
-    ----------
-    hypotheses : sequence of Hypothesis
-    chosen : Hypothesis
-    """
+    """What the best set with more effects makes the data likelier by (natural logarithm), at least 0."""
     size = len(chosen.fit.candidates)
     larger = [h.fit.misfit_with_prior for h in hypotheses if len(h.fit.candidates) > size]
     return max(0.0, 0.5 * (chosen.fit.misfit_with_prior - min(larger))) if larger else 0.0

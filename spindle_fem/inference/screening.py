@@ -28,7 +28,6 @@ class Screened:
 
     Attributes
     ----------
-    variants : tuple of Variant
     gram : (m, m) ndarray
         Inner products of their answers, less what the machine's own coordinates absorb.
     data : (m,) ndarray
@@ -106,7 +105,6 @@ class Screened:
         ----------
         size : int
             1 to 3; triples extend the best pairs.
-        number : int
         """
         sets, gain = self._evaluated(size)
         found: dict[frozenset[tuple[str, str]], tuple[tuple[int, ...], float]] = {}
@@ -224,10 +222,8 @@ def screen(
 
     Parameters
     ----------
-    problem : Problem
     fit : Fit
         What the model already holds.
-    variants : sequence of Variant
     weights : mapping of effect to float
     families : mapping of component to str
         As :class:`Screened` has them.

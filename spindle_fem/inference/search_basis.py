@@ -37,7 +37,6 @@ def on_search_basis(
 
     Parameters
     ----------
-    predictor : Predictor
     names : sequence of str
         Parameters of the machine.
     places : sequence of str

@@ -36,7 +36,6 @@ class Ranked:
     ----------
     best : Hypothesis
         Most probable form.
-    probability : float
     """
 
     best: Hypothesis
@@ -54,15 +53,12 @@ class Judgement:
 
     Attributes
     ----------
-    verdict : str
     p_value : float
         Probability of so large a mismatch if nothing were missing.
-    chosen : Ranked
     alternatives : tuple of Ranked
         What the data cannot rule out, the chosen set apart.
     other : float
         Probability of something that is not in the catalogue, or of a law unlike those in it.
-    reason : str
     evidence : float
         Probability of the chosen set by evidence alone.
     share_of_last : float

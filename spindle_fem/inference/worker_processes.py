@@ -19,14 +19,12 @@ class FitOrder:
 
     Attributes
     ----------
-    candidates : tuple of Candidate
     start : mapping of str to float
         Values to begin from, by name.
     shares : tuple of float
         Factors on the amplitudes at the start, tried one after the other until the set can be simulated.
     hopeless : float
         As :meth:`Problem.fit` takes it.
-    iterations : int
     """
 
     candidates: tuple[Candidate, ...]
@@ -73,13 +71,7 @@ class Workers:
         self._pool.wake()
 
     def fits(self, problem: Problem, orders: Sequence[FitOrder]) -> list[Fit | None]:
-        """Fits in the order asked for, with the candidates that were given.
-
-        Parameters
-        ----------
-        problem : Problem
-        orders : sequence of FitOrder
-        """
+        """Fits in the order asked for, with the candidates that were given."""
         fits = self.done(problem, [partial(fit_order, order=order) for order in orders])
         # Candidates are known by identity; those that come back are copies.
         return [
@@ -92,7 +84,6 @@ class Workers:
 
         Parameters
         ----------
-        problem : Problem
         jobs : sequence of callable
             That can be sent to another process: functions of modules, perhaps with some arguments given.
         """

@@ -67,7 +67,6 @@ class ThermalModel:
     cell_area : (n_starts, n_along) ndarray, [m²]
     cell_angle, cell_position : (n_along,) ndarray, [rad], [m]
     cell_is_port : (n_along,) bool ndarray
-    contacts : tuple of str
     gap_radii : mapping of gap to (float, float), [m]
         Mean radius of the turning side and of what faces it.
     ranges : mapping of coefficient to (float, float)
@@ -80,7 +79,6 @@ class ThermalModel:
         Temperature of every node of the mesh from the unknowns; empty where not kept.
     mesh_numbers : mapping of str to float
         ``nodes``, ``elements``, ``min_quality``, where the nodes are kept.
-    mesh_digest : str
     checked : tuple of str
         Keys of the designs that were solved in full to check it.
     digest : str
@@ -172,7 +170,6 @@ def project(model: ThermalModel, basis: Array, one: Array) -> ThermalModel:
 
     Parameters
     ----------
-    model : ThermalModel
     basis : (n, r) ndarray
     one : (r,) ndarray
         Coordinates of the uniform field, which the basis should hold.

@@ -133,7 +133,6 @@ def heat_of_table(
 
     Parameters
     ----------
-    spec : MachineSpec
     speed : (n,) ndarray, [rad/s]
     thrust : (n,) ndarray, [N]
     """
@@ -236,7 +235,6 @@ class BearingMechanics:
 
         Parameters
         ----------
-        point : OperatingPoint
         temperatures : (n,) array_like, [K]
 
         Raises

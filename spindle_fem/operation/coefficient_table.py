@@ -24,8 +24,6 @@ class CoefficientTable:
 
     Attributes
     ----------
-    spec : MachineSpec
-    contacts : tuple of str
     gap_radii : mapping of gap to (float, float), [m]
         Mean radius of the turning side and of what faces it.
     groups : mapping of coefficient to tuple of str

@@ -53,7 +53,6 @@ def film_coefficient(
     Returns
     -------
     coefficient : (n_facets,) ndarray, [W/(m²·K)]
-    warnings : tuple of CodedWarning
     """
     if isinstance(film, ConstantFilm):
         return np.full(wall.shape, film.coefficient.value), ()
@@ -124,7 +123,6 @@ def ball_conductances(group: BearingSet, heat: BearingHeat | None = None) -> tup
 
     Parameters
     ----------
-    group : BearingSet
     heat : BearingHeat, optional
         What the contacts conduct at the state; without it, or where the heat
         model has no contacts, ``nan`` for a row that follows them.
@@ -165,9 +163,6 @@ def linear_coefficients(
 
     Parameters
     ----------
-    spec : MachineSpec
-    point : OperatingPoint
-    contacts : iterable of str
     gap_radii : mapping of gap to (float, float), [m]
         Mean radius of the turning side and of what faces it.
     """

@@ -40,8 +40,6 @@ class CoolantLoop:
 
     Parameters
     ----------
-    spec : MachineSpec
-    cells : ChannelCells
     cell_factor : (n_along,) ndarray, optional
         Further factor on the film of each cell along the channel.
     """

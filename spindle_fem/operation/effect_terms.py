@@ -71,7 +71,6 @@ class Quantities:
     by : (n, q, n_y + n_x + p) ndarray
         To the sensed temperatures, the memories and the asked parameters (to their logarithms where
         they are logarithmic), side by side; fewer columns where fewer were asked for.
-    n_sensed, n_states : int
     """
 
     value: Array
@@ -208,7 +207,6 @@ class EffectTerms:
 
     Parameters
     ----------
-    terms : sequence of Term
     parameters : mapping of str to float
         Values by outer name (``<term>.<parameter>``), nominal where absent.
     derivatives : sequence of str
@@ -295,12 +293,10 @@ class EffectTerms:
 
         Parameters
         ----------
-        instants : Instants
         sensed : (n, n_y) ndarray, [K]
             Temperatures of :attr:`reads`.
         states : (n, n_x) ndarray
             Memories.
-        derivatives : Derivatives
         """
         heat, friction, factor = (
             self._quantities(instants.number, len(names), fill, derivatives)
@@ -435,7 +431,6 @@ def require_known(
 
     Parameters
     ----------
-    terms : iterable of Term
     places : collection of str
         Whose temperatures can be read, and that can be heated.
     fluids : collection of str
@@ -465,10 +460,8 @@ def operating_factors(
 
     Parameters
     ----------
-    terms : sequence of Term
     values : sequence of mapping of str to float
         Of each term's own parameters.
-    point : Operating
     """
     return [term.operating_factor(point, own) for term, own in zip(terms, values, strict=True)]
 

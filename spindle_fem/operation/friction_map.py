@@ -119,7 +119,6 @@ class FrictionMap:
 
     Attributes
     ----------
-    bearings : tuple of str
     speed : (n_speeds,) ndarray, [rad/s]
     thrust : (n_thrusts,) ndarray, [N]
     turning : CubicSpline

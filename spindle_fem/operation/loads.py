@@ -114,7 +114,6 @@ class Loads:
     surface_heat : mapping of surface to float, [W]
         Spread evenly over the surface.
     films : mapping of surface to FilmLoad
-    lumped : tuple of LumpedLoad
     bearing_heat : mapping of bearing to BearingHeat
     heat_to : mapping of bearing to {"inner", "outer", "balls"} shares in W
     change : LoadChange

@@ -137,8 +137,6 @@ class LoadsBuilder:
 
         Parameters
         ----------
-        point : OperatingPoint
-        state : FieldState
         change : LoadChange
             Physics beyond the machine's own.
         """

@@ -38,7 +38,6 @@ def named_places(machine: MachineOnMesh, lumped: tuple[str, ...], size: int) -> 
 
     Parameters
     ----------
-    machine : MachineOnMesh
     lumped : tuple of str
         Lumped nodes, whose unknowns follow those of the mesh.
     size : int

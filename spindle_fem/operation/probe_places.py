@@ -76,7 +76,6 @@ def harmonics(operators: ThermalOperators, mean: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    operators : ThermalOperators
     mean : (n_unknowns,) ndarray
         Weights of the place's mean; their sum is 1.
 

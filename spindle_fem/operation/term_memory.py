@@ -34,7 +34,6 @@ def remembered(
 
     Parameters
     ----------
-    terms : EffectTerms
     instants : Instants
         Starts of the G steps.
     steps : (G,) ndarray, [s]

@@ -29,8 +29,6 @@ class Shared(Generic[Value]):
 
     Parameters
     ----------
-    value : object
-
     >>> Shared([1, 2]).value
     [1, 2]
     """

@@ -39,7 +39,6 @@ class Recording:
 
     Attributes
     ----------
-    name : str
     source : str
         Manifest file.
     start : str or None
@@ -66,14 +65,12 @@ class Recording:
         True: holds until the next reading; False: straight line.
     input_units : tuple of str
         SI base units.
-    covariate_names : tuple of str
     covariates : (N, k) float64 ndarray
         SI.
     covariate_units : tuple of str
         SI base units.
     segments : (S, 2) int64 ndarray
         Start and stop of the stretches between long gaps.
-    defects : DefectReport
     """
 
     name: str
@@ -180,10 +177,6 @@ def read_recording(path: str | Path, *, long_gap: float | None = None) -> Record
         Gaps longer than this begin a new segment, in which a network starts
         again from its readings. Default: half an hour or 60 median steps,
         whichever is longer.
-
-    Returns
-    -------
-    Recording
 
     Raises
     ------

@@ -24,7 +24,6 @@ class ErrorRow:
 
     Attributes
     ----------
-    channel, condition : str
     readings : int
         Readings in use.
     rmse, mean, largest : float, [K]
@@ -64,7 +63,6 @@ class Comparison:
     rows : tuple of ErrorRow
         Condition "all" first for each channel, with NaN where nothing was read;
         other conditions without readings are left out.
-    conditions : Conditions
     """
 
     residual: NDArray[np.float64]
@@ -81,13 +79,8 @@ def compare(recording: Recording, predicted: NDArray[np.float64]) -> Comparison:
 
     Parameters
     ----------
-    recording : Recording
     predicted : (N, c) ndarray, [K]
         At every stamp, for every temperature channel.
-
-    Returns
-    -------
-    Comparison
 
     Raises
     ------

@@ -51,10 +51,6 @@ class Conditions:
 def operating_conditions(recording: Recording) -> Conditions:
     """Classify every stamp of a recording.
 
-    Parameters
-    ----------
-    recording : Recording
-
     Returns
     -------
     Conditions

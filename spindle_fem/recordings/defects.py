@@ -23,19 +23,16 @@ class ChannelDefects:
 
     Attributes
     ----------
-    column, role : str
     readings : int
         Finite values.
     empty_cells, infinite : int
         Cells of the file.
-    longest_missing_s : float
     spikes, dropouts, stuck, implausible : int
         Flagged readings, kept but not used.
     bridged : int
         Grid points of an input that its neighbours' readings fill by ``hold``.
     noise : ChannelNoise
         Measured, SI.
-    sigma_declared : float or None
     """
 
     column: str
@@ -64,7 +61,6 @@ class Thinning:
 
     Attributes
     ----------
-    step_s : float
     rows, bins : int
         Before and after.
     missing : int
@@ -86,12 +82,8 @@ class DefectReport:
 
     Attributes
     ----------
-    name : str
     rows, stamps : int
         Rows of the file, and distinct stamps.
-    duration_s, median_step_s, long_gap_s : float
-    rows_without_time, blank_rows, short_rows : int
-    truncated_last_row : bool
     unordered_rows : int
         Rows with a stamp before one that came earlier in the file.
     repeated_rows : int
@@ -104,8 +96,6 @@ class DefectReport:
         Steps above 1.5 medians.
     segments : int
         Stretches between gaps longer than ``long_gap_s``.
-    unused_columns : tuple of str
-    channels : tuple of ChannelDefects
     thinned : Thinning or None
         Where the recording was averaged since; everything else is of the file.
     """

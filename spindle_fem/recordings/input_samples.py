@@ -20,7 +20,6 @@ class InputHistory:
     Attributes
     ----------
     times : (N,) float64 ndarray, [s]
-    names : tuple of str
     values : (N, m) float64 ndarray
         SI. Finite.
     held : (m,) bool ndarray

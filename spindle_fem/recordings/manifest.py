@@ -68,7 +68,6 @@ class ColumnUnit:
 
     Attributes
     ----------
-    scale, offset : float
     unit : str
         SI base unit, ``""`` for a pure number.
     is_temperature : bool
@@ -145,7 +144,6 @@ def load_manifest(path: str | Path) -> tuple[Manifest, Path]:
 
     Returns
     -------
-    Manifest
     Path
         The data file.
 

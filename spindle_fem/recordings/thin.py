@@ -34,7 +34,6 @@ def thinned_recording(
 
     Parameters
     ----------
-    recording : Recording
     step : float, [s]
         Length of a bin.
     exponents : mapping of input to float, optional

@@ -206,7 +206,6 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
 
     Parameters
     ----------
-    coolant : CoolantResult
     ports : bool
         Whether the first and the last cell are the drilled ports: another
         section with another film, so they are told in words.

@@ -182,9 +182,6 @@ def render_document(
     ----------
     kind : str
         What the page is of, set above the title: "Sweep", "Diagnosis".
-    title : str
-    sections : sequence of Section
-    subtitle, footer : str
     """
     import jinja2
 

@@ -103,7 +103,6 @@ def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Fi
 
     Parameters
     ----------
-    data : Dataset
     components : sequence of str
         The most credible first; four are drawn.
     number : int

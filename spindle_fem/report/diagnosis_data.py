@@ -35,7 +35,6 @@ def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequ
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     before, after : sequence of (N, c) ndarray, [K]
         Predictions at the stamps of every recording, without and with what was found.
 

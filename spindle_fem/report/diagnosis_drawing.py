@@ -57,10 +57,8 @@ def located_on_machine(
     ----------
     data : Dataset
         As ``diagnosis.nc`` has it.
-    spec : MachineSpec
     component : str
         What is outlined: where the mismatch is; may be empty.
-    assembly : AssemblyGeometry, optional
     """
     if "spot" not in data:
         return None

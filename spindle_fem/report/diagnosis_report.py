@@ -97,7 +97,6 @@ def write_diagnosis_report(
 
     Parameters
     ----------
-    folder : str or Path
     pictures : mapping of kind to list of Illustration, optional
         What :func:`draw_figures` has drawn already.
 

@@ -83,7 +83,6 @@ def exposed_triangles(
 
     Parameters
     ----------
-    mesh : TaggedMesh
     values : (n_nodes,) or (n_nodes, k) ndarray
     surfaces : iterable of str, optional
         Names of the surfaces; all exposed ones when left out.

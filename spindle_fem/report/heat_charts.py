@@ -24,10 +24,6 @@ def write_heat_charts(content: Mapping[str, Any], folder: Path) -> list[Path]:
         As ``heat_study`` returns it.
     folder : Path
         Made when missing.
-
-    Returns
-    -------
-    list of Path
     """
     folder.mkdir(parents=True, exist_ok=True)
     return [save_png(draw(content), folder / f"{name}.png") for name, draw in CHARTS.items()]

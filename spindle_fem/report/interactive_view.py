@@ -35,7 +35,6 @@ def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGE
 
     Parameters
     ----------
-    result : ThermalResult
     triangle_budget : int
         Above it neighbouring points of a surface are merged.
 

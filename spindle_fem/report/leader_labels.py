@@ -82,7 +82,6 @@ def draw_labels(
     ----------
     axes : Axes
         In pixels, downwards.
-    labels : sequence of Label
     places : (n, 2) array_like, [px]
         Of the labels, in ``axes``.
     edge : float, [px]

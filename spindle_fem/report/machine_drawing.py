@@ -54,7 +54,6 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
 
     Parameters
     ----------
-    spec : MachineSpec
     assembly : AssemblyGeometry, optional
         Made from ``spec`` when left out.
     """

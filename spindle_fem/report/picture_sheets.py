@@ -42,7 +42,6 @@ def picture_figure(
     ----------
     picture : Picture
         Shown pixel by pixel; the figure is a little wider.
-    title : str
     bars : sequence of ColourBar
         Drawn side by side under the picture.
     above, below : sequence of Label

@@ -61,7 +61,6 @@ def clip_triangles(shape: TriangleSet, level: NDArray[np.float64]) -> TriangleSe
 
     Parameters
     ----------
-    shape : TriangleSet
     level : (n,) ndarray
         Signed distance at the points, linear in each triangle.
     """
@@ -117,7 +116,6 @@ def section_of_volume(
 
     Parameters
     ----------
-    mesh : TaggedMesh
     values : (n_nodes,) or (n_nodes, k) ndarray
     level : (n_nodes,) ndarray
         Signed distance from the plane at every mesh node.
@@ -206,7 +204,6 @@ def boundary_lines(mesh: TaggedMesh, values: NDArray[np.float64], level: NDArray
 
     Parameters
     ----------
-    mesh : TaggedMesh
     values : (n_nodes,) or (n_nodes, k) ndarray
     level : (n_nodes,) ndarray
         Signed distance from the plane.

@@ -31,7 +31,6 @@ class MeridianSection:
         One value: temperature in K; labelled by part.
     outlines : SegmentSet
         Outlines of the parts with their temperature in K.
-    part_names : tuple of str
     """
 
     faces: TriangleSet
@@ -61,7 +60,6 @@ def radial_profile(
 
     Parameters
     ----------
-    section : MeridianSection
     z : float, [m]
 
     Returns
@@ -103,8 +101,6 @@ def axial_profile(
 
     Parameters
     ----------
-    section : MeridianSection
-    part : str
     side : {"inner", "outer"}
     number : int
         Places along z.

@@ -54,7 +54,6 @@ class Course:
 
     Attributes
     ----------
-    name : str
     times : (N,) ndarray, [s]
     read : (N,) ndarray, [degC]
         NaN where the reading is of no use.
@@ -143,7 +142,6 @@ def courses_figure(courses: list[Course], title: str, notes: str, band: str) -> 
     ----------
     courses : list of Course
         With the same predictions and times.
-    title, notes : str
     band : str
         What the shaded band is.
     """
@@ -178,14 +176,9 @@ def draw_channels(folder: Path, recording: Recording, predicted: Array, half_wid
     ----------
     folder : Path
         Made when missing.
-    recording : Recording
     predicted : (N, c) ndarray, [K]
     half_width : (N, c) ndarray, [K]
         Of the interval that should hold nine readings in ten.
-
-    Returns
-    -------
-    list of Path
     """
     folder.mkdir(parents=True, exist_ok=True)
     nothing = np.zeros(recording.times.size, dtype=bool)

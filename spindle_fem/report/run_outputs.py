@@ -113,7 +113,6 @@ def write_outputs(
 
     Parameters
     ----------
-    result : ThermalResult
     folder : str or Path
         An existing folder.
     started : float, optional

@@ -213,8 +213,6 @@ class SceneRenderer:
 
         Parameters
         ----------
-        view : View
-        width_px : int
         margin_px : float
             Left free on each side.
         """

@@ -33,8 +33,6 @@ class Scale:
         Column.
     label : str
         Name with unit for an axis.
-    factor : float
-    unit : str
     words : tuple of str
         Of a column of words, which are drawn at 0, 1, 2; empty for numbers.
     """

@@ -55,7 +55,6 @@ def probe_history(result: StudyResult, steady: Mapping[str, float] | None = None
 
     Parameters
     ----------
-    result : StudyResult
     steady : mapping of probe to float, optional, [°C]
         Where the last phase tends to: dotted over it.
     """

@@ -21,7 +21,6 @@ def write_transient_report(summary: Mapping[str, Any], result: StudyResult, fold
     ----------
     summary : mapping
         Of ``transient.json``.
-    result : StudyResult
     folder : Path
         An existing folder.
     """

@@ -63,7 +63,6 @@ def surface_means(
 
     Parameters
     ----------
-    mesh : TaggedMesh
     facets : (n, 6) ndarray of int
     values : (n_nodes,) ndarray
 
@@ -112,7 +111,6 @@ def build_dataset(result: ThermalResult, sources: tuple[str, ...] = ()) -> xr.Da
 
     Parameters
     ----------
-    result : ThermalResult
     sources : tuple of str
         Literature behind the models that were used, for the attributes.
 

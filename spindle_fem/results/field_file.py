@@ -65,7 +65,6 @@ def heat_flux(
 
     Parameters
     ----------
-    mesh : TaggedMesh
     temperature : (n_nodes,) ndarray, [K]
     conductivity : mapping of part to float, [W/(m·K)]
 
@@ -108,15 +107,6 @@ def write_fields(result: ThermalResult, path: str | Path) -> Path:
     ``part.NAME`` and ``surface.NAME`` hold the number of each name. On faces
     with a film ``film_coefficient_W_m2K`` and ``fluid_temperature_degC``, NaN
     elsewhere.
-
-    Parameters
-    ----------
-    result : ThermalResult
-    path : str or Path
-
-    Returns
-    -------
-    Path
     """
     mesh, spec = result.mesh, result.spec
     conductivity = {name: spec.part_material(name).thermal_conductivity for name in mesh.part_names}
@@ -151,8 +141,6 @@ def write_tagged_vtu(
 
     Parameters
     ----------
-    mesh : TaggedMesh
-    path : str or Path
     point_data : mapping of str to (n_nodes,) or (n_nodes, 3) ndarray, optional
     cell_data : mapping of str to ndarray, optional
         Volume elements first, then the faces of every surface in order.

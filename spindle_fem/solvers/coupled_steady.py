@@ -70,8 +70,6 @@ def solve_coupled(
 
     Parameters
     ----------
-    machine : PreparedMachine
-    point : OperatingPoint
     start : (n_unknowns,) ndarray, optional, [K]
     beyond : callable, optional
         Point, field and lumped temperatures to what physics beyond the

@@ -48,7 +48,6 @@ class HeatInMemory:
 
     Parameters
     ----------
-    model : HeatModel
     tolerance : float, [K]
         Temperatures closer than this are the same.
     """
@@ -117,8 +116,6 @@ class CoupledInputs:
 
     Parameters
     ----------
-    machine : PreparedMachine
-    history : OperatingHistory
     coefficient_tolerance : float, [-]
         Relative change of a film or contact coefficient below which the
         matrix keeps the old one; 0 renews it at every stage.

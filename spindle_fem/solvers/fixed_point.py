@@ -97,7 +97,6 @@ def fixed_point(
     settled : callable
         Whether a state and its image are near enough; may raise where the iteration leads nowhere.
     start : (n,) ndarray
-    iteration : Iteration
     name : str
         What is solved, for messages.
 
@@ -105,7 +104,6 @@ def fixed_point(
     -------
     state : (n,) ndarray
         The last one that was given to ``respond``.
-    steps : int
 
     Raises
     ------

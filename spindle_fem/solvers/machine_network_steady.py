@@ -116,7 +116,6 @@ def solve_machine_network(
 
     Parameters
     ----------
-    machine : MachineNetwork
     point : OperatingPoint, optional
         The definition's own by default.
     heat_model : HeatModel, optional

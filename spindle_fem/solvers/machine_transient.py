@@ -80,7 +80,6 @@ def simulate_full(
 
     Parameters
     ----------
-    machine : PreparedMachine
     inputs : InputHistory
         ``speed``, ``thrust``, ``ambient``, ``coolant_inlet``, ``coolant_flow``
         and ``heat.<place>`` in SI, held or on straight lines; such as
@@ -90,7 +89,6 @@ def simulate_full(
     start : ThermalState, optional
         Everything at the first ambient temperature when absent; a saved state
         to restart from.
-    options : TransientOptions
     stop : callable, optional
         Asked after every accepted step; True ends the run there.
     breakpoints : sequence of float, [s]
@@ -99,11 +97,6 @@ def simulate_full(
         Terms and factors beyond the machine's own.
     memory : ndarray, optional
         What the terms remember where ``start`` goes on from an earlier run.
-    progress : callable
-
-    Returns
-    -------
-    MachineTransient
 
     Raises
     ------

@@ -44,7 +44,6 @@ class Physics:
 
     Attributes
     ----------
-    terms : tuple of Term
     values : mapping of str to float
         Parameters of the terms by outer name; nominal where absent.
     factors : mapping of str to float
@@ -100,10 +99,8 @@ class FieldTerms:
 
     Parameters
     ----------
-    machine : PreparedMachine
     lumped_names : sequence of str
         Lumped nodes in the order of their unknowns.
-    physics : Physics
 
     Raises
     ------
@@ -377,8 +374,6 @@ def settled_memory(
     ----------
     machine : PreparedMachine
         Of :func:`with_factors`.
-    physics : Physics
-    point : OperatingPoint
     temperature, lumped : ndarray, [K]
     """
     return _terms_of(machine, physics).settled(point, temperature, lumped) if physics.is_there else None

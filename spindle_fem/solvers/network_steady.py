@@ -63,20 +63,14 @@ def solve_steady(
 
     Parameters
     ----------
-    network : ThermalNetwork
     inputs : mapping of str to float, optional
         SI values of every input the network needs.
     initial : (n,) ndarray, [K], optional
         Start of the iteration; default: the mean boundary temperature.
-    max_iterations : int
     tolerance : float
         Largest node imbalance over the sum of all heat flows.
     temperature_limit : float, [K]
         Beyond it the iteration of a network with laws is taken to run away.
-
-    Returns
-    -------
-    NetworkSteady
 
     Raises
     ------
@@ -137,7 +131,6 @@ def require_stable(derivative: Array, network: ThermalNetwork) -> None:
     ----------
     derivative : (n, n) float64 ndarray, [W/K]
         Of the net heat to the temperatures.
-    network : ThermalNetwork
 
     Raises
     ------

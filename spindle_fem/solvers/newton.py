@@ -30,7 +30,6 @@ class HeatBalance(Protocol):
     ----------
     name : str
         Of the network, for messages.
-    node_names : tuple of str
     is_linear : bool
         Whether nothing in it depends on temperature.
     """
@@ -60,7 +59,6 @@ def newton(
 
     Parameters
     ----------
-    balance : HeatBalance
     start : (n,) ndarray, [K]
     enough : float, [K]
         A step that moves less ends the iteration, whatever imbalance is left.
@@ -74,7 +72,6 @@ def newton(
     temperature : (n,) ndarray, [K]
     derivative : (n, n) matrix, [W/K]
         Of the net heat, there.
-    steps : int
 
     Raises
     ------

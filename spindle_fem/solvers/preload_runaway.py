@@ -80,8 +80,6 @@ def no_equilibrium(
     ----------
     name : str
         Of the machine.
-    point : OperatingPoint
-    reason : str
     limit : float, optional, [rad/s]
         Speed up to which they do.
     """

@@ -96,7 +96,6 @@ def prepare_machine(
 
     Parameters
     ----------
-    spec : MachineSpec
     size_factor : float, optional
         In place of the machine's own, for mesh-refinement estimates.
     progress : callable

@@ -23,12 +23,10 @@ class ReadingRows:
 
     Attributes
     ----------
-    machine : PreparedMachine
     rows : (n_outputs, n + m) sparse array
         Point probes, raceway means of every bearing, ball rows, channel cells.
     probes : tuple of str
         In the order of the definition.
-    bearings : tuple of str
     """
 
     machine: PreparedMachine

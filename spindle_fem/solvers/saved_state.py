@@ -17,8 +17,6 @@ def save_state(path: str | Path, state: ThermalState, memory: Array | None = Non
 
     Parameters
     ----------
-    path : str or Path
-    state : ThermalState
     memory : (n,) ndarray, optional
         What terms remember then, such as ``MachineTransient.memory``.
     """

@@ -40,7 +40,6 @@ class NetworkPrediction:
     predicted : (N, c) float64 ndarray, [K]
     sensitivity : (N, c, p) float64 ndarray, [K]
         Derivative to the natural logarithm of each parameter.
-    parameters : tuple of Parameter
     initial : (S, n) float64 ndarray, [K]
         State of all nodes at the start of each segment.
     method : str
@@ -166,7 +165,6 @@ def initial_state(
 
     Parameters
     ----------
-    network : ThermalNetwork
     history : InputHistory
         Its first row counts.
     readings : mapping of str to float, [K]
@@ -255,8 +253,6 @@ def simulate_on_recording(
 
     Parameters
     ----------
-    network : ThermalNetwork
-    recording : Recording
     parameters : tuple of Parameter
         Those to differentiate by; of the network, or of kind "initial" (they
         then set the first segment's start).
@@ -264,10 +260,6 @@ def simulate_on_recording(
         Start of every segment; see :func:`initial_state`.
     step_error : float or None, [K]
         Of each implicit step, where the network is not linear.
-
-    Returns
-    -------
-    NetworkPrediction
 
     Raises
     ------
@@ -315,8 +307,6 @@ def initial_parameters(
 
     Parameters
     ----------
-    network : ThermalNetwork
-    recording : Recording
     unread_sigma : float, [K]
         Standard deviation of a node that nothing reads, about its estimate.
 

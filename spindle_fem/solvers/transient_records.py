@@ -159,19 +159,14 @@ class MachineTransient:
     ----------
     times : (n,) ndarray, [s]
         Sample times.
-    probes : tuple of str
     readings : (n, n_probes) ndarray, [K]
-    bearings : tuple of str
     inner, outer, balls : (n, n_bearings) ndarray, [K]
         Raceway means and ball rows.
-    steps : StepRecord
-    energy : MachineEnergy
     state : ThermalState
         At the end, to go on from.
     counts : mapping of str to int
         ``rejected``, ``linear_iterations``, ``matrix_builds``,
         ``preconditioner_builds``, ``evaluations``.
-    cpu_seconds : float
     stopped : bool
         Whether the stop condition ended it, not the end time.
     memory : ndarray or None

@@ -39,16 +39,12 @@ class Simulation:
     ----------
     machine : str
         Its name.
-    recording : Recording
     predicted : (N, c) ndarray, [K]
     half_width : (N, c) ndarray, [K]
         Half of the 90 % interval of a reading: noise, slow error and parameters,
         these as the calibration left them or as their priors say.
-    comparison : Comparison
-    calibration : Calibration or None
     machine_text : str or None
         Definition with the calibrated values.
-    notes : tuple of str
     model : mapping
         Size and checked error of the reduced model; empty for a network.
     """
@@ -78,7 +74,6 @@ def simulate_recordings(
     ----------
     machine : str or Path
         A definition file or the name of a machine that ships; with geometry or a ``[network]``.
-    recording : Recording
     calibration : sequence of Recording
         These may move the uncertain parameters first.
     overrides : sequence of str

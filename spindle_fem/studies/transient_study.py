@@ -144,13 +144,10 @@ class PhaseResult:
 
     Attributes
     ----------
-    name : str
-    point : OperatingPoint
     start, end : float, [s]
     settled : bool or None
         Whether it ended because the probes had settled; None for a phase of
         fixed length.
-    transient : MachineTransient
     """
 
     name: str
@@ -163,13 +160,7 @@ class PhaseResult:
 
 @dataclass(frozen=True, slots=True)
 class StudyResult:
-    """A study as it ran.
-
-    Attributes
-    ----------
-    study : TransientStudy
-    phases : tuple of PhaseResult
-    """
+    """A study as it ran."""
 
     study: TransientStudy
     phases: tuple[PhaseResult, ...]
@@ -199,15 +190,7 @@ class StudyResult:
 
 
 class Settled:
-    """Stop condition: no probe has changed by more than asked over a window.
-
-    Parameters
-    ----------
-    rows : ReadingRows
-    history : OperatingHistory
-    until : Until
-    start : ThermalState
-    """
+    """Stop condition: no probe has changed by more than asked over a window."""
 
     def __init__(
         self, rows: ReadingRows, history: OperatingHistory, until: Until, start: ThermalState
@@ -269,15 +252,12 @@ def run_study(
 
     Parameters
     ----------
-    machine : PreparedMachine
-    study : TransientStudy
     start : ThermalState, optional
         A saved state to go on from, in place of the study's own start.
     memory : ndarray, optional
         What the terms remembered then.
     physics : Physics
         Terms and factors beyond the machine's own; their memory goes on from phase to phase.
-    progress : callable
     """
     machine, physics = with_factors(machine, physics)
     point = OperatingPoint.of(machine.spec)

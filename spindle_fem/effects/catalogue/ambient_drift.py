@@ -36,7 +36,6 @@ class DriftTerm(Term):
         Whose fluid it is.
     form : str
         steady drift, ramp (from one instant to another), step, hump (there and back) or wave.
-    parameters : tuple of TermParameter
     """
 
     def __init__(

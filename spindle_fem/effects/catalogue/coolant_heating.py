@@ -21,8 +21,6 @@ class CoolantHeatingTerm(Term):
     ----------
     links : tuple of str
         Coefficients in the order in which the coolant passes.
-    walls : tuple of str
-    fluid : str or float
     conductance : tuple of float, [W/K]
         Nominal, of each link.
     """

@@ -37,7 +37,6 @@ class GreaseChurningTerm(Term):
 
     Parameters
     ----------
-    bearings : tuple of str
     speed : str
         Input that tells whether the machine turns.
     threshold : float

@@ -27,7 +27,6 @@ class HeatCapacityTerm(Term):
 
     Parameters
     ----------
-    places : tuple of str
     usual : float, [J/K]
     """
 
@@ -48,7 +47,6 @@ class ContactCapacityTerm(Term):
 
     Parameters
     ----------
-    places : tuple of str
     usual : float, [J/K]
     sides : tuple of str
         Of the place, as :class:`Spread` has them.

@@ -32,7 +32,6 @@ class DetachedReading(Reading):
 
     Parameters
     ----------
-    parameters : tuple of TermParameter
     ambient : float, [K]
         Where no input tells it.
     """

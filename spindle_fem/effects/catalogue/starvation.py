@@ -38,7 +38,6 @@ class StarvationTerm(Term):
 
     Parameters
     ----------
-    bearings : tuple of str
     speed : str
         Input.
     highest : float, [rad/s]

@@ -21,10 +21,6 @@ class ThermalPreloadTerm(Term):
     The bearings of a set share one preload, hence one mean difference. The
     ramp is 0 where the outer rings are warmer and the set goes slack. The lag
     is that of spacers, housing and shaft, which follow the rings and give way.
-
-    Parameters
-    ----------
-    bearings, inner, outer : tuple of str
     """
 
     n_states = 1

@@ -48,7 +48,6 @@ class ViscosityHeatTerm(Term):
 
     Parameters
     ----------
-    bearings : tuple of str
     places : tuple of tuple of str
         For each bearing, those whose mean temperature its grease has.
     viscosity : (float, float), [m²/s]

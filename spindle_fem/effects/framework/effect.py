@@ -55,7 +55,6 @@ class Reading(ABC):
         Column of the recording.
     name : str
         Outer names of the parameters are ``<name>.<parameter>``.
-    parameters : tuple of TermParameter
     """
 
     channel: str = ""

@@ -184,7 +184,6 @@ class MachineView:
         Of the recording.
     lowest_speed : float, [rad/s]
         Lowest that the recording holds, standstill apart.
-    seats : tuple of Seat
     spots : mapping of str to tuple of str
         Places where heat may come and go unrecorded, by a name of their own.
     sides : mapping of str to (str, str)

@@ -25,7 +25,6 @@ class OutsideFilmTerm(Term):
 
     Parameters
     ----------
-    films : tuple of str
     walls : tuple of str
         Place that drives each film.
     fluids : tuple of (str or float)

@@ -35,7 +35,6 @@ class SpeedHeatTerm(Term):
 
     Parameters
     ----------
-    places : tuple of str
     speed : str
         Input.
     size : (str, float, float)

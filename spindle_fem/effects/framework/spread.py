@@ -25,7 +25,6 @@ class Spread:
 
     Attributes
     ----------
-    places : tuple of str
     sides : tuple of str
         First harmonics around the axis, along y and along -x.
     spot : str

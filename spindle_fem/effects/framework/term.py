@@ -105,7 +105,6 @@ class Term:
 
     Attributes
     ----------
-    parameters : tuple of TermParameter
     heat_places : tuple of str
         Places of :class:`spindle_fem.model.thermal_model.ThermalModel`, in W; or
         ``fluid.<surface>`` (the film's fluid) and ``fluid.coolant_inlet``, in

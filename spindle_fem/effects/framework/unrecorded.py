@@ -37,7 +37,6 @@ class Share(Protocol):
 
     Attributes
     ----------
-    parameters : tuple of TermParameter
     follows : tuple of str
         Inputs.
     """

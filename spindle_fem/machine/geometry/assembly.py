@@ -41,12 +41,9 @@ class AssemblyGeometry:
 
     Attributes
     ----------
-    parts : tuple of PartGeometry
     edges : tuple of MeridianEdge
         Every face of revolution as its line in the meridian plane, with the
         name of its surface or joint.
-    channel : ChannelGeometry or None
-    balls : tuple of BallRowGeometry
     notes : tuple of str
         What was decided for the user, for example a port drilled narrower.
     """
@@ -91,13 +88,8 @@ def build_assembly(spec: MachineSpec, *, where: str | None = None) -> AssemblyGe
 
     Parameters
     ----------
-    spec : MachineSpec
     where : str, optional
         The file, for messages; the machine's name where none is given.
-
-    Returns
-    -------
-    AssemblyGeometry
 
     Raises
     ------
@@ -163,18 +155,10 @@ def assemble(
 
     Parameters
     ----------
-    parts : iterable of PartGeometry
-    surfaces : iterable of SurfaceDefinition
-    channel : ChannelDefinition, optional
-    balls : iterable of BallRowGeometry, optional
     remaining : {"adiabatic", "error"}
         Exposed faces without a name go to ``<part>.adiabatic``, or are faults.
     where : str
         The file, for messages.
-
-    Returns
-    -------
-    AssemblyGeometry
 
     Raises
     ------

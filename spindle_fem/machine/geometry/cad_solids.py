@@ -84,13 +84,8 @@ def build_solids(assembly: AssemblyGeometry, geometry: Geometry) -> SolidModel:
 
     Parameters
     ----------
-    assembly : AssemblyGeometry
     geometry : pygmsh.occ.Geometry
         Open environment, see :func:`gmsh_session`.
-
-    Returns
-    -------
-    SolidModel
 
     Raises
     ------

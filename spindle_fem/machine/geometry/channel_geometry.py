@@ -35,7 +35,6 @@ class ChannelDefinition:
         Section: radius of the inner wall, radial depth, axial width.
     pitch : float
         Advance of one start in one turn.
-    turns : float
     starts : int
         Channels side by side, evenly spread around the axis.
     hand : {"right", "left"}
@@ -166,14 +165,11 @@ def build_channel(
 
     Parameters
     ----------
-    definition : ChannelDefinition
-    meridian : MeridianMap
     faults : list of GeometryError
         Faults are added here.
 
     Returns
     -------
-    channel : ChannelGeometry
     notes : tuple of str
         Where a port was drilled narrower than asked.
     """

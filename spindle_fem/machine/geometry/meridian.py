@@ -32,7 +32,6 @@ class MeridianMap:
 
     Attributes
     ----------
-    part_names : tuple of str
     z_lines, r_lines : (n,), (m,) int64 ndarray, [nm]
     owner : (n + 1, m + 1) int32 ndarray
         Part of the cell below each pair of lines, VOID outside; the rim of

@@ -16,13 +16,8 @@ def export_step(assembly: AssemblyGeometry, path: str | Path) -> Path:
 
     Parameters
     ----------
-    assembly : AssemblyGeometry
     path : str or Path
         Ends in .step or .stp.
-
-    Returns
-    -------
-    Path
 
     Raises
     ------

@@ -35,7 +35,6 @@ def build_mesh(
 
     Parameters
     ----------
-    assembly : AssemblyGeometry
     preset : {"coarse", "normal", "fine"}
     size_factor : float
         On every size of the preset; 0.5 makes about eight times the elements.
@@ -46,10 +45,6 @@ def build_mesh(
     threads : int
         Of the mesher. One gives the same mesh every time; more give one of the
         same quality but never quite the same, and are faster only on idle cores.
-
-    Returns
-    -------
-    TaggedMesh
 
     Raises
     ------

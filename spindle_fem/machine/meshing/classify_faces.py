@@ -47,14 +47,9 @@ def classify_face(
 
     Parameters
     ----------
-    assembly : AssemblyGeometry
     points : (n, 3) ndarray, [m]
     parts : tuple of str
         The parts that it bounds.
-
-    Returns
-    -------
-    FaceClass
 
     Raises
     ------

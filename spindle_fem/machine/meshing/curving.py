@@ -27,11 +27,6 @@ def curved_middles(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Middles of every edge that is not straight.
 
-    Parameters
-    ----------
-    mesh : LinearMesh
-    ports : tuple of PortGeometry
-
     Returns
     -------
     keys : (n,) int64 ndarray, ascending

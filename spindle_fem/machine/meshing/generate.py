@@ -48,7 +48,6 @@ class LinearMesh:
     points : (n, 3) float64 ndarray, [m]
     tetrahedra : (m, 4) int64 ndarray
     part_of_element : (m,) int32 ndarray
-    faces : tuple of MeshedFace
     circle_edges : (k, 2) int64 ndarray
         Edges on circles about the axis.
     volume : (n_parts,) float64 ndarray, [m³]
@@ -93,17 +92,6 @@ LADDER = (
 
 def mesh_once(assembly: AssemblyGeometry, sizes: MeshSizes, attempt: Attempt, threads: int) -> LinearMesh:
     """Mesh with one set of settings.
-
-    Parameters
-    ----------
-    assembly : AssemblyGeometry
-    sizes : MeshSizes
-    attempt : Attempt
-    threads : int
-
-    Returns
-    -------
-    LinearMesh
 
     Raises
     ------

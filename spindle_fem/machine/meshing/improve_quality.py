@@ -50,7 +50,6 @@ def improve_elements(
         Nodes on faces.
     quality : (m,) ndarray, [-]
         Sampled quality of every element.
-    target : float
 
     Returns
     -------

@@ -27,11 +27,6 @@ FORMAT = "spindle-fem/mesh/1"
 def mesh_digest(assembly: AssemblyGeometry, sizes: MeshSizes) -> str:
     """Hash of geometry, sizes, and versions and source of the mesher: the identity of a mesh.
 
-    Parameters
-    ----------
-    assembly : AssemblyGeometry
-    sizes : MeshSizes
-
     Returns
     -------
     str
@@ -126,14 +121,6 @@ def _save(mesh: TaggedMesh, stream: object, *, compressed: bool) -> None:
 
 def load_npz(path: str | Path) -> TaggedMesh:
     """Read a mesh written by this package.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    TaggedMesh
 
     Raises
     ------

@@ -21,15 +21,10 @@ def write_mesh(mesh: TaggedMesh, path: str | Path) -> Path:
 
     Parameters
     ----------
-    mesh : TaggedMesh
     path : str or Path
         ``.msh``: Gmsh 2.2, physical groups by name, both sides of a joint as
         ``name:a`` and ``name:b``. ``.vtu``: cell arrays ``part`` and ``face``
         index the string arrays ``part_names`` and ``face_names`` (-1: none).
-
-    Returns
-    -------
-    Path
 
     Raises
     ------
@@ -103,10 +98,6 @@ def load_named_mesh(name: str, folder: str | Path | None = None) -> TaggedMesh:
         For example ``"tiny_spindle"``.
     folder : str or Path, optional
         Where ``SHA256SUMS`` lies; ``meshes/`` of the checkout where none is given.
-
-    Returns
-    -------
-    TaggedMesh
 
     Raises
     ------

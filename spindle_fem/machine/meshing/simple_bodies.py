@@ -35,7 +35,6 @@ class Block:
 
     Attributes
     ----------
-    part : str
     counts : (int, int, int)
         Cells along u, v and w.
     mapping : callable
@@ -46,7 +45,6 @@ class Block:
         Equal names merge into one surface.
     periodic : bool
         Whether v closes on itself (a full tube).
-    rotating : bool
     """
 
     part: str
@@ -72,14 +70,9 @@ def build_structured_mesh(
 
     Parameters
     ----------
-    blocks : sequence of Block
     joints : sequence of (part_a, face_a, part_b, face_b)
         Faces that coincide point by point, for example
         ``("inner", "u1", "outer", "u0")``.
-
-    Returns
-    -------
-    TaggedMesh
 
     Raises
     ------
@@ -151,8 +144,6 @@ def build_box(
     lengths : (float, float, float), [m]
     counts : (int, int, int)
         Cells along x, y, z; each makes six tetrahedra.
-    part : str
-
     >>> build_box((1.0, 1.0, 1.0), (1, 1, 1)).n_elements
     6
     """
@@ -204,9 +195,6 @@ def build_tube(
         Cells along radius, angle (3 at least when closed) and z.
     angle : float, [rad]
         Below 2π a sector with faces ``theta0`` and ``theta1``.
-    part : str
-    rotating : bool
-
     >>> sorted(build_tube((0.1, 0.2), 0.1, (1, 6, 1)).surfaces)
     ['tube.inner', 'tube.outer', 'tube.z0', 'tube.z1']
     """
@@ -232,9 +220,6 @@ def build_joined_tubes(
     counts : (sequence of int, int, int)
         Cells along the radius of each tube, angle and z.
     angle : float, [rad]
-    parts : sequence of str
-    rotating : sequence of bool, optional
-
     >>> list(build_joined_tubes((0.1, 0.2, 0.3), 0.1, ((1, 1), 6, 1)).joints)
     ['inner|outer']
     """

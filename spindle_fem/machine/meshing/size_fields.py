@@ -18,13 +18,7 @@ _CORNER_GROWTH = 0.8
 
 
 def set_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
-    """Give the open model its sizes; gmsh carries those of corners inwards.
-
-    Parameters
-    ----------
-    assembly : AssemblyGeometry
-    sizes : MeshSizes
-    """
+    """Give the open model its sizes; gmsh carries those of corners inwards."""
     import gmsh
 
     wanted: dict[tuple[int, int], float] = {}

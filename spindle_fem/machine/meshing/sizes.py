@@ -101,16 +101,11 @@ def build_sizes(
 
     Parameters
     ----------
-    assembly : AssemblyGeometry
     preset : {"coarse", "normal", "fine"}
     size_factor : float
         Every length is multiplied by it; 0.5 gives about eight times the elements.
     overrides : mapping of str to float, optional, [m]
         By part, ``"channel"`` for its walls; not multiplied by ``size_factor``.
-
-    Returns
-    -------
-    MeshSizes
 
     Raises
     ------

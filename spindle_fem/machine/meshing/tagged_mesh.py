@@ -50,7 +50,6 @@ class TaggedMesh:
     tetrahedra : (n_elements, 10) int64 ndarray; (n_elements, 4) for a linear mesh
         Corners 0–3, then middles of edges 01, 12, 02, 03, 13, 23 (the order
         of scikit-fem's quadratic tetrahedron); positive volume.
-    part_names : tuple of str
     part_of_element : (n_elements,) int32 ndarray
         Index into ``part_names``.
     surfaces : mapping of str to (n, 6) int64 ndarray

@@ -30,16 +30,6 @@ _MEASURE_BELOW = 0.35
 def tag_mesh(assembly: AssemblyGeometry, linear: LinearMesh, digest: str = "") -> TaggedMesh:
     """Split parts, curve edges, name facets and measure quality.
 
-    Parameters
-    ----------
-    assembly : AssemblyGeometry
-    linear : LinearMesh
-    digest : str
-
-    Returns
-    -------
-    TaggedMesh
-
     Raises
     ------
     MeshTagError

@@ -45,11 +45,6 @@ def view_of(names: MachineNames, recording: Recording) -> MachineView:
     part is the shaft, what lies ahead of its bearings the nose, behind them
     the drive end; the largest standing part is the housing, its widest segment
     the flange.
-
-    Parameters
-    ----------
-    names : MachineNames
-    recording : Recording
     """
     spec, bearings = names.spec, names.bearings
     places = set(names.place_names)

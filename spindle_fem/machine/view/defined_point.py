@@ -43,8 +43,6 @@ def defined_recording(
 
     Parameters
     ----------
-    source : str
-    probes : tuple of str
     temperature : float, [K]
     inputs : mapping of str to (float, float)
         Value at the start and at the end, SI.

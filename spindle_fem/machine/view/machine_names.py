@@ -18,7 +18,6 @@ class MachineNames:
 
     Attributes
     ----------
-    spec : MachineSpec
     place_names : tuple of str
         Where heat may enter and temperatures are read.
     fluid_names : tuple of str

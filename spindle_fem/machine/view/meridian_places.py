@@ -39,7 +39,6 @@ def regions_of(spec: MachineSpec, name: str) -> tuple[Region, ...]:
 
     Parameters
     ----------
-    spec : MachineSpec
     name : str
         ``front_bearings``, ``F2``, ``F2.outer_ring``, ``shaft``, ``housing``,
         ``housing.flange``, ``nose``, ``drive_end``, ``flange``, ``channel``,

@@ -24,7 +24,6 @@ class Layout:
 
     Parameters
     ----------
-    spec : MachineSpec
     places : set of str
         That the model has.
     """

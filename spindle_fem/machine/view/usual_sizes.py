@@ -50,7 +50,6 @@ def quantities_of(recording: Recording, speeds: Collection[str]) -> tuple[Record
 
     Parameters
     ----------
-    recording : Recording
     speeds : collection of str
         Inputs that are speeds.
     """

@@ -24,7 +24,6 @@ class ContactFaces:
     bearing : int
         Row of the friction law.
     node : (k,) int64 ndarray
-    ball : int
     area_share : (k,) ndarray, [-]
     resistance : (k,) ndarray, [K/W]
         From the face into its node.
@@ -56,7 +55,6 @@ class BallContactLaw:
     ----------
     friction : FrictionLaw
         Of the same bearings.
-    n_nodes : int
     node, ball, bearing, raceway : (m,) int64 ndarray
         ``raceway`` is the table that a face follows.
     area_share, resistance, heat_share, link, kept : (m,) ndarray

@@ -196,7 +196,6 @@ def build_cells(
 
     Parameters
     ----------
-    assembly : AssemblyGeometry
     spacing : float, [m]
         Longest side of a cell.
     channelling : {"smeared", "rings"}

@@ -163,11 +163,9 @@ def exact_transient(
     ----------
     network : ThermalNetwork
         Linear, without streams.
-    history : InputHistory
     initial : (n,) ndarray, [K]
     outputs : (q,) int ndarray
         Nodes to return.
-    parameters : tuple of Parameter
     initial_derivative : (n, p) ndarray, [K], optional
         Of the initial temperatures to the logarithms of the parameters.
     system : LinearSystem, optional

@@ -48,10 +48,8 @@ class WallFilmLaw:
 
     Attributes
     ----------
-    patch : SurfacePatch
     flux, flux_slope : CubicSpline
         Heat flux from the wall [W/m²] over wall temperature [K], and its derivative.
-    name : str
     """
 
     patch: SurfacePatch
@@ -108,7 +106,6 @@ class CoolantLaw:
 
     Attributes
     ----------
-    patch : SurfacePatch
     cell : (k,) int64 ndarray
         Coolant cell of each face.
     upstream : (n_cells,) int64 ndarray

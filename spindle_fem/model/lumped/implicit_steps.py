@@ -39,7 +39,6 @@ class StepCounts:
 
     Attributes
     ----------
-    steps, rejected, newton : int
     heat_stored, heat_in : float, [J]
         Change of stored heat, and the time integral (by the scheme's own
         quadrature) of the net heat into all nodes.
@@ -109,11 +108,8 @@ def implicit_transient(
 
     Parameters
     ----------
-    network : ThermalNetwork
-    history : InputHistory
     initial : (n,) ndarray, [K]
     outputs : (q,) int ndarray
-    parameters : tuple of Parameter
     initial_derivative : (n, p) ndarray, [K], optional
     step_error : float or None, [K]
         Largest estimated error of a step; steps are divided to keep it. None:
@@ -126,7 +122,6 @@ def implicit_transient(
     sensitivity : (N, q, p) ndarray, [K]
         Derivatives of the discrete solution, step lengths held.
     final : (n,) ndarray, [K]
-    counts : StepCounts
 
     Raises
     ------

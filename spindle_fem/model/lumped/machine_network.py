@@ -50,7 +50,6 @@ class AirBands:
     Attributes
     ----------
     edges : (n + 1,) ndarray, [m]
-    rotating, standing : SurfacePatch
     rotating_band, standing_band : (k,) int64 ndarray
         Band of each face.
     area : (n,) ndarray, [m²]
@@ -85,7 +84,6 @@ class CoolantCells:
         All wetted faces.
     cell : (k,) int64 ndarray
     area : (n,) ndarray, [m²]
-    loop : CoolantLoop
     volume : (n,) ndarray, [m³]
     """
 
@@ -157,7 +155,6 @@ def build_machine_network(
 
     Parameters
     ----------
-    spec : MachineSpec
     refinement : int
         1: the paper's lumps. n > 1: rectangular cells no longer than the
         narrowest bearing's width over n, each a node.

@@ -26,7 +26,6 @@ class NetworkTransient:
     node_names : tuple of str
         The q nodes that were asked for.
     temperature : (N, q) float64 ndarray, [K]
-    parameter_names : tuple of str
     sensitivity : (N, q, p) float64 ndarray, [K]
         Derivative to the natural logarithm of each parameter.
     final : (n,) float64 ndarray, [K]
@@ -64,8 +63,6 @@ def simulate_transient(
 
     Parameters
     ----------
-    network : ThermalNetwork
-    history : InputHistory
     initial : (n,) ndarray, [K]
     nodes : tuple of str, optional
         Nodes to return; default all.
@@ -81,10 +78,6 @@ def simulate_transient(
         Of the implicit scheme.
     system : LinearSystem, optional
         Modes of this network, to share between calls.
-
-    Returns
-    -------
-    NetworkTransient
 
     Raises
     ------

@@ -32,8 +32,6 @@ def view_of_network(
 
     Parameters
     ----------
-    network : ThermalNetwork
-    recording : Recording
     has : frozenset of str
         Effects that the definition switches on.
     """
@@ -189,7 +187,6 @@ def day_of_a_network(network: ThermalNetwork, speeds: Sequence[str] = ()) -> Rec
 
     Parameters
     ----------
-    network : ThermalNetwork
     speeds : sequence of str
         Inputs in rad/s, beside those of the network or among them.
     """

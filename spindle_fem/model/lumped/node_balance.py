@@ -8,12 +8,7 @@ from spindle_fem.model.lumped.thermal_network import Array, ConductanceLaw, Inpu
 
 
 class NetworkBalance:
-    """Net heat into every node and its derivative, prepared for repeated evaluation.
-
-    Parameters
-    ----------
-    network : ThermalNetwork
-    """
+    """Net heat into every node and its derivative, prepared for repeated evaluation."""
 
     def __init__(self, network: ThermalNetwork) -> None:
         self.network = network

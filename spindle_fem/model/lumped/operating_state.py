@@ -59,7 +59,6 @@ class OperatingNetwork:
 
     Attributes
     ----------
-    boundary_names : tuple of str
     boundary_temperature : (b,) ndarray, [K]
     first, second : (m,) int64 ndarray
     conductance : (m,) ndarray, [W/K]
@@ -69,7 +68,6 @@ class OperatingNetwork:
         Given heat into each node.
     streams : tuple of (upstream, downstream) int64 ndarrays
     stream_rate : float, [W/K]
-    laws : tuple of Law
     raceways : mapping of bearing to (inner, outer) Raceway
     bearing_heat : mapping of bearing to BearingHeat
         At the state that conductances were taken at.
@@ -130,9 +128,6 @@ def operate(
 
     Parameters
     ----------
-    machine : MachineNetwork
-    point : OperatingPoint
-    heat_model : HeatModel
     around : mapping of bearing to BearingTemperatures, optional
         State at which contacts conduct and heat without ``friction`` is made;
         the ambient temperature by default.

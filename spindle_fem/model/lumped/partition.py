@@ -34,7 +34,6 @@ class Column:
     name : str
         Of its bearing, or ``front_end``, ``F2_F3``, ``rear_end``.
     z : (low, high), [m]
-    bearing : str or None
     """
 
     name: str
@@ -52,7 +51,6 @@ class Partition:
         Of the solid nodes.
     node_of_cell : (n_cells,) int64 ndarray
     column_of_node : (n_nodes,) int64 ndarray
-    columns : tuple of Column
     z_bounds : (n_columns + 1,) ndarray, [m]
         Where coolant and gap air are divided.
     """

@@ -83,13 +83,11 @@ class ThermalNetwork:
 
     Attributes
     ----------
-    node_names, boundary_names, link_names, source_names : tuple of str
     capacity : (n,) float64 ndarray, [J/K]
     link_first, link_second : (m,) int64 ndarray
     link_conductance : (m,) float64 ndarray, [W/K]
     boundary_temperature : (b,) float64 ndarray, [K]
         NaN where ``boundary_input`` names the input that drives it.
-    boundary_input : tuple of str or None
     source_node : (s,) int64 ndarray
     source_input : tuple of str or None
         None: the heat is the gain itself, in W.
@@ -102,7 +100,6 @@ class ThermalNetwork:
         the upstream end gives nothing (its own balance has its own inflow).
     stream_rate : (k,) float64 ndarray, [W/K]
         Mass flow times specific heat.
-    conductance_laws : tuple of ConductanceLaw
     heat_laws : tuple of callable
         ``(nodes (n,) [K], boundaries (b,) [K], inputs)`` to heat ``(n,) [W]``
         and its derivative ``(n, n) [W/K]`` to the node temperatures.

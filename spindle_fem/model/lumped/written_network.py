@@ -80,12 +80,10 @@ def value_in_definition(spec: NetworkMachineSpec, network: ThermalNetwork, name:
 
     Parameters
     ----------
-    spec : NetworkMachineSpec
     network : ThermalNetwork
         Made of it.
     name : str
         As the network's parameters are named.
-    factor : float
     """
     kind, _, label = name.partition(".")
     if kind == "gain":

@@ -24,7 +24,6 @@ class Film:
 
     Attributes
     ----------
-    surface : str
     coefficient : float or (n,) ndarray, [W/(m²·K)]
         One value, or one for each facet.
     ambient_temperature : float or (n,) ndarray, [K]
@@ -50,7 +49,6 @@ class FilmLaw:
 
     Attributes
     ----------
-    surface : str
     coefficient : callable
         ``(n,)`` mean temperature of each facet [K] to ``(n,)`` coefficients
         [W/(m²·K)], positive; for natural convection and radiation.
@@ -80,7 +78,6 @@ class LumpedNode:
 
     Attributes
     ----------
-    name : str
     connections : tuple of (surface, coefficient)
         Coefficient in W/(m²·K), one value or one for each facet (zero outside
         a band).
@@ -100,7 +97,6 @@ class LumpedLink:
 
     Attributes
     ----------
-    node : str
     conductance : float, [W/K]
     other : str or None
         The other lumped node; None when ``temperature`` is given.
@@ -124,7 +120,6 @@ class ConductionProblem:
 
     Attributes
     ----------
-    operators : ThermalOperators
     conductivity : mapping of str to float, [W/(m·K)]
         Of each part.
     films : tuple of Film
@@ -141,8 +136,6 @@ class ConductionProblem:
     capacity_scale : (n_unknowns,) ndarray or None, [-]
         Above 0: entry (i, j) of the capacity matrix is scaled by the root of
         both unknowns' values. For mass that the parts do not have.
-    lumped_nodes : tuple of LumpedNode
-    lumped_links : tuple of LumpedLink
     volumetric_capacity : mapping of str to float, [J/(m³·K)]
         Needed for transients only.
     film_laws : tuple of FilmLaw

@@ -117,7 +117,6 @@ def integrate_elements(mesh: TaggedMesh, order: int, chosen: slice) -> ElementIn
 
     Parameters
     ----------
-    mesh : TaggedMesh
     order : int
         Of the temperature, 1 or 2.
     chosen : slice

@@ -28,10 +28,6 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
     reference : float, optional, [K]
         Temperature that unknowns count from; the mean of the surroundings
         when absent.
-
-    Returns
-    -------
-    ThermalSystem
     """
     if problem.film_laws:
         raise SpecError("problem", "film laws must be linearised before assembly.", "Use linearise_films.")
@@ -94,7 +90,6 @@ def assemble_load(
 
     Parameters
     ----------
-    problem : ConductionProblem
     reference : float, [K]
         Temperature that unknowns count from.
     """

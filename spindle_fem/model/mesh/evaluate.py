@@ -47,7 +47,6 @@ def locate_points(mesh: TaggedMesh, points: ArrayLike, parts: Sequence[str]) -> 
 
     Parameters
     ----------
-    mesh : TaggedMesh
     points : (n, 3) array_like, [m]
     parts : sequence of str
         Part of each point: at a joint, both sides have a temperature.
@@ -150,7 +149,6 @@ def probe_matrix(operators: ThermalOperators, points: ArrayLike, parts: Sequence
 
     Parameters
     ----------
-    operators : ThermalOperators
     points : (n, 3) array_like, [m]
     parts : sequence of str
         Part of each point.

@@ -94,7 +94,6 @@ def boundary_flows(
 
     Parameters
     ----------
-    problem : ConductionProblem
     reference : float, [K]
     rise, lumped_rise : (n,), (m,) ndarray, [K]
         Temperatures above the reference.
@@ -142,7 +141,6 @@ def compute_balance(
 
     Parameters
     ----------
-    problem : ConductionProblem
     system : ThermalSystem
         Of the same problem, before perfect joints are tied.
     rise, lumped_rise : (n,), (m,) ndarray, [K]

@@ -34,7 +34,6 @@ class MeshIntegrals:
 
     Attributes
     ----------
-    pattern : SymmetricPattern
     part_of_unknown : (n_unknowns,) int32 ndarray
     part_of_slot : (n_upper,) int16 ndarray
         -1 where only a joint couples.
@@ -92,9 +91,6 @@ def integrate_mesh(
 
     Parameters
     ----------
-    mesh : TaggedMesh
-    order : int
-    n_unknowns : int
     facet_nodes : (n_facets, n) int ndarray
     joints : list of (slice, slice)
         Rows of both sides of each joint in ``facet_nodes``.

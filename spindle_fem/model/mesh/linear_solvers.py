@@ -57,7 +57,6 @@ class LinearSolution:
     Attributes
     ----------
     unknowns : (n,) ndarray
-    iterations : int
     residual : float, [-]
         2-norm of the true residual relative to the load's; not a number where
         an error tolerance ended the iteration.
@@ -160,7 +159,6 @@ def solve_linear(
     reduction : float, [-]
         With an error tolerance: this share of the guess's own error is enough
         even where it is larger, for use inside an outer iteration.
-    max_iterations : int
 
     Raises
     ------
@@ -249,7 +247,6 @@ def solve_many(
         Galerkin solutions in some space (their energy is taken for their
         share of the solution's).
     relative_tolerance : float, [-]
-    max_iterations : int
 
     Returns
     -------

@@ -123,7 +123,6 @@ def load_into_skfem(mesh: TaggedMesh, order: int) -> SkfemMesh:
 
     Parameters
     ----------
-    mesh : TaggedMesh
     order : int
         1 or 2.
     """

@@ -24,7 +24,6 @@ class SymmetricPattern:
 
     Attributes
     ----------
-    size : int
     n_upper : int
         Entries on and above the diagonal.
     indptr, indices : ndarray

@@ -51,7 +51,6 @@ class ConductionSolution:
     temperature : (n_unknowns,) ndarray, [K]
     lumped_temperature : (m,) ndarray, [K]
         In the order of ``problem.lumped_names``.
-    balance : HeatBalance
     iterations : int
         Of the linear solver, summed over nonlinear iterations.
     residual : float, [-]
@@ -95,7 +94,6 @@ def solve_steady(
 
     Parameters
     ----------
-    problem : ConductionProblem
     guess : ConductionSolution, optional
         Of a similar problem on the same mesh.
     preconditioner : Preconditioner, optional

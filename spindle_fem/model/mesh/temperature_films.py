@@ -46,7 +46,6 @@ def linearise_films(problem: ConductionProblem, temperature: NDArray[np.float64]
 
     Parameters
     ----------
-    problem : ConductionProblem
     temperature : (n_unknowns,) ndarray, [K]
     """
     operators = problem.operators

@@ -27,11 +27,8 @@ class ThermalOperators:
 
     Attributes
     ----------
-    mesh : TaggedMesh
     order : int
         1 or 2.
-    n_unknowns : int
-    pattern : SymmetricPattern
     part_of_slot : (n_upper,) int16 ndarray
         Part of each upper entry; -1 where only a joint couples.
     part_of_unknown : (n_unknowns,) int32 ndarray
@@ -184,7 +181,6 @@ class ThermalOperators:
         Parameters
         ----------
         upper : (n_upper,) ndarray
-        joint : str
         conductance : (n,) ndarray, [W/(m²·K)]
             Of each facet pair.
         """
@@ -225,7 +221,6 @@ class ThermalOperators:
 
         Parameters
         ----------
-        surface : str
         coefficient : float or (n,) array_like, [W/(m²·K)]
         """
         rows = self.rows_of(surface, "film_matrix")
@@ -237,7 +232,6 @@ class ThermalOperators:
 
         Parameters
         ----------
-        joint : str
         conductance : float or (n,) array_like, [W/(m²·K)]
         """
         side_a, side_b = self.joint_sides(joint, "joint_matrix")

@@ -74,7 +74,6 @@ def uniform_state(problem: ConductionProblem, temperature: float, time: float = 
 
     Parameters
     ----------
-    problem : ConductionProblem
     temperature : float, [K]
     time : float, [s]
     """

@@ -90,8 +90,6 @@ class StageSolver:
     ----------
     inputs : ConductionProblem or callable
         See :func:`spindle_fem.model.mesh.time_stepper.integrate`.
-    start : ThermalState
-    control : StepControl
     """
 
     def __init__(

@@ -63,10 +63,6 @@ class TransientResult:
         Start and the end of every accepted step.
     step_errors : (n_steps,) ndarray, [K]
         Estimated error of each accepted step.
-    rejected : int
-    linear_iterations : int
-    matrix_builds : int
-    energy : EnergyAccount
     preconditioner_builds : int
         Factors or hierarchies; one serves many matrices.
     """
@@ -128,9 +124,7 @@ def integrate(
         A constant problem, or ``(time, state)`` to the problem at that time,
         with the same operators and lumped nodes. Jumps are right-continuous
         and listed in ``breakpoints``.
-    start : ThermalState
     end_time : float, [s]
-    control : StepControl
     breakpoints : sequence of float, [s]
         Times where inputs jump; steps end there.
     restarts : sequence of float, [s]
@@ -141,10 +135,6 @@ def integrate(
         Rising; between steps the stages' parabola is read.
     observer : callable, optional
         Called after each accepted step with the state; True ends the run.
-
-    Returns
-    -------
-    TransientResult
 
     Raises
     ------

@@ -40,7 +40,6 @@ class RunInstants:
 
     Attributes
     ----------
-    instants : Instants
     coefficients : mapping of str to (n,) ndarray
         Those that terms scale or whose fluids they shift.
     friction : (n, n_heat_places) ndarray, [W]
@@ -82,7 +81,6 @@ class _Moved:
 
     Attributes
     ----------
-    coefficient : str
     sensed, columns : slice
         Its directions among the sensed temperatures, and among what is added.
     vectors : (r, k) ndarray
@@ -121,8 +119,6 @@ class AddedHeat:
 
     Parameters
     ----------
-    fast : FastModel
-    terms : sequence of Term
     parameters : mapping of str to float
         Factors of the machine's parameters, and values of the terms' by outer name.
     derivatives : sequence of str
@@ -130,11 +126,9 @@ class AddedHeat:
 
     Attributes
     ----------
-    terms : EffectTerms
     sense : (n_y, r) ndarray
         Sensed temperatures from the unknowns: what the terms read, then each direction of the
         coefficients that they scale.
-    n_added : int
 
     Raises
     ------
@@ -229,13 +223,11 @@ class AddedHeat:
 
         Parameters
         ----------
-        where : RunInstants
         touched : mapping of coefficient to sequence of int
             Which of the asked parameters scale it.
         sensed : (n, n_y) ndarray, [K]
         states : (n, n_x) ndarray
             Memories of the terms.
-        derivatives : Derivatives
         """
         answers = self.terms.at(where.instants, sensed, states, derivatives)
         width = answers.heat.by.shape[2]

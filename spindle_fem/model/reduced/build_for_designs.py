@@ -72,7 +72,6 @@ def build_model_for_designs(
 
     Returns
     -------
-    ThermalModel
     SteadySolver
         With the heat tables that it needed.
     """

@@ -178,8 +178,6 @@ def reduced_model_of(
 
     Parameters
     ----------
-    spec : MachineSpec
-    options : ReductionOptions, optional
     as_given : bool
         Whether the coefficients stay as the definition gives them; a model of
         a machine that differs in coefficients only will then do, where its

@@ -35,10 +35,8 @@ class ChannelOperators:
 
     Parameters
     ----------
-    model : ThermalModel
     spec : MachineSpec
         With a channel.
-    table : CoefficientTable
     load_names : sequence of str
         Of the load inputs; ``coolant_inlet`` and ``coolant_friction`` among them.
     """
@@ -102,7 +100,6 @@ class ChannelOperators:
 
         Parameters
         ----------
-        operators : ClassOperators
         point, factors, changes
             As :meth:`FastModel.operators` takes them.
         scaled_by : sequence of str

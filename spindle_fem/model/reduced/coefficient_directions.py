@@ -21,7 +21,6 @@ class ConductingDirections:
 
     Parameters
     ----------
-    model : ThermalModel
     spread : (r,) ndarray, optional
         How large each coordinate of the states is. The directions are then those in which
         such states flow, far fewer: ``Q = L W`` with ``K_i = L Lᵀ`` and the first columns

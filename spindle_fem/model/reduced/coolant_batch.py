@@ -56,8 +56,6 @@ class ChannelBatch:
 
     Parameters
     ----------
-    model : ThermalModel
-    inputs : DesignInputs
     band : (n, n_along) ndarray, optional
         Further factor on the film of each cell.
     """

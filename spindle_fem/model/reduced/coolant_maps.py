@@ -54,7 +54,6 @@ def coolant_maps(
 
     Parameters
     ----------
-    model : ThermalModel
     film : (n_cells,) ndarray, [W/(m²·K)]
         May be complex, for derivatives.
     capacity_rate : float, [W/K]
@@ -102,10 +101,6 @@ class UniformFilmMaps:
     With a film h and a capacity rate C they depend on h / C alone, but for a
     factor of C or of the friction heat: one variable, whose logarithm carries
     polynomials of degree nine through even nodes.
-
-    Parameters
-    ----------
-    model : ThermalModel
     """
 
     def __init__(self, model: ThermalModel) -> None:

@@ -171,7 +171,6 @@ def check_effects(entries: Sequence[EffectEntry | None], spec: MachineSpec) -> N
     ----------
     entries : sequence of EffectEntry or None
         None stands for one that was refused already.
-    spec : MachineSpec
 
     Raises
     ------
@@ -195,7 +194,6 @@ def check_network_effects(entries: Sequence[EffectEntry | None], network: Therma
     ----------
     entries : sequence of EffectEntry or None
         None stands for one that was refused already.
-    network : ThermalNetwork
 
     Raises
     ------

@@ -23,8 +23,6 @@ class DesignInputs:
 
     Attributes
     ----------
-    specs : tuple of MachineSpec
-    points : tuple of OperatingPoint
     coefficients : (n, n_c) ndarray, SI
         In the order of the model; those of the balls nan where they follow the contacts.
     fluid : (n, n_f) ndarray, [K]
@@ -79,7 +77,6 @@ def design_inputs(
 
     Parameters
     ----------
-    specs : sequence of MachineSpec
     names, fluid_names : sequence of str
         Coefficients and films of the model.
     contacts : sequence of str

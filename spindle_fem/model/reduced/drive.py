@@ -66,7 +66,6 @@ class Drive:
         Class of each step.
     points : tuple of OperatingPoint
         Mean operating point of each class.
-    notes : tuple of str
     restarts : tuple of int
         Points of the grid at which a network starts again, after a long gap.
     """
@@ -270,7 +269,6 @@ def with_walls(drive: Drive, walls: Array) -> Drive:
 
     Parameters
     ----------
-    drive : Drive
     walls : (G + 1, n_cells) ndarray, [K]
         At the ends of the steps.
     """

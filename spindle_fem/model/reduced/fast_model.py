@@ -40,7 +40,6 @@ class ModelInputs(Protocol):
 
     Attributes
     ----------
-    spec : MachineSpec, NetworkMachineSpec or None
     network : ThermalNetwork or None
         None for a machine with geometry.
     table : CoefficientTable or NetworkTable
@@ -119,7 +118,6 @@ class FastModel:
     ----------
     model : ThermalModel
         Dense.
-    inputs : ModelInputs
     spread : (r,) ndarray, optional
         How large each coordinate of the states is, as :class:`ConductingDirections` takes it.
     """
@@ -252,7 +250,6 @@ class FastModel:
             Of the class; heat, air and inlet temperature do not enter.
         factors : mapping of str to float
             As the table's ``factors`` gives them.
-        parameters : sequence of str
         changes : mapping of str to float
             Further factors on single coefficients, and on the flow.
         conductances : mapping of str to float, [W/K]

@@ -40,14 +40,11 @@ class FilmHeat(OneInstant, Term):
 
     Parameters
     ----------
-    friction_map : FrictionMap
-    machine : MachineSpec
     table : MachineSpec
         As :func:`tabulated_machine` makes it of the machine and the map.
 
     Attributes
     ----------
-    friction_map : FrictionMap
     follow : (k,) ndarray of int
         Bearings whose ball row follows its contacts.
     """
@@ -157,7 +154,6 @@ def operators_machine(table: MachineSpec, film_heat: FilmHeat) -> MachineSpec:
     ----------
     table : MachineSpec
         As :func:`tabulated_machine` makes it, with other parameters or not.
-    film_heat : FilmHeat
     """
     known = film_heat.friction_map
     highest = float(known.speed[-1])

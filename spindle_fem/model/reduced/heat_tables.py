@@ -51,7 +51,6 @@ class HeatTable:
     ----------
     series : FilmSeries
         ``QUANTITIES``, then the terms of the heat; nan for what the heat model does not have.
-    terms : tuple of str
     """
 
     series: FilmSeries
@@ -125,8 +124,6 @@ def mechanical_key(spec: MachineSpec, point: OperatingPoint, dump: Mapping[str, 
 
     Parameters
     ----------
-    spec : MachineSpec
-    point : OperatingPoint
     dump : mapping, optional
         The dumped definition, where there is one already.
     """

@@ -84,11 +84,6 @@ class Followed:
 class Linearised:
     """A run with terms as straight lines.
 
-    Parameters
-    ----------
-    answers : Answers
-    lines : Lines
-
     Raises
     ------
     ConvergenceError

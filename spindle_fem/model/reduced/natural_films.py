@@ -21,12 +21,6 @@ class NaturalFilmTerm(OneInstant, Term):
 
     The full model takes the coefficient of each facet, this one that of the
     surface's mean temperature.
-
-    Parameters
-    ----------
-    spec : MachineSpec
-    film : NaturalFilm
-    surface : str
     """
 
     def __init__(self, spec: MachineSpec, film: NaturalFilm, surface: str) -> None:

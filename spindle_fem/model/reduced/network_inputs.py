@@ -288,20 +288,14 @@ class NetworkInputs:
 
         Parameters
         ----------
-        recording : Recording
         drive : Drive
             Of the same recording, by :meth:`drive`.
         parameters : mapping of str to float
             Factors; those of terms and unknown ones are left aside.
-        derivatives : sequence of str
         kind : {"first_reading", "ambient", "steady"}
             As :func:`initial_state` has it; terms do not enter.
         initial : sequence of Parameter
             Of :meth:`initial_parameters`; the factors ``initial.<node>`` multiply them.
-
-        Returns
-        -------
-        Start
         """
         factors = {name: value for name, value in parameters.items() if name in self.table.names}
         network = self.moved(factors)

@@ -76,7 +76,6 @@ class OpenLoads:
         Parameters
         ----------
         coefficients : collection of str
-        derivatives : sequence of str
 
         Returns
         -------
@@ -111,16 +110,12 @@ def with_open_terms(
 
     Parameters
     ----------
-    fast : FastModel
-    drive : Drive
-    built : RunOperators
     machine : MachineInputs
         The machine's own.
     terms : sequence of Term
         Open ones.
     parameters : mapping of str to float
         Values of the terms' parameters by outer name.
-    derivatives : sequence of str
 
     Raises
     ------

@@ -42,12 +42,10 @@ class FastTransient:
     Attributes
     ----------
     times : (N,) ndarray, [s]
-    channels : tuple of str
     temperature : (N, c) ndarray, [K]
     sensitivity : (N, c, p) ndarray, [K]
         Derivative to the natural logarithm of each parameter; to the value
         itself for term parameters that say so.
-    parameters : tuple of str
     grid : (G + 1,) ndarray, [s]
     states : (G + 1, r) ndarray
         Reduced unknowns at the ends of the steps.
@@ -81,8 +79,6 @@ def simulate_fast(
 
     Parameters
     ----------
-    fast : FastModel or FastModel
-    drive : Drive
     initial : float, (r,) ndarray or Start
         Uniform temperature [K]; unknowns; or unknowns with derivatives, at
         time zero and after long gaps. What the terms remember outlasts a gap.
@@ -94,10 +90,6 @@ def simulate_fast(
     terms : sequence of Term
         Physics beside the machine's own; its natural films, and heat that the
         drive gives (``heat.<place>``), are always there.
-
-    Returns
-    -------
-    FastTransient
 
     Raises
     ------

@@ -29,7 +29,6 @@ class RunOperators:
         Of the machine's coefficients.
     machine_derivatives : tuple of str
         Asked parameters that are the machine's.
-    classes : tuple of ClassOperators
     owner : (n_classes,) int64 ndarray
         Class whose operators each class has: its own, or that of one that hardly differs.
     coefficients : tuple of mapping of str to float
@@ -63,13 +62,10 @@ def run_operators(
 
     Parameters
     ----------
-    fast : FastModel
     points : sequence of OperatingPoint
         Of each class.
     parameters : mapping of str to float
         Factors of the machine's parameters and values of the terms'.
-    derivatives : sequence of str
-    terms : sequence of Term
     same_within : float
         Classes none of whose coefficients, flows and what terms do to them differ by more than this share
         have the operators of one of them.
@@ -151,8 +147,6 @@ def _owners(values: Array, slopes: Array, within: float) -> NDArray[np.int64]:
         Compared by their ratios.
     slopes : (n_classes, m) ndarray
         Compared by their differences.
-    within : float
-
     >>> _owners(np.array([[1.0], [1.001], [2.0], [0.999]]), np.zeros((4, 0)), 0.01).tolist()
     [0, 0, 2, 0]
     """
@@ -175,7 +169,6 @@ class _SteadyChange:
 
     Attributes
     ----------
-    name : str
     scale : float
         From the difference of both to the derivative.
     ends : list of pair of mapping of str to float

@@ -53,7 +53,6 @@ class ShiftedSystem:
         Independent fields from which first guesses are combined.
     projected : (k, k) ndarray
         The matrix on them.
-    full : MeshModel
     tolerance : float
         Of each solution, relative to its norm in energy.
     """
@@ -92,8 +91,6 @@ def shifted_systems(
 
     Parameters
     ----------
-    full : MeshModel
-    sample : Sample
     shifts : sequence of float, [1/s]
     known : (n, k) ndarray, optional
     tolerance : float

@@ -35,7 +35,6 @@ def fast_spindle(
 
     Parameters
     ----------
-    model : ThermalModel
     spec : MachineSpec
         The machine that the model was made of, or one that differs only in
         coefficients, operation and effects.
@@ -176,7 +175,6 @@ class SpindleInputs:
         heat : (n, n_bearings) ndarray, [W]
             Before factors.
         factors : mapping of str to float
-        parameters : sequence of str
 
         Returns
         -------

@@ -50,7 +50,6 @@ class SteadyBatch:
         Of each design.
     coefficients : (n, n_c) ndarray
         With those of the balls.
-    channel : ChannelField or None
     """
 
     unknowns: Array
@@ -70,7 +69,6 @@ class SteadySolver:
     ----------
     model : ThermalModel
         Dense, its unknowns by falling weight.
-    tables : BearingTables
     bearings : sequence of str
         In the order of the definition.
     """
@@ -108,7 +106,6 @@ class SteadySolver:
 
         Parameters
         ----------
-        inputs : DesignInputs
         band : (n, n_along) ndarray, optional
             Further factor on the film of each cell along the channel.
 

@@ -48,7 +48,6 @@ class Tracks:
     columns : list of (r, m) ndarray
         What every added quantity puts in, by group of steps.
     added_start, added_end : (G, m) ndarray
-    linearised : Linearised
     start_by_parameter, end_by_parameter : (G, m, p) ndarray
         Explicit derivatives of what is added.
     state_by_parameter : (G, n_x, p) ndarray
@@ -97,15 +96,10 @@ class TermMarch:
 
     Attributes
     ----------
-    drive : Drive
-    built : RunOperators
-    dynamic : AddedHeat
     columns : list of (r, m) ndarray
         As :class:`Tracks` has them.
-    answers : Answers
     response : (G, r) ndarray
         What the machine's own loads add to the end of each step.
-    start : Start
     friction : pair of (G, n_heat_places) ndarray, [W]
         Heat that the machine itself gives, at the start and end of every step.
     friction_by : pair of (G, n_heat_places, p) ndarray, [W]

@@ -20,7 +20,6 @@ def friction_loads(model: ThermalModel, groups: Sequence[Sequence[str]], ends: S
 
     Parameters
     ----------
-    model : ThermalModel
     groups : sequence of sequence of str
         Bearings that heat together.
     ends : sequence of str
@@ -48,7 +47,6 @@ def coolant_loads(model: ThermalModel, film: Array, degree: int) -> Array:
 
     Parameters
     ----------
-    model : ThermalModel
     film : (n_cells,) ndarray, [W/(m²·K)]
     degree : int
         Highest, of Legendre polynomials.

@@ -60,7 +60,6 @@ class BearingCase:
     temperatures : SetTemperatures
         All at the operation's temperature, which is also that of assembly,
         unless ``[temperatures]`` says otherwise.
-    warnings : tuple of CodedWarning
     """
 
     bearing_set: BearingSet
@@ -75,10 +74,6 @@ class BearingCase:
 
 def bearing_report(path: str | Path) -> dict[str, Any]:
     """Solve the bearing or set of a TOML file and report it for JSON.
-
-    Parameters
-    ----------
-    path : str or Path
 
     Returns
     -------

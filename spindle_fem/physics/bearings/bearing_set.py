@@ -68,8 +68,6 @@ def solve_bearing_set(
         Without it there is no film, no heat, and friction cannot decide.
     control : {"equilibrium", "outer", "inner"}
         ``"equilibrium"`` lets friction decide (eqs 22, 23).
-    heat : HeatOptions, optional
-    options : TractionOptions, optional
 
     Returns
     -------

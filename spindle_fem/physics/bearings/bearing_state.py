@@ -110,7 +110,6 @@ class BearingState:
         Heat over speed; 0 at rest.
     lubricant_temperature : float, [K]
     residual : float, [-]
-    warnings : tuple of CodedWarning
     """
 
     name: str

@@ -52,7 +52,6 @@ class BearingSet:
 
     Attributes
     ----------
-    bearings : tuple of MountedBearing
     preload : float, [N]
         Force through the set at assembly, at rest: bearings in tandem share it.
     preload_kind : {"rigid", "spring"}
@@ -163,7 +162,6 @@ class SetTemperatures:
 
     Attributes
     ----------
-    bearings : tuple of BearingTemperatures
     shaft, housing : float
         Between the bearings.
     assembly : float

@@ -94,7 +94,6 @@ class SolvedBearings:
 
     Attributes
     ----------
-    bearings : sequence of MountedBearing
     rows : sequence of dict
         Arrays of each bearing's balls.
     speed : float, [rad/s]

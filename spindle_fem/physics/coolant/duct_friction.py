@@ -184,7 +184,6 @@ class PressureDrop:
         Darcy, of the channel.
     reynolds : float, [-]
         On the hydraulic diameter.
-    warnings : tuple of CodedWarning
     """
 
     channel: float

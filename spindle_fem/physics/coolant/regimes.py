@@ -69,7 +69,6 @@ class FilmCoefficient:
         Correlations behind the value.
     in_range : bool or (n,) ndarray of bool
         Whether the value's source was used inside its range.
-    warnings : tuple of CodedWarning
     reynolds : float or (n,) ndarray, [-]
         On the hydraulic diameter.
     prandtl : float or (n,) ndarray, [-]

@@ -82,7 +82,6 @@ class RotatingFilm:
     reynolds : float or (n,) ndarray, [-]
     in_range : bool or (n,) ndarray of bool
         Whether the source covers the state; at the minimum it always does.
-    warnings : tuple of CodedWarning
     """
 
     value: Any

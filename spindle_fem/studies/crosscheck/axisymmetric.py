@@ -65,7 +65,6 @@ class AxisymmetricState:
         In the order of the network's nodes; coolant at the end of each cell.
     residual_relative : float
         Heat in less heat out over heat in (over 1 W where there is less).
-    n_unknowns : int
     """
 
     cells: MeridianCells

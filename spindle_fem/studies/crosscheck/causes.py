@@ -97,7 +97,6 @@ def study_causes(
         The three-dimensional elements, as defined.
     fem_temperature : (n_nodes,) ndarray, [K]
         Their averages over the lumps' regions.
-    heat_model : HeatModel
     """
     spec, point = coarse.spec, state.network.point
     refinement = REFERENCE_REFINEMENT

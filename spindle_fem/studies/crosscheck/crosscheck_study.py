@@ -52,7 +52,6 @@ class Crosscheck:
         The network whose conductances were fitted to the elements.
     points : tuple of OperatingPoint
         For which the matched network is exported.
-    heat_model : HeatModel
     """
 
     content: dict[str, Any]

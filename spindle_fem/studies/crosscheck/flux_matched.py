@@ -46,7 +46,6 @@ class ElementState:
 
     Attributes
     ----------
-    point : OperatingPoint
     temperature : (n,) ndarray, [K]
         Of every network node; coolant entries are not used.
     heat : mapping of bearing to float, [W]
@@ -70,7 +69,6 @@ class MatchedNetwork:
 
     Attributes
     ----------
-    machine : MachineNetwork
     node_names : tuple of str
         Of the machine's network without its coolant.
     boundary_names : tuple of str
@@ -84,7 +82,6 @@ class MatchedNetwork:
         That conductance at the matched state.
     spread : (n, n_bearings) ndarray, [-]
         Where each bearing's heat goes.
-    matched : ElementState
     coolant_rate : float, [W/K]
         Mass flow times heat capacity; 0 without coolant.
     """

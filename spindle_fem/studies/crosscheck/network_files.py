@@ -46,7 +46,6 @@ def state_space(network: MatchedNetwork, conductance: Array | None = None) -> St
 
     Parameters
     ----------
-    network : MatchedNetwork
     conductance : (m,) ndarray, [W/K], optional
         Those of the matched state by default.
     """

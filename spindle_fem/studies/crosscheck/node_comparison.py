@@ -58,7 +58,6 @@ class Comparison:
     Attributes
     ----------
     network_temperature, fem_temperature : (n,) ndarray, [K]
-    links : tuple of LinkComparison
     """
 
     machine: MachineNetwork
@@ -81,7 +80,6 @@ def compare(
     ----------
     prepared, coupled : PreparedMachine, CoupledState
         The finite elements.
-    state : MachineNetworkState
     regions : NodeRegions
         Of the state's network on the prepared mesh.
     """

@@ -69,7 +69,6 @@ class PortMap:
 
     Attributes
     ----------
-    source, target : PortGeometry
     reach : float, [m]
         Distance from the axis of the source at which its map ends.
     exit_radius : float, [m]
@@ -87,14 +86,7 @@ class PortMap:
 
 @dataclass(frozen=True, slots=True)
 class ChannelMap:
-    """Map from the space around one channel to that around another; see the module.
-
-    Attributes
-    ----------
-    source, target : ChannelGeometry
-    room : Room
-    ports : tuple of PortMap
-    """
+    """Map from the space around one channel to that around another; see the module."""
 
     source: ChannelGeometry
     target: ChannelGeometry
@@ -226,14 +218,6 @@ def _between(values: Array, knots: tuple[Array, ...], images: tuple[Array, ...])
 
 def build_map(source: AssemblyGeometry, target: AssemblyGeometry) -> ChannelMap:
     """Map between two machines that differ in nothing but depth, width and pitch of the channel.
-
-    Parameters
-    ----------
-    source, target : AssemblyGeometry
-
-    Returns
-    -------
-    ChannelMap
 
     Raises
     ------

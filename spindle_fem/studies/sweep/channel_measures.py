@@ -45,14 +45,11 @@ def channel_measures(channel: ChannelGeometry, exit_radii: Sequence[float] = ())
 
     Parameters
     ----------
-    channel : ChannelGeometry
     exit_radii : sequence of float, [m]
         For each port.
 
     Returns
     -------
-    ChannelMeasures
-
     >>> from spindle_fem.machine.geometry.channel_geometry import ChannelDefinition
     >>> plain = ChannelGeometry(ChannelDefinition("housing", 0.108, 0.010, 0.012, 0.024, 5.0))
     >>> round(channel_measures(plain).rest * 1e6, 6)  # two ends of 10 mm by 12 mm

@@ -59,7 +59,6 @@ class Axis:
 
     Attributes
     ----------
-    path : str
     choices : tuple of Choice
         The list or the grid values; empty for a range that is only sampled.
     low, high : float or None
@@ -130,7 +129,6 @@ def build_axes(study: Study, content: Mapping[str, Any], where: str) -> tuple[Ax
 
     Parameters
     ----------
-    study : Study
     content : mapping
         Raw tables of the machine.
     where : str

@@ -59,7 +59,6 @@ class Question:
 
     Attributes
     ----------
-    outputs : tuple of str
     film_uncertainty : bool
         Whether the film's band is carried.
     backend : {"auto", "full", "reduced"}
@@ -87,7 +86,6 @@ class DesignTask:
 
     Attributes
     ----------
-    design : Design
     key : str
         Hash of all that the result depends on: the same key, the same numbers.
     spec : MachineSpec or None
@@ -130,7 +128,6 @@ class TaskBuilder:
     ----------
     content : mapping
         Raw tables of the machine.
-    question : Question
     """
 
     def __init__(self, content: Mapping[str, Any], question: Question) -> None:
@@ -274,7 +271,6 @@ def solve_checked(task: DesignTask, film_ratio: NDArray[np.float64] | None = Non
 
     Parameters
     ----------
-    task : DesignTask
     film_ratio : (n_along,) ndarray, optional
         Further factor on the film of each cell along the channel.
 

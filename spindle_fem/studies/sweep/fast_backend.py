@@ -186,10 +186,8 @@ def model_of(group: GroupTask, question: Question) -> tuple[ThermalModel, list[R
 
     Returns
     -------
-    ThermalModel
     list of Row
         Of the designs that were solved in full to check it; none from the cache.
-    BearingTables
 
     Raises
     ------

@@ -36,11 +36,8 @@ def values_of(
 
     Parameters
     ----------
-    model : ThermalModel
-    inputs : DesignInputs
     batch : SteadyBatch
         Their states.
-    outputs : sequence of str
 
     Returns
     -------
@@ -86,7 +83,6 @@ def extreme_temperatures(model: ThermalModel, unknowns: Array, reference: Array)
 
     Parameters
     ----------
-    model : ThermalModel
     unknowns : (n, r) ndarray
     reference : (n,) ndarray, [K]
         A temperature near the field's: single precision takes the rise above it.

@@ -67,16 +67,11 @@ def film_map(
         One of ``coolant.regimes.FILM_MODELS``.
     section : ChannelSection
         Everything but the depth is taken from it.
-    coolant : Coolant
     depths : (n_depths,) array_like, [m]
     temperatures : (n_temperatures,) array_like, [K]
     velocity : float or None, [m/s]
     volume_flow : float or None, [m³/s]
         Total, all starts. Give exactly one of the two.
-
-    Returns
-    -------
-    FilmMap
 
     Raises
     ------

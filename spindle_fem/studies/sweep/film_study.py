@@ -37,7 +37,6 @@ class FilmChart:
         "velocity" or "flow".
     amount : float
         What is held, m/s or m³/s.
-    chart : FilmMap
     laminar_share : (n_depths, n_temperatures) ndarray, [-]
         Reynolds number over that at which the model leaves laminar flow: 1 is
         the laminar-turbulent line.

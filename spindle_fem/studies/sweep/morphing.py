@@ -54,10 +54,6 @@ _STRAIGHT = 1.0e-9
 def lattice_machine(spec: MachineSpec) -> MachineSpec | None:
     """The machine whose mesh is moved to a design, None where the design lies on the lattice itself.
 
-    Parameters
-    ----------
-    spec : MachineSpec
-
     Returns
     -------
     MachineSpec or None
@@ -120,7 +116,6 @@ def move_mesh(mesh: TaggedMesh, source: AssemblyGeometry, target: AssemblyGeomet
     ----------
     mesh : TaggedMesh
         Of ``source``.
-    source, target : AssemblyGeometry
 
     Returns
     -------

@@ -32,8 +32,6 @@ def search_designs(
     ----------
     study : Study
         With objectives and a search.
-    axes : sequence of Axis
-    limits : sequence of Limit
     rows : sequence of Row
         Of the planned designs.
     solve : callable

@@ -23,7 +23,6 @@ class OutputUnit:
         For people.
     si : str
         What a limit must convert to, as for :func:`spindle_fem.units.to_si`.
-    kind : str
     from_si : callable
         Number of the summary from the SI value.
     """

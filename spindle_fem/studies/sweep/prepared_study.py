@@ -33,20 +33,14 @@ class PreparedStudy:
 
     Attributes
     ----------
-    name : str
-    study : Study
     spec : MachineSpec
         The machine as defined, before any design.
     content : mapping
         Its raw tables.
-    axes : tuple of Axis
-    limits : tuple of Limit
-    question : Question
     tasks : tuple of DesignTask
         The planned designs in order, then those to compare with.
     references : mapping of str to int
         Number of each design to compare with, by its name.
-    builder : TaskBuilder
     """
 
     name: str

@@ -36,7 +36,6 @@ class ResultTable:
 
     Parameters
     ----------
-    folder : Path
     columns : sequence of str
         Of the table; ``key`` must be one of them.
 

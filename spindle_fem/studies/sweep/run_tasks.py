@@ -34,8 +34,6 @@ def run_tasks(
 
     Parameters
     ----------
-    tasks : sequence of DesignTask
-    question : Question
     land : callable
         Called in this process only.
     plan : sequence of DesignTask

@@ -25,8 +25,6 @@ class Sensitivity:
 
     Attributes
     ----------
-    output : str
-    paths : tuple of str
     first : tuple of float
         Share that each parameter makes alone.
     total : tuple of float

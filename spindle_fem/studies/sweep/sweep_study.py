@@ -42,7 +42,6 @@ def solve_study(
 
     Parameters
     ----------
-    prepared : PreparedStudy
     table : ResultTable
         Rows so far; gets each new one as it comes.
     tell : callable
