@@ -1,79 +1,15 @@
-"""Draw concealed effects: what, where, how strong, and what an answer about it must say."""
+"""Draw concealed effects of the machine: what, where, how strong, and what an answer about it must say."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from . import laws, machine
-from .cycles import Plan
-from .laws import Law, Sensor
-from .reduction import ReducedSpindle
-from .stepping import Path
+from .concealed_effect import Concealed, Scene
+from .draw_sensor_errors import SENSOR_EFFECTS
 
-KINDS = {
-    "joint_conductance": "parameter",
-    "heat_split": "parameter",
-    "heat_scale": "parameter",
-    "heat_capacity": "parameter",
-    "sensor_offset": "sensor",
-    "sensor_gain": "sensor",
-    "sensor_lag": "sensor",
-    "sensor_drift": "sensor",
-    "sensor_detached": "sensor",
-    "clock_shift": "sensor",
-}
 _SET_NAMES = {"F": ["F1", "F2", "F3", "front_bearings"], "R": ["R1", "R2", "rear_bearings"]}
 _PRIMARY = {"F": "front_bearings", "R": "rear_bearings"}
-
-
-@dataclass(slots=True)
-class Concealed:
-    """One effect as it is in the machine, with the part of the answer that belongs to it."""
-
-    effect: str
-    component: str
-    acceptable: list[str]
-    amplitude: float
-    machine: Law | None = None
-    sensor: Sensor | None = None
-    parameters: dict[str, tuple[float, str]] = field(default_factory=dict)
-    intervals: list[list[float]] | None = None
-    follows: str | None = None
-    outside_catalogue: bool = False
-    form: dict[str, object] = field(default_factory=dict)
-
-    @property
-    def kind(self) -> str:
-        """Kind of the effect in the catalogue."""
-        return KINDS.get(self.effect, "missing_physics")
-
-
-@dataclass(frozen=True, slots=True)
-class Scene:
-    """What a draw may look at: the run of the same machine without any effect."""
-
-    rng: np.random.Generator
-    model: ReducedSpindle
-    plan: Plan
-    plain: Path
-    strength: float
-
-    def sign(self) -> float:
-        """Plus or minus one."""
-        return float(self.rng.choice([-1.0, 1.0]))
-
-    def log(self, low: float, high: float) -> float:
-        """Log-uniform draw."""
-        return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
-
-    def reading(self, name: str) -> np.ndarray:
-        """Temperature over the plain run."""
-        return self.plain.states @ self.model.readings[self.model.reading_names.index(name)]
-
-    def factor(self, low: float, high: float) -> float:
-        """Factor away from 1, drawn towards it with the strength."""
-        return float(np.exp(self.sign() * self.log(low, high) * self.strength))
 
 
 def _bearings(scene: Scene, *, single: bool = False) -> tuple[str, str, list[str]]:
@@ -460,39 +396,6 @@ def _cooling(s: Scene) -> Concealed:
     )
 
 
-def _sensor(kind: str) -> Callable[[Scene], Concealed]:
-    def draw(s: Scene) -> Concealed:
-        channel = int(s.rng.integers(0, 5 if kind in ("sensor_detached", "sensor_lag", "clock_shift") else 6))
-        onset, shape = 0.0, 1.0
-        if kind == "sensor_offset":
-            size, names = s.sign() * s.log(0.8, 3.0) * s.strength, ("offset", "K")
-        elif kind == "sensor_gain":
-            size, names = 1.0 + s.sign() * s.rng.uniform(0.08, 0.22) * s.strength, ("gain", "")
-        elif kind == "sensor_lag":
-            size, names = s.log(240, 900) * s.strength, ("time_constant", "s")
-        elif kind == "sensor_drift":
-            size, names = s.sign() * s.log(0.2, 0.7) * s.strength, ("rate", "K/h")
-            shape = s.rng.uniform(0.85, 1.25)
-        elif kind == "sensor_detached":
-            size, names = s.rng.uniform(0.15, 0.5) * s.strength, None
-            onset = float(s.rng.choice([0.0, s.rng.uniform(0.2, 0.6) * s.plan.drive.time[-1]]))
-            shape = float(s.rng.uniform(1.0, 3.0))
-        else:
-            size, names = s.sign() * s.log(120, 600) * s.strength, ("shift", "s")
-        name = machine.CHANNELS[channel]
-        return Concealed(
-            kind,
-            name,
-            [name],
-            size,
-            sensor=Sensor(kind, channel, size, onset, shape),
-            parameters={names[0]: (size, names[1])} if names else {},
-            form={"onset": onset, "shape": shape},
-        )
-
-    return draw
-
-
 def _thrust_heat(s: Scene) -> Concealed:
     place = str(s.rng.choice(["shaft_front", "housing_behind_front", "housing_bore", "flange_rim"]))
     component = {"shaft_front": "shaft", "flange_rim": "flange"}.get(place, "housing")
@@ -547,17 +450,6 @@ MACHINE_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {
     "heat_capacity": _capacity,
     "unrecorded_heat_source": _source,
     "unrecorded_cooling": _cooling,
-}
-SENSOR_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {
-    name: _sensor(name)
-    for name in (
-        "sensor_offset",
-        "sensor_gain",
-        "sensor_lag",
-        "sensor_drift",
-        "sensor_detached",
-        "clock_shift",
-    )
 }
 FOREIGN_EFFECTS: dict[str, Callable[[Scene], Concealed]] = {
     "thrust_heat": _thrust_heat,

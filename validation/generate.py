@@ -11,8 +11,10 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from .concealed_effect import Concealed, Scene
 from .cycles import Plan, draw_drive
-from .draw import EVERY_EFFECT, MACHINE_EFFECTS, SENSOR_EFFECTS, Concealed, Scene
+from .draw import EVERY_EFFECT, MACHINE_EFFECTS
+from .draw_sensor_errors import SENSOR_EFFECTS
 from .identify import Study, machine_mimics, sensor_mimics
 from .recorder import draw_noise, record
 from .reduction import ReducedSpindle, load_reduced

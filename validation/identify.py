@@ -14,9 +14,10 @@ from scipy.linalg import cholesky, solve_triangular
 
 from . import laws, machine
 from .cycles import Plan
-from .laws import Law, Sensor
+from .laws import Law
 from .recorder import Noise
 from .reduction import ReducedSpindle
+from .sensor_errors import Sensor
 from .stepping import PRIORS, run
 
 EVERY = 6

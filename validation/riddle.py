@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import laws
+from .concealed_effect import Concealed
 from .cycles import STEP, Plan
-from .draw import Concealed
 from .generate import _effect_answer, _identify, judge
 from .identify import Study
 from .machine import CHANNELS

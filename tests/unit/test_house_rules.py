@@ -12,11 +12,7 @@ LONGEST_FILE = 500
 MOST_PARAMETERS = 8
 MOST_OF_ONE_NAME = 2
 # Offences that are left to mend: each list only shrinks.
-LONG_FILES = {
-    "spindle_fem/model/reduced/fast_model.py",
-    "validation/draw.py",
-    "validation/laws.py",
-}
+LONG_FILES: set[str] = set()
 BUSY_FUNCTIONS = {
     "spindle_fem/model/lumped/network_transient.py:simulate_transient",
     "spindle_fem/model/mesh/time_stepper.py:integrate",

@@ -8,11 +8,12 @@ from spindle_fem.effects.registry import catalogue
 from validation.cycles import draw_drive
 from validation.draw import EVERY_EFFECT, FOREIGN_EFFECTS
 from validation.generate import choose_effects, judge, make_case
-from validation.laws import Intervals, Sensor, Starvation, first_order
+from validation.laws import Intervals, Starvation
 from validation.recorder import Noise, record, slow_error
 from validation.reduction import load_reduced
 from validation.run_study import not_concealed
 from validation.score import changes_unseen, matches, score_case, summarise, undecidable
+from validation.sensor_errors import Sensor, first_order
 from validation.stepping import Moment
 
 
@@ -262,7 +263,7 @@ def test_sets_match_each_effect_once():
 
 def test_judgement_of_what_cannot_be_seen(reduced):
     case = EVERY_EFFECT["mount_sink"]
-    from validation.draw import Scene
+    from validation.concealed_effect import Scene
 
     plan = draw_drive(np.random.default_rng(2))
     effect = case(Scene(np.random.default_rng(1), reduced, plan, None, 1.0))
