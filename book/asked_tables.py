@@ -8,7 +8,7 @@ from typing import Any
 from book.causes import study_seed
 from book.work import Desk
 from spindle_fem.report.block_page import Table
-from spindle_fem.report.run_tables import column, rows_of, significant
+from spindle_fem.report.table_rows import column, rows_of, significant
 from validation.asked import held_against_asked
 from validation.score import score_study
 

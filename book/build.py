@@ -15,7 +15,7 @@ from book.page import Chapter, Entry, Pictures, link, render_chapter
 from book.work import Desk, fingerprint
 from spindle_fem.errors import BadInputError
 from spindle_fem.report.block_page import Commands, Section, Table, Text, render_document
-from spindle_fem.report.run_tables import column, rows_of
+from spindle_fem.report.table_rows import column, rows_of
 from spindle_fem.results.output_folder import replace_text
 
 CLAIMS = Path(__file__).parent / "claims.toml"

@@ -11,7 +11,7 @@ from typing import Any
 
 from spindle_fem.errors import BadInputError
 from spindle_fem.report.block_page import Table
-from spindle_fem.report.run_tables import column, rows_of
+from spindle_fem.report.table_rows import column, rows_of
 
 CAUSES = Path(__file__).parent / "causes.toml"
 OPEN = "not looked into yet"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from spindle_fem.report.block_page import Table
-from spindle_fem.report.run_tables import column, rows_of
+from spindle_fem.report.table_rows import column, rows_of
 
 _DONE = ("gaps", "empty", "spikes", "doubled", "swapped")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from book.measured import Check, Test, worst_by_assertion
 from spindle_fem.report.block_page import Table
-from spindle_fem.report.run_tables import column, rows_of, significant
+from spindle_fem.report.table_rows import column, rows_of, significant
 
 _RELATIONS = {"=": "", "<": "below ", "<=": "at most ", ">": "above ", ">=": "at least "}
 

@@ -12,7 +12,8 @@ from typing import Any
 from book.page import Chapter, Pictures
 from book.work import ROOT, Desk, read_json
 from spindle_fem.report.block_page import Section, Table, Text
-from spindle_fem.report.run_tables import column, number, readable, rows_of, significant
+from spindle_fem.report.run_tables import readable
+from spindle_fem.report.table_rows import column, number, rows_of, significant
 from spindle_fem.results.output_folder import replace_text
 
 TITLE = "Energy balance and mesh independence"

@@ -17,7 +17,7 @@ from book.page import Chapter, Pictures
 from book.work import ROOT, Desk, read_json
 from spindle_fem.report.block_page import Commands, Notice, Section, Table, Text
 from spindle_fem.report.diagnosis_words import chance, set_words
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import column, number, rows_of, significant
 
 TITLE = "Bench motor: real recordings, blind"
 FOLDER = "bench_motor"

@@ -16,7 +16,7 @@ from book.makeup import makeup_tables
 from book.page import Chapter, Pictures
 from book.work import Desk
 from spindle_fem.report.block_page import Bullets, Notice, Section, Table, Text
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import column, number, rows_of, significant
 from spindle_fem.results.output_folder import replace_text
 from validation.asked import held_against_asked
 from validation.score import score_study

@@ -11,7 +11,7 @@ from book.tables import comparisons, tightest
 from book.work import Desk
 from spindle_fem.report.block_page import Section, Table, Text
 from spindle_fem.report.figure_style import CYCLE, MUTED, new_figure, set_title, styled
-from spindle_fem.report.run_tables import column, rows_of, significant
+from spindle_fem.report.table_rows import column, rows_of, significant
 
 TITLE = "Exact solutions and rates of convergence"
 FILES = {

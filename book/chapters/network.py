@@ -10,7 +10,7 @@ from book.page import Chapter, Pictures
 from book.tables import comparisons
 from book.work import Desk, read_json
 from spindle_fem.report.block_page import Section, Table, Text, illustration_of
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import column, number, rows_of, significant
 
 TITLE = "Lumped network against finite elements"
 MACHINE, MESH = "recorded_spindle", "coarse"

@@ -16,7 +16,7 @@ from book.page import Chapter, Pictures
 from book.work import ROOT, Desk, read_json
 from spindle_fem.errors import BadInputError
 from spindle_fem.report.block_page import Section, Table, Text
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import column, number, rows_of, significant
 from spindle_fem.results.output_folder import replace_text
 
 TITLE = "Other programs on the same mesh"

@@ -15,7 +15,7 @@ from book.page import Chapter, Pictures
 from book.work import Desk, read_json
 from spindle_fem.report.block_page import Section, Table, Text
 from spindle_fem.report.diagnosis_words import chance, set_words
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import column, number, rows_of, significant
 from validation import riddle
 
 TITLE = "The paper's riddle: worst at 2000 and 2500 rpm"

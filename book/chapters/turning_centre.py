@@ -23,7 +23,7 @@ from book.work import ROOT, Desk, read_json
 from spindle_fem.report.block_page import Section, Table, Text
 from spindle_fem.report.diagnosis_words import chance, set_words
 from spindle_fem.report.figure_style import CYCLE, MUTED, new_figure, set_title, styled
-from spindle_fem.report.run_tables import column, number, rows_of
+from spindle_fem.report.table_rows import column, number, rows_of
 
 TITLE = "Turning centre: 200 days of a production machine, blind"
 FOLDER = "turning_centre"

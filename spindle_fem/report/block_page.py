@@ -4,7 +4,7 @@ A page is a list of sections, a section a list of blocks; one template draws
 them. What is inside a page needs no network and no other file. Texts and
 cells are escaped but where they are ``markupsafe.Markup``.
 
->>> from spindle_fem.report.run_tables import column, rows_of
+>>> from spindle_fem.report.table_rows import column, rows_of
 >>> table = Table((column("design"), column("°C", number=True)), rows_of([["a", "31.5"]]))
 >>> section = Section("results", "Results", [Text("One design."), table])
 >>> html = render_document("Sweep", "Channel depth", [section])
@@ -91,7 +91,7 @@ class Warnings:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Columns of :func:`~spindle_fem.report.run_tables.column`, rows of ``rows_of``.
+    """Columns of :func:`~spindle_fem.report.table_rows.column`, rows of ``rows_of``.
 
     With ``folded``, its summary, it is shut until it is clicked, but where ``open``.
     """

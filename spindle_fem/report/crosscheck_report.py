@@ -16,7 +16,7 @@ from spindle_fem.report.block_page import (
     render_document,
 )
 from spindle_fem.report.crosscheck_charts import CAPTIONS
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import fixed, number, rounded, significant, table_of, whole, words
 from spindle_fem.results.output_folder import read_content, replace_text
 from spindle_fem.studies.crosscheck.causes import CAUSES, CHECKS
 from spindle_fem.studies.crosscheck.crosscheck_study import SCHEMA
@@ -116,118 +116,83 @@ def _sentence(content: Mapping[str, Any]) -> str:
 
 
 def _node_table(content: Mapping[str, Any]) -> Table:
-    rows = [
-        (
-            item["node"],
-            number(item["network_degC"], 2),
-            number(item["fem_degC"], 2),
-            number(item["difference_K"], 2),
-            CAUSES[item["largest_cause"]].split(":")[0],
-            number(item["largest_cause_K"], 2),
-        )
-        for item in content["nodes"]
-    ]
-    columns = (
-        column("node"), column("network °C", number=True), column("elements °C", number=True),
-        column("difference K", number=True), column("largest cause"), column("of it K", number=True),
-    )  # fmt: skip
-    return Table(columns, rows_of(rows), "Elements are averaged over each node’s region.")
+    fields = (
+        words("node", "node"),
+        fixed("network °C", "network_degC", 2),
+        fixed("elements °C", "fem_degC", 2),
+        fixed("difference K", "difference_K", 2),
+        words("largest cause", lambda item: CAUSES[item["largest_cause"]].split(":")[0]),
+        fixed("of it K", "largest_cause_K", 2),
+    )
+    return table_of(fields, content["nodes"], "Elements are averaged over each node’s region.")
 
 
 def _link_tables(content: Mapping[str, Any]) -> list[Table]:
-    columns = (
-        column("link"), column("network W", number=True), column("elements W", number=True),
-        column("difference W", number=True), column("over"),
-    )  # fmt: skip
+    def difference(item: Mapping[str, Any]) -> float:
+        return item["network_W"] - item["fem_W"]
 
-    def rows(items: list[Mapping[str, Any]]) -> Any:
-        return rows_of(
-            (
-                item["link"].replace("|", " → "),
-                number(item["network_W"], 2),
-                number(item["fem_W"], 2),
-                number(item["network_W"] - item["fem_W"], 2),
-                item["surface"],
-            )
-            for item in items
-        )
-
-    ranked = sorted(content["links"], key=lambda item: -abs(item["network_W"] - item["fem_W"]))
+    fields = (
+        words("link", lambda item: item["link"].replace("|", " → ")),
+        fixed("network W", "network_W", 2),
+        fixed("elements W", "fem_W", 2),
+        fixed("difference W", difference, 2),
+        words("over", "surface"),
+    )
+    links = content["links"]
+    ranked = sorted(links, key=lambda item: -abs(difference(item)))
     return [
-        Table(columns, rows(ranked[:_SHOWN_LINKS]), f"The {_SHOWN_LINKS} links that differ most."),
-        Table(columns, rows(content["links"]), "Every link.", folded=f"All {len(ranked)} links"),
+        table_of(fields, ranked[:_SHOWN_LINKS], f"The {_SHOWN_LINKS} links that differ most."),
+        table_of(fields, links, "Every link.", folded=f"All {len(links)} links"),
     ]
 
 
 def _cause_table(content: Mapping[str, Any]) -> Table:
     titles = {**CAUSES, **CHECKS}
-    rows = [
-        (titles[item["cause"]], "step" if item["kind"] == "step" else "by itself",
-         number(item["max_K"], 3), number(item["rms_K"], 3))
-        for item in content["causes"]
-    ]  # fmt: skip
-    columns = (
-        column("assumption exchanged"),
-        column("kind"),
-        column("at most K", number=True),
-        column("rms K", number=True),
+    fields = (
+        words("assumption exchanged", lambda item: titles[item["cause"]]),
+        words("kind", lambda item: "step" if item["kind"] == "step" else "by itself"),
+        fixed("at most K", "max_K", 3),
+        fixed("rms K", "rms_K", 3),
     )
-    return Table(
-        columns, rows_of(rows), "Steps add up to the difference; the others change one assumption by itself."
-    )
+    caption = "Steps add up to the difference; the others change one assumption by itself."
+    return table_of(fields, content["causes"], caption)
 
 
 def _convergence_table(content: Mapping[str, Any]) -> Table:
-    rows = [
-        (f"{item['refinement']}×", item["nodes"], number(item["max_difference_K"], 3))
-        for item in content["convergence"]["rows"]
-    ]
-    columns = (
-        column("refinement"),
-        column("nodes", number=True),
-        column("largest difference K", number=True),
+    found = content["convergence"]
+    fields = (
+        words("refinement", lambda item: f"{item['refinement']}×"),
+        whole("nodes", "nodes"),
+        fixed("largest difference K", "max_difference_K", 3),
     )
-    caption = (
-        f"Against axisymmetric elements with {content['convergence']['axisymmetric_unknowns']} unknowns."
-    )
-    return Table(columns, rows_of(rows), caption)
+    caption = f"Against axisymmetric elements with {found['axisymmetric_unknowns']} unknowns."
+    return table_of(fields, found["rows"], caption)
 
 
 def _speed_table(content: Mapping[str, Any]) -> Table:
-    rows = [
-        (
-            number(item["speed_rpm"], 0),
-            significant(item["matched_max_K"], 2),
-            number(item["fixed_max_K"], 2),
-            number(item["unmatched_max_K"], 2),
-        )
-        for item in content["matched"]["speeds"]
-    ]
-    columns = (
-        column("rpm", number=True), column("matched K", number=True),
-        column("matched, conductances fixed K", number=True), column("not matched K", number=True),
-    )  # fmt: skip
-    return Table(columns, rows_of(rows), "Largest difference of any node to the elements.")
+    fields = (
+        fixed("rpm", "speed_rpm", 0),
+        rounded("matched K", "matched_max_K", 2),
+        fixed("matched, conductances fixed K", "fixed_max_K", 2),
+        fixed("not matched K", "unmatched_max_K", 2),
+    )
+    return table_of(fields, content["matched"]["speeds"], "Largest difference of any node to the elements.")
 
 
 def _claim_blocks(claim: Mapping[str, Any]) -> list[Any]:
     if "not_possible" in claim:
         return [Text(claim["not_possible"])]
-    rows = [
-        (
-            item["model"],
-            item["design"],
-            number(item["max_degC"], 1),
-            ", ".join(f"{name} {number(value, 1)}" for name, value in item["ring_difference_K"].items()),
-            number(item["film_coefficient_W_m2K"], 0),
-            number(item["coolant_heat_W"], 0),
-            number(item["friction_heat_W"], 0),
-        )
-        for item in claim["cases"]
-    ]
-    columns = (
-        column("model"), column("design"), column("maximum °C", number=True), column("inner − outer K"),
-        column("film W/(m²·K)", number=True), column("to the oil W", number=True),
-        column("friction W", number=True),
-    )  # fmt: skip
-    return [Table(columns, rows_of(rows), claim["source"]), Bullets(claim["explanation"])]
+    fields = (
+        words("model", "model"),
+        words("design", "design"),
+        fixed("maximum °C", "max_degC"),
+        words("inner − outer K", lambda item: _by_name(item["ring_difference_K"])),
+        fixed("film W/(m²·K)", "film_coefficient_W_m2K", 0),
+        fixed("to the oil W", "coolant_heat_W", 0),
+        fixed("friction W", "friction_heat_W", 0),
+    )
+    return [table_of(fields, claim["cases"], claim["source"]), Bullets(claim["explanation"])]
+
+
+def _by_name(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {number(value, 1)}" for name, value in values.items())

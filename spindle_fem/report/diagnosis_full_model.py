@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from spindle_fem.report.block_page import Notice, Section, Table, Text
-from spindle_fem.report.run_tables import column, number, rows_of
+from spindle_fem.report.diagnosis_tables import recording_fields
+from spindle_fem.report.table_rows import fixed, table_of, words
 
 
 def full_model_sections(content: Mapping[str, Any]) -> list[Section]:
@@ -51,74 +52,48 @@ def _largest(found: Mapping[str, Any], key: str) -> float:
 def _tables(content: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]:
     fit = content["fit"]
     errors = [
-        [
-            f"{name}, {model}",
-            number(values["train_rmse_K"], 3),
-            number(values["heldout_rmse_K"], 3),
-            number(values.get("seconds"), 1),
-        ]
+        {"model": f"{name}, {model}", "seconds": None, **values}
         for name in ("before", "after")
         for model, values in (("fast model", fit[name]), ("full model", found[name]))
     ]
-    errors.append(["noise", number(fit["noise_K"], 3), number(fit["noise_K"], 3), ""])
-    several = any("recording" in row for row in found["differences"])
-    both = {
-        "before": (content["mismatch"]["channels"], found["before"]["channels"]),
-        "after": (fit["channels_after"], found["after"]["channels"]),
+    models = (
+        words("model", "model"),
+        fixed("fitted readings / K", "train_rmse_K", 3),
+        fixed("held-out readings / K", "heldout_rmse_K", 3),
+        fixed("time taken / s", "seconds", 1),
+    )
+    by_model = table_of(models, errors, "Root mean square error over all channels.")
+    noise = fixed("noise / K", "noise_K", 3)
+    level = noise.cell(fit)
+    by_model.rows.append({"cells": ["noise", level, level, ""]})
+    sources = {
+        "before, fast model": content["mismatch"]["channels"],
+        "before, full model": found["before"]["channels"],
+        "after, fast model": fit["channels_after"],
+        "after, full model": found["after"]["channels"],
     }
-    channels = [
-        [
-            *([row.get("recording", "")] if several else []),
-            row["channel"],
-            *(number(model[index]["rmse_K"], 3) for models in both.values() for model in models),
-            number(row["noise_K"], 3),
-        ]
+    named = (*recording_fields(found["differences"]), words("channel", "channel"))
+    channels = (
+        *named,
+        *(fixed(f"{name} / K", name, 3) for name in sources),
+        noise,
+    )
+    rows = [
+        {**row, **{name: source[index]["rmse_K"] for name, source in sources.items()}}
         for index, row in enumerate(found["after"]["channels"])
     ]
-    differences = [
-        [
-            *([row.get("recording", "")] if several else []),
-            row["channel"],
-            number(row["before_K"], 3),
-            number(row["after_K"], 3),
-            number(row["change_K"], 3),
-        ]
-        for row in found["differences"]
-    ]
+    differences = (
+        *named,
+        fixed("before / K", "before_K", 3),
+        fixed("after / K", "after_K", 3),
+        fixed("of what they differ by / K", "change_K", 3),
+    )
     return [
-        Table(
-            (
-                column("model"),
-                column("fitted readings / K", number=True),
-                column("held-out readings / K", number=True),
-                column("time taken / s", number=True),
-            ),
-            rows_of(errors),
-            "Root mean square error over all channels.",
-        ),
-        Table(
-            (
-                *([column("recording")] if several else []),
-                column("channel"),
-                *(
-                    column(f"{name}, {model} / K", number=True)
-                    for name in both
-                    for model in ("fast model", "full model")
-                ),
-                column("noise / K", number=True),
-            ),
-            rows_of(channels),
-            "Root mean square error of each channel over all its readings.",
-        ),
-        Table(
-            (
-                *([column("recording")] if several else []),
-                column("channel"),
-                column("before / K", number=True),
-                column("after / K", number=True),
-                column("of what they differ by / K", number=True),
-            ),
-            rows_of(differences),
+        by_model,
+        table_of(channels, rows, "Root mean square error of each channel over all its readings."),
+        table_of(
+            differences,
+            found["differences"],
             "Largest difference of the full model from the fast one at each channel.",
         ),
     ]

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 from spindle_fem.report.block_page import Cards, Notice, Table, Text
 from spindle_fem.report.diagnosis_words import chance, kelvin, level, moment, set_words
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import Field, fixed, plain, rounded, significant, table_of, whole, words
 
 _DEFECTS = ("spikes", "dropouts", "stuck", "implausible", "bridged", "empty_cells", "infinite")
+_FROM_TO = (
+    words("from", lambda item: moment(item["start"])),
+    words("to", lambda item: moment(item["end"])),
+)
 
 
 def cards(content: Mapping[str, Any]) -> Cards:
@@ -36,99 +41,77 @@ def cards(content: Mapping[str, Any]) -> Cards:
 def fit_table(content: Mapping[str, Any]) -> Table:
     """Errors before and after, on fitted and held-out readings."""
     fit = content["fit"]
-    rows = [
-        [
-            title,
-            number(fit[key]["train_rmse_K"], 3),
-            number(fit[key]["heldout_rmse_K"], 3),
-            number(_ratio(fit[key]["heldout_rmse_K"], fit["noise_K"]), 2),
-        ]
-        for key, title in (("before", "before"), ("after", "after"))
-    ]
-    columns = (
-        column("model"),
-        column("fitted readings / K", number=True),
-        column("held-out readings / K", number=True),
-        column("held out / noise", number=True),
+
+    def over_noise(model: str) -> float | None:
+        error, noise = fit[model]["heldout_rmse_K"], fit["noise_K"]
+        return None if error is None or not noise else error / noise
+
+    fields = (
+        words("model", str),
+        fixed("fitted readings / K", lambda model: fit[model]["train_rmse_K"], 3),
+        fixed("held-out readings / K", lambda model: fit[model]["heldout_rmse_K"], 3),
+        fixed("held out / noise", over_noise, 2),
     )
     caption = f"Root mean square error over all channels; held out: {fit['heldout']}."
-    return Table(columns, rows_of(rows), caption)
+    return table_of(fields, ("before", "after"), caption)
 
 
-def _ratio(value: float | None, by: float | None) -> float | None:
-    return None if value is None or not by else value / by
+def recording_fields(items: Sequence[Mapping[str, Any]]) -> tuple[Field, ...]:
+    """Column that names the recording of a row, where there are several."""
+    several = any("recording" in item for item in items)
+    return (words("recording", lambda item: item.get("recording", "")),) if several else ()
 
 
 def channel_table(content: Mapping[str, Any]) -> list[Table]:
     """Errors of every channel."""
     before = content["mismatch"]["channels"]
     after = content["fit"].get("channels_after") or [{}] * len(before)
-    several = any("recording" in row for row in before)
-    rows = [
-        [
-            *([first.get("recording", "")] if several else []),
-            first["channel"],
-            number(first["rmse_K"], 3),
-            number(second.get("rmse_K"), 3),
-            number(first["noise_K"], 3),
-            number(first["max_K"], 2),
-            number(second.get("max_K"), 2),
-        ]
+    items = [
+        {**first, "rmse_after": second.get("rmse_K"), "max_after": second.get("max_K")}
         for first, second in zip(before, after, strict=True)
     ]
-    columns = (
-        *([column("recording")] if several else []),
-        column("channel"),
-        *(
-            column(name, number=True)
-            for name in ("before / K", "after / K", "noise / K", "largest before / K", "largest after / K")
-        ),
+    fields = (
+        *recording_fields(before),
+        words("channel", "channel"),
+        fixed("before / K", "rmse_K", 3),
+        fixed("after / K", "rmse_after", 3),
+        fixed("noise / K", "noise_K", 3),
+        fixed("largest before / K", "max_K", 2),
+        fixed("largest after / K", "max_after", 2),
     )
-    return [Table(columns, rows_of(rows), "Root mean square and largest error of every channel.")]
+    return [table_of(fields, items, "Root mean square and largest error of every channel.")]
 
 
 def set_tables(content: Mapping[str, Any]) -> list[Any]:
     """Parameters, intervals and alternatives."""
-    blocks: list[Any] = []
-    rows = [
-        [
-            item["effect"].replace("_", " "),
-            item["component"].replace("_", " "),
-            name.replace("_", " "),
-            significant(value["value"]),
-            f"{significant(value['low'])} to {significant(value['high'])}",
-            str(value["unit"]).replace("degC", "°C"),
-        ]
+    effect = (
+        words("effect", lambda item: plain(item["effect"])),
+        words("place", lambda item: plain(item["component"])),
+    )
+    parameters = [
+        {**item, **value, "parameter": plain(name)}
         for item in content["findings"]
         for name, value in item["parameters"].items()
     ]
-    if rows:
-        columns = (
-            column("effect"),
-            column("place"),
-            column("parameter"),
-            column("value", number=True),
-            column("90 % interval", number=True),
-            column("unit"),
+    intervals = [{**item, **interval} for item in content["findings"] for interval in item["intervals"]]
+    blocks: list[Any] = []
+    if parameters:
+        fields = (
+            *effect,
+            words("parameter", "parameter"),
+            rounded("value", "value"),
+            whole("90 % interval", lambda item: f"{significant(item['low'])} to {significant(item['high'])}"),
+            words("unit", lambda item: str(item["unit"]).replace("degC", "°C")),
         )
-        blocks.append(Table(columns, rows_of(rows), "What was found."))
-    intervals = [
-        [
-            item["effect"].replace("_", " "),
-            item["component"].replace("_", " "),
-            moment(i["start"]),
-            moment(i["end"]),
-        ]
-        for item in content["findings"]
-        for i in item["intervals"]
-    ]
+        blocks.append(table_of(fields, parameters, "What was found."))
     if intervals:
-        columns = (column("effect"), column("place"), column("from"), column("to"))
-        blocks.append(Table(columns, rows_of(intervals), "When it is on."))
-    others = [[set_words(item["findings"]), chance(item["probability"])] for item in content["alternatives"]]
-    if others:
-        columns = (column("instead"), column("probability", number=True))
-        blocks.append(Table(columns, rows_of(others), "What the data cannot rule out."))
+        blocks.append(table_of((*effect, *_FROM_TO), intervals, "When it is on."))
+    if content["alternatives"]:
+        fields = (
+            words("instead", lambda item: set_words(item["findings"])),
+            whole("probability", lambda item: chance(item["probability"])),
+        )
+        blocks.append(table_of(fields, content["alternatives"], "What the data cannot rule out."))
     elif content["findings"]:
         blocks.append(Text("No other set of effects keeps a probability of 2 % or more."))
     return blocks
@@ -151,31 +134,17 @@ def place_tables(content: Mapping[str, Any]) -> list[Table]:
     """Missing heat by place, and when the readings differ."""
     mismatch = content["mismatch"]
     blocks = []
-    heat = [
-        [name.replace("_", " "), number(item["mean"], 0), number(item["peak"], 0)]
-        for name, item in mismatch["missing_heat_W"].items()
-    ]
-    if heat:
-        columns = (column("place"), column("mean / W", number=True), column("peak / W", number=True))
-        blocks.append(Table(columns, rows_of(heat), "Missing heat, if at this place only."))
-    several = any("recording" in item for item in mismatch["when"])
-    when = [
-        [
-            *([item.get("recording", "")] if several else []),
-            moment(item["start"]),
-            moment(item["end"]),
-            item["condition"],
-        ]
-        for item in mismatch["when"]
-    ]
-    if when:
-        columns = (
-            *([column("recording")] if several else []),
-            column("from"),
-            column("to"),
-            column("condition"),
+    if mismatch["missing_heat_W"]:
+        fields = (
+            words("place", lambda item: plain(item[0])),
+            fixed("mean / W", lambda item: item[1]["mean"], 0),
+            fixed("peak / W", lambda item: item[1]["peak"], 0),
         )
-        blocks.append(Table(columns, rows_of(when), "When the readings differ significantly."))
+        heat = mismatch["missing_heat_W"].items()
+        blocks.append(table_of(fields, heat, "Missing heat, if at this place only."))
+    if mismatch["when"]:
+        fields = (*recording_fields(mismatch["when"]), *_FROM_TO, words("condition", "condition"))
+        blocks.append(table_of(fields, mismatch["when"], "When the readings differ significantly."))
     return blocks
 
 
@@ -186,36 +155,28 @@ def next_blocks(content: Mapping[str, Any]) -> list[Any]:
         Notice(f"Measure {item['quantity']} at {item['where']}: {item['condition']}."),
         Text(item["why"]),
     ]
-    rows = [
-        [
-            option["where"],
-            option["condition"],
-            number(option["expected_information"], 2),
-            option["channel"] if option["where"] != option["channel"] else "the new sensor",
-            number(option["difference_K"], 2),
-            number(option["sigma_K"], 2),
-            number(option["after_s"] / 60.0, 0),
-        ]
-        for option in item.get("options", [])
-    ]
-    if rows:
-        columns = (
-            column("sensors"),
-            column("operation"),
-            column("information / bit", number=True),
-            column("clearest at"),
-            column("difference / K", number=True),
-            column("± 1 σ / K", number=True),
-            column("after / min", number=True),
+    if item.get("options"):
+        fields = (
+            words("sensors", "where"),
+            words("operation", "condition"),
+            fixed("information / bit", "expected_information", 2),
+            words("clearest at", _clearest_channel),
+            fixed("difference / K", "difference_K", 2),
+            fixed("± 1 σ / K", "sigma_K", 2),
+            fixed("after / min", lambda option: option["after_s"] / 60.0, 0),
         )
         between = " and ".join(item.get("between", [])[:2])
         caption = f"The proposal first, then the most telling. Difference between {between}."
-        blocks.append(Table(columns, rows_of(rows), caption))
+        blocks.append(table_of(fields, item["options"], caption))
     blocks += [
         Text(f"Not simulated: {failed['condition']} ({failed['reason']})")
         for failed in item.get("not_simulated", [])
     ]
     return blocks
+
+
+def _clearest_channel(option: Mapping[str, Any]) -> str:
+    return option["channel"] if option["where"] != option["channel"] else "the new sensor"
 
 
 def defect_blocks(content: Mapping[str, Any]) -> list[Any]:
@@ -243,8 +204,8 @@ def defect_blocks(content: Mapping[str, Any]) -> list[Any]:
         for own in item.get("channels", []):
             faults = [f"{own[key]} {key.replace('_', ' ')}" for key in _DEFECTS if own.get(key)]
             if faults:
-                rows.append([item.get("name", ""), own["channel"], ", ".join(faults)])
+                rows.append((item.get("name", ""), own["channel"], ", ".join(faults)))
     if rows:
-        columns = (column("recording"), column("channel"), column("left out"))
-        blocks.append(Table(columns, rows_of(rows), "Readings that were not used."))
+        fields = [words(title, itemgetter(n)) for n, title in enumerate(("recording", "channel", "left out"))]
+        blocks.append(table_of(fields, rows, "Readings that were not used."))
     return blocks

@@ -7,7 +7,7 @@ from typing import Any
 
 from spindle_fem.effects.framework.effect import capital, place_words
 from spindle_fem.effects.registry import catalogue
-from spindle_fem.report.run_tables import significant
+from spindle_fem.report.table_rows import significant
 
 VERDICTS = {
     "consistent": "nothing is missing",

@@ -147,15 +147,12 @@ def render_run_report(
     over_speed = _drawn(illustrations, *(name for name in CAPTIONS if name.startswith(OVER_SPEED)))
     if over_speed:
         sections.append(Section("over_speed", "Bearings over speed", [_OVER_SPEED_TEXT, *over_speed]))
-    coolant = tables.coolant_table(summary)
-    if coolant is not None:
+    coolant = summary.get("coolant")
+    if coolant:
+        state = [Text(tables.regime_words(coolant)), tables.coolant_table(coolant)]
         pictures = _drawn(illustrations, "coolant", "channel_walls")
-        sections.append(
-            Section("coolant", "Coolant", [Text(coolant["sentence"]), _table(coolant), *pictures])
-        )
-    balance = _table(
-        tables.balance_table(summary), "Heat put in and heat that leaves; negative values enter the machine."
-    )
+        sections.append(Section("coolant", "Coolant", [*state, *pictures]))
+    balance = tables.balance_table(summary)
     sections += [
         Section("balance", "Energy balance", [balance, *_drawn(illustrations, "heat_balance")]),
         Section("probes", "Probes, joints and surfaces", [_places(summary, dataset)]),
@@ -165,10 +162,6 @@ def render_run_report(
         Section("versions", "Versions and provenance", _versions(summary, dataset)),
     ]
     return render_document("Thermal run", dataset.attrs["title"], sections, _subtitle(definition))
-
-
-def _table(found: Mapping[str, Any], caption: str = "") -> Table:
-    return Table(found["columns"], found["rows"], caption)
 
 
 def _drawn(illustrations: Mapping[str, Illustration | None], *names: str) -> list[Illustration]:
@@ -200,25 +193,23 @@ def _temperature(surface: xr.Dataset | None, illustrations: Mapping[str, Illustr
 def _bearings(summary: Mapping[str, Any], illustrations: Mapping[str, Illustration | None]) -> list[Any]:
     close_ups = [name for name in illustrations if name.startswith("bearings_")]
     return [
-        _table(tables.bearing_table(summary), "Heat, temperatures and state of each bearing."),
-        _table(tables.term_table(summary), "Friction heat of each bearing, W."),
+        tables.bearing_table(summary),
+        tables.term_table(summary),
         *_drawn(illustrations, "heat_by_bearing", *close_ups),
     ]
 
 
 def _places(summary: Mapping[str, Any], dataset: xr.Dataset) -> Columns:
     probes, joints = tables.probe_table(summary), tables.joint_table(summary)
-    left = [_table(probes, "What the probes should read.")] if probes["rows"] else []
-    left.append(_table(tables.surface_table(dataset), "Exposed surfaces with a film: area means."))
-    through = "Heat through each joint, from the first-named part to the second."
-    return Columns([left, [_table(joints, through)] if joints["rows"] else []])
+    left = [*([probes] if probes.rows else []), tables.surface_table(dataset)]
+    return Columns([left, [joints] if joints.rows else []])
 
 
 def _checks(summary: Mapping[str, Any], illustrations: Mapping[str, Illustration | None]) -> list[Any]:
     return [
         Text("A failed check ends a run with an error; this table shows by how much each one held."),
-        _table(tables.check_table(summary)),
-        _table(tables.mesh_table(summary), "Mesh: largest differences from the solid model."),
+        tables.check_table(summary),
+        tables.mesh_table(summary),
         *_drawn(illustrations, "mesh"),
     ]
 
@@ -234,7 +225,7 @@ def _inputs(definition: Mapping[str, Any], dataset: xr.Dataset) -> list[Any]:
 def _versions(summary: Mapping[str, Any], dataset: xr.Dataset) -> list[Any]:
     sources = [line for line in str(dataset.attrs.get("sources", "")).split("\n") if line]
     listed = [Heading("Sources of the models"), Bullets(sources)] if sources else []
-    return [_table(tables.version_table(summary, dataset.attrs)), *listed]
+    return [tables.version_table(summary, dataset.attrs), *listed]
 
 
 def embedded_figures(folder: Path) -> dict[str, Illustration | None]:

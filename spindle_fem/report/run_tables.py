@@ -3,59 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from spindle_fem.report.block_page import Table
 from spindle_fem.report.figure_style import BODY_NAMES, grouped
+from spindle_fem.report.table_rows import (
+    MISSING,
+    Field,
+    column,
+    fixed,
+    number,
+    rounded,
+    rows_of,
+    significant,
+    table_of,
+    words,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
-
-MISSING = "–"
-
-
-def number(value: Any, digits: int = 1) -> str:
-    """Fixed-point text, a dash where there is no value.
-
-    >>> number(3.14159, 2), number(None), number(-0.04, 1)
-    ('3.14', '–', '0.0')
-    """
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return MISSING
-    text = f"{value:.{digits}f}"
-    return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
-
-
-def significant(value: Any, digits: int = 3) -> str:
-    """Text with significant digits, a dash where there is no value.
-
-    >>> significant(1213.6), significant(2.6e-13, 2), significant(0.0)
-    ('1210', '2.6e−13', '0')
-    """
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return MISSING
-    if value == 0.0:
-        return "0"
-    if 1.0e-3 <= abs(value) < 1.0e6:
-        decimals = digits - 1 - math.floor(math.log10(abs(value)))
-        text = f"{round(value, decimals):.{max(decimals, 0)}f}"
-        if "." in text:
-            text = text.rstrip("0").rstrip(".")
-    else:
-        text = f"{value:.{max(digits - 1, 1)}e}".replace("e-0", "e-").replace("e+0", "e+")
-    return text.replace("-", "−")
-
-
-def column(title: str, **kind: bool) -> dict[str, Any]:
-    """Column of the table macro; ``number``, ``mark`` or ``verdict``."""
-    return {"title": title, **kind}
-
-
-def rows_of(cells: Any) -> list[dict[str, Any]]:
-    """Rows of the table macro."""
-    return [{"cells": list(row)} for row in cells]
 
 
 def readable(name: str) -> str:
@@ -132,11 +100,9 @@ def _or_low(value: Any) -> float:
     return -math.inf if value is None else value
 
 
-def bearing_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
+def bearing_table(summary: Mapping[str, Any]) -> Table:
     """State of each bearing."""
-    if not summary["bearings"]:
-        return None
-    fields = (
+    columns = (
         ("heat_W", "heat / W", 1),
         ("temperature_inner_degC", "inner race / °C", 1),
         ("temperature_ball_degC", "balls / °C", 1),
@@ -148,20 +114,17 @@ def bearing_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
         ("film_um", "film / µm", 2),
         ("lambda", "lambda", 1),
     )
-    return {
-        "columns": [column("bearing")] + [column(title, number=True) for _, title, _ in fields],
-        "rows": rows_of(
-            [name, *(number(state.get(key), digits) for key, _, digits in fields)]
-            for name, state in summary["bearings"].items()
-        ),
-    }
+    fields = (
+        words("bearing", itemgetter(0)),
+        *(fixed(title, lambda item, key=key: item[1].get(key), digits) for key, title, digits in columns),
+    )
+    caption = "Heat, temperatures and state of each bearing."
+    return table_of(fields, summary["bearings"].items(), caption)
 
 
-def term_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
+def term_table(summary: Mapping[str, Any]) -> Table:
     """Heat term by term, and where it enters, one column a bearing."""
     bearings = summary["bearings"]
-    if not bearings:
-        return None
 
     def rows(key: str, names: Mapping[str, str]) -> list[dict[str, Any]]:
         found = list(dict.fromkeys(name for state in bearings.values() for name in state.get(key, {})))
@@ -174,34 +137,34 @@ def term_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
         return table
 
     total = [state["heat_W"] for state in bearings.values()]
-    columns = [
+    columns = (
         column("friction heat / W"),
         *(column(name, number=True) for name in bearings),
         column("all", number=True),
+    )
+    lines = [
+        {"kind": "group", "cells": ["term by term"]},
+        *rows("terms_W", {}),
+        {"kind": "total", "cells": ["sum", *map(number, total), number(sum(total))]},
+        {"kind": "group", "cells": ["where it enters"]},
+        *rows("heat_to_W", BODY_NAMES),
     ]
-    return {
-        "columns": columns,
-        "rows": [
-            {"kind": "group", "cells": ["term by term"]},
-            *rows("terms_W", {}),
-            {"kind": "total", "cells": ["sum", *map(number, total), number(sum(total))]},
-            {"kind": "group", "cells": ["where it enters"]},
-            *rows("heat_to_W", BODY_NAMES),
-        ],
-    }
+    return Table(columns, lines, "Friction heat of each bearing, W.")
 
 
-def coolant_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Channel flow with the range of its film coefficient."""
-    coolant = summary.get("coolant")
-    if not coolant:
-        return None
-    film = coolant["film_coefficient_W_m2K"]
+def regime_words(coolant: Mapping[str, Any]) -> str:
+    """Flow regime of the channel and the source of its film coefficient."""
     state = (
         "within the range of its source"
         if coolant["in_range"]
         else "outside the range of its source, see the warnings"
     )
+    return f"Flow regime: {coolant['regime']}. Film coefficient after {coolant['source']}; {state}."
+
+
+def coolant_table(coolant: Mapping[str, Any]) -> Table:
+    """Channel flow with the range of its film coefficient."""
+    film = coolant["film_coefficient_W_m2K"]
     entries = (
         ("flow", significant(coolant["flow_m3_s"] * 6.0e4), "L/min"),
         ("inlet", number(coolant["inlet_degC"], 2), "°C"),
@@ -219,99 +182,79 @@ def coolant_table(summary: Mapping[str, Any]) -> dict[str, Any] | None:
         ("length", significant(coolant["length_m"], 4), "m"),
         ("wetted area", significant(coolant["wetted_area_m2"] * 1.0e4, 4), "cm²"),
     )
-    return {
-        "sentence": f"Flow regime: {coolant['regime']}. Film coefficient after {coolant['source']}; {state}.",
-        "columns": [column("quantity"), column("value", number=True), column("unit")],
-        "rows": rows_of(entries),
-    }
+    return Table((column("quantity"), column("value", number=True), column("unit")), rows_of(entries))
 
 
-def balance_table(summary: Mapping[str, Any]) -> dict[str, Any]:
+def balance_table(summary: Mapping[str, Any]) -> Table:
     """Heat in and out."""
     energy = summary["energy"]
     scale = abs(energy["heat_in_W"]) or 1.0
-    rows: list[dict[str, Any]] = [{"kind": "group", "cells": ["put in"]}]
-    for name, value in heat_by_source(energy.get("heat_in_by_W", {}), summary["bearings"]).items():
-        rows.append({"cells": [readable(name), number(value, 2), number(100.0 * value / scale)]})
-    rows.append({"kind": "total", "cells": ["sum", number(energy["heat_in_W"], 2), "100.0"]})
-    rows.append({"kind": "group", "cells": ["leaves by"]})
-    for name, value in sorted(energy["heat_out_W"].items(), key=lambda item: -item[1]):
-        rows.append({"cells": [readable(name), number(value, 2), number(100.0 * value / scale)]})
-    out = sum(energy["heat_out_W"].values())
-    rows.append({"kind": "total", "cells": ["sum", number(out, 2), number(100.0 * out / scale)]})
-    return {
-        "columns": [column("heat"), column("W", number=True), column("% of heat put in", number=True)],
-        "rows": rows,
-    }
 
+    def cells(name: str, value: float) -> list[str]:
+        return [name, number(value, 2), number(100.0 * value / scale)]
 
-def probe_table(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Probe readings."""
-    return {
-        "columns": [column("probe"), column("temperature / °C", number=True)],
-        "rows": rows_of([name, number(value, 2)] for name, value in summary["probes"].items()),
-    }
-
-
-def joint_table(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Heat through joints."""
-    joints = summary.get("joints", {})
-    return {
-        "columns": [column("joint"), column("heat / W", number=True)],
-        "rows": rows_of([readable(name), number(item["heat_W"], 2)] for name, item in sorted(joints.items())),
-    }
-
-
-def surface_table(dataset: xr.Dataset) -> dict[str, Any]:
-    """Surfaces that exchange heat."""
-    columns = [
-        column("surface"),
-        column("area / cm²", number=True),
-        column("mean / °C", number=True),
-        column("film / W/(m²·K)", number=True),
-        column("fluid / °C", number=True),
+    sources = heat_by_source(energy.get("heat_in_by_W", {}), summary["bearings"])
+    sinks = sorted(energy["heat_out_W"].items(), key=lambda item: -item[1])
+    rows = [
+        {"kind": "group", "cells": ["put in"]},
+        *rows_of(cells(readable(name), value) for name, value in sources.items()),
+        {"kind": "total", "cells": ["sum", number(energy["heat_in_W"], 2), "100.0"]},
+        {"kind": "group", "cells": ["leaves by"]},
+        *rows_of(cells(readable(name), value) for name, value in sinks),
+        {"kind": "total", "cells": cells("sum", sum(energy["heat_out_W"].values()))},
     ]
-    film = dataset["surface_film_coefficient"].values
-    rows = rows_of(
-        [
-            readable(str(name)),
-            number(dataset["surface_area"].values[index] * 1.0e4, 1),
-            number(dataset["surface_temperature_mean"].values[index], 2),
-            significant(float(film[index])),
-            number(dataset["surface_fluid_temperature"].values[index], 2),
-        ]
-        for index, name in enumerate(dataset["surface"].values)
-        if np.isfinite(film[index])
+    columns = (column("heat"), column("W", number=True), column("% of heat put in", number=True))
+    return Table(columns, rows, "Heat put in and heat that leaves; negative values enter the machine.")
+
+
+def probe_table(summary: Mapping[str, Any]) -> Table:
+    """Probe readings."""
+    fields = (words("probe", itemgetter(0)), fixed("temperature / °C", itemgetter(1), 2))
+    return table_of(fields, summary["probes"].items(), "What the probes should read.")
+
+
+def joint_table(summary: Mapping[str, Any]) -> Table:
+    """Heat through joints."""
+    fields = (
+        words("joint", lambda item: readable(item[0])),
+        fixed("heat / W", lambda item: item[1]["heat_W"], 2),
     )
-    return {"columns": columns, "rows": rows}
+    caption = "Heat through each joint, from the first-named part to the second."
+    return table_of(fields, sorted(summary.get("joints", {}).items()), caption)
 
 
-def check_table(summary: Mapping[str, Any]) -> dict[str, Any]:
+def surface_table(dataset: xr.Dataset) -> Table:
+    """Surfaces that exchange heat."""
+
+    def values(name: str) -> Callable[[int], float]:
+        return dataset[f"surface_{name}"].values.astype(float).tolist().__getitem__
+
+    film, area = values("film_coefficient"), values("area")
+    fields = (
+        words("surface", lambda index: readable(str(dataset["surface"].values[index]))),
+        fixed("area / cm²", lambda index: area(index) * 1.0e4),
+        fixed("mean / °C", values("temperature_mean"), 2),
+        rounded("film / W/(m²·K)", film),
+        fixed("fluid / °C", values("fluid_temperature"), 2),
+    )
+    shown = [index for index in range(dataset.sizes["surface"]) if math.isfinite(film(index))]
+    return table_of(fields, shown, "Exposed surfaces with a film: area means.")
+
+
+def check_table(summary: Mapping[str, Any]) -> Table:
     """Self-checks with value and limit."""
-    return {
-        "columns": [
-            column("check"),
-            column("value", number=True),
-            column("limit", number=True),
-            column("unit"),
-            column("result", verdict=True),
-            column("meaning"),
-        ],
-        "rows": rows_of(
-            [
-                item["name"],
-                significant(item["value"], 2),
-                significant(item["limit"], 2),
-                item["unit"].replace("-", ""),
-                item["passed"],
-                item["explanation"],
-            ]
-            for item in summary.get("checks", ())
-        ),
-    }
+    fields = (
+        words("check", "name"),
+        rounded("value", "value", 2),
+        rounded("limit", "limit", 2),
+        words("unit", lambda item: item["unit"].replace("-", "")),
+        Field("result", "passed", bool, "verdict"),
+        words("meaning", "explanation"),
+    )
+    return table_of(fields, summary.get("checks", ()))
 
 
-def mesh_table(summary: Mapping[str, Any]) -> dict[str, Any]:
+def mesh_table(summary: Mapping[str, Any]) -> Table:
     """Mesh figures and how near the mesh is to the solid model."""
     mesh = summary["mesh"]
     rows = [
@@ -327,13 +270,11 @@ def mesh_table(summary: Mapping[str, Any]) -> dict[str, Any]:
             rows.append(
                 [f"largest relative error of {title}", significant(errors[worst], 2), readable(worst)]
             )
-    return {
-        "columns": [column("quantity"), column("value", number=True), column("where")],
-        "rows": rows_of(rows),
-    }
+    columns = (column("quantity"), column("value", number=True), column("where"))
+    return Table(columns, rows_of(rows), "Mesh: largest differences from the solid model.")
 
 
-def version_table(summary: Mapping[str, Any], attributes: Mapping[str, Any]) -> dict[str, Any]:
+def version_table(summary: Mapping[str, Any], attributes: Mapping[str, Any]) -> Table:
     """Versions, hashes, times."""
     rows = [[name, version] for name, version in summary["versions"].items()]
     rows += [
@@ -349,4 +290,4 @@ def version_table(summary: Mapping[str, Any], attributes: Mapping[str, Any]) -> 
     rows += [
         [f"iterations: {readable(name)}", str(value)] for name, value in summary.get("iterations", {}).items()
     ]
-    return {"columns": [column("what"), column("value")], "rows": rows_of(rows)}
+    return Table((column("what"), column("value")), rows_of(rows))

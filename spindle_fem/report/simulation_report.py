@@ -16,7 +16,7 @@ from spindle_fem.report.block_page import (
     illustration_of,
     render_document,
 )
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import fixed, number, rounded, significant, table_of, whole, words
 from spindle_fem.results.output_folder import replace_text
 
 
@@ -72,44 +72,32 @@ def _cards(content: Mapping[str, Any]) -> list[dict[str, str]]:
 
 
 def _channel_table(content: Mapping[str, Any]) -> Table:
-    rows = [
-        [
-            item["channel"],
-            str(item["readings"]),
-            *(number(item[key], 3) for key in ("rmse_K", "mean_K", "max_K", "noise_K")),
-            number(item["interval_half_width_K"], 2),
-            number(100.0 * item["inside_90_percent_interval"], 0),
-        ]
-        for item in content["channels"]
-    ]
-    columns = (
-        column("channel"),
-        *(
-            column(title, number=True)
-            for title in (
-                "readings",
-                "error / K",
-                "mean / K",
-                "largest / K",
-                "noise / K",
-                "90 % interval ± / K",
-                "inside / %",
-            )
-        ),
+    fields = (
+        words("channel", "channel"),
+        whole("readings", "readings"),
+        fixed("error / K", "rmse_K", 3),
+        fixed("mean / K", "mean_K", 3),
+        fixed("largest / K", "max_K", 3),
+        fixed("noise / K", "noise_K", 3),
+        fixed("90 % interval ± / K", "interval_half_width_K", 2),
+        fixed("inside / %", lambda item: 100.0 * item["inside_90_percent_interval"], 0),
     )
-    return Table(columns, rows_of(rows), "Predicted less read; error: root mean square.")
+    return table_of(fields, content["channels"], "Predicted less read; error: root mean square.")
 
 
 def _condition_table(content: Mapping[str, Any]) -> Table:
     """Error of every channel in every condition."""
-    channels = [item["channel"] for item in content["channels"]]
-    found = {(item["condition"], item["channel"]): item["rmse_K"] for item in content["conditions"]}
-    rows = [
-        [name, *(number(found.get((name, channel)), 3) for channel in channels)]
-        for name in dict.fromkeys(condition for condition, _ in found)
-    ]
-    columns = (column("condition"), *(column(f"{name} / K", number=True) for name in channels))
-    return Table(columns, rows_of(rows), "Root mean square of predicted less read.")
+    found: dict[str, dict[str, float | None]] = {}
+    for item in content["conditions"]:
+        found.setdefault(item["condition"], {})[item["channel"]] = item["rmse_K"]
+    fields = (
+        words("condition", lambda row: row[0]),
+        *(
+            fixed(f"{name} / K", lambda row, name=name: row[1].get(name), 3)
+            for name in (item["channel"] for item in content["channels"])
+        ),
+    )
+    return table_of(fields, found.items(), "Root mean square of predicted less read.")
 
 
 def _picture(folder: Path, name: str) -> Any:
@@ -121,36 +109,32 @@ def _picture(folder: Path, name: str) -> Any:
 
 
 def _calibration_blocks(calibration: Mapping[str, Any]) -> list[Any]:
-    rows = [
-        [
-            item["name"],
-            *(significant(item[key], 4) for key in ("prior", "value", "low", "high")),
-            item["unit"],
-            number(item["factor"], 3),
-            number(item["sigma_log"] / item["prior_sigma_log"], 2),
-        ]
-        for item in calibration["parameters"]
-    ]
-    columns = (
-        column("parameter"),
-        *(column(title, number=True) for title in ("before", "calibrated", "low", "high")),
-        column("unit"),
-        *(column(title, number=True) for title in ("factor", "width over prior's")),
+    fields = (
+        words("parameter", "name"),
+        rounded("before", "prior", 4),
+        rounded("calibrated", "value", 4),
+        rounded("low", "low", 4),
+        rounded("high", "high", 4),
+        words("unit", "unit"),
+        fixed("factor", "factor", 3),
+        fixed("width over prior's", lambda item: item["sigma_log"] / item["prior_sigma_log"], 2),
     )
     slow = calibration["slow_error"]
-    words = [
+    sentences = [
         f"Slow error of the readings and of the model: {number(slow['sigma_K'], 3)} K over "
         f"{number(slow['time_s'], 0)} s; whitened squares {number(calibration['chi_square_per_value'], 2)} a "
         f"value, {number(100.0 * calibration['outlier_share'], 1)} % beyond the robust limit."
     ]
-    words += [
+    sentences += [
         f"The data cannot tell {first} from {second} (correlation {number(value, 2)})."
         for first, second, value in calibration["cannot_tell_apart"]
     ]
     if calibration["not_learned"]:
-        words.append(f"The data say no more than the prior about: {', '.join(calibration['not_learned'])}.")
-    table = Table(columns, rows_of(rows), "Low and high: 90 % interval.")
-    return [table, *(Text(text) for text in words)]
+        sentences.append(
+            f"The data say no more than the prior about: {', '.join(calibration['not_learned'])}."
+        )
+    table = table_of(fields, calibration["parameters"], "Low and high: 90 % interval.")
+    return [table, *(Text(text) for text in sentences)]
 
 
 def _model_notes(model: Mapping[str, Any]) -> list[str]:

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from spindle_fem.report.block_page import Table, Text
+from spindle_fem.report.block_page import Text
 from spindle_fem.report.figure_style import FILM_MAP, INK, new_figure, styled
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import fixed, number, rounded, significant, table_of, whole, words
 from spindle_fem.studies.sweep.film_study import MODELS, PAPER_DEPTH, PAPER_TEMPERATURE, FilmChart, PumpLimits
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -155,29 +155,24 @@ def _mark(axes: object, item: FilmChart, *, own: bool = True) -> None:
 
 def film_words(films: Sequence[FilmChart], limits: PumpLimits = NO_LIMITS) -> list[Any]:
     """Where each map is largest, also within the pump's limits, and what the paper's choice gives on it."""
-    heads = (
-        column("equations"), column("held"), column("largest at: depth / mm", number=True),
-        column("oil / °C", number=True), column("W/(m²·K)", number=True),
-        column("at 19 mm, 31 °C", number=True), column("share of the largest", number=True),
-        *((column("largest that the pump allows"),) if limits.given else ()),
-    )  # fmt: skip
-    cells = [
-        [
-            MODELS[item.model], held_text(item), number(item.best[0] * 1e3, 1),
-            number(item.best[1] - ZERO_CELSIUS_K, 1), significant(item.best_value),
-            significant(item.paper_value),
-            f"{item.paper_value / item.best_value:.0%}",
-            *((_allowed(item, limits),) if limits.given else ()),
-        ]
-        for item in films
-    ]  # fmt: skip
+    fields = [
+        words("equations", lambda item: MODELS[item.model]),
+        words("held", held_text),
+        fixed("largest at: depth / mm", lambda item: item.best[0] * 1e3),
+        fixed("oil / °C", lambda item: item.best[1] - ZERO_CELSIUS_K),
+        rounded("W/(m²·K)", lambda item: item.best_value),
+        rounded("at 19 mm, 31 °C", lambda item: item.paper_value),
+        whole("share of the largest", lambda item: f"{item.paper_value / item.best_value:.0%}"),
+    ]
+    if limits.given:
+        fields.append(words("largest that the pump allows", lambda item: _allowed(item, limits)))
     text = (
         "The paper chose 19 mm and 31 °C from its map of the film coefficient. The velocity held here is the "
         "one at which that point lies on the paper's laminar–turbulent line; the flow is the machine's own. "
         "A film map says nothing of the bearings: hotter oil also lifts the whole machine, which only the "
         "solved designs show."
     )
-    return [Text(text), Table(heads, rows_of(cells))]
+    return [Text(text), table_of(fields, films)]
 
 
 def _allowed(chart: FilmChart, limits: PumpLimits) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +19,13 @@ from spindle_fem.report.block_page import (
     Interactive,
     Notice,
     Section,
-    Table,
     illustration_of,
     render_document,
 )
 from spindle_fem.report.figure_style import save_png
-from spindle_fem.report.run_tables import column, rows_of
 from spindle_fem.report.sweep_best import best_designs
 from spindle_fem.report.sweep_scales import Scale, scale_of_column
+from spindle_fem.report.table_rows import MISSING, Field, table_of, whole, words
 from spindle_fem.results.output_folder import read_content, replace_text, require_complete
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.studies.sweep.file_names import MACHINE_FILE, SUMMARY_FILE, SWEEP_SCHEMA
@@ -237,10 +237,8 @@ def _sections(
         blocks = [*words, pictures["film_maps"], pictures["pump_maps"]]
         sections.append(Section("film", "The paper's choice of depth and oil temperature", blocks))
     sections.append(Section("table", "All designs", _table(rows, parameters, outputs)))
-    versions = rows_of([[name, text] for name, text in summary["versions"].items()])
-    sections.append(
-        Section("versions", "Versions", [Table((column("package"), column("version")), versions)])
-    )
+    packages = (words("package", itemgetter(0)), words("version", itemgetter(1)))
+    sections.append(Section("versions", "Versions", [table_of(packages, summary["versions"].items())]))
     return sections
 
 
@@ -291,56 +289,38 @@ def _optimum(
             else "."
         )
         blocks.append(Notice(text + sure, "good"))
-    lines = [("", n) for n in optimum["front"]]
+    lines = [("best", n) for n in optimum["front"]]
     lines += [(name, item["design"]) for name, item in summary["references"].items()]
     lines += [("neighbour of the best", item["design"]) for item in optimum["neighbours"]]
-    heads = (column("what"), *_columns(parameters, outputs))
-    cells = [[what or "best", *_cells(by_number[n], parameters, outputs)] for what, n in lines]
-    blocks.append(
-        Table(heads, rows_of(cells), "The best designs, those to compare with, and the nearest ones solved.")
-    )
-    return blocks
+    fields = (words("what", "what"), *_fields(parameters, outputs))
+    compared = [{"what": what, **by_number[n]} for what, n in lines]
+    caption = "The best designs, those to compare with, and the nearest ones solved."
+    return [*blocks, table_of(fields, compared, caption)]
 
 
-def _columns(parameters: Sequence[Scale], outputs: Sequence[Scale]) -> list[dict[str, Any]]:
-    return [
-        column("design", number=True),
-        *(column(item.label, number=True) for item in (*parameters, *outputs)),
-    ]
-
-
-def _cells(row: Row, parameters: Sequence[Scale], outputs: Sequence[Scale]) -> list[str]:
-    return [str(row["design"]), *(item.text(row[item.path]) for item in (*parameters, *outputs))]
+def _fields(parameters: Sequence[Scale], outputs: Sequence[Scale]) -> tuple[Field, ...]:
+    scales = (*parameters, *outputs)
+    shown = (Field(item.label, item.path, item.text, "number") for item in scales)
+    return (whole("design", "design"), *shown)
 
 
 def _table(rows: Sequence[Row], parameters: Sequence[Scale], outputs: Sequence[Scale]) -> list[Any]:
-    heads = (
-        *_columns(parameters, outputs),
-        column("status"),
-        column("limits"),
-        column("answered by"),
-        column("reason"),
+    kept = {"yes": "kept", "no": "broken", None: MISSING}
+    fields = (
+        *_fields(parameters, outputs),
+        words("status", "status"),
+        words("limits", lambda row: kept[row["feasible"]]),
+        words("answered by", answered_by),
+        words("reason", "reason"),
     )
-    words = {"yes": "kept", "no": "broken", None: "–"}
-    cells = [
-        [
-            *_cells(row, parameters, outputs),
-            row["status"],
-            words[row["feasible"]],
-            answered_by(row),
-            row["reason"] or "",
-        ]
-        for row in rows
-    ]
-    return [
-        Table(heads, rows_of(cells), folded=f"{len(rows)} designs (results.csv has them with all digits)")
-    ]
+    folded = f"{len(rows)} designs (results.csv has them with all digits)"
+    return [table_of(fields, rows, folded=folded)]
 
 
 def answered_by(row: Row) -> str:
     """What answered a design, with the error estimate of a reduced answer, and whether its mesh was moved."""
     if row["backend"] is None:
-        return "–"
+        return MISSING
     error = row["error_estimate_K"]
     answered = row["backend"] if error is None else f"{row['backend']}, within {1e3 * error:.2g} mK"
     return f"{answered}, moved mesh" if row["mesh"] == MOVED else answered

@@ -8,7 +8,16 @@ from typing import Any
 
 from spindle_fem.report.block_page import Cards, Section, Table, Text, illustration_of, render_document
 from spindle_fem.report.figure_style import save_png
-from spindle_fem.report.run_tables import column, number, rows_of, significant
+from spindle_fem.report.table_rows import (
+    YES_OR_NO,
+    fixed,
+    number,
+    rounded,
+    significant,
+    table_of,
+    whole,
+    words,
+)
 from spindle_fem.report.transient_charts import bearing_history, heat_history, probe_history, step_history
 from spindle_fem.results.output_folder import replace_text
 from spindle_fem.studies.transient_study import StudyResult
@@ -90,47 +99,29 @@ def equilibrium_text(equilibrium: dict[str, Any]) -> str:
 
 
 def _phase_table(phases: list[dict[str, Any]]) -> Table:
-    probes = list(phases[0]["probes_degC"])
-    words = {True: "yes", False: "no", None: "–"}
-    columns = [
-        column("phase"),
-        *(column(name, number=True) for name in ("h", "settled", "heat W", "hottest °C", *probes)),
-    ]
-    rows = [
-        [
-            phase["name"],
-            number((phase["end_s"] - phase["start_s"]) / 3600.0, 2),
-            words[phase["settled"]],
-            number(phase["heat_W"]),
-            number(phase["hottest_degC"], 2),
-            *(number(phase["probes_degC"][name], 2) for name in probes),
-        ]
-        for phase in phases
-    ]
-    return Table(tuple(columns), rows_of(rows), caption="At the end of each phase; probes in °C.")
+    fields = (
+        words("phase", "name"),
+        fixed("h", lambda phase: (phase["end_s"] - phase["start_s"]) / 3600.0, 2),
+        whole("settled", lambda phase: YES_OR_NO[phase["settled"]]),
+        fixed("heat W", "heat_W"),
+        fixed("hottest °C", "hottest_degC", 2),
+        *(
+            fixed(name, lambda phase, name=name: phase["probes_degC"][name], 2)
+            for name in phases[0]["probes_degC"]
+        ),
+    )
+    return table_of(fields, phases, "At the end of each phase; probes in °C.")
 
 
 def _energy_table(phases: list[dict[str, Any]]) -> Table:
-    sinks = list(phases[0]["energy"]["heat_out_J"])
-    columns = [
-        column("phase"),
-        *(column(name, number=True) for name in ("heat in", "stored", *sinks, "imbalance")),
-    ]
-    rows = [
-        [
-            phase["name"],
-            *(
-                number(value / 1.0e3)
-                for value in (
-                    phase["energy"]["heat_in_J"],
-                    phase["energy"]["stored_J"],
-                    *(phase["energy"]["heat_out_J"][name] for name in sinks),
-                )
-            ),
-            significant(phase["energy"]["imbalance_relative"], 2),
-        ]
-        for phase in phases
-    ]
-    return Table(
-        tuple(columns), rows_of(rows), caption="Heat in kJ; the imbalance relative to the heat moved."
+    fields = (
+        words("phase", "name"),
+        fixed("heat in", lambda phase: phase["energy"]["heat_in_J"] / 1.0e3),
+        fixed("stored", lambda phase: phase["energy"]["stored_J"] / 1.0e3),
+        *(
+            fixed(name, lambda phase, name=name: phase["energy"]["heat_out_J"][name] / 1.0e3)
+            for name in phases[0]["energy"]["heat_out_J"]
+        ),
+        rounded("imbalance", lambda phase: phase["energy"]["imbalance_relative"], 2),
     )
+    return table_of(fields, phases, "Heat in kJ; the imbalance relative to the heat moved.")

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from spindle_fem.definition.load import load_machine
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.report import run_tables as tables
+from spindle_fem.report import table_rows
 from spindle_fem.report.definition_tables import customary, input_groups
 from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of
 from spindle_fem.report.leader_labels import spread
@@ -126,7 +127,7 @@ def test_marks_do_not_cover_values_that_the_file_left_out():
     [(1.25, 1, "1.2"), (-0.02, 1, "0.0"), (-3.0, 0, "−3"), (None, 1, "–"), (math.nan, 2, "–")],
 )
 def test_numbers_of_tables(value, digits, expected):
-    assert tables.number(value, digits) == expected
+    assert table_rows.number(value, digits) == expected
 
 
 @pytest.mark.parametrize(
@@ -134,7 +135,7 @@ def test_numbers_of_tables(value, digits, expected):
     [(1234.5, "1230"), (0.0, "0"), (2.6e-13, "2.60e−13"), (None, "–"), (418.0, "418"), (-0.25, "−0.25")],
 )
 def test_significant_digits_of_tables(value, expected):
-    assert tables.significant(value) == expected
+    assert table_rows.significant(value) == expected
 
 
 def test_heat_sources_are_added_up_by_bearing():

@@ -13,7 +13,7 @@ import pytest
 from spindle_fem.errors import BadInputError
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.report import block_page as document
-from spindle_fem.report import run_tables as tables
+from spindle_fem.report import table_rows
 from spindle_fem.report.figure_style import new_figure
 from spindle_fem.report.interactive_view import SURFACE_GROUP, display_surface, viewer_payload
 from spindle_fem.report.run_outputs import OutputHelpers, write_outputs
@@ -129,8 +129,8 @@ def test_a_machine_without_channel_has_no_coolant_section():
 
 def test_reports_of_other_commands_are_put_together_from_blocks():
     table = document.Table(
-        (tables.column("channel"), tables.column("passed", verdict=True)),
-        tables.rows_of([["SP01", True], ["SP<02>", False]]),
+        (table_rows.column("channel"), table_rows.column("passed", verdict=True)),
+        table_rows.rows_of([["SP01", True], ["SP<02>", False]]),
         caption="All channels",
         folded="Details",
     )
