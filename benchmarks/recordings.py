@@ -21,7 +21,7 @@ import pandas as pd
 
 from spindle_fem.definition.load import machine_folder
 from spindle_fem.definition.network_load import load_network_machine
-from spindle_fem.model.lumped.network_transient import simulate_transient
+from spindle_fem.model.lumped.network_transient import TimeScheme, simulate_transient
 from spindle_fem.model.lumped.thermal_network import ConductanceLaw, ThermalNetwork
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import Recording, read_recording
@@ -158,7 +158,9 @@ def main() -> None:
     for error in (1e-3, 1e-2, None):
         timed(
             f"4 h at 10 s, 72 nodes with laws, step error {error} K",
-            lambda error=error: simulate_transient(network, history, start, step_error=error),
+            lambda error=error: simulate_transient(
+                network, history, start, scheme=TimeScheme(step_error=error)
+            ),
         )
     if len(sys.argv) > 1:
         bench_recording(sys.argv[1], Path(sys.argv[1]))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.errors import EnergyBalanceError, NoSteadyStateError, SpecError
 from spindle_fem.model.mesh.thermal_state import ThermalState
-from spindle_fem.model.mesh.time_stepper import EnergyAccount, TransientResult, integrate
+from spindle_fem.model.mesh.time_stepper import EnergyAccount, StopTimes, TransientResult, integrate
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import RUNAWAY_TEMPERATURE, CoupledState
 from spindle_fem.solvers.coupled_transient import CoupledInputs, coolant_heat
@@ -60,6 +60,28 @@ def require_state(machine: PreparedMachine, state: ThermalState) -> None:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """What looks at a transient while it runs.
+
+    Attributes
+    ----------
+    stop : callable, optional
+        Asked after every accepted step; True ends the run there.
+    looks : sequence of float, [s]
+        Times at which a step has to end besides those of the inputs.
+    progress : callable
+        Told in words how far the run is.
+    """
+
+    stop: Callable[[ThermalState], bool] | None = None
+    looks: Sequence[float] = ()
+    progress: Callable[[str], None] = lambda text: None
+
+
+NO_WATCH = Watch()
+
+
 def simulate_full(
     machine: PreparedMachine,
     inputs: InputHistory,
@@ -67,11 +89,9 @@ def simulate_full(
     sample_times: ArrayLike | None = None,
     start: ThermalState | None = None,
     options: TransientOptions = DEFAULT_OPTIONS,
-    stop: Callable[[ThermalState], bool] | None = None,
-    breakpoints: Sequence[float] = (),
     physics: Physics = NO_PHYSICS,
     memory: Array | None = None,
-    progress: Callable[[str], None] = lambda text: None,
+    watch: Watch = NO_WATCH,
 ) -> MachineTransient:
     """Temperatures of a machine under inputs that change in time.
 
@@ -89,14 +109,12 @@ def simulate_full(
     start : ThermalState, optional
         Everything at the first ambient temperature when absent; a saved state
         to restart from.
-    stop : callable, optional
-        Asked after every accepted step; True ends the run there.
-    breakpoints : sequence of float, [s]
-        Times at which a step has to end besides those of the inputs.
     physics : Physics
         Terms and factors beyond the machine's own.
     memory : ndarray, optional
         What the terms remember where ``start`` goes on from an earlier run.
+    watch : Watch
+        What may end the run, times at which a step has to end, and who is told.
 
     Raises
     ------
@@ -115,11 +133,11 @@ def simulate_full(
         start = start_at(machine, history, first.ambient_temperature)
     require_state(machine, start)
     samples = np.asarray(inputs.times if sample_times is None else sample_times, dtype=float)
-    end = float(max(inputs.times[-1], samples.max(initial=-np.inf), max(breakpoints, default=-np.inf)))
+    end = float(max(inputs.times[-1], samples.max(initial=-np.inf), max(watch.looks, default=-np.inf)))
     marks = np.concatenate(
         (
             history.breakpoints(options.input_resolution),
-            np.asarray(breakpoints, dtype=float),
+            np.asarray(watch.looks, dtype=float),
             np.array(physics.breakpoints()),
         )
     )
@@ -137,14 +155,13 @@ def simulate_full(
         )
     rows = ReadingRows.of(machine, names)
     restarts = history.restarts()
-    run = _Run(machine, source, start, stop, frozenset((*restarts.tolist(), end)), progress)
+    run = _Run(machine, source, start, watch, frozenset((*restarts.tolist(), end)))
     result = integrate(
         source,
         start,
         end,
         control=options.control(),
-        breakpoints=marks.tolist(),
-        restarts=restarts.tolist(),
+        stops=StopTimes(marks.tolist(), restarts.tolist()),
         outputs=rows.rows,
         sample_times=samples[samples >= start.time],
         observer=run.observe,
@@ -160,12 +177,11 @@ class _Run:
         machine: PreparedMachine,
         source: CoupledInputs,
         start: ThermalState,
-        stop: Callable[[ThermalState], bool] | None,
+        watch: Watch,
         told: frozenset[float],
-        progress: Callable[[str], None],
     ) -> None:
-        self.machine, self.source, self.stop = machine, source, stop
-        self._told, self._progress = told, progress
+        self.machine, self.source, self.stop = machine, source, watch.stop
+        self._told, self._progress = told, watch.progress
         self.hottest: list[float] = []
         self.coldest: list[float] = []
         self.ends: list[tuple] = []

@@ -18,7 +18,7 @@ from spindle_fem.errors import (
 )
 from spindle_fem.model.lumped.driven_inputs import boundary_history, source_history
 from spindle_fem.model.lumped.exact_steps import LinearSystem
-from spindle_fem.model.lumped.network_transient import simulate_transient
+from spindle_fem.model.lumped.network_transient import TimeScheme, simulate_transient
 from spindle_fem.model.lumped.node_balance import NetworkBalance, explicit_derivative
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
 from spindle_fem.recordings.align import Recording
@@ -290,7 +290,7 @@ def simulate_on_recording(
             nodes=recording.probes,
             parameters=chosen,
             initial_derivative=slope,
-            step_error=step_error,
+            scheme=TimeScheme(step_error=step_error),
             system=system,
         )
         method = run.method

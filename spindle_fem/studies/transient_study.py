@@ -33,6 +33,7 @@ from spindle_fem.solvers.input_history import FIELD_OF, OperatingHistory
 from spindle_fem.solvers.machine_transient import (
     MachineTransient,
     TransientOptions,
+    Watch,
     require_state,
     simulate_full,
     start_at,
@@ -314,11 +315,9 @@ def _run_phase(
         sample_times=samples[samples <= begin + length],
         start=state,
         options=options,
-        stop=stop,
-        breakpoints=looks,
         physics=beyond[0],
         memory=beyond[1],
-        progress=progress,
+        watch=Watch(stop, looks, progress),
     )
     settled = None if until is None else transient.stopped
     return PhaseResult(phase.name, history.at(begin), begin, transient.state.time, settled, transient)

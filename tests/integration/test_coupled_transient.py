@@ -22,7 +22,13 @@ from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.coupled_transient import CoupledInputs
 from spindle_fem.solvers.input_history import OperatingHistory
-from spindle_fem.solvers.machine_transient import MachineEnergy, TransientOptions, simulate_full, start_from
+from spindle_fem.solvers.machine_transient import (
+    MachineEnergy,
+    TransientOptions,
+    Watch,
+    simulate_full,
+    start_from,
+)
 from spindle_fem.solvers.mesh_terms import Physics
 from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
@@ -197,7 +203,7 @@ def test_kept_coefficients_cost_little(quick):
 def test_restart_from_a_saved_state(quick, tmp_path):
     """Saved, read back and gone on: the same end as without the break."""
     names = {"speed": 1500 * RPM, "thrust": 1750.0}
-    whole = simulate_full(quick, held([0.0, 600.0], **names), breakpoints=[300.0])
+    whole = simulate_full(quick, held([0.0, 600.0], **names), watch=Watch(looks=[300.0]))
     first = simulate_full(quick, held([0.0, 300.0], **names))
     first.state.save(tmp_path / "state.npz")
     second = simulate_full(
@@ -283,7 +289,7 @@ def test_a_step_begins_with_what_the_last_one_ended_with(quick, monkeypatch):
         error=0.5, first_step=20.0, coupling_tolerance=1e-3, coefficient_tolerance=5e-3
     )
     inputs = held(times, speed=np.array([1500.0, 3000.0, 3000.0]) * RPM)
-    run = simulate_full(quick, inputs, breakpoints=[900.0], options=options)
+    run = simulate_full(quick, inputs, watch=Watch(looks=[900.0]), options=options)
     begins = {0.0, *run.steps.times.tolist()}
     assert 900.0 in begins
     assert begins & set(asked) == {0.0, 600.0}

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from spindle_fem.model.lumped.network_transient import simulate_transient
+from spindle_fem.model.lumped.network_transient import TimeScheme, simulate_transient
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.network_steady import solve_steady
@@ -125,7 +125,9 @@ def test_implicit_balance_and_agreement(network):
     )
     start = np.full(network.n_nodes, 300.0)
     exact = simulate_transient(network, history, start)
-    implicit = simulate_transient(network, history, start, method="implicit", step_error=1e-3)
+    implicit = simulate_transient(
+        network, history, start, scheme=TimeScheme(method="implicit", step_error=1e-3)
+    )
     assert implicit.counts.imbalance_relative < 1e-9
     assert_allclose(implicit.temperature, exact.temperature, atol=0.1)
 

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, RecordingError, SpecError
 from spindle_fem.model.lumped.exact_steps import divided_differences, first_order_recurrence, phi_functions
-from spindle_fem.model.lumped.network_transient import simulate_transient
+from spindle_fem.model.lumped.network_transient import TimeScheme, simulate_transient
 from spindle_fem.model.lumped.thermal_network import ConductanceLaw, Parameter, ThermalNetwork
 from spindle_fem.recordings.input_samples import InputHistory
 
@@ -157,7 +157,11 @@ def test_implicit_converges_to_exact():
     start = np.array([295.0, 310.0, 301.0])
     exact = simulate_transient(network, history, start, parameters=network.parameters)
     implicit = simulate_transient(
-        network, history, start, parameters=network.parameters, method="implicit", step_error=1e-6
+        network,
+        history,
+        start,
+        parameters=network.parameters,
+        scheme=TimeScheme(method="implicit", step_error=1e-6),
     )
     assert_allclose(implicit.temperature, exact.temperature, atol=1e-3)
     assert_allclose(implicit.sensitivity, exact.sensitivity, atol=5e-3)
@@ -175,7 +179,7 @@ def test_implicit_order_two(nonlinear):
 
     def run(step):
         return simulate_transient(
-            network, history, start, method="implicit", step_error=None, max_step=step
+            network, history, start, scheme=TimeScheme(method="implicit", step_error=None, max_step=step)
         ).temperature[-1]
 
     reference = run(0.01)
@@ -187,9 +191,9 @@ def test_implicit_order_two(nonlinear):
 def test_step_error_is_kept():
     network, history = three_bodies(**LAWS), some_history()
     start = np.array([295.0, 310.0, 301.0])
-    reference = simulate_transient(network, history, start, step_error=1e-7)
-    coarse = simulate_transient(network, history, start, step_error=1e-2)
-    fine = simulate_transient(network, history, start, step_error=1e-4)
+    reference = simulate_transient(network, history, start, scheme=TimeScheme(step_error=1e-7))
+    coarse = simulate_transient(network, history, start, scheme=TimeScheme(step_error=1e-2))
+    fine = simulate_transient(network, history, start, scheme=TimeScheme(step_error=1e-4))
     error = [np.abs(run.temperature - reference.temperature).max() for run in (coarse, fine)]
     assert error[0] < 0.05
     assert error[1] < 2e-3
@@ -221,7 +225,7 @@ def test_sensitivities_against_finite_differences(case):
     network = three_bodies(**LAWS) if case == "nonlinear" else three_bodies()
     method = "exact" if case == "exact" else "implicit"
     history, start = some_history(), np.array([295.0, 310.0, 301.0])
-    fixed = {"method": method, "step_error": None, "max_step": 5.0}
+    fixed = {"scheme": TimeScheme(method, None, 5.0)}
     derivative = simulate_transient(
         network, history, start, parameters=network.parameters, **fixed
     ).sensitivity
@@ -260,7 +264,7 @@ def test_initial_temperature_as_a_parameter():
     for method in ("exact", "implicit"):
         run = simulate_transient(
             lump(), history, np.array([310.0]), parameters=(parameter,),
-            initial_derivative=np.array([[310.0]]), method=method, step_error=1e-6,
+            initial_derivative=np.array([[310.0]]), scheme=TimeScheme(method=method, step_error=1e-6),
         )  # fmt: skip
         assert run.sensitivity[-1, 0, 0] == pytest.approx(310.0 * np.exp(-1.0), rel=1e-4)
 
@@ -281,11 +285,11 @@ def test_streams_need_the_implicit_scheme():
         stream_upstream=[1], stream_downstream=[0], stream_rate=[2.0],
     )  # fmt: skip
     history = InputHistory.constant(np.linspace(0.0, 30.0, 4), {})
-    run = simulate_transient(network, history, np.array([310.0]), step_error=1e-6)
+    run = simulate_transient(network, history, np.array([310.0]), scheme=TimeScheme(step_error=1e-6))
     assert run.method == "implicit"
     assert_allclose(run.temperature[:, 0], 300.0 + 10.0 * np.exp(-run.times / 10.0), atol=1e-3)
     with pytest.raises(SpecError, match="without streams"):
-        simulate_transient(network, history, np.array([310.0]), method="exact")
+        simulate_transient(network, history, np.array([310.0]), scheme=TimeScheme(method="exact"))
 
 
 def test_runaway_in_time_is_an_error():
@@ -306,7 +310,9 @@ def test_tightly_joined_nodes():
     )  # fmt: skip
     history = InputHistory.constant(np.linspace(0.0, 100.0, 11), {})
     for method in ("exact", "implicit"):
-        run = simulate_transient(network, history, np.array([310.0, 310.0]), method=method, step_error=1e-5)
+        run = simulate_transient(
+            network, history, np.array([310.0, 310.0]), scheme=TimeScheme(method=method, step_error=1e-5)
+        )
         expected = 300.0 + 10.0 * np.exp(-run.times / 50.0)
         assert_allclose(run.temperature, np.stack([expected, expected], axis=1), atol=2e-3)
 
@@ -335,4 +341,4 @@ def test_unknown_input_and_method_are_named():
     with pytest.raises(RecordingError, match=r'needs the input "room".*Did you mean "romm"'):
         simulate_transient(lump(), history, np.array([300.0]))
     with pytest.raises(SpecError, match='"euler" is unknown'):
-        simulate_transient(lump(), history, np.array([300.0]), method="euler")
+        simulate_transient(lump(), history, np.array([300.0]), scheme=TimeScheme(method="euler"))

@@ -27,7 +27,7 @@ from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.model.mesh.step_control import StepControl
 from spindle_fem.model.mesh.thermal_state import ThermalState, uniform_state
 from spindle_fem.model.mesh.time_stage import same_coefficients
-from spindle_fem.model.mesh.time_stepper import integrate
+from spindle_fem.model.mesh.time_stepper import StopTimes, integrate
 
 OPERATORS = build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((1, 1), 12, 2)), 1)
 PROBLEM = ConductionProblem(
@@ -71,7 +71,9 @@ def test_jump_at_a_breakpoint_acts_from_there_on():
     def inputs(time, state):
         return replace(PROBLEM, surface_heat={"inner.inner": 100.0 if 200.0 <= time < 600.0 else 0.0})
 
-    result = integrate(inputs, START, 1000.0, breakpoints=(200.0, 600.0), control=StepControl(tolerance=0.02))
+    result = integrate(
+        inputs, START, 1000.0, stops=StopTimes((200.0, 600.0)), control=StepControl(tolerance=0.02)
+    )
     assert result.energy.heat_in == pytest.approx(100.0 * 400.0 + 10.0 * 1000.0, rel=1e-9)
     assert {200.0, 600.0} <= set(result.step_times.tolist())
     assert result.energy.imbalance_relative < 1e-10
@@ -79,7 +81,7 @@ def test_jump_at_a_breakpoint_acts_from_there_on():
 
 def test_steps_begin_anew_after_a_restart():
     control = StepControl(tolerance=0.05, first_step=0.5)
-    result = integrate(PROBLEM, START, 5e4, restarts=(3e4,), control=control)
+    result = integrate(PROBLEM, START, 5e4, stops=StopTimes(restarts=(3e4,)), control=control)
     sizes, begins = np.diff(result.step_times), result.step_times[:-1]
     assert 3e4 in begins
     assert sizes[begins == 3e4] == 0.5
@@ -318,5 +320,5 @@ def test_a_preconditioner_that_has_become_useless_is_renewed():
         return replace(PROBLEM, joint_conductance={"inner|outer": 1e5 if time < 500.0 else 1.0})
 
     control = StepControl(tolerance=None, first_step=50.0, method="direct")
-    result = integrate(inputs, START, 2000.0, breakpoints=(500.0,), control=control)
+    result = integrate(inputs, START, 2000.0, stops=StopTimes((500.0,)), control=control)
     assert result.preconditioner_builds == 2

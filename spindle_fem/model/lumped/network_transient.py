@@ -46,6 +46,28 @@ class NetworkTransient:
     counts: StepCounts | None
 
 
+@dataclass(frozen=True, slots=True)
+class TimeScheme:
+    """How a network is followed in time.
+
+    Attributes
+    ----------
+    method : {"auto", "exact", "implicit"}
+        Exact needs a linear network without streams; auto takes it where it can.
+    step_error : float or None, [K]
+        Of the implicit scheme, for each step.
+    max_step : float, [s]
+        Of the implicit scheme.
+    """
+
+    method: str = "auto"
+    step_error: float | None = 1.0e-3
+    max_step: float = np.inf
+
+
+DEFAULT_SCHEME = TimeScheme()
+
+
 def simulate_transient(
     network: ThermalNetwork,
     history: InputHistory,
@@ -54,9 +76,7 @@ def simulate_transient(
     nodes: tuple[str, ...] | None = None,
     parameters: tuple[Parameter, ...] = (),
     initial_derivative: NDArray[np.float64] | None = None,
-    method: str = "auto",
-    step_error: float | None = 1.0e-3,
-    max_step: float = np.inf,
+    scheme: TimeScheme = DEFAULT_SCHEME,
     system: LinearSystem | None = None,
 ) -> NetworkTransient:
     """Follow a network through a history of inputs.
@@ -70,12 +90,8 @@ def simulate_transient(
         Those to differentiate by.
     initial_derivative : (n, p) ndarray, [K], optional
         Of the initial state to the log-parameters.
-    method : {"auto", "exact", "implicit"}
-        Exact needs a linear network without streams; auto takes it where it can.
-    step_error : float or None, [K]
-        Of the implicit scheme, for each step.
-    max_step : float, [s]
-        Of the implicit scheme.
+    scheme : TimeScheme
+        Method, step error and longest step.
     system : LinearSystem, optional
         Modes of this network, to share between calls.
 
@@ -95,6 +111,7 @@ def simulate_transient(
     >>> float(run.temperature[-1, 0].round(6))  # 290 + 10 exp(-1)
     293.678794
     """
+    method = scheme.method
     if method not in METHODS:
         raise SpecError("method", f'"{method}" is unknown.', f"Allowed: {', '.join(METHODS)}.")
     possible = network.is_linear and network.is_symmetric
@@ -126,8 +143,8 @@ def simulate_transient(
             outputs,
             parameters,
             initial_derivative,
-            step_error=step_error,
-            max_step=max_step,
+            step_error=scheme.step_error,
+            max_step=scheme.max_step,
         )
         used = "implicit"
     return NetworkTransient(

@@ -82,6 +82,25 @@ class TransientResult:
 Inputs = Callable[[float, ThermalState], ConductionProblem]
 
 
+@dataclass(frozen=True, slots=True)
+class StopTimes:
+    """Times inside a run at which a step has to end.
+
+    Attributes
+    ----------
+    breakpoints : sequence of float, [s]
+        Times where inputs jump.
+    restarts : sequence of float, [s]
+        Times where inputs jump and steps begin as at the start.
+    """
+
+    breakpoints: Sequence[float] = ()
+    restarts: Sequence[float] = ()
+
+
+NO_STOPS = StopTimes()
+
+
 @dataclass(slots=True)
 class _Ledger:
     """Running sums while stepping."""
@@ -110,8 +129,7 @@ def integrate(
     end_time: float,
     *,
     control: StepControl = DEFAULT_CONTROL,
-    breakpoints: Sequence[float] = (),
-    restarts: Sequence[float] = (),
+    stops: StopTimes = NO_STOPS,
     outputs: sparse.sparray | None = None,
     sample_times: ArrayLike = (),
     observer: Callable[[ThermalState], bool] | None = None,
@@ -123,12 +141,10 @@ def integrate(
     inputs : ConductionProblem or callable
         A constant problem, or ``(time, state)`` to the problem at that time,
         with the same operators and lumped nodes. Jumps are right-continuous
-        and listed in ``breakpoints``.
+        and listed in ``stops``.
     end_time : float, [s]
-    breakpoints : sequence of float, [s]
-        Times where inputs jump; steps end there.
-    restarts : sequence of float, [s]
-        Those of them after which steps begin as at the start.
+    stops : StopTimes
+        Where inputs jump; steps end there.
     outputs : (n_outputs, n) or (n_outputs, n + m) sparse array, optional
         Rows to sample, for example of ``probe_matrix``.
     sample_times : (n_samples,) array_like, [s]
@@ -150,8 +166,8 @@ def integrate(
     solver = StageSolver(inputs, start, control)
     rows = solver.output_rows(outputs)
     samples = np.full((len(times), rows.shape[0]), np.nan)
-    marks = [t for t in (*breakpoints, *restarts) if start.time < t < end_time]
-    stops, anew = np.unique([*marks, end_time]), frozenset(restarts)
+    marks = [t for t in (*stops.breakpoints, *stops.restarts) if start.time < t < end_time]
+    ends, anew = np.unique([*marks, end_time]), frozenset(stops.restarts)
     first_step = control.first_step or 1e-4 * (end_time - start.time)
     step = start.step or first_step
     ledger = _Ledger(ends=[start.time])
@@ -160,7 +176,7 @@ def integrate(
     samples[times == start.time] = rows @ start.vector()
     rejections = 0
     while state.time < end_time:
-        stop = float(stops[np.searchsorted(stops, state.time, side="right")])
+        stop = float(ends[np.searchsorted(ends, state.time, side="right")])
         allowed = min(step, control.largest_step)
         left = stop - state.time
         # two equal steps to a stop rather than one full and a sliver
@@ -198,7 +214,7 @@ def integrate(
             samples[inside] = interpolate_step(place, *(rows @ stage.values for stage in stages))
         step = _next_step(step, size, error, control.tolerance)
         solver.accept(stages, size)
-        if end in stops:
+        if end in ends:
             solver.forget_slope()
         if end in anew:
             step = first_step
