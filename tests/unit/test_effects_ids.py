@@ -11,7 +11,7 @@ from spindle_fem.effects.registry import catalogue
 PACKAGE = Path(spindle_fem.__file__).parent
 # The same word for something else: an option of the definition's heat model, a number of a joint.
 OTHER_MEANING = {
-    "thermal_preload": {"model/lumped/machine_steady.py", "solvers"},
+    "thermal_preload": {"operation/bearing_heat.py", "solvers"},
     "joint_conductance": {"model/mesh/conduction_problem.py"},
 }
 

@@ -113,7 +113,7 @@ def build_sizes(
         Unknown preset, unknown name or a size that is not positive.
 
     >>> from spindle_fem.machine.geometry.assembly import assemble
-    from spindle_fem.machine.geometry.part_shapes import AnnularSegment, PartGeometry
+    >>> from spindle_fem.machine.geometry.part_shapes import AnnularSegment, PartGeometry
     >>> ring = PartGeometry("ring", (AnnularSegment(0.0, 0.02, 0.05, 0.06),))
     >>> round(build_sizes(assemble([ring]), "normal").part["ring"], 6)
     0.01

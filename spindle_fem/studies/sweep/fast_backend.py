@@ -49,7 +49,7 @@ CHECKS = 3
 AT_ONCE = 256
 # Errors of a model at the designs that were solved in full: the largest in K, and the largest ratio of a
 # true error to its estimate, at least 1.
-TRUE, RATIO = "true", "true over estimated"
+TRUE_ERROR, ERROR_RATIO = "true", "true over estimated"
 # Beyond the coefficients that the basis was made for by more than this, the full solve answers.
 RANGE_SLACK = 1.0e-6
 
@@ -82,7 +82,7 @@ def answer_group(group: GroupTask, question: Question) -> list[Row]:
             model, rows, tables = model_of(group, question)
         except SpindleFemError:
             return []  # the full solves will say what is wrong, design by design
-        if not model.errors[TRUE] <= LARGEST_ERROR:
+        if not model.errors[TRUE_ERROR] <= LARGEST_ERROR:
             return rows
         wanted = {task.key for task in group.wanted} - {row["key"] for row in rows} - set(model.checked)
         for tasks in (group.plan, tuple(t for t in group.wanted if t not in group.plan)):
@@ -128,8 +128,8 @@ def _answer(
             for row in _answer(solver, inputs, part, tasks, question)
         ]
     model = solver.model
-    error = model.errors[RATIO] * np.max([state.estimate for state in states], axis=0)
-    error = np.maximum(error, model.errors[TRUE])
+    error = model.errors[ERROR_RATIO] * np.max([state.estimate for state in states], axis=0)
+    error = np.maximum(error, model.errors[TRUE_ERROR])
     good = np.all([state.settled for state in states], axis=0) & (error <= LARGEST_ERROR)
     good &= inside_range(model, states[0])
     rows = []
@@ -250,8 +250,8 @@ def checked_model(
             model,
             errors={
                 **model.errors,
-                TRUE: max(errors) if errors else float("inf"),
-                RATIO: max(ratios),
+                TRUE_ERROR: max(errors) if errors else float("inf"),
+                ERROR_RATIO: max(ratios),
             },
             checked=tuple(plan[row].key for row in chosen),
         ),
