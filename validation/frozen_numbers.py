@@ -29,7 +29,7 @@ HASHES = ("key", "geometry")
 PASSING = (
     "versions",
     "wall",
-    "timings",
+    "timing",
     "rss",
     "_MB",
     "seconds",

@@ -34,7 +34,7 @@ def test_shares_nothing_with_the_program_it_tries_to_fool():
             for name in node.names
         }
         ours = {name for name in imported if name.startswith("spindle_fem")}
-        # What diagnoses the cases, or finds the program's constants by them, calls it; nothing that makes them does.
+        # What diagnoses the cases or finds constants by them calls the program; nothing that makes them does.
         calls = path.stem in ("run_study", "riddle", "reliability", "calibration_coverage")
         assert calls or not ours, path.name
 
