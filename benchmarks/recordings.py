@@ -21,14 +21,11 @@ import pandas as pd
 
 from spindle_fem.definition.load import machine_folder
 from spindle_fem.definition.network_load import load_network_machine
-from spindle_fem.model.lumped.network_transient import TimeScheme, simulate_transient
-from spindle_fem.model.lumped.thermal_network import ConductanceLaw, ThermalNetwork
 from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.network_inputs import fast_network
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.compare import compare
-from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.network_steady import solve_steady
-from spindle_fem.solvers.simulate_network import simulate_on_recording
 
 ROWS = 200_000
 MANIFEST = """
@@ -88,50 +85,6 @@ def make_recording(folder: Path, data: str) -> Path:
     return path
 
 
-def large_network() -> tuple[ThermalNetwork, InputHistory]:
-    """A grid of 9 by 8 nodes with natural convection outside and heat that falls as it warms."""
-    columns, layers = 9, 8
-    number = columns * layers
-    grid = np.arange(number).reshape(columns, layers)
-    pairs = np.concatenate(
-        [
-            np.stack([grid[:-1].ravel(), grid[1:].ravel()], axis=1),
-            np.stack([grid[:, :-1].ravel(), grid[:, 1:].ravel()], axis=1),
-            np.stack([grid[:, -1], np.full(columns, number)], axis=1),
-        ]
-    )
-    random = np.random.default_rng(0)
-    heated = grid[[1, 2, 6, 7], 3]
-
-    def convection(first: Any, second: Any, inputs: Any) -> Any:
-        difference = first - second
-        size = np.sqrt(difference**2 + 1.0)
-        slope = 0.125 * size**-1.75 * difference
-        return 0.5 * size**0.25, slope, -slope
-
-    def friction(nodes: Any, boundaries: Any, inputs: Any) -> Any:
-        heat, slope = np.zeros(number), np.zeros((number, number))
-        heat[heated] = 0.5 * inputs["speed"] * np.exp(-0.02 * (nodes[heated] - 293.15))
-        slope[heated, heated] = -0.02 * heat[heated]
-        return heat, slope
-
-    network = ThermalNetwork(
-        tuple(f"node{k}" for k in range(number)),
-        random.uniform(50.0, 1000.0, number),
-        pairs[:, 0],
-        pairs[:, 1],
-        random.uniform(1.0, 20.0, len(pairs)),
-        ("air",),
-        [293.15],
-        conductance_laws=(ConductanceLaw(np.arange(len(pairs) - columns, len(pairs)), convection),),
-        heat_laws=(friction,),
-        law_inputs=("speed",),
-    )
-    times = np.arange(0.0, 14401.0, 10.0)
-    speed = 50.0 + 50.0 * (times // 1600.0)
-    return network, InputHistory(times, ("speed",), speed[:, None], [True])
-
-
 def bench_recording(label: str, path: Path) -> None:
     """Read, check, simulate, differentiate and compare one recording."""
     recording: Recording = timed(f"read and check {label}", lambda: read_recording(path))
@@ -141,27 +94,22 @@ def bench_recording(label: str, path: Path) -> None:
     network = build_network(load_network_machine(machine_folder() / f"{machine}.toml").network)
     if not probes <= set(network.node_names):
         return
-    result = timed("simulate", lambda: simulate_on_recording(network, recording))
-    number = len(network.parameters)
-    timed(
-        f"simulate with derivatives to {number} parameters",
-        lambda: simulate_on_recording(network, recording, parameters=network.parameters),
-    )
-    timed("errors by channel and condition", lambda: compare(recording, result.predicted))
+    fast = fast_network(network)
+
+    def simulate(names: tuple[str, ...] = ()) -> Any:
+        drive = fast.inputs.drive(recording)
+        start = fast.inputs.start(recording, drive, {}, names)
+        return simulate_fast(fast, drive, start, derivatives=names).temperature
+
+    temperature = timed("simulate", simulate)
+    names = tuple(parameter.name for parameter in network.parameters)
+    timed(f"simulate with derivatives to {len(names)} parameters", lambda: simulate(names))
+    rows = fast.require_channels(recording.probes, "benchmark")
+    timed("errors by channel and condition", lambda: compare(recording, temperature[:, rows]))
 
 
 def main() -> None:
     """Run every case."""
-    network, history = large_network()
-    start = np.full(network.n_nodes, 293.15)
-    timed("steady state, 72 nodes with laws", lambda: solve_steady(network, {"speed": 450.0}), 20)
-    for error in (1e-3, 1e-2, None):
-        timed(
-            f"4 h at 10 s, 72 nodes with laws, step error {error} K",
-            lambda error=error: simulate_transient(
-                network, history, start, scheme=TimeScheme(step_error=error)
-            ),
-        )
     if len(sys.argv) > 1:
         bench_recording(sys.argv[1], Path(sys.argv[1]))
         return

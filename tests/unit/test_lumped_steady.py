@@ -113,8 +113,7 @@ def test_jacobian_against_finite_differences():
     for node in range(3):
         shift = np.eye(3)[node] * step
         numeric = (
-            balance.net_heat(temperature + shift, *arguments)
-            - balance.net_heat(temperature - shift, *arguments)
+            balance(temperature + shift, *arguments)[0] - balance(temperature - shift, *arguments)[0]
         ) / (2 * step)
         np.testing.assert_allclose(derivative[:, node], numeric, rtol=1e-7, atol=1e-7)
 

@@ -11,7 +11,7 @@ from spindle_fem.definition.network_load import load_network_machine
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare
-from spindle_fem.solvers.simulate_network import simulate_on_recording
+from tests.support.network_runs import run_on_recording
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 FOLDER = Path(os.environ.get("SPINDLE_FEM_RECORDINGS", BESIDE))
@@ -91,7 +91,7 @@ def test_shipped_machines_fit_their_recordings(machine, name):
     """Names and units agree; before calibration the error is only bounded by the priors' width."""
     network = build_network(load_network_machine(machine_folder() / f"{machine}.toml").network)
     recording = read_recording(FOLDER / name)
-    result = simulate_on_recording(network, recording, parameters=network.parameters)
+    result = run_on_recording(network, recording, parameters=network.parameters)
     comparison = compare(recording, result.predicted)
     prior = np.array([parameter.sigma_log for parameter in network.parameters])
     spread = np.sqrt(np.sum((result.sensitivity * prior) ** 2, axis=2) + recording.sigma**2)

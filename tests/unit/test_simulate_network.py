@@ -11,18 +11,13 @@ from numpy.testing import assert_allclose
 
 from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.errors import FaultsError, RecordingError, SpecError
-from spindle_fem.model.lumped.network_transient import simulate_transient
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare, simulation_summary, write_simulated
 from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.simulate_network import (
-    initial_parameters,
-    initial_state,
-    magnitude_history,
-    simulate_on_recording,
-)
+from spindle_fem.solvers.network_start import initial_parameters, initial_state, magnitude_history
+from tests.support.network_runs import modal_solution, run_on_recording
 
 MACHINE = """
 schema = "spindle-fem/machine/1"
@@ -106,7 +101,7 @@ def make(folder, network, *, times=None, start=(295.0, 295.0, 295.0), noise=0.0,
         np.column_stack([room + 273.15, np.abs(speed) * 2 * np.pi / 60]),
         [False, True],
     )
-    truth = simulate_transient(network, history, np.array(start)).temperature - 273.15
+    truth = modal_solution(network, history, start) - 273.15
     random = np.random.default_rng(1)
     frame = pd.DataFrame(
         {
@@ -125,8 +120,7 @@ def make(folder, network, *, times=None, start=(295.0, 295.0, 295.0), noise=0.0,
 def test_prediction_reproduces_the_machine_that_made_the_recording(tmp_path, network):
     """The unread shaft starts in balance with the bearing, which it is here."""
     recording = make(tmp_path, network)
-    result = simulate_on_recording(network, recording)
-    assert result.method == "exact"
+    result = run_on_recording(network, recording)
     assert_allclose(result.predicted, recording.temperature, atol=1e-6)
     assert result.notes == ('node "shaft" is not read',)
     assert compare(recording, result.predicted).row("T_bearing").rmse < 1e-6
@@ -145,7 +139,7 @@ def test_missing_readings_do_not_stop_the_prediction(tmp_path, network):
     frame.loc[200:210, "room"] = np.nan
     frame.drop(index=range(300, 320)).to_csv(tmp_path / "data.csv", index=False)
     holed = read_recording(tmp_path)
-    predicted = simulate_on_recording(network, holed).predicted
+    predicted = run_on_recording(network, holed).predicted
     kept = np.isin(recording.times, holed.times)
     assert np.isfinite(predicted).all()
     # a straight line over 110 s of a room that swings by a degree in 1.5 h
@@ -156,7 +150,7 @@ def test_each_segment_starts_from_its_first_reading(tmp_path, network):
     times = np.concatenate([np.arange(0.0, 1000.0, 10.0), np.arange(90000.0, 91000.0, 10.0)])
     recording = make(tmp_path, network, times=times)
     assert len(recording.segments) == 2
-    result = simulate_on_recording(network, recording)
+    result = run_on_recording(network, recording)
     assert_allclose(result.predicted[100], recording.temperature[100], atol=1e-9)
     assert result.initial.shape == (2, 3)
     assert any("each starts from its first readings" in note for note in result.notes)
@@ -170,7 +164,7 @@ def test_initial_parameters_move_the_first_segment_only(tmp_path, network):
     # 0.1 K of noise on what is read, 5 K on the estimate of what is not
     assert [item.sigma_log * item.value for item in start] == pytest.approx([0.1, 5.0, 0.1])
     moved = tuple(replace(item, value=item.value + 10.0) for item in start)
-    result = simulate_on_recording(network, recording, parameters=moved)
+    result = run_on_recording(network, recording, parameters=moved)
     assert_allclose(result.predicted[0], recording.temperature[0] + 10.0, atol=1e-9)
     assert_allclose(result.predicted[100], recording.temperature[100], atol=1e-9)
     assert np.all(result.sensitivity[100:] == 0.0)
@@ -200,7 +194,7 @@ def test_sensitivities_with_the_start_against_finite_differences(tmp_path, netwo
     recording = make(tmp_path, network, times=np.arange(0.0, 3000.0, 30.0), start=(310.0, 290.0, 300.0))
     extra = initial_parameters(network, recording) if kind == "first_reading" else ()
     parameters = network.parameters + extra
-    derivative = simulate_on_recording(network, recording, parameters=parameters, initial=kind).sensitivity
+    derivative = run_on_recording(network, recording, parameters=parameters, initial=kind).sensitivity
     step = 1e-6
     for p, parameter in enumerate(parameters):
         shifted = []
@@ -211,13 +205,11 @@ def test_sensitivities_with_the_start_against_finite_differences(tmp_path, netwo
                     replace(i, value=value) if i.name == parameter.name else i for i in parameters
                 )
                 shifted.append(
-                    simulate_on_recording(network, recording, parameters=changed, initial=kind).predicted
+                    run_on_recording(network, recording, parameters=changed, initial=kind).predicted
                 )
             else:
                 other = network.with_values({parameter.name: value})
-                shifted.append(
-                    simulate_on_recording(other, recording, parameters=extra, initial=kind).predicted
-                )
+                shifted.append(run_on_recording(other, recording, parameters=extra, initial=kind).predicted)
         numeric = (shifted[0] - shifted[1]) / (2 * step)
         assert_allclose(derivative[:, :, p], numeric, atol=2e-5 * max(1.0, np.abs(numeric).max()))
 
@@ -227,11 +219,11 @@ def test_unread_start_carries_its_dependence_on_parameters(tmp_path, network):
     manifest = MANIFEST.replace('probe = "bearing"', 'probe = "shaft"')
     start = (320.0, 290.0, 300.0)
     recording = make(tmp_path, network, times=np.arange(0.0, 3000.0, 30.0), start=start, manifest=manifest)
-    derivative = simulate_on_recording(network, recording, parameters=network.parameters).sensitivity
+    derivative = run_on_recording(network, recording, parameters=network.parameters).sensitivity
     step = 1e-6
     for p, parameter in enumerate(network.parameters):
         shifted = [
-            simulate_on_recording(
+            run_on_recording(
                 network.with_values({parameter.name: parameter.value * np.exp(s * step)}), recording
             ).predicted
             for s in (1.0, -1.0)
@@ -268,7 +260,7 @@ def test_flagged_readings_do_not_count(tmp_path, network):
     frame.loc[100, "T_bearing"] = 300.0
     frame.to_csv(tmp_path / "data.csv", index=False)
     recording = read_recording(tmp_path)
-    comparison = compare(recording, simulate_on_recording(network, recording).predicted)
+    comparison = compare(recording, run_on_recording(network, recording).predicted)
     assert comparison.row("T_bearing").readings == recording.times.size - 1
     assert comparison.row("T_bearing").rmse < 0.1
 
@@ -296,7 +288,7 @@ def test_conditions_of_a_run(tmp_path, network):
 
 def test_simulated_csv(tmp_path, network):
     recording = make(tmp_path, network)
-    result = simulate_on_recording(network, recording)
+    result = run_on_recording(network, recording)
     write_simulated(tmp_path / "simulated.csv", recording, result.predicted)
     frame = pd.read_csv(tmp_path / "simulated.csv")
     assert list(frame.columns) == ["time_s", "T_bearing", "T_housing"]
@@ -319,7 +311,7 @@ def test_channel_that_reads_nothing_has_no_error(tmp_path, network):
     frame["T_housing"] = np.nan
     frame.to_csv(tmp_path / "data.csv", index=False)
     recording = read_recording(tmp_path)
-    result = simulate_on_recording(network, recording)
+    result = run_on_recording(network, recording)
     assert np.isfinite(result.predicted).all()
     content = simulation_summary(compare(recording, result.predicted))
     assert content["channels"][1]["rmse_K"] is None
@@ -333,7 +325,7 @@ def test_every_misfit_of_machine_and_recording_at_once(tmp_path, network):
     manifest = manifest.replace('drives = "ambient"', 'drives = "hall"')
     (tmp_path / "recording.toml").write_text(manifest)
     with pytest.raises(FaultsError) as caught:
-        simulate_on_recording(network, read_recording(tmp_path))
+        run_on_recording(network, read_recording(tmp_path))
     text = str(caught.value)
     assert len(caught.value.faults) == 2
     assert 'channel T_bearing: probe "bearng" is not a node of the machine. Did you mean "bearing"' in text
@@ -353,7 +345,7 @@ def test_units_of_machine_and_recording_must_agree(tmp_path, network, old, new, 
     assert old in MACHINE
     other = validate_network_machine(tomllib.loads(MACHINE.replace(old, new)), "machine.toml")
     with pytest.raises(FaultsError, match=message):
-        simulate_on_recording(build_network(other.network), recording)
+        run_on_recording(build_network(other.network), recording)
 
 
 def test_prediction_of_another_shape_is_refused(tmp_path, network):

@@ -1,39 +1,37 @@
-"""Boundary temperatures and source heat of a network over the history of its inputs."""
+"""Boundary temperatures and source heat of a network from its inputs over time."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.model.lumped.thermal_network import Array, ThermalNetwork
-from spindle_fem.recordings.input_samples import InputHistory
 
 
-def boundary_history(network: ThermalNetwork, history: InputHistory, values: Array) -> Array:
-    """Boundary temperatures, ``(N, b) [K]``, of input values ``(N, m)``."""
-    result = np.tile(network.boundary_temperature, (len(values), 1))
+def boundary_temperatures(network: ThermalNetwork, inputs: Mapping[str, Array], number: int) -> Array:
+    """Boundary temperatures, ``(number, b) [K]``, of inputs that are ``(number,)`` each."""
+    result = np.tile(network.boundary_temperature, (number, 1))
     for position, name in enumerate(network.boundary_input):
         if name is not None:
-            result[:, position] = values[:, history.column(name)]
+            result[:, position] = inputs[name]
     return result
 
 
-def source_history(network: ThermalNetwork, history: InputHistory, values: Array) -> Array:
-    """Heat of each source, ``(N, s) [W]``, of input values ``(N, m)``.
+def source_heat(network: ThermalNetwork, inputs: Mapping[str, Array], number: int) -> Array:
+    """Heat of each source, ``(number, s) [W]``, of inputs that are ``(number,)`` each.
 
     Raises
     ------
     OutOfValidityError
         A negative input under an exponent that is not a whole number.
     """
-    result = np.tile(network.source_gain, (len(values), 1))
+    result = np.tile(network.source_gain, (number, 1))
     for position, name in enumerate(network.source_input):
         if name is None:
             continue
-        driven, exponent = values[:, history.column(name)], float(network.source_exponent[position])
-        if exponent == 1.0:
-            result[:, position] *= driven
-            continue
+        driven, exponent = inputs[name], float(network.source_exponent[position])
         if not exponent.is_integer() and np.any(driven < 0.0):
             raise OutOfValidityError(
                 f'source "{network.source_names[position]}"',

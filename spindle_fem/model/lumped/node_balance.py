@@ -50,17 +50,6 @@ class NetworkBalance:
                 derivative += heat_derivative
         return net, derivative
 
-    def net_heat(self, temperature: Array, boundary: Array, source_heat: Array, inputs: Inputs) -> Array:
-        """Net heat into every node, ``(n,) [W]``, without the Jacobian."""
-        net = source_heat - self.node_matrix @ temperature + self.boundary_matrix @ boundary
-        if self._laws or self.network.heat_laws:
-            both = np.concatenate([temperature, boundary])
-            for law in self._laws:
-                law.add(both, inputs, net, None)
-            for function in self.network.heat_laws:
-                net = net + function(temperature, boundary, inputs)[0]
-        return net
-
     def link_conductances(self, temperature: Array, boundary: Array, inputs: Inputs) -> Array:
         """Conductance of every link, ``(m,) [W/K]``, laws evaluated."""
         conductance = self.network.link_conductance.copy()
@@ -90,14 +79,12 @@ class _PlacedLaw:
     def evaluate(self, both: Array, inputs: Inputs) -> tuple[Array, Array, Array]:
         return self.function(both[self.first], both[self.second], inputs)
 
-    def add(self, both: Array, inputs: Inputs, net: Array, derivative: Array | None) -> None:
+    def add(self, both: Array, inputs: Inputs, net: Array, derivative: Array) -> None:
         conductance, to_first, to_second = self.evaluate(both, inputs)
         difference = both[self.first] - both[self.second]
         flow = conductance * difference
         gathered = np.bincount(self._nodes, np.concatenate([-flow, flow]), self._n_total)
         net += gathered[: self.n_nodes]
-        if derivative is None:
-            return
         by_first = conductance + to_first * difference
         by_second = to_second * difference - conductance
         weights = np.concatenate([-by_first, -by_second, by_first, by_second])[self._inside]

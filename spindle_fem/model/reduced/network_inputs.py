@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.effects.framework.term import COVARIATE, RecordedHeat, Term
 from spindle_fem.errors import SpecError
+from spindle_fem.model.lumped.driven_inputs import boundary_temperatures, source_heat
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
 from spindle_fem.model.reduced.channel_operators import ChannelOperators
 from spindle_fem.model.reduced.class_operators import NO_CHANGES
@@ -34,13 +35,12 @@ from spindle_fem.model.reduced.network_operators import (
     NetworkTable,
     boundary_of_links,
     network_thermal_model,
-    source_power,
 )
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import Recording
-from spindle_fem.solvers.simulate_network import (
+from spindle_fem.solvers.network_start import (
     initial_parameters,
     initial_state,
     magnitude_history,
@@ -197,23 +197,17 @@ class NetworkInputs:
         """
         network = self.network
         column = {name: inputs[:, position] for position, name in enumerate(names)}
-        heat = np.tile(network.source_gain, (len(inputs), 1))
-        for position, name in enumerate(network.source_input):
-            if name is not None:
-                heat[:, position] *= source_power(
-                    network.source_names[position], column[name], float(network.source_exponent[position])
-                )
+        heat = source_heat(network, column, len(inputs))
         friction, friction_by = self.friction_loads(heat, factors, parameters)
         found = np.zeros((len(inputs), len(self.load_names)))
         found[:, : friction.shape[1]] = friction
         by = {name: np.zeros_like(found) for name in friction_by}
         for name, part in friction_by.items():
             by[name][:, : part.shape[1]] = part
-        for position, boundary in enumerate(network.boundary_names):
-            name, driven = f"temperature.{boundary}", network.boundary_input[position]
-            own = network.boundary_temperature[position] if driven is None else column[driven]
-            place = len(self.bearings) + position
-            found[:, place] = own * factors.get(name, 1.0)
+        found[:, len(self.bearings) :] = boundary_temperatures(network, column, len(inputs))
+        for place, boundary in enumerate(network.boundary_names, len(self.bearings)):
+            name = f"temperature.{boundary}"
+            found[:, place] *= factors.get(name, 1.0)
             if name in parameters:
                 by[name] = np.zeros_like(found)
                 by[name][:, place] = found[:, place]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import OutOfValidityError, SpecError, did_you_mean
+from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.model.thermal_model import ThermalModel
 
@@ -68,25 +68,6 @@ class NetworkTable:
     def scale(self, coefficient: str, factors: Mapping[str, float]) -> float:
         """Product of the factors on one coefficient."""
         return float(np.prod([factors.get(name, 1.0) for name in self.groups[coefficient]]))
-
-
-def source_power(source: str, values: Array, exponent: float) -> Array:
-    """Input of a source to its exponent.
-
-    Raises
-    ------
-    OutOfValidityError
-        A negative input under an exponent that is not a whole number.
-    """
-    if exponent == 1.0:
-        return values
-    if not exponent.is_integer() and np.any(values < 0.0):
-        raise OutOfValidityError(
-            f'source "{source}"',
-            f"its input falls to {values.min():g}, which has no power {exponent:g}.",
-            "Give the magnitude of the input, or a whole exponent.",
-        )
-    return values**exponent
 
 
 def boundary_of_links(network: ThermalNetwork) -> dict[str, str]:

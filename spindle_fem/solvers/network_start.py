@@ -1,8 +1,8 @@
-"""A network machine on a recording: what every temperature channel should have read."""
+"""A written network on a recording: whether they fit, its inputs, and the temperatures it starts from."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,7 @@ from spindle_fem.errors import (
     UnitError,
     did_you_mean,
 )
-from spindle_fem.model.lumped.driven_inputs import boundary_history, source_history
-from spindle_fem.model.lumped.exact_steps import LinearSystem
-from spindle_fem.model.lumped.network_transient import TimeScheme, simulate_transient
+from spindle_fem.model.lumped.driven_inputs import boundary_temperatures, source_heat
 from spindle_fem.model.lumped.node_balance import NetworkBalance, explicit_derivative
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
 from spindle_fem.recordings.align import Recording
@@ -29,32 +27,6 @@ from spindle_fem.units import ANGULAR_SPEED_UNIT, registry
 Array = NDArray[np.float64]
 
 INITIAL_KINDS = ("first_reading", "ambient", "steady")
-
-
-@dataclass(frozen=True, slots=True)
-class NetworkPrediction:
-    """Temperatures of every channel at every stamp of a recording.
-
-    Attributes
-    ----------
-    predicted : (N, c) float64 ndarray, [K]
-    sensitivity : (N, c, p) float64 ndarray, [K]
-        Derivative to the natural logarithm of each parameter.
-    initial : (S, n) float64 ndarray, [K]
-        State of all nodes at the start of each segment.
-    method : str
-        "exact" or "implicit".
-    notes : tuple of str
-        What the reader should know: inputs that drive nothing, nodes that
-        nothing reads.
-    """
-
-    predicted: Array
-    sensitivity: Array
-    parameters: tuple[Parameter, ...]
-    initial: Array
-    method: str
-    notes: tuple[str, ...]
 
 
 def require_compatible(network: ThermalNetwork, recording: Recording) -> tuple[str, ...]:
@@ -192,8 +164,9 @@ def initial_state(
     n, number = network.n_nodes, len(parameters)
     balance = NetworkBalance(network)
     inputs = history.at_first()
-    boundary = boundary_history(network, history, history.values[:1])[0]
-    sources = source_history(network, history, history.values[:1])[0]
+    first = {name: history.values[:1, history.column(name)] for name in network.input_names}
+    boundary = boundary_temperatures(network, first, 1)[0]
+    sources = source_heat(network, first, 1)[0]
     node_heat = network.node_heat(sources)
     derivative = np.zeros((n, number))
     if kind == "ambient":
@@ -239,65 +212,6 @@ def initial_state(
     driven = explicit[unread] + jacobian[np.ix_(unread, np.flatnonzero(known))] @ derivative[known]
     derivative[unread] = np.linalg.solve(jacobian[np.ix_(unread, unread)], -driven)
     return state, derivative
-
-
-def simulate_on_recording(
-    network: ThermalNetwork,
-    recording: Recording,
-    *,
-    parameters: tuple[Parameter, ...] = (),
-    initial: str = "first_reading",
-    step_error: float | None = 1.0e-2,
-) -> NetworkPrediction:
-    """Predict every temperature channel of a recording.
-
-    Parameters
-    ----------
-    parameters : tuple of Parameter
-        Those to differentiate by; of the network, or of kind "initial" (they
-        then set the first segment's start).
-    initial : {"first_reading", "ambient", "steady"}
-        Start of every segment; see :func:`initial_state`.
-    step_error : float or None, [K]
-        Of each implicit step, where the network is not linear.
-
-    Raises
-    ------
-    FaultsError
-        The recording does not fit the machine.
-    """
-    notes = require_compatible(network, recording)
-    history = magnitude_history(network, recording)
-    number = len(parameters)
-    size = recording.times.size
-    predicted = np.empty((size, len(recording.probes)))
-    sensitivity = np.empty((size, len(recording.probes), number))
-    system = LinearSystem.of(network) if network.is_linear and network.is_symmetric else None
-    of_network = tuple(item for item in parameters if item.kind != "initial")
-    states = np.empty((len(recording.segments), network.n_nodes))
-    method = "exact"
-    for segment, (begin, end) in enumerate(recording.segments):
-        part = history.cut(begin, end)
-        # parameters of the initial state belong to the first segment; later ones start from their readings
-        chosen = parameters if segment == 0 else of_network
-        columns = [p for p, item in enumerate(parameters) if segment == 0 or item.kind != "initial"]
-        state, slope = initial_state(network, part, recording.first_readings(segment), chosen, kind=initial)
-        states[segment] = state
-        run = simulate_transient(
-            network,
-            part,
-            state,
-            nodes=recording.probes,
-            parameters=chosen,
-            initial_derivative=slope,
-            scheme=TimeScheme(step_error=step_error),
-            system=system,
-        )
-        method = run.method
-        predicted[begin:end] = run.temperature
-        sensitivity[begin:end] = 0.0
-        sensitivity[begin:end][:, :, columns] = run.sensitivity
-    return NetworkPrediction(predicted, sensitivity, tuple(parameters), states, method, notes)
 
 
 def initial_parameters(
