@@ -133,7 +133,7 @@ def test_agreement_with_the_modes(network):
 @several
 @given(networks(), st.integers(3, 80).map(lambda sixteenths: sixteenths / 16.0))
 def test_scaling_time_and_capacity_together_changes_nothing(network, factor):
-    """Capacity and time enter only as their ratio; steps are whole microseconds, as the fast model takes them."""
+    """Capacity and time enter only as their ratio; steps are whole microseconds, as in the model."""
     slower = ThermalNetwork(
         network.node_names,
         network.capacity * factor,
