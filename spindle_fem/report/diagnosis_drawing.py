@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
@@ -24,11 +23,11 @@ from spindle_fem.report.figure_style import (
     styled,
 )
 from spindle_fem.report.leader_labels import spread
+from spindle_fem.report.meridian_axes import MM, box, draw_edges, extent, meridian_axes
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_MM = 1.0e3
 # As thick as a wall is drawn, m.
 WALL = 3.0e-3
 PLAIN = "#e9ecef"
@@ -63,22 +62,19 @@ def located_on_machine(
     if "spot" not in data:
         return None
     assembly = build_assembly(spec) if assembly is None else assembly
-    segments = [segment for part in assembly.parts for segment in part.segments]
-    z_low, z_high = min(s.z_start for s in segments) * _MM, max(s.z_end for s in segments) * _MM
-    reach = 1.06 * max(s.outer_radius for s in segments) * _MM
+    z_low, z_high, outside = extent(assembly)
+    reach = 1.06 * outside
     pad = 0.03 * (z_high - z_low)
     left, width = 100.0, 1470.0
     scale = width / (z_high - z_low + 2.0 * pad)
     top, height = 190.0, (reach + 4.0) * scale
     total = top + height + 220.0
     figure = new_figure(total)
-    axes = pixel_axes(figure, left, top, width, height)
-    axes.set(xlim=(z_low - pad, z_high + pad), ylim=(-4.0, reach), aspect="equal")
-    axes.grid(False)
-    axes.set(xlabel="z / mm", ylabel="radius / mm")
+    axes = meridian_axes(figure, (left, top, width, height), (z_low - pad, z_high + pad), (-4.0, reach))
     bar = ColourBar(FILM_MAP.reversed(), 0.0, 100.0, BAR_LABEL)
-    for segment in segments:
-        _patch(axes, segment.z_start, segment.z_end, segment.inner_radius, segment.outer_radius, PLAIN)
+    for segment in (segment for part in assembly.parts for segment in part.segments):
+        z, radius = (segment.z_start, segment.z_end), (segment.inner_radius, segment.outer_radius)
+        axes.add_patch(box(z, radius, facecolor=PLAIN, edgecolor="none"))
     shares = explained_shares(data)
     # Large spots first: what lies within them is drawn on top.
     areas = {
@@ -87,22 +83,16 @@ def located_on_machine(
     for regions, share in sorted(areas.values(), key=lambda item: -sum(r.volume for r in item[0])):
         for region in regions:
             inner, outer = region.r
-            _patch(axes, *region.z, inner, max(outer, inner + WALL), bar.colours(share))
-    for edge in assembly.edges:
-        if not edge.is_axis:
-            axes.plot(
-                np.array(edge.z) * _MM,
-                np.array(edge.r) * _MM,
-                color=INK,
-                linewidth=0.5 if edge.is_contact else 0.9,
-            )
+            thick = (inner, max(outer, inner + WALL))
+            axes.add_patch(box(region.z, thick, facecolor=bar.colours(share), edgecolor="none"))
+    draw_edges(axes, assembly, (1.0,), (0.5, 0.9))
     for spot, share in shares.items():
         for region in regions_of(spec, spot) if spot.startswith(NEAR) else ():
             radius, place = region.middle
             axes.add_patch(
                 Circle(
-                    (place * _MM, radius * _MM),
-                    0.35 * STANDARD_DISTANCE * _MM,
+                    (place * MM, radius * MM),
+                    0.35 * STANDARD_DISTANCE * MM,
                     facecolor=bar.colours(share),
                     edgecolor=INK,
                     linewidth=0.7,
@@ -112,9 +102,9 @@ def located_on_machine(
     for region in regions_of(spec, component) if component else ():
         axes.add_patch(
             Rectangle(
-                (region.z[0] * _MM - 1.5, region.r[0] * _MM - 1.5),
-                (region.z[1] - region.z[0]) * _MM + 3.0,
-                (region.r[1] - region.r[0]) * _MM + 3.0,
+                (region.z[0] * MM - 1.5, region.r[0] * MM - 1.5),
+                (region.z[1] - region.z[0]) * MM + 3.0,
+                (region.r[1] - region.r[0]) * MM + 3.0,
                 facecolor="none",
                 edgecolor="#D55E00",
                 linewidth=2.6,
@@ -131,18 +121,6 @@ def located_on_machine(
     return figure
 
 
-def _patch(axes, z_start: float, z_end: float, inner: float, outer: float, colour) -> None:
-    axes.add_patch(
-        Rectangle(
-            (z_start * _MM, inner * _MM),
-            (z_end - z_start) * _MM,
-            (outer - inner) * _MM,
-            facecolor=colour,
-            edgecolor="none",
-        )
-    )
-
-
 def _label_probes(axes, spec: MachineSpec, reach: float, scale: float) -> None:
     """Names of point probes above the section, with leaders."""
     probes = [probe for probe in spec.probe if probe.kind == "point"]
@@ -150,13 +128,13 @@ def _label_probes(axes, spec: MachineSpec, reach: float, scale: float) -> None:
         return
     low, high = axes.get_xlim()
     centres = spread(
-        [probe.z * _MM for probe in probes],
+        [probe.z * MM for probe in probes],
         [(12.5 * len(probe.name) + 20.0) / scale for probe in probes],
         low,
         high,
     )
     for probe, centre in zip(probes, centres, strict=True):
-        at = (probe.z * _MM, probe.r * _MM)
+        at = (probe.z * MM, probe.r * MM)
         lift = reach + 26.0 / scale
         axes.plot([at[0], centre], [at[1], lift], color=INK, linewidth=0.7, clip_on=False, zorder=6)
         axes.plot(*at, marker="o", markersize=3.6, markerfacecolor="white", markeredgecolor=INK, zorder=7)

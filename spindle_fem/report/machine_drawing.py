@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle
 
 from spindle_fem.definition.machine_spec import Channel, MachineSpec
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
-from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, pixel_axes, set_title, styled
+from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, set_title, styled
 from spindle_fem.report.leader_labels import Label, draw_labels
+from spindle_fem.report.meridian_axes import MM, box, draw_edges, extent, meridian_axes
 from spindle_fem.units import ZERO_CELSIUS_K
 
 _BY_NAME = (
@@ -29,7 +30,6 @@ _BY_NAME = (
 _OTHERS = ("#d9a7a0", "#a9d4cf", "#e3c1d7", "#c7cf9b")
 BALL_COLOUR = "#f2f2f2"
 OIL_COLOUR = "#f0c419"
-_MM = 1.0e3
 
 
 def part_colours(names: Sequence[str]) -> tuple[str, ...]:
@@ -58,9 +58,7 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
         Made from ``spec`` when left out.
     """
     assembly = build_assembly(spec) if assembly is None else assembly
-    segments = [segment for part in assembly.parts for segment in part.segments]
-    z_low, z_high = min(s.z_start for s in segments) * _MM, max(s.z_end for s in segments) * _MM
-    reach = max(s.outer_radius for s in segments) * _MM
+    z_low, z_high, reach = extent(assembly)
     margin, width_px = 24.0, 1600.0
     z_margin = 0.05 * (z_high - z_low)
     scale = (width_px - 2.0 * margin - 70.0) / (z_high - z_low + 2.0 * z_margin)
@@ -69,10 +67,10 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
     drawing_height = 2.0 * reach * 1.03 * scale
     top, foot = 142.0, 138.0 + 30.0 * rows + 24.0
     figure = new_figure(top + drawing_height + foot, width_px)
-    axes = pixel_axes(figure, margin + 70.0, top, width_px - 2.0 * margin - 70.0, drawing_height)
-    axes.set(xlim=(z_low - z_margin, z_high + z_margin), ylim=(-1.03 * reach, 1.03 * reach), aspect="equal")
-    axes.grid(False)
-    axes.set_ylabel("radius / mm")
+    place = (margin + 70.0, top, width_px - 2.0 * margin - 70.0, drawing_height)
+    limit = 1.03 * reach
+    axes = meridian_axes(figure, place, (z_low - z_margin, z_high + z_margin), (-limit, limit))
+    axes.set_xlabel("")
     axes.annotate(
         "z / mm",
         (1.0, 0.0),
@@ -140,28 +138,10 @@ def _draw_parts(axes: Axes, assembly: AssemblyGeometry) -> None:
     colours = dict(zip(assembly.part_names, part_colours(assembly.part_names), strict=True))
     for part in assembly.parts:
         for segment in part.segments:
+            z, radius = (segment.z_start, segment.z_end), (segment.inner_radius, segment.outer_radius)
             for sign in (1.0, -1.0):
-                low = min(sign * segment.inner_radius, sign * segment.outer_radius) * _MM
-                axes.add_patch(
-                    Rectangle(
-                        (segment.z_start * _MM, low),
-                        (segment.z_end - segment.z_start) * _MM,
-                        (segment.outer_radius - segment.inner_radius) * _MM,
-                        facecolor=colours[part.name],
-                        edgecolor="none",
-                    )
-                )
-    for edge in assembly.edges:
-        if edge.is_axis:
-            continue
-        for sign in (1.0, -1.0):
-            axes.plot(
-                np.array(edge.z) * _MM,
-                sign * np.array(edge.r) * _MM,
-                color=INK,
-                linewidth=0.7 if edge.is_contact else 1.1,
-                solid_capstyle="round",
-            )
+                axes.add_patch(box(z, radius, sign, facecolor=colours[part.name], edgecolor="none"))
+    draw_edges(axes, assembly, (1.0, -1.0), (0.7, 1.1), solid_capstyle="round")
 
 
 def channel_sections(channel: Channel, theta: float) -> list[float]:
@@ -194,29 +174,12 @@ def _draw_channel(axes: Axes, spec: MachineSpec) -> None:
     style = {"facecolor": OIL_COLOUR, "edgecolor": INK, "linewidth": 0.8}
     for theta, sign in ((0.0, 1.0), (math.pi, -1.0)):
         for z in channel_sections(channel, theta):
-            low = inner if sign > 0.0 else -outer
-            axes.add_patch(
-                Rectangle(
-                    ((z - 0.5 * channel.width) * _MM, low * _MM),
-                    channel.width * _MM,
-                    channel.depth * _MM,
-                    **style,
-                )
-            )
+            sides = (z - 0.5 * channel.width, z + 0.5 * channel.width)
+            axes.add_patch(box(sides, (inner, outer), sign, **style))
     for z, sign in _ports_in_plane(spec):
         reach = _outside_radius(spec, z)
-        start = inner + 0.5 * channel.depth
-        low = start if sign > 0.0 else -reach
-        axes.add_patch(
-            Rectangle(
-                ((z - 0.5 * channel.ports.diameter) * _MM, low * _MM),
-                channel.ports.diameter * _MM,
-                (reach - start) * _MM,
-                facecolor=OIL_COLOUR,
-                edgecolor=INK,
-                linewidth=0.8,
-            )
-        )
+        sides = (z - 0.5 * channel.ports.diameter, z + 0.5 * channel.ports.diameter)
+        axes.add_patch(box(sides, (inner + 0.5 * channel.depth, reach), sign, **style))
 
 
 def _ports_in_plane(spec: MachineSpec) -> list[tuple[float, float]]:
@@ -248,11 +211,11 @@ def _outside_radius(spec: MachineSpec, z: float) -> float:
 def _draw_bearings(axes: Axes, spec: MachineSpec) -> None:
     for group, bearing in spec.bearings:
         kind = spec.bearing_types[group.bearing_type]
-        z = 0.5 * sum(bearing.z) * _MM
-        radius = 0.5 * kind.pitch * _MM
-        ball = 0.5 * kind.ball_diameter * _MM
+        z = 0.5 * sum(bearing.z) * MM
+        radius = 0.5 * kind.pitch * MM
+        ball = 0.5 * kind.ball_diameter * MM
         lean = 1.0 if bearing.takes_thrust == "towards_rear" else -1.0
-        reach = 0.62 * (kind.outer_diameter - kind.bore_diameter) * _MM
+        reach = 0.62 * (kind.outer_diameter - kind.bore_diameter) * MM
         step = np.array([lean * math.sin(kind.contact_angle), math.cos(kind.contact_angle)])
         for sign in (1.0, -1.0):
             axes.add_patch(
@@ -308,8 +271,8 @@ def _draw_films(axes: Axes, spec: MachineSpec, assembly: AssemblyGeometry) -> No
         if edge.name in colours:
             for sign in (1.0, -1.0):
                 axes.plot(
-                    np.array(edge.z) * _MM,
-                    sign * np.array(edge.r) * _MM,
+                    np.array(edge.z) * MM,
+                    sign * np.array(edge.r) * MM,
                     color=colours[edge.name],
                     linewidth=3.4,
                     solid_capstyle="butt",
@@ -328,11 +291,11 @@ def _above(spec: MachineSpec) -> list[Label]:
         )
         away = abs(math.sin(probe.angle)) > 0.02
         text = f"{probe.name}\nθ = {math.degrees(probe.angle):.0f}°" if away else probe.name
-        labels.append(Label(text, np.array([probe.z * _MM, side * probe.r * _MM])))
+        labels.append(Label(text, np.array([probe.z * MM, side * probe.r * MM])))
     for z, sign in _ports_in_plane(spec):
         if sign > 0.0:
             text = "oil in" if abs(z - spec.channel.z_start) < 1.0e-9 else "oil out"
-            labels.append(Label(text, np.array([z * _MM, _outside_radius(spec, z) * _MM])))
+            labels.append(Label(text, np.array([z * MM, _outside_radius(spec, z) * MM])))
     return labels
 
 
@@ -340,7 +303,7 @@ def _below(spec: MachineSpec, assembly: AssemblyGeometry) -> list[Label]:
     labels = []
     for group, bearing in spec.bearings:
         kind = spec.bearing_types[group.bearing_type]
-        labels.append(Label(bearing.name, np.array([0.5 * sum(bearing.z) * _MM, -0.5 * kind.pitch * _MM])))
+        labels.append(Label(bearing.name, np.array([0.5 * sum(bearing.z) * MM, -0.5 * kind.pitch * MM])))
     rings = {
         f"{bearing.name}.{ring}" for _, bearing in spec.bearings for ring in ("inner_ring", "outer_ring")
     }
@@ -350,8 +313,8 @@ def _below(spec: MachineSpec, assembly: AssemblyGeometry) -> list[Label]:
         longest = max(part.segments, key=lambda s: (s.z_end - s.z_start) * (s.outer_radius - s.inner_radius))
         place = np.array(
             [
-                0.5 * (longest.z_start + longest.z_end) * _MM,
-                -(0.35 * longest.inner_radius + 0.65 * longest.outer_radius) * _MM,
+                0.5 * (longest.z_start + longest.z_end) * MM,
+                -(0.35 * longest.inner_radius + 0.65 * longest.outer_radius) * MM,
             ]
         )
         labels.append(Label(_two_lines(part.name.replace("_", " ")), place))

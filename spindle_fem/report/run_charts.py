@@ -24,6 +24,7 @@ from spindle_fem.report.figure_style import (
     set_title,
     styled,
 )
+from spindle_fem.report.meridian_axes import MM, meridian_axes
 from spindle_fem.report.profiles import (
     MeridianSection,
     axial_profile,
@@ -34,24 +35,24 @@ from spindle_fem.report.profiles import (
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
-_MM = 1.0e3
-
 
 @styled
 def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: ColourBar) -> Figure:
     """Temperature in the vertical plane through the axis with isotherms, in mm."""
     faces = section.faces
-    z, height = faces.points[:, 2] * _MM, faces.points[:, 1] * _MM
+    z, height = faces.points[:, 2] * MM, faces.points[:, 1] * MM
     width_px, left, right, top, foot = 1600.0, 96.0, 24.0, 100.0, 190.0
     pad = 0.015 * np.ptp(z)
     scale = (width_px - left - right) / (np.ptp(z) + 2.0 * pad)
     drawing = (np.ptp(height) + 2.0 * pad) * scale
     figure = new_figure(top + drawing + foot, width_px)
-    axes = pixel_axes(figure, left, top, width_px - left - right, drawing)
-    axes.set(
-        xlim=(z.min() - pad, z.max() + pad), ylim=(height.min() - pad, height.max() + pad), aspect="equal"
+    axes = meridian_axes(
+        figure,
+        (left, top, width_px - left - right, drawing),
+        (z.min() - pad, z.max() + pad),
+        (height.min() - pad, height.max() + pad),
+        "radius / mm (θ = 0 up)",
     )
-    axes.grid(False)
     step = _isotherm_step(bar.high - bar.low)
     draw_field(axes, section, bar, np.arange(math.ceil(bar.low / step) * step, bar.high, step))
     for group, bearing in result.spec.bearings:
@@ -60,8 +61,8 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
         for sign in (1.0, -1.0):
             axes.add_patch(
                 Circle(
-                    (0.5 * sum(bearing.z) * _MM, sign * 0.5 * kind.pitch * _MM),
-                    0.5 * kind.ball_diameter * _MM,
+                    (0.5 * sum(bearing.z) * MM, sign * 0.5 * kind.pitch * MM),
+                    0.5 * kind.ball_diameter * MM,
                     facecolor=colour,
                     edgecolor=INK,
                     linewidth=0.8,
@@ -71,16 +72,14 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
     for probe in result.spec.probe:
         if probe.kind == "point" and abs(math.sin(probe.angle)) < 0.02:
             axes.plot(
-                probe.z * _MM,
-                probe.r * math.cos(probe.angle) * _MM,
+                probe.z * MM,
+                probe.r * math.cos(probe.angle) * MM,
                 marker="o",
                 markersize=4.5,
                 markerfacecolor="white",
                 markeredgecolor=INK,
                 zorder=5,
             )
-    axes.set_xlabel("z / mm")
-    axes.set_ylabel("radius / mm (θ = 0 up)")
     axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
     draw_colour_bar(pixel_axes(figure, 0.5 * width_px - 380.0, top + drawing + foot - 92.0, 760.0, 20.0), bar)
     set_title(
@@ -117,14 +116,14 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
         profile = radial_profile(section, 0.5 * sum(bearing.z))
         for name, (radius, temperature) in profile.items():
             colour = kinds["rotating" if result.mesh.rotating[name] else "standing"]
-            axes.plot(radius * _MM, temperature - ZERO_CELSIUS_K, color=colour, linewidth=2.0)
+            axes.plot(radius * MM, temperature - ZERO_CELSIUS_K, color=colour, linewidth=2.0)
             axes.axvspan(
-                np.nanmin(radius) * _MM, np.nanmax(radius) * _MM, color=colour, alpha=0.06, linewidth=0.0
+                np.nanmin(radius) * MM, np.nanmax(radius) * MM, color=colour, alpha=0.06, linewidth=0.0
             )
         state = result.bearings[bearing.name]
         reach = 0.25 * (kind.outer_ring_inner_diameter - kind.inner_ring_outer_diameter)
         centre = 0.25 * (kind.outer_ring_inner_diameter + kind.inner_ring_outer_diameter)
-        balls = np.array([centre - reach, centre + reach]) * _MM
+        balls = np.array([centre - reach, centre + reach]) * MM
         axes.plot(
             balls,
             [state.temperature_ball - ZERO_CELSIUS_K] * 2,
@@ -133,7 +132,7 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
             solid_capstyle="butt",
         )
         axes.set_title(f"{bearing.name}, {state.heat:.0f} W")
-        axes.set_xlabel(f"radius / mm  (z = {0.5 * sum(bearing.z) * _MM:.1f})")
+        axes.set_xlabel(f"radius / mm  (z = {0.5 * sum(bearing.z) * MM:.1f})")
         axes.tick_params(labelbottom=True)
     for axes in list(grid.flat)[len(bearings) :]:
         axes.axis("off")
@@ -186,7 +185,7 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
     handles, texts = [], []
     for part, side, text, colour in lines:
         z, temperature = axial_profile(section, part, side)
-        handles += axes.plot(z * _MM, temperature - ZERO_CELSIUS_K, color=colour)
+        handles += axes.plot(z * MM, temperature - ZERO_CELSIUS_K, color=colour)
         texts.append(text)
     for name, colour, text in (
         ("temperature_inner", INNER, "inner raceway"),
@@ -195,7 +194,7 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
     ):
         if not result.bearings:
             break
-        places = [0.5 * sum(bearing.z) * _MM for _, bearing in result.spec.bearings]
+        places = [0.5 * sum(bearing.z) * MM for _, bearing in result.spec.bearings]
         values = [
             getattr(result.bearings[bearing.name], name) - ZERO_CELSIUS_K
             for _, bearing in result.spec.bearings
@@ -211,10 +210,10 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
         )
         texts.append(text)
     for _, bearing in result.spec.bearings:
-        axes.axvspan(bearing.z[0] * _MM, bearing.z[1] * _MM, color="#eef1f4", linewidth=0.0, zorder=0)
+        axes.axvspan(bearing.z[0] * MM, bearing.z[1] * MM, color="#eef1f4", linewidth=0.0, zorder=0)
         axes.annotate(
             bearing.name,
-            (0.5 * sum(bearing.z) * _MM, 1.0),
+            (0.5 * sum(bearing.z) * MM, 1.0),
             xycoords=("data", "axes fraction"),
             ha="center",
             va="bottom",
