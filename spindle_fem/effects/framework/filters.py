@@ -31,6 +31,7 @@ def first_order_lag(times: Array, values: ArrayLike, time_constant: ArrayLike) -
     >>> time = np.array([0.0, 3.0, 4.0, 60.0])
     >>> lagged = first_order_lag(time, 2.0 * time[:, None], np.array([5.0]))
     >>> bool(np.allclose(lagged[:, 0], 2.0 * (time - 5.0 * (1.0 - np.exp(-time / 5.0)))))
+    True
     """
     x = np.asarray(values, dtype=complex)
     if len(times) < 2:
