@@ -271,8 +271,3 @@ def uncertain_to_si(value: Any, unit: str, *, where: str) -> Uncertain:
 def kelvin_to_celsius(temperature: Any) -> Any:
     """Temperature in °C of one in K (scalar or array)."""
     return temperature - ZERO_CELSIUS_K
-
-
-def celsius_to_kelvin(temperature: Any) -> Any:
-    """Temperature in K of one in °C (scalar or array)."""
-    return temperature + ZERO_CELSIUS_K

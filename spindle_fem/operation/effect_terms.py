@@ -16,7 +16,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.term import Operating, Term, TermContext
+from spindle_fem.effects.framework.term import Term, TermContext
 from spindle_fem.errors import SpecError, did_you_mean
 
 Array = NDArray[np.float64]
@@ -451,19 +451,6 @@ def require_known(
             for name in names:
                 if name not in known:
                     raise SpecError(f"term {term.name}", f'{verb} "{name}".', did_you_mean(name, known))
-
-
-def operating_factors(
-    terms: Sequence[Term], values: Sequence[Mapping[str, float]], point: Operating
-) -> list[dict[str, float]]:
-    """Factors that each term puts on coefficients and on the flow at an operating point.
-
-    Parameters
-    ----------
-    values : sequence of mapping of str to float
-        Of each term's own parameters.
-    """
-    return [term.operating_factor(point, own) for term, own in zip(terms, values, strict=True)]
 
 
 def multiplied(parts: Iterable[Mapping[str, float]]) -> dict[str, float]:

@@ -149,20 +149,6 @@ class SceneRenderer:
             **_shading(shape, lit),
         )
 
-    def add_plain(self, shape: TriangleSet, colour: str, *, lit: bool = True, opacity: float = 1.0) -> Any:
-        """Layer of one colour."""
-        if not len(shape.triangles):
-            return None
-        return self._plotter.add_mesh(
-            _polydata(shape),
-            color=colour,
-            opacity=opacity,
-            show_scalar_bar=False,
-            render=False,
-            reset_camera=False,
-            **_shading(shape, lit),
-        )
-
     def add_parts(
         self, shape: TriangleSet, colours: Sequence[str], *, lit: bool = True, closed: bool = False
     ) -> Any:

@@ -15,7 +15,6 @@ from pydantic import BaseModel
 from spindle_fem.definition.load import write_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import BadInputError
-from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -54,27 +53,6 @@ def _defaults(value: Any, path: str) -> Iterator[str]:
     elif isinstance(value, tuple):
         for index, item in enumerate(value):
             yield from _defaults(item, f"{path}{index}.")
-
-
-def surface_means(
-    mesh: TaggedMesh, facets: NDArray[np.int64], values: NDArray[np.float64]
-) -> tuple[float, float]:
-    """Area and area mean of nodal values on curved facets.
-
-    Parameters
-    ----------
-    facets : (n, 6) ndarray of int
-    values : (n_nodes,) ndarray
-
-    Returns
-    -------
-    area : float, [m²]
-    mean : float
-        In the unit of ``values``.
-    """
-    weights = _facet_weights(mesh.points[facets])
-    area = float(weights.sum())
-    return area, float((weights * _at_quadrature(values[facets])).sum() / area)
 
 
 # Three points inside, exact for polynomials of degree two.

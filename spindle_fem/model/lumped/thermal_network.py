@@ -183,12 +183,6 @@ class ThermalNetwork:
         used = [*self.boundary_input, *self.source_input, *self.law_inputs]
         return tuple(dict.fromkeys(name for name in used if name is not None))
 
-    def node_index(self, name: str, where: str = "network") -> int:
-        """Position of a node; an unknown name is refused with the nearest one."""
-        if name not in self.node_names:
-            raise UnknownSurfaceError(where, f'"{name}" is not a node.', did_you_mean(name, self.node_names))
-        return self.node_names.index(name)
-
     def conductance_matrix(self) -> Array:
         """Constant conductances as ``K (n, n + b) [W/K]``: heat out of node i is ``(K T)_i``.
 
