@@ -1,8 +1,9 @@
 """Diagnose the recordings that have answers beside them, and say which sets are right.
 
 ``python -m validation.open_examples RESULTS [--recordings DIR] [--only NAME ...] [--jobs 2]`` leaves
-``RESULTS/NAME/diagnosis.json`` for every example that is not there yet and prints a table: verdict, sets, whether
-they count as right, what is left held out over the noise, seconds. Answers are read after the diagnoses only.
+``RESULTS/NAME/diagnosis.json`` for every example that is not there yet and prints a table: verdict, sets,
+whether they count as right, what is left held out over the noise, seconds. Answers are read after the
+diagnoses only.
 """
 
 import argparse
@@ -109,12 +110,11 @@ def main(arguments: list[str] | None = None) -> None:
             told, timing = (json.loads((folder / f).read_text()) for f in ("diagnosis.json", "timing.json"))
             rows.append(row(name, json.loads(answer.read_text()), told, timing["wall_s"]))
     for item in rows:
-        marks = "".join(
-            "+" if item[k] else "-" for k in ("set_right", "verdict_right", "among_alternatives")
-        )
+        marks = "".join("+" if item[k] else "-" for k in ("set_right", "verdict_right", "among_alternatives"))
+        ratios = f"{item['before_over_noise']:5.2f} > {item['after_over_noise']:5.2f}"
         print(
             f"{item['case']:34s} {marks} {item['verdict']:15s} p {item['probability'] or 0:.2f}"
-            f" rms/noise {item['before_over_noise']:5.2f} > {item['after_over_noise']:5.2f} {item['wall_s']:5.0f} s"
+            f" rms/noise {ratios} {item['wall_s']:5.0f} s"
             f"  {', '.join(item['found']) or '(nothing)'}   truth: {', '.join(item['truth']) or '(nothing)'}"
         )
     (given.results / "examples.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
