@@ -3,7 +3,7 @@
 ``python -m validation.run_study DIR RESULTS --jobs 2 --mesh coarse`` leaves
 ``RESULTS/case_0001/diagnosis.json`` and ``timing.json``. What is there is not done again, so an
 interrupted study goes on where it stopped; a case that raised leaves ``failed.json`` and is tried
-again next time.
+again next time. A case with a ``machine.toml`` of its own is held against that.
 """
 
 import argparse
@@ -24,7 +24,10 @@ def diagnose_case(inputs: Path, result: Path, machine: str, overrides: tuple[str
     from spindle_fem.commands.diagnose_command import diagnose, diagnose_without_report
 
     result.mkdir(parents=True, exist_ok=True)
-    calibration = inputs / "calibration.toml"
+    calibration, own = inputs / "calibration.toml", inputs / "machine.toml"
+    if own.exists():
+        machine = str(own)
+        overrides = () if "[[network." in own.read_text(encoding="utf-8") else overrides
     began, cpu = time.perf_counter(), time.process_time()
     try:
         found = (diagnose if report else diagnose_without_report)(

@@ -1,0 +1,1 @@
+"""Concealed networks: machines known by nodes and links only, by a modal solver of their own."""
