@@ -196,7 +196,7 @@ class BaseRun:
                 added += shift[:, None] * loads[self.drive.step_class]
             elif place.startswith(FLUID_PREFIX) and place not in model.place_names:
                 film = fast.fluid_places[place]
-                strength = self._strength(film) * heat
+                strength = self.strength(film) * heat
                 added += strength[:, None] * model.fluid_load[model.fluid_names.index(film)]
             else:
                 added += heat[:, None] * model.place(place)
@@ -206,18 +206,18 @@ class BaseRun:
                 heat = (factor - 1.0) * friction[:, position]
                 added += heat[:, None] * model.place(fast.heat_places[position])
         for coefficient, factor in zip(terms.coefficients, answers.factor.value.T, strict=True):
-            excess = (factor - 1.0) * self._strength(coefficient)
-            added -= excess[:, None] * self._flow(coefficient, before)
+            excess = (factor - 1.0) * self.strength(coefficient)
+            added -= excess[:, None] * self.flow(coefficient, before)
         return added, shift
 
-    def _strength(self, coefficient: str) -> Array:
+    def strength(self, coefficient: str) -> Array:
         """A coefficient in every step, (G,)."""
         if coefficient not in self._coefficient:
             by_class = np.array([found[coefficient] for found in self.run.built.coefficients])
             self._coefficient[coefficient] = by_class[self.drive.step_class]
         return self._coefficient[coefficient]
 
-    def _flow(self, coefficient: str, before: bool) -> Array:
+    def flow(self, coefficient: str, before: bool) -> Array:
         """What a unit coefficient takes out at one end of every step, (G, r)."""
         model = self.predictor.fast.model
         steps = len(self.drive.steps)
@@ -232,12 +232,17 @@ class BaseRun:
             )
         return flow
 
-    def _reading(self, variant: Variant) -> Array:
-        """Difference of one channel that a sensor effect makes, (G + 1, c)."""
+    def told(self) -> Array:
+        """What the channels tell in this run, (G + 1, c) K."""
         if self._told is None:
             self._told = self.predictor.predict(self.number, self.values, self.candidates).temperature
+        return self._told
+
+    def _reading(self, variant: Variant) -> Array:
+        """Difference of one channel that a sensor effect makes, (G + 1, c)."""
         values = self.values | variant.values(variant.candidate.reference)
-        return self.predictor.read(self.number, [variant.candidate], values, self._told) - self._told
+        told = self.told()
+        return self.predictor.read(self.number, [variant.candidate], values, told) - told
 
     def _steady(self, variants: Sequence[Variant]) -> Array:
         """Constant changes of the operators, by their derivatives where they do nothing."""

@@ -19,7 +19,12 @@ JUMP_PREFIX = "jump."
 # ``within_gap.<recording>.<number>``: friction of a bearing set, as a share of the highest that it gives; an
 # input temperature that is another after the gap, as a share of its change.
 GAP_PREFIX = "within_gap."
+# How far the machine is from its definition in one direction, ``misdescribed.<direction>``; of one recording,
+# ``misdescribed_in.<recording>.<direction>``.
+MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX = "misdescribed.", "misdescribed_in."
 # Coordinates that say nothing about other recordings.
-OF_ONE_RECORDING = (START_PREFIX, JUMP_PREFIX, GAP_PREFIX)
+OF_ONE_RECORDING = (START_PREFIX, JUMP_PREFIX, GAP_PREFIX, MISDESCRIBED_IN_PREFIX)
+# Those that a prediction follows to first order, outside the march of the model.
+FIRST_ORDER = (PROBE_PREFIX, JUMP_PREFIX, GAP_PREFIX, MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)
 
 NO_VALUES: Mapping[str, float] = MappingProxyType({})

@@ -18,6 +18,7 @@ from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Coordinate, Fit, Problem
 from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
@@ -110,6 +111,10 @@ def diagnose_recordings(
     predictor = Predictor(fast, recordings, [~mask for mask, _ in chosen], machine.effects)
     progress("diagnosis: calibration" if calibration else "diagnosis: what is known")
     earlier = Predictor(fast, calibration, effects=machine.effects) if calibration else None
+    directions = misdescriptions_of(predictor)
+    predictor = with_misdescriptions(predictor, directions)
+    if earlier is not None:
+        earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
     calibrated = calibrate(earlier, predictor)
     clock.lap("calibration")
     candidates = candidates_for(view)
@@ -125,6 +130,12 @@ def diagnose_recordings(
         contacts = sorted({name for own in view.joint_coefficients.values() for name in own})
         small = on_search_basis(predictor, [prior.name for prior in predictor.uncertain()], known, contacts)
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
+    if directions:
+        # What they do, about the machine as its recordings have it.
+        values = problem.fit().values
+        predictor = with_misdescriptions(predictor, directions, values)
+        small = small.misdescribed_like(predictor)
+        problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)
     found = run_search(search)

@@ -22,7 +22,7 @@ from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.errors import EnergyBalanceError, SpecError, SpindleFemError, WorkerDiedError
 from spindle_fem.inference import tuned
-from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX, PROBE_PREFIX
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, FIRST_ORDER
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import channel_errors, channel_noise, predictions_at_stamps, rmse
 from spindle_fem.inference.hypothesis_fit import Fit
@@ -54,10 +54,9 @@ MOST_STEPS = 800
 # Further steps that a jump of an input costs.
 STEPS_AFTER_JUMP = 3
 
-#: What the reduced model adds to its readings to first order: places of probes, and what gaps hide.
-FIRST_ORDER = (PROBE_PREFIX, JUMP_PREFIX, GAP_PREFIX)
 FIRST_ORDER_NOTE = (
-    "where probes sit within their holes, and what happened within gaps, as the reduced model has them"
+    "where probes sit within their holes, how the machine differs from its definition, and what happened "
+    "within gaps, as the reduced model has them"
 )
 NETWORK_REASON = "The machine is a network: it has no finite-element model."
 

@@ -9,7 +9,7 @@ from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import write_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.registry import definition_entry
-from spindle_fem.inference.coordinate_names import OF_ONE_RECORDING, PROBE_PREFIX
+from spindle_fem.inference.coordinate_names import FIRST_ORDER, OF_ONE_RECORDING
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import candidate_values
 from spindle_fem.inference.opened_machine import DiagnosedMachine
@@ -32,7 +32,7 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     own = {
         coordinate.name: (values[coordinate.name], coordinate.sigma)
         for coordinate in diagnosis.machine_coordinates
-        if not coordinate.name.startswith((PROBE_PREFIX, *OF_ONE_RECORDING))
+        if not coordinate.name.startswith((*FIRST_ORDER, *OF_ONE_RECORDING))
     }
     if not machine.is_network:
         spec = with_parameters(machine.spec, {name: value for name, (value, _) in own.items()})

@@ -7,6 +7,7 @@ of a minute from one change of the inputs to the next.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,7 @@ from spindle_fem.effects.framework.term import Term
 from spindle_fem.inference.coordinate_names import (
     DIRECTIONS,
     EFFECT_PREFIX,
+    FIRST_ORDER,
     GAP_PREFIX,
     JUMP_PREFIX,
     NO_VALUES,
@@ -26,6 +28,7 @@ from spindle_fem.inference.coordinate_names import (
     START_PREFIX,
 )
 from spindle_fem.inference.drive_steps import coarse_drive, even_drive
+from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.observations import Observation, observe
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.recording_gaps import (
@@ -126,6 +129,8 @@ class Predictor:
             for recording, gaps in zip(self.recordings, self._gaps, strict=True)
         ]
         self._slopes: dict[tuple[str, int], Array] = {}
+        self.misdescribed: tuple[Misdescription, ...] = ()
+        self._columns: dict[tuple[int, str], Array] = {}
         self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
         self.observations = self._observe(self.use)
         self.heldout = self._observe([~mask for mask in self.use])
@@ -152,7 +157,7 @@ class Predictor:
 
     def with_model(self, fast: FastModel, same_within: float = 0.0) -> Predictor:
         """The same recordings on another reduction of the same machine."""
-        return Predictor(
+        found = Predictor(
             fast,
             self.recordings,
             self.use,
@@ -161,6 +166,25 @@ class Predictor:
             drives=self.drives,
             same_within=same_within,
         )
+        return found.misdescribed_like(self)
+
+    def misdescribed_by(
+        self, directions: Sequence[Misdescription], columns: Mapping[tuple[int, str], Array]
+    ) -> Predictor:
+        """The same with directions in which the machine may differ from its definition.
+
+        Parameters
+        ----------
+        columns : mapping of (recording, coordinate) to (G + 1, c) ndarray, [K]
+            Change of every channel for each unit of a direction; none where it does nothing.
+        """
+        found = copy.copy(self)
+        found.misdescribed, found._columns = tuple(directions), dict(columns)
+        return found
+
+    def misdescribed_like(self, other: Predictor) -> Predictor:
+        """The same with the directions of another predictor of the same recordings."""
+        return self.misdescribed_by(other.misdescribed, other._columns)
 
     # ------------------------------------------------------------------ what is uncertain
     def uncertain(self) -> tuple[Prior, ...]:
@@ -242,7 +266,7 @@ class Predictor:
 
     def _run_name(self, number: int, name: str, outside: Sequence[str]) -> str | None:
         """What a coordinate is called in the run of one recording; None where it does not enter."""
-        if name in outside or name.startswith((PROBE_PREFIX, JUMP_PREFIX, GAP_PREFIX)):
+        if name in outside or name.startswith(FIRST_ORDER):
             return None
         if name.startswith(START_PREFIX):
             owner, _, own = name.removeprefix(START_PREFIX).partition(".")
@@ -383,7 +407,14 @@ class Predictor:
     def _unseen(
         self, number: int, told: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
-        """What happened in gaps of the recording, to first order, in place."""
+        """What happened in gaps of the recording, and how the machine differs, to first order, in place."""
+        for item in self.misdescribed:
+            name, slope = item.coordinate, self._columns.get((number, item.coordinate))
+            if slope is None:
+                continue
+            told.temperature[:] += values.get(name, 0.0) * slope
+            if name in derivatives:
+                told.sensitivity[:, :, derivatives.index(name)] += slope
         for kind in (JUMP_PREFIX, GAP_PREFIX):
             prefix = f"{kind}{number}."
             for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:

@@ -11,6 +11,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import coordinate_of
 from spindle_fem.inference.coordinate_names import DIRECTIONS, PROBE_PREFIX
 from spindle_fem.inference.hypothesis_fit import THETA_BOUND, Belief, Coordinate, Fit, Problem
+from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError, likely_slow_error
 
@@ -40,7 +41,7 @@ class Calibrated:
 
 
 def machine_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
-    """The machine's uncertain parameters, and the places of the probes."""
+    """The machine's uncertain parameters, the places of the probes, and how else it may differ."""
     found = [coordinate_of(prior, THETA_BOUND) for prior in predictor.uncertain()]
     found += [
         Coordinate(
@@ -54,11 +55,15 @@ def machine_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
         )
         for name in predictor.displacements()
     ]
-    return tuple(found)
+    return (*found, *(_direction(item) for item in predictor.misdescribed if item.recording is None))
+
+
+def _direction(item: Misdescription) -> Coordinate:
+    return Coordinate(item.coordinate, 0.0, item.sigma, False, -THETA_BOUND, THETA_BOUND, item.unit)
 
 
 def start_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
-    """What is uncertain of each recording: temperatures at its start, changes of inputs within gaps."""
+    """What is uncertain of each recording: temperatures at its start, inputs within gaps, its clocks."""
     starts = [coordinate_of(prior, THETA_BOUND) for prior in predictor.starts()]
     # Anywhere in the gap: a uniform distribution's mean, spread and ends.
     ends = float(np.sqrt(3.0))
@@ -70,7 +75,8 @@ def start_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
         Coordinate(name, 0.0, tuned.GAP_SIGMA, False, -1.0 / tuned.GAP_SIGMA, 1.0 / tuned.GAP_SIGMA)
         for name in predictor.gaps()
     ]
-    return (*starts, *jumps, *gaps)
+    own = [_direction(item) for item in predictor.misdescribed if item.recording is not None]
+    return (*starts, *jumps, *gaps, *own)
 
 
 def known_before(predictor: Predictor) -> Belief:

@@ -30,6 +30,12 @@ SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
 # Friction within a gap beyond what the inputs beside it say, one standard deviation as a share of the
 # highest: most machines go on as before.
 GAP_SIGMA = 0.3
+# What a machine with geometry may be beside its definition. A table of heat over speed: one standard
+# deviation as a share, and the part of the range of speed over which it stays alike. Share by which balls
+# conduct better at the highest speed. Clocks of inputs and temperatures, s: two loggers set by hand.
+HEAT_SHAPE_SIGMA, HEAT_SHAPE_LENGTH = 0.05, 0.3
+BALL_SPEED_SIGMA = 0.15
+CLOCK_SIGMA = 30.0
 # A network of a few nodes is a coarse picture: its slow error as multiples of the larger of the noise and
 # this share of what the temperatures move.
 NETWORK_SLOW_SIGMAS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)

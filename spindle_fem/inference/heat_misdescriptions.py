@@ -1,0 +1,157 @@
+"""How a machine with geometry may differ in what follows its speed, and its clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.misdescription import Change, Misdescription
+from spindle_fem.inference.predictor import Predictor
+
+Array = NDArray[np.float64]
+
+# Points of the range of speed at which the modes of a table's shape are worked out.
+MODE_POINTS = 61
+# Modes that hold less than this share of the variance are left out.
+LEAST_VARIANCE = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedShape:
+    """Friction of some bearings, changed by a share that follows speed.
+
+    Attributes
+    ----------
+    bearings : tuple of str
+    speed : tuple of float, [rad/s]
+        Increasing.
+    share : tuple of float
+        At each speed; linear between.
+    """
+
+    bearings: tuple[str, ...]
+    speed: tuple[float, ...]
+    share: tuple[float, ...]
+
+    def __call__(self, base: BaseRun) -> Change:
+        """Loads of the added heat."""
+        fast, run = base.predictor.fast, base.run
+        rows = [row for bearing in self.bearings for row in fast.heat_rows(bearing)]
+        loads = np.array([fast.model.place(fast.heat_places[row]) for row in rows])
+
+        def added(friction: Array, inputs: dict[str, Array]) -> Array:
+            share = np.interp(inputs["speed"], self.speed, self.share)
+            return (share[:, None] * friction[:, rows]) @ loads
+
+        return Change(added(run.friction_start, base.start_inputs), added(run.friction_end, base.end_inputs))
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedConductance:
+    """Coefficients that grow by a share in proportion to speed.
+
+    Attributes
+    ----------
+    coefficients : tuple of str
+    highest : float, [rad/s]
+        Speed at which the share is one.
+    """
+
+    coefficients: tuple[str, ...]
+    highest: float
+
+    def __call__(self, base: BaseRun) -> Change:
+        """Loads of what they conduct more."""
+        ends = []
+        for before, inputs in ((True, base.start_inputs), (False, base.end_inputs)):
+            share = inputs["speed"] / self.highest
+            ends.append(
+                -sum(
+                    (share * base.strength(name))[:, None] * base.flow(name, before)
+                    for name in self.coefficients
+                )
+            )
+        return Change(*ends)
+
+
+def clock_change(base: BaseRun) -> Change:
+    """Temperatures stamped a second later than the inputs: readings are those of a second before."""
+    told = base.told()
+    return Change(direct=-np.gradient(told, base.drive.grid, axis=0))
+
+
+def shape_modes(speed: Array, length: float) -> list[tuple[float, Array]]:
+    """Independent shapes of a curve over speed beside its mean, by falling size.
+
+    A Gaussian process of unit variance whose values are alike over ``length`` of the range, less its mean
+    (which the heat factor has): its Karhunen-Loève modes.
+
+    Source: Rasmussen & Williams (2006), Gaussian Processes for Machine Learning, section 4.3.
+
+    Returns
+    -------
+    list of (float, (n,) ndarray)
+        Standard deviation of each and its shape, whose largest magnitude is 1.
+    """
+    part = (speed - speed[0]) / (speed[-1] - speed[0])
+    kernel = np.exp(-0.5 * ((part[:, None] - part) / length) ** 2)
+    kernel -= kernel.mean(axis=0)
+    kernel -= kernel.mean(axis=1)[:, None]
+    values, vectors = np.linalg.eigh(kernel)
+    found = []
+    for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
+        if value < LEAST_VARIANCE * values.sum():
+            break
+        peak = vector[np.argmax(np.abs(vector))]
+        found.append((float(np.sqrt(value) * abs(peak)), vector / peak))
+    return found
+
+
+def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
+    """Shape of the heat over speed, balls that conduct better with speed, and clocks.
+
+    Widths: ``tuned.HEAT_SHAPE_SIGMA``, ``tuned.BALL_SPEED_SIGMA`` and ``tuned.CLOCK_SIGMA``.
+    """
+    if predictor.is_network:
+        return
+    spec = predictor.fast.spec
+    highest = float(max(spec.heat.table.speed))
+    speed = np.linspace(0.0, highest, MODE_POINTS)
+    for group in spec.bearing_set:
+        bearings = tuple(item.name for item in group.bearing)
+        for number, (size, shape) in enumerate(shape_modes(speed, tuned.HEAT_SHAPE_LENGTH)):
+            at = f"{speed[np.argmax(np.abs(shape))] * 30.0 / np.pi:.0f} rpm"
+            yield Misdescription(
+                f"heat_shape.{group.name}.{number + 1}",
+                "heat.table",
+                "",
+                tuned.HEAT_SHAPE_SIGMA * size,
+                f"share by which the heat of the {group.name} bearings differs from its table at {at}, "
+                f"in the smooth shape {number + 1} over speed",
+                SpeedShape(bearings, tuple(speed), tuple(shape)),
+            )
+    rows = tuple(name for name in predictor.fast.model.coefficient_names if name.startswith("balls."))
+    if rows:
+        yield Misdescription(
+            "ball_conductance_over_speed",
+            "bearing_set.ball_row.conductance",
+            "",
+            tuned.BALL_SPEED_SIGMA,
+            f"share by which balls conduct better at {highest * 30.0 / np.pi:.0f} rpm than at rest",
+            SpeedConductance(rows, highest),
+        )
+    for number in range(len(predictor.recordings)):
+        yield Misdescription(
+            "clock",
+            "clock of the recording",
+            "s",
+            tuned.CLOCK_SIGMA,
+            "time by which temperatures are stamped later than inputs",
+            clock_change,
+            number,
+        )

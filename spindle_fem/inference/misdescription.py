@@ -1,0 +1,75 @@
+"""Directions in which a machine may differ from its definition, beside its uncertain parameters.
+
+Each has a prior width and moves what every channel reads along a fixed column, to first order. Within a fit
+it is one more Gaussian number: calibration narrows it, and what it can explain is no evidence of missing
+physics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDESCRIBED_PREFIX
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What one unit of a misdescription changes in one recording, at fixed temperatures of the machine.
+
+    Attributes
+    ----------
+    start, end : (G, r) ndarray or None, [W]
+        Loads on the model's unknowns at both ends of every step: a change ``dK`` of the conduction matrix is
+        ``-states[:-1] @ dK`` and ``-states[1:] @ dK``; None where there are none.
+    direct : (G + 1, c) ndarray or None, [K]
+        What the channels read beside that.
+    """
+
+    start: Array | None = None
+    end: Array | None = None
+    direct: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Misdescription:
+    """One direction.
+
+    Attributes
+    ----------
+    name : str
+        Unique for a machine: ``heat_shape.front.1``, ``housing.outer_diameter``.
+    key : str
+        Key of the definition that would be corrected; words where there is none.
+    unit : str
+    sigma : float
+        One standard deviation of the prior, in ``unit``; the mean is zero: as the definition says.
+    statement : str
+        What it is, as a report says it, with what the width rests on.
+    change : callable
+        Takes the :class:`spindle_fem.inference.candidate_response.BaseRun` of a recording. A function of a
+        module or a frozen dataclass, as other processes get it too.
+    recording : int or None
+        The only recording that it concerns; None for the machine itself.
+    """
+
+    name: str
+    key: str
+    unit: str
+    sigma: float
+    statement: str
+    change: Callable[[Any], Change]
+    recording: int | None = None
+
+    @property
+    def coordinate(self) -> str:
+        """Name among the free numbers of a fit."""
+        if self.recording is None:
+            return MISDESCRIBED_PREFIX + self.name
+        return f"{MISDESCRIBED_IN_PREFIX}{self.recording}.{self.name}"

@@ -1,0 +1,69 @@
+"""Directions in which a machine may differ from its definition, and what each does to the readings.
+
+A provider is a function that takes a :class:`Predictor` and yields the directions it knows of; a new one is
+added to ``PROVIDERS``. What a direction does is worked out once, about one run of each recording, by the
+model itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.coordinate_names import NO_VALUES
+from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
+from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.predictor import Predictor
+
+Array = NDArray[np.float64]
+Provider = Callable[[Predictor], Iterable[Misdescription]]
+
+PROVIDERS: tuple[Provider, ...] = (heat_misdescriptions,)
+
+
+def misdescriptions_of(predictor: Predictor) -> tuple[Misdescription, ...]:
+    """Every direction of a machine on its recordings; the same and in one order for the same machine."""
+    return tuple(item for provider in PROVIDERS for item in provider(predictor))
+
+
+def with_misdescriptions(
+    predictor: Predictor,
+    directions: Sequence[Misdescription],
+    values: Mapping[str, float] = NO_VALUES,
+    candidates: Sequence[Candidate] = (),
+) -> Predictor:
+    """The same predictor with columns of the directions about runs with some values.
+
+    Parameters
+    ----------
+    values, candidates
+        As :meth:`Predictor.predict` takes them.
+    """
+    columns = {}
+    for number in range(len(predictor.recordings)):
+        acting = [item for item in directions if item.recording in (None, number)]
+        if acting:
+            found = direction_columns(BaseRun(predictor, number, values, candidates), acting)
+            columns |= {(number, item.coordinate): found[:, :, i] for i, item in enumerate(acting)}
+    return predictor.misdescribed_by(directions, columns)
+
+
+def direction_columns(base: BaseRun, directions: Sequence[Misdescription]) -> Array:
+    """Change of every channel for a unit of each direction, (G + 1, c, n) in K over their units."""
+    changes = [item.change(base) for item in directions]
+    steps, size = len(base.drive.steps), base.predictor.fast.model.size
+    start, end = (np.zeros((steps, size, len(changes))) for _ in range(2))
+    for index, change in enumerate(changes):
+        if change.start is not None:
+            start[:, :, index] = change.start
+        if change.end is not None:
+            end[:, :, index] = change.end
+    found = base.march(start, end)
+    for index, change in enumerate(changes):
+        if change.direct is not None:
+            found[:, :, index] += change.direct
+    return found

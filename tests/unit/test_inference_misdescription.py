@@ -1,0 +1,111 @@
+"""Directions in which a machine may differ from its definition: what they do to readings, and to a fit."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX
+from spindle_fem.inference.heat_misdescriptions import SpeedConductance, SpeedShape, clock_change, shape_modes
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
+from tests.support.diagnosed_spindle import TIMES, Case, written
+
+FRONT = ("F1", "F2", "F3")
+SHAPE = "heat_shape.front.1"
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    return Case(tmp_path_factory.mktemp("misdescribed"))
+
+
+@pytest.fixture(scope="module")
+def predictor(case):
+    return Predictor(case.fast, [case.blank])
+
+
+def column_of(predictor, change):
+    item = Misdescription("one", "", "", 1.0, "", change)
+    own = with_misdescriptions(predictor, [item])
+    return own.predict(0, {}, (), [item.coordinate]).sensitivity[:, :, 0]
+
+
+def test_more_heat_at_all_speeds_is_the_heat_factor(predictor):
+    column = column_of(predictor, SpeedShape(FRONT, (0.0, 1000.0), (1.0, 1.0)))
+    expected = predictor.predict(0, {}, (), ["heat.front"]).sensitivity[:, :, 0]
+    np.testing.assert_allclose(column, expected, atol=2e-3 * np.abs(expected).max())
+
+
+def test_balls_that_conduct_better_at_full_speed_are_another_conductance(predictor):
+    better = SpeedConductance(("balls.F1.inner", "balls.F1.outer"), 100.0)
+
+    def at_full_speed(base):
+        base.start_inputs = base.end_inputs = {"speed": np.full(len(base.drive.steps), 100.0)}
+        return better(base)
+
+    column = column_of(predictor, at_full_speed)
+    plain, more = (
+        predictor.predict(0, {f"balls.F1.{side}": factor for side in ("inner", "outer")}).temperature
+        for factor in (1.0, 1.001)
+    )
+    expected = (more - plain) / 0.001
+    np.testing.assert_allclose(column, expected, atol=0.01 * np.abs(expected).max())
+
+
+def test_a_clock_moves_readings_along_their_own_slope(predictor):
+    column = column_of(predictor, clock_change)
+    told, grid = predictor.predict(0, {}).temperature, predictor.drives[0].grid
+    later = np.array([np.interp(grid - 20.0, grid, one) for one in told.T]).T
+    smooth = (grid > 200.0) & (np.abs(grid - 1800.0) > 200.0) & (np.abs(grid - 8100.0) > 200.0)
+    np.testing.assert_allclose(20.0 * column[smooth], (later - told)[smooth], atol=0.02)
+
+
+def test_modes_are_apart_and_without_a_mean():
+    speed = np.linspace(0.0, 500.0, 61)
+    modes = shape_modes(speed, 0.3)
+    sizes = [size for size, _ in modes]
+    assert 2 <= len(modes) <= 5
+    assert sizes == sorted(sizes, reverse=True)
+    shapes = np.array([shape for _, shape in modes])
+    np.testing.assert_allclose(shapes.mean(axis=1), 0.0, atol=1e-12)
+    products = shapes @ shapes.T
+    np.testing.assert_allclose(products, np.diag(np.diag(products)), atol=1e-9)
+
+
+def test_a_machine_off_in_a_direction_is_explained_by_it_and_calibration_remembers(case, predictor):
+    one = Misdescription("F1", "", "", 0.1, "", SpeedShape(("F1",), (0.0, 1000.0), (1.0, 1.0)))
+    clock = Misdescription("clock", "", "s", 30.0, "", clock_change, 0)
+    true = predictor.predict(0, {"heat.F1": 1.3}).temperature
+    at_stamps = np.array([np.interp(TIMES, predictor.drives[0].grid, column) for column in true.T]).T
+    noise = np.random.default_rng(1).normal(0.0, 0.1, at_stamps.shape)
+    seen = Predictor(case.fast, [written(case.folder, at_stamps - 273.15 + noise)])
+    misfits = []
+    for directions in ((), (one, clock)):
+        described = with_misdescriptions(seen, directions)
+        belief = calibrate(None, described).belief
+        fit = Problem(described, belief, EXPECTED_SLOW, described.observations).fit()
+        misfits.append(fit.misfit_with_prior)
+    assert misfits[1] < misfits[0] - 10.0
+    low, high = fit.interval(one.coordinate, 2.0)
+    assert low < 0.3 < high
+    assert high - low < 0.3
+    # Calibration narrows it: the next recording begins from there; what concerns one recording only does not.
+    after = calibrate(described, described).belief
+    names = [c.name for c in after.coordinates]
+    assert after.mean[names.index(one.coordinate)] == pytest.approx(3.0, abs=1.0)
+    assert after.root[names.index(one.coordinate), names.index(one.coordinate)] > 1.5
+    assert after.mean[names.index(clock.coordinate)] == 0.0
+
+
+def test_columns_go_where_the_predictor_goes(predictor):
+    own = with_misdescriptions(predictor, misdescriptions_of(predictor))
+    name = MISDESCRIBED_PREFIX + SHAPE
+    expected = own.predict(0, {name: 0.1}).temperature
+    for other in (pickle.loads(pickle.dumps(own)), own.with_model(own.fast), copy.copy(own)):
+        np.testing.assert_array_equal(other.predict(0, {name: 0.1}).temperature, expected)
+    assert np.abs(expected - own.predict(0, {}).temperature).max() > 0.1
