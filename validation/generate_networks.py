@@ -228,7 +228,7 @@ def judge(effects: list[Concealed], known: dict[str, Any], room_recorded: bool) 
     if any(e.also for e in effects):
         verdicts.append("ambiguous")
     return {
-        "verdict": truth,
+        "verdict": "ambiguous" if twins else truth,
         "true_verdict": truth,
         "acceptable_verdicts": sorted(set(verdicts)),
         "detectable": detectable,
