@@ -9,11 +9,26 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from spindle_fem import __version__
 
+PLAN_FLAG = "--plan"
+
+
+class _Commands(TyperGroup):
+    """The commands; ``diagnose --plan`` asks other things than a diagnosis and is a command of its own."""
+
+    def resolve_command(self, ctx: typer.Context, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Which command arguments are for, and those that are left."""
+        if args[0] == "diagnose" and PLAN_FLAG in args:
+            args = ["plan", *(item for item in args[1:] if item != PLAN_FLAG)]
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
     name="spindle-fem",
+    cls=_Commands,
     help="Thermal finite elements for grease-lubricated machine-tool spindles.",
     no_args_is_help=True,
     add_completion=False,
@@ -267,7 +282,11 @@ def diagnose(
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
-    """Where a recording and the model differ, which physics was left out, and how the fit improves."""
+    """Where a recording and the model differ, which physics was left out, and how the fit improves.
+
+    ``diagnose --plan MACHINE -o DIR``, before anything is measured: which effects the sensors and a test
+    could tell apart; the same as ``spindle-fem plan``.
+    """
     from spindle_fem.commands.console import print_diagnosis, stages
     from spindle_fem.commands.diagnose_command import diagnose as diagnose_machine
 
@@ -283,6 +302,64 @@ def diagnose(
             progress=tell,
         )
     _print_json(content) if as_json else print_diagnosis(content, output)
+
+
+@app.command()
+def plan(
+    machine: Machine,
+    output: Folder,
+    test: Annotated[
+        str,
+        typer.Option(
+            "--test",
+            metavar="RECORDING|NAME",
+            help="A recording whose inputs are used; or heat_up, steps, cool_down, with a length: steps:4h.",
+        ),
+    ] = "steps",
+    sensors: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sensors",
+            metavar="NAME[=NOISE],...",
+            help="Probes or nodes that are read, with their noise: SP01,SP04=0.05K; all=0.2K. Default: every "
+            "one of the definition (or of the recording), 0.1 K.",
+        ),
+    ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            metavar="NAME=VALUE",
+            help='Input at full load in a standard test, with its unit, repeatable: speed="3000 rpm".',
+        ),
+    ] = None,
+    calibrate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--calibrate",
+            metavar="FILE",
+            help="Recording of the same machine with nothing missing; repeatable.",
+        ),
+    ] = None,
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Before measuring: which effects the sensors and a test could tell apart (also diagnose --plan)."""
+    from spindle_fem.commands.console import print_plan, stages
+    from spindle_fem.commands.plan_command import plan as plan_measurement
+
+    with stages(not as_json) as tell:
+        content = plan_measurement(
+            machine,
+            output,
+            test=test,
+            sensors=sensors or (),
+            inputs=inputs or (),
+            calibrate=calibrate or (),
+            overrides=set_ or (),
+            progress=tell,
+        )
+    _print_json(content) if as_json else print_plan(content, output)
 
 
 @app.command()

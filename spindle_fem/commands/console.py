@@ -220,6 +220,27 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     console.print(f"Files: {folder}")
 
 
+def print_plan(content: dict[str, Any], folder: Path) -> None:
+    """What a planned test tells, the best further sensors and tests."""
+    console = _console()
+    for sentence in content["summary"]:
+        console.print(sentence, markup=False)
+    for key, title in (("sensors_in_turn", "Further sensors, one after another"), ("tests", "Tests")):
+        table = _table(title, "", "information bit", "seen", "told from all")
+        for item in content[key]:
+            table.add_row(
+                item["words"],
+                _number(item["information_bit"], 3),
+                str(item["seen"]),
+                str(item["told_from_all"]),
+            )
+        if content[key]:
+            console.print(table)
+    for note in content["notes"]:
+        console.print(note, style="dim", markup=False)
+    console.print(f"Report: {folder / 'report.html'}")
+
+
 def print_sweep(content: dict[str, Any], folder: Path) -> None:
     """How many designs were solved, and where the table is."""
     console = _console()

@@ -24,6 +24,10 @@ def rebuild(folder: Path) -> Path:
         from spindle_fem.report.diagnosis_report import write_diagnosis_report
 
         return write_diagnosis_report(place)
+    if (place / "plan.json").is_file():
+        from spindle_fem.report.plan_report import write_plan_report
+
+        return write_plan_report(place)
     if (place / "simulation.json").is_file():
         from spindle_fem.report.simulation_report import write_simulation_report
 

@@ -39,7 +39,7 @@ class Gain:
     unit: str
 
 
-def _base_unit(text: Any) -> str:
+def base_unit_of(text: Any) -> str:
     """SI unit of a quantity's text in a form that reads back, ``""`` for a pure number."""
     match = _NUMBER_AND_UNIT.fullmatch(str(text))
     if match is None or not match[1]:
@@ -63,7 +63,7 @@ def _read_gain(value: Any) -> Any:
     if isinstance(value, Mapping):
         sample = value.get("value", value.get("low"))
     try:
-        unit = _base_unit(sample)
+        unit = base_unit_of(sample)
         return Gain(uncertain_to_si(value, unit, where=""), unit)
     except SpindleFemError as error:
         offer = "Where the exponent is not whole, give the gain in W and a reference."
@@ -97,7 +97,7 @@ def _read_reference(value: Any) -> Any:
     if value is None or isinstance(value, Gain):
         return value
     try:
-        unit = _base_unit(value)
+        unit = base_unit_of(value)
         return Gain(Uncertain(to_si(value, unit, where="")), unit)
     except SpindleFemError as error:
         raise ValueError(f"{error.what} {error.how_to_fix}".strip()) from error

@@ -67,6 +67,8 @@ class BaseRun:
     values : mapping of str to float
     candidates : sequence of Candidate
         Already in the model.
+    places : (k, r) ndarray, optional
+        Means over places that answer as further channels do.
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class BaseRun:
         number: int,
         values: Mapping[str, float],
         candidates: Sequence[Candidate] = (),
+        places: Array | None = None,
     ) -> None:
         self.predictor, self.number, self.values, self.candidates = (
             predictor,
@@ -89,6 +92,8 @@ class BaseRun:
         self.start_inputs = {name: drive.start[:, i] for i, name in enumerate(drive.names)}
         self.end_inputs = {name: drive.end[:, i] for i, name in enumerate(drive.names)}
         self.columns = predictor.columns[number]
+        self.places = np.zeros((0, predictor.fast.model.size)) if places is None else places
+        self.channels = len(self.columns) + len(self.places)
         self._coefficient: dict[str, Array] = {}
         self._told: Array | None = None
 
@@ -97,15 +102,17 @@ class BaseRun:
         """Channels' answer (G + 1, c, m) to changes of states (G + 1, r, m) and coolant inlet."""
         owner = np.append(self.run.step_class, self.run.step_class[-1])
         column = self.predictor.fast.inlet_column if inlet is not None else None
-        found = np.zeros((tangent.shape[0], len(self.columns), tangent.shape[2]))
+        read = len(self.columns)
+        found = np.zeros((tangent.shape[0], self.channels, tangent.shape[2]))
+        found[:, read:] = self.places @ tangent
         for number in np.unique(owner):
             operators, rows = self.run.operators[number], np.flatnonzero(owner == number)
-            found[rows] = np.einsum(
+            found[rows, :read] = np.einsum(
                 "or,nrm->nom", operators.outputs[self.columns], tangent[rows], optimize=True
             )
             if inlet is not None:
                 direct = operators.output_inputs[self.columns, column]
-                found[rows] += direct[None, :, None] * inlet[rows, None, :]
+                found[rows, :read] += direct[None, :, None] * inlet[rows, None, :]
         return found
 
     def march(self, start: Array, end: Array, inlet: Array | None = None) -> Array:
@@ -124,7 +131,7 @@ class BaseRun:
     # ------------------------------------------------------------------ candidates
     def responses(self, variants: Sequence[Variant]) -> Array:
         """Answer of the channels to every variant at its reference amplitude, (G + 1, c, m)."""
-        size = (self.drive.grid.size, len(self.columns))
+        size = (self.drive.grid.size, self.channels)
         found = np.zeros((*size, len(variants)))
         dynamic, steady = [], []
         for position, variant in enumerate(variants):
@@ -132,7 +139,7 @@ class BaseRun:
             if candidate.recording not in (None, self.number):
                 continue
             if candidate.reading is not None:
-                found[:, :, position] += self._reading(variant)
+                found[:, : len(self.columns), position] += self._reading(variant)
             if any(term.is_dynamic for term in candidate.terms):
                 dynamic.append(position)
             if candidate.factors or any(_is_steady(term) for term in candidate.terms):
@@ -278,10 +285,11 @@ class BaseRun:
         asked = tuple(dict.fromkeys(name for own in names for name, _ in own))
         holder = Candidate("", "", "", "parameter", "", 0.0, 0.0, terms=tuple(terms))
         prediction = self.predictor.predict(self.number, values, (*self.candidates, holder), asked)
-        found = np.zeros((*prediction.temperature.shape, len(variants)))
+        slopes = np.concatenate((prediction.sensitivity, prediction.slopes_at(self.places)), axis=1)
+        found = np.zeros((*slopes.shape[:2], len(variants)))
         for position, own in enumerate(names):
             for name, step in own:
-                found[:, :, position] += step * prediction.sensitivity[:, :, asked.index(name)]
+                found[:, :, position] += step * slopes[:, :, asked.index(name)]
         return found
 
 

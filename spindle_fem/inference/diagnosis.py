@@ -27,7 +27,7 @@ from spindle_fem.inference.prepared_problem import (
     calibrate,
     slow_error_of,
 )
-from spindle_fem.inference.search_basis import on_search_basis
+from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
@@ -120,15 +120,7 @@ def diagnose_recordings(
     candidates = candidates_for(view)
     effects = catalogue()
     weights = {name: effect.prior_weight for name, effect in effects.items()}
-    places = sorted(
-        {p for named in (view.spots, view.sides) for own in named.values() for p in own}
-        | {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)}
-    )
-    known = [p for p in places if p in fast.model.place_names]
-    small = predictor
-    if not machine.is_network:
-        contacts = sorted({name for own in view.joint_coefficients.values() for name in own})
-        small = on_search_basis(predictor, [prior.name for prior in predictor.uncertain()], known, contacts)
+    small, known = searched_predictor(predictor, view, candidates)
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
     if directions:
         # What they do, about the machine as its recordings have it.
@@ -144,7 +136,7 @@ def diagnose_recordings(
     best = rank(found)[0].best
     slow = slow_error_of(problem, best.fit)
     final = Problem(predictor, calibrated.belief, slow, predictor.observations)
-    overlapping = _overlapping(view)
+    overlapping = overlapping_components(view)
     readings = _Readings(predictor, slow.sigma)
     refitted = _refit(final, found, workers, overlapping, readings)
     clock.lap("final fits")
@@ -181,7 +173,7 @@ def diagnose_recordings(
     )
 
 
-def _overlapping(view: MachineView) -> dict[str, frozenset[str]]:
+def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
     """Components that a decision does not tell apart from each.
 
     A set, its bearings, its other bearings; a probe and what it sits in.

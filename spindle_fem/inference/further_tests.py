@@ -10,25 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.effects.framework.laws import RPM
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.inference.coordinate_names import NO_VALUES, OF_ONE_RECORDING
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.schedules import HOLD, geometry_schedules, network_schedules
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.reduced.drive import STANDARD, Drive, make_drive
 from spindle_fem.model.reduced.run_start import Start
 
 Array = NDArray[np.float64]
 
-MINUTE = 60.0
 # Longest step of a simulated test, s: tests are compared between hypotheses, not with readings.
 TEST_STEP = 120.0
-# A held level lasts as long as a spindle needs to come near its steady state, s; standstill before it.
-HOLD = 60.0 * MINUTE
-REST = 10.0 * MINUTE
-# Change of the room's or the coolant's temperature that a workshop can make, K.
-TEMPERATURE_STEP = 5.0
 # Name of the test that repeats the recorded operation.
 AGAIN = "the same operation again"
 
@@ -225,76 +219,11 @@ def _geometry_trials(predictor: Predictor, view: MachineView) -> list[Trial]:
     names = predictor.drives[0].names
     usual = _usual(predictor)
     high = max(float(np.max(drive.start[:, drive.column("speed")])) for drive in predictor.drives)
-    high = high or view.highest_speed
-    levels = [round(share * high / RPM, -2) * RPM or high for share in (1.0 / 3.0, 2.0 / 3.0, 1.0)]
-    middle = levels[1]
-
-    def trial(
-        words: str, quantity: str, effort: int, stages: Sequence[tuple[float, Mapping[str, float]]]
-    ) -> Trial:
-        return Trial(words, quantity, _staged(names, usual, stages), effort)
-
-    rpm = [f"{level / RPM:.0f}" for level in levels]
-    warm = usual["coolant_inlet"] + TEMPERATURE_STEP
-    found = [
-        trial(
-            f"speed holds of {HOLD / MINUTE:.0f} min at {', '.join(rpm)} rpm",
-            "speed",
-            1,
-            [(REST, {"speed": 0.0}), *((HOLD, {"speed": level}) for level in levels)],
-        ),
-        trial(
-            f"{1.5 * HOLD / MINUTE:.0f} min at {rpm[-1]} rpm, then {1.5 * HOLD / MINUTE:.0f} min cool-down "
-            "at standstill",
-            "speed",
-            1,
-            [(1.5 * HOLD, {"speed": levels[-1]}), (1.5 * HOLD, {"speed": 0.0})],
-        ),
+    has_channel = predictor.fast.spec.channel is not None
+    return [
+        Trial(item.name, item.quantity, _staged(names, usual, item.stages), item.effort)
+        for item in geometry_schedules(usual, high or view.highest_speed, has_channel=has_channel)
     ]
-    if usual["thrust"] > 0.0:
-        thrusts = [0.5 * usual["thrust"], 1.5 * usual["thrust"]]
-        found.append(
-            trial(
-                f"{rpm[1]} rpm held, thrust {thrusts[0]:.0f} N then {thrusts[1]:.0f} N, "
-                f"{HOLD / MINUTE:.0f} min each",
-                "thrust",
-                1,
-                [(HOLD, {"speed": middle, "thrust": value}) for value in thrusts],
-            )
-        )
-    if predictor.fast.spec.channel is not None and usual["coolant_flow"] > 0.0:
-        found += [
-            trial(
-                f"{rpm[1]} rpm held, oil temperature +{TEMPERATURE_STEP:.0f} K after "
-                f"{HOLD / MINUTE:.0f} min, −{TEMPERATURE_STEP:.0f} K after {2 * HOLD / MINUTE:.0f} min",
-                "coolant inlet temperature",
-                1,
-                [
-                    (HOLD, {"speed": middle}),
-                    (HOLD, {"speed": middle, "coolant_inlet": warm}),
-                    (HOLD, {"speed": middle, "coolant_inlet": warm - 2.0 * TEMPERATURE_STEP}),
-                ],
-            ),
-            trial(
-                f"{rpm[1]} rpm held, oil flow reduced to 70 % after {HOLD / MINUTE:.0f} min",
-                "coolant flow",
-                1,
-                [
-                    (HOLD, {"speed": middle}),
-                    (HOLD, {"speed": middle, "coolant_flow": 0.7 * usual["coolant_flow"]}),
-                ],
-            ),
-        ]
-    room = usual["ambient"] + TEMPERATURE_STEP
-    found.append(
-        trial(
-            f"{rpm[1]} rpm held, the room {TEMPERATURE_STEP:.0f} K warmer after {HOLD / MINUTE:.0f} min",
-            "ambient temperature",
-            2,
-            [(HOLD, {"speed": middle}), (2.0 * HOLD, {"speed": middle, "ambient": room})],
-        )
-    )
-    return found
 
 
 def _usual(predictor: Predictor) -> dict[str, float]:
@@ -329,27 +258,24 @@ def _network_trials(predictor: Predictor) -> list[Trial]:
     """Every input that varied: half its range, the highest, then the lowest; the others as usual."""
     drive = predictor.drives[0]
     usual = _usual(predictor)
-    duration = float(np.clip(0.25 * (drive.grid[-1] - drive.grid[0]), HOLD, 4.0 * HOLD))
+    hold = float(np.clip(0.25 * (drive.grid[-1] - drive.grid[0]), HOLD, 4.0 * HOLD))
+    lows, highs = drive.start.min(axis=0).tolist(), drive.start.max(axis=0).tolist()
+    ranges = dict(zip(drive.names, zip(lows, highs, strict=True), strict=True))
     found = []
-    for position, name in enumerate(drive.names):
-        values = drive.start[:, position]
-        low, high = float(values.min()), float(values.max())
-        if high - low <= 1e-9 * max(abs(high), 1.0):
-            continue
-        stages = (0.5 * (low + high), high, low)
-        grid = np.linspace(0.0, 3.0 * duration, int(np.ceil(3.0 * duration / TEST_STEP / 3.0)) * 3 + 1)
-        owner = np.minimum((3.0 * 0.5 * (grid[:-1] + grid[1:]) / grid[-1]).astype(int), 2)
-        inputs = np.tile([usual[n] for n in drive.names], (len(owner), 1))
-        inputs[:, position] = np.array(stages)[owner]
+    for item in network_schedules(ranges, hold):
+        # Equal steps: one matrix of the model.
+        count = int(np.ceil(item.length / TEST_STEP / len(item.stages))) * len(item.stages)
+        grid = np.linspace(0.0, item.length, count + 1)
+        owner = np.repeat(np.arange(len(item.stages)), count // len(item.stages))
+        rows = np.array([[{**usual, **changed}[n] for n in drive.names] for _, changed in item.stages])
         own = replace(
             drive,
             times=grid,
             grid=grid,
-            start=inputs,
-            end=inputs.copy(),
+            start=rows[owner],
+            end=rows[owner],
             step_class=np.zeros(len(owner), dtype=np.int64),
             restarts=(),
         )
-        words = f"{_plain(name)} at half its range, highest, lowest, {duration / MINUTE:.0f} min each"
-        found.append(Trial(words, _plain(name), own, 1))
+        found.append(Trial(item.name, item.quantity, own, item.effort))
     return found

@@ -246,8 +246,8 @@ def screen(
     for first, found in enumerate(answers):
         columns[:, first::PIECES] = found
     gram, data, total = linear.gram(columns)
-    spread = np.array([_spread(v) for v in variants])
-    signs = np.array([_one_sided(v) for v in variants])
+    spread = np.array([amplitude_spread(v) for v in variants])
+    signs = np.array([is_one_sided(v) for v in variants])
     priors = log_priors(variants, weights)
     boxed = linear.boxed(columns) if linear.box.matters or trust is not None else None
     base = linear.box.cost
@@ -266,7 +266,8 @@ def _answers(problem: Problem, fit: Fit, variants: Sequence[Variant]) -> Array:
     )
 
 
-def _spread(variant: Variant) -> float:
+def amplitude_spread(variant: Variant) -> float:
+    """Prior standard deviation of an amplitude, in units of its reference."""
     candidate = variant.candidate
     item = candidate.parameters[candidate.amplitude]
     if item.logarithmic:
@@ -274,7 +275,8 @@ def _spread(variant: Variant) -> float:
     return item.sigma / abs(candidate.reference - candidate.null)
 
 
-def _one_sided(variant: Variant) -> float:
+def is_one_sided(variant: Variant) -> float:
+    """1 where an amplitude cannot be negative, 0 where it can."""
     candidate = variant.candidate
     item = candidate.parameters[candidate.amplitude]
     upwards = candidate.reference > candidate.null

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.inference import tuned
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.reduced_transient import TransientRun
@@ -23,6 +25,30 @@ EVERY_TANGENT = 4
 PLACE_RATES = (0.0, 3e-4, 3e-3)
 # Heat at a place, W: what makes its temperatures weigh as much as the states.
 PLACE_HEAT = 50.0
+
+
+def searched_predictor(
+    predictor: Predictor, view: MachineView, candidates: Sequence[Candidate], read: Sequence[str] = ()
+) -> tuple[Predictor, frozenset[str]]:
+    """The recordings on the basis of a search, and the places of the model where something may act.
+
+    A network is small enough as it is.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        What will be asked, beside heat at every spot of the view.
+    read : sequence of str
+        Further places that will be read.
+    """
+    places = {p for named in (view.spots, view.sides) for own in named.values() for p in own}
+    places |= {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)} | {*read}
+    known = places & {*predictor.fast.model.place_names}
+    if predictor.is_network:
+        return predictor, frozenset(known)
+    contacts = sorted({name for own in view.joint_coefficients.values() for name in own})
+    names = [prior.name for prior in predictor.uncertain()]
+    return on_search_basis(predictor, names, sorted(known), contacts), frozenset(known)
 
 
 def on_search_basis(

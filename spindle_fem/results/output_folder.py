@@ -28,6 +28,7 @@ _OWN = frozenset(
         "simulated.csv",
         "calibrated_machine.toml",
         "diagnosis.json",
+        "plan.json",
         "improved_machine.toml",
         "states.csv",
         "heat.json",

@@ -14,7 +14,7 @@ from spindle_fem.definition.load import write_machine
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.errors import BadInputError
 from spindle_fem.inference import search_course, tuned
-from spindle_fem.inference.diagnosis import _overlapping
+from spindle_fem.inference.diagnosis import overlapping_components
 from spindle_fem.inference.findings import findings_of, noise_level, predictions_at_stamps, rmse
 from spindle_fem.inference.further_tests import AGAIN, answer, reachable_places, trials_of
 from spindle_fem.inference.hypothesis import Hypothesis
@@ -87,7 +87,7 @@ def lying(case):
 
 
 def test_a_decision_does_not_wait_for_which_part_of_a_component_it_is(case):
-    one = _overlapping(case.view)
+    one = overlapping_components(case.view)
     assert one["F1"] == one["front_bearings"] >= {"F1", "F2", "F3", "front_bearings"}
     assert one["SP04"] == {"SP04", "housing"}
     assert one["housing"] >= {"housing", "SP04", "SP05"}

@@ -1,0 +1,234 @@
+"""The function behind ``spindle-fem diagnose --plan``."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spindle_fem.definition.network_tables import base_unit_of
+from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.inference.diagnosis_content import plain_data
+from spindle_fem.inference.measurement_plan import MeasurementPlan, plan_measurement
+from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine
+from spindle_fem.inference.plan_content import plan_content
+from spindle_fem.inference.planned_test import (
+    LONGEST_COMPARED,
+    NOISE,
+    STANDARD_TESTS,
+    Conditions,
+    Sensor,
+    as_predicted,
+    base_name,
+    conditions_of,
+    recording_of,
+    with_sensors,
+)
+from spindle_fem.inference.sufficiency import says_too_little
+from spindle_fem.recordings.align import Recording, read_recording
+from spindle_fem.results.output_folder import output_folder, replace_text
+from spindle_fem.units import TEMPERATURE_UNIT, to_si
+
+Progress = Callable[[str], None]
+ALL = "all"
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """A plan with how it was asked for."""
+
+    plan: MeasurementPlan
+    conditions: Conditions
+    sensors: tuple[Sensor, ...]
+    test: str
+    compared: float
+    notes: tuple[str, ...]
+
+
+def plan(
+    machine: str | Path,
+    folder: str | Path,
+    *,
+    test: str | Path = "steps",
+    sensors: Sequence[str] = (),
+    inputs: Sequence[str] = (),
+    calibrate: Iterable[str | Path] = (),
+    overrides: Iterable[str] = (),
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Say which effects a machine's sensors and a test could tell apart, and what would tell more.
+
+    Parameters
+    ----------
+    machine : str or Path
+        A definition or the name of one that ships; with geometry or a ``[network]``.
+    folder : str or Path
+        Gets ``plan.json``, ``figures/*.png`` and ``report.html``.
+    test : str or Path
+        A recording, whose inputs are used; or ``heat_up``, ``steps`` or ``cool_down``, with a length
+        after a colon (``steps:4h``).
+    sensors : sequence of str
+        Names of probes or nodes, each perhaps with its noise (``SP01=0.05K``); ``all=0.2K`` for all. By
+        default those of the recording, else every one of the definition.
+    inputs : sequence of str
+        ``NAME=VALUE`` texts with units: inputs at full load in a standard test.
+    calibrate : iterable of str or Path
+        Recordings of the same machine with nothing missing.
+    overrides : iterable of str
+        ``path=value`` texts.
+
+    Returns
+    -------
+    dict
+        The content of ``plan.json``.
+
+    Raises
+    ------
+    SpindleFemError
+    """
+    started = time.perf_counter()
+    tell = progress or (lambda stage: None)
+    planned = planned_measurement(
+        machine,
+        test=test,
+        sensors=sensors,
+        inputs=inputs,
+        calibrate=calibrate,
+        overrides=overrides,
+        progress=tell,
+    )
+    with output_folder(folder) as place:
+        content = plan_content(planned.plan, planned.sensors, planned.test, planned.compared, planned.notes)
+        content["wall_time_s"] = time.perf_counter() - started
+        content = plain_data(content)
+        replace_text(place / "plan.json", json.dumps(content, indent=1) + "\n")
+        from spindle_fem.report.plan_report import write_plan_report
+
+        tell("report")
+        write_plan_report(place)
+        return content
+
+
+def planned_measurement(
+    machine: str | Path,
+    *,
+    test: str | Path = "steps",
+    sensors: Sequence[str] = (),
+    inputs: Sequence[str] = (),
+    calibrate: Iterable[str | Path] = (),
+    overrides: Iterable[str] = (),
+    progress: Progress = lambda stage: None,
+) -> Planned:
+    """What :func:`plan` works out, before anything is written; parameters as there."""
+    overrides = tuple(overrides)
+    given = dict(_input(text) for text in inputs)
+    name, _, length = str(test).partition(":")
+    standard = name in STANDARD_TESTS
+    if not standard and not Path(test).exists():
+        raise SpecError(
+            "test",
+            f'"{test}" is neither a standard test nor a recording.',
+            f"Allowed: a recording's folder or .toml file, or {', '.join(STANDARD_TESTS)}, "
+            "with a length after a colon (steps:4h).",
+        )
+    conditions = conditions_of(str(machine), overrides, given, recorded=not standard)
+    if standard:
+        seconds = to_si(length, "s", where="test: length") if length else conditions.default_length
+        if seconds <= 0.0:
+            raise SpecError("test", f"its length is {seconds:g} s.", "Allowed: above 0 s.")
+        schedule = conditions.standard_tests(seconds)[name]
+        chosen = _sensors(sensors, {probe: Sensor(probe, probe, NOISE) for probe in conditions.probes})
+        asked, words = recording_of(conditions, schedule, chosen), schedule.name
+    else:
+        read = read_recording(test)
+        if given:
+            raise SpecError(
+                "input", "belongs to a standard test.", "Leave it out: the recording has its own."
+            )
+        asked, chosen = _of_recording(read, sensors, conditions)
+        seconds, words = float(np.ptp(read.times)), f'the inputs of "{read.name}"'
+        conditions = _as_recorded(conditions, read)
+    compared = min(seconds, LONGEST_COMPARED)
+    schedules = conditions.family(compared)
+    recordings = [asked, *(recording_of(conditions, item, chosen) for item in schedules)]
+    earlier = [read_recording(path) for path in calibrate]
+    opened = open_machine(machine, overrides, recordings, earlier, progress=progress)
+    # Usual sizes of effects, and of a network's errors, follow from what the sensors would read.
+    opened = open_machine(machine, overrides, as_predicted(opened, recordings), earlier, progress=progress)
+    found = plan_measurement(opened, schedules, asked=words, progress=progress)
+    little = says_too_little(_only_first(opened))
+    notes = (f"A diagnosis of such a recording would refuse it: {little}",) if little else ()
+    return Planned(found, conditions, tuple(chosen), words, compared, notes)
+
+
+def _input(text: str) -> tuple[str, tuple[float, str]]:
+    """Name of an input, its value (SI) and its base unit, from ``NAME=VALUE``."""
+    name, found, value = (part.strip() for part in text.partition("="))
+    if not found or not name or not value:
+        raise SpecError("input", f'"{text}" cannot be read.', 'Write it as speed="3000 rpm".')
+    where = f"input {name}"
+    unit = base_unit_of(value)
+    kind = "temperature" if unit == "K" else "quantity"
+    return name, (to_si(value, unit, where=where, kind=kind), base_name(unit))
+
+
+def _sensors(asked: Sequence[str], known: Mapping[str, Sensor]) -> tuple[Sensor, ...]:
+    """Sensors that are asked for, by the probe that each reads, with the noise that is given."""
+    if not known:
+        raise SpecError(
+            "sensors",
+            "the machine has none.",
+            "Add [[probe]] tables to the definition; see docs/planning.md.",
+        )
+    chosen, noise = [], {}
+    for text in (part for item in asked for part in item.split(",")):
+        name, found, given = (part.strip() for part in text.partition("="))
+        if name != ALL and name not in known:
+            raise SpecError(
+                "sensors", f'"{name}" is no sensor of this machine.', did_you_mean(name, (*known, ALL))
+            )
+        if found:
+            where = f"sensors: noise of {name}"
+            noise[name] = to_si(given, "K", where=where, kind="temperature_difference")
+            if noise[name] <= 0.0:
+                raise SpecError(where, f"is {noise[name]:g} K.", "Allowed: above 0 K.")
+        if name != ALL:
+            chosen.append(name)
+    return tuple(
+        replace(known[name], noise=noise.get(name, noise.get(ALL, known[name].noise)))
+        for name in dict.fromkeys(chosen or known)
+    )
+
+
+def _of_recording(
+    read: Recording, asked: Sequence[str], conditions: Conditions
+) -> tuple[Recording, tuple[Sensor, ...]]:
+    """A recording's inputs with the sensors asked for, those of the recording unless others are."""
+    own = {
+        probe: Sensor(name, probe, float(sigma))
+        for name, probe, sigma in zip(read.temperature_names, read.probes, read.sigma, strict=True)
+    }
+    others = {probe: Sensor(probe, probe, NOISE) for probe in conditions.probes if probe not in own}
+    names = [item for item in asked if item.partition("=")[0].strip() != ALL]
+    chosen = _sensors(asked, own | others if names else own)
+    return with_sensors(read, chosen, conditions.start), chosen
+
+
+def _as_recorded(conditions: Conditions, read: Recording) -> Conditions:
+    """Conditions whose full load is the largest that a recording holds, temperatures their means."""
+    usual, units = dict(conditions.usual), dict(conditions.units)
+    for name, unit in zip(read.input_names, read.input_units, strict=True):
+        if name in usual or conditions.network is not None:
+            values = np.abs(read.input_at(name, read.times))
+            usual[name] = float(values.mean() if unit == TEMPERATURE_UNIT else values.max())
+            units[name] = unit
+    return replace(conditions, usual=usual, units=units)
+
+
+def _only_first(machine: DiagnosedMachine) -> DiagnosedMachine:
+    return replace(machine, recordings=machine.recordings[:1])

@@ -1,0 +1,313 @@
+"""What the sensors of a machine and a test could tell apart, before anything is measured.
+
+Every effect of the catalogue at every place is given its usual size on the
+model of the planned test; what the machine's uncertain numbers, the probes'
+places and the noise leave of it is held against nothing missing and against
+every other effect (:mod:`spindle_fem.inference.told_apart`). The same numbers
+choose one more sensor and another test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
+from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
+from spindle_fem.inference import tuned
+from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
+from spindle_fem.inference.diagnosis import overlapping_components
+from spindle_fem.inference.further_tests import Place, network_places, reachable_places
+from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.inference.hypothesis_fit import Problem, candidate_coordinates
+from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import calibrate
+from spindle_fem.inference.reading_noise import Whitener
+from spindle_fem.inference.schedules import Schedule
+from spindle_fem.inference.screening import amplitude_spread, amplitude_value, is_one_sided, log_priors
+from spindle_fem.inference.search_basis import searched_predictor
+from spindle_fem.inference.told_apart import ChannelProducts, EffectForms, Separation
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+# Intervals of unrecorded heat or cooling that stand for all others, as shares of the test.
+INTERVALS = ((0.0, 1.0), (0.05, 0.35), (0.2, 0.5), (0.35, 0.65), (0.5, 0.8), (0.65, 0.95), (0.4, 0.95))
+# Prior of nothing missing over that of one effect.
+NOTHING = tuned.NUMBER_PRIOR[0] / tuned.NUMBER_PRIOR[1]
+# Sizes beyond this many usual ones are not told: answers to first order say nothing of them.
+LARGEST_MULTIPLE = 5.0
+# Further sensors that are chosen one after another.
+SENSORS_ADDED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothetical:
+    """One effect at one place, in all its forms.
+
+    Attributes
+    ----------
+    main : Variant
+        Its likeliest form, in whose size the others are told.
+    weight : float
+        Prior, of all effects at all places together 1.
+    """
+
+    effect: str
+    component: str
+    main: Variant
+    weight: float
+
+    def size(self, multiple: float) -> tuple[str, float, str] | None:
+        """Parameter, value and unit at a multiple of the usual size; None beyond what can be."""
+        candidate = self.main.candidate
+        item = candidate.parameters[candidate.amplitude]
+        value = amplitude_value(self.main, multiple)
+        limit = item.high if candidate.reference > candidate.null else item.low
+        if multiple > LARGEST_MULTIPLE or value == limit:
+            return None
+        told = effect_of(self.effect).report(candidate, self.main.values(value))
+        name, reported = next(iter(told.items()))
+        return name, reported.value, reported.unit
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """One further sensor, or one other test.
+
+    Attributes
+    ----------
+    information : float
+        Mean over all pairs, bits.
+    seen, told : int
+        Effects seen at their usual size, and of these told from every other.
+    """
+
+    name: str
+    words: str
+    information: float
+    seen: int
+    told: int
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class MeasurementPlan:
+    """What a test with some sensors would tell.
+
+    Attributes
+    ----------
+    machine : DiagnosedMachine
+        On the test first, then on those compared with it.
+    separation : Separation
+        Of the sensors and the test asked for.
+    further_sensors : tuple of Option
+        Each place with the sensors that are there, the most telling first.
+    sensors_in_turn : tuple of Option
+        The most telling place, then the most telling beside it, and so on.
+    tests : tuple of Option
+        All tests with the sensors that are there, the most telling first; ``detail`` is what is varied.
+    not_simulated : tuple of (str, str)
+        Tests that could not be, and why.
+    """
+
+    machine: DiagnosedMachine
+    hypotheticals: tuple[Hypothetical, ...]
+    separation: Separation
+    asked: Option
+    further_sensors: tuple[Option, ...]
+    sensors_in_turn: tuple[Option, ...]
+    tests: tuple[Option, ...]
+    not_simulated: tuple[tuple[str, str], ...] = ()
+
+    @cached_property
+    def comparable(self) -> NDArray[np.bool_]:
+        """Pairs that are different effects, or places that a decision tells apart, (k, k)."""
+        return comparable_pairs(self.hypotheticals, self.machine.view)
+
+
+def comparable_pairs(items: Sequence[Hypothetical], view: MachineView) -> NDArray[np.bool_]:
+    """Pairs of which a diagnosis may name one and not mean the other, (k, k)."""
+    overlapping = overlapping_components(view)
+    return np.array(
+        [
+            [
+                one.effect != other.effect
+                or (
+                    one.component != other.component
+                    and other.component not in overlapping.get(one.component, ())
+                )
+                for other in items
+            ]
+            for one in items
+        ]
+    )
+
+
+def plan_measurement(
+    machine: DiagnosedMachine,
+    schedules: Sequence[Schedule],
+    *,
+    asked: str,
+    progress: Progress = lambda stage: None,
+) -> MeasurementPlan:
+    """What a test and its sensors would tell, and which sensor or test would tell more.
+
+    Parameters
+    ----------
+    machine : DiagnosedMachine
+        On the test asked for, then on one recording of every schedule.
+    asked : str
+        The test asked for, in words.
+    """
+    masks = [~heldout_stamps(item)[0] for item in machine.recordings]
+    predictor = Predictor(machine.fast, machine.recordings, masks, machine.effects)
+    earlier = Predictor(machine.fast, machine.calibration, effects=machine.effects)
+    calibrated = calibrate(earlier if machine.calibration else None, predictor)
+    candidates = candidates_for(machine.view)
+    spots = _interval_candidates(machine.view, float(np.ptp(machine.recordings[0].times)))
+    places = _places(machine, predictor)
+    progress("plan: basis")
+    small, _ = searched_predictor(predictor, machine.view, candidates, [place.name for place in places])
+    problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
+    variants = variants_of(candidates) + variants_of(spots)
+    forms, hypotheticals = _forms(variants)
+    progress(f"plan: {asked}")
+    products = _products(problem, 0, variants, places)
+    read = list(range(len(machine.recordings[0].temperature_names)))
+    beside = {place.name: len(read) + index for index, place in enumerate(places)}
+    weights = np.array([item.weight for item in hypotheticals])
+    comparable = comparable_pairs(hypotheticals, machine.view)
+
+    def judged(own: ChannelProducts, channels: Sequence[int], name: str, words: str, detail: str) -> Option:
+        told = forms.judged(own.gram(channels))
+        seen, apart = told.seen_from <= 1.0, (told.told_from <= 1.0) | ~comparable
+        information = told.mean_information(weights, NOTHING)
+        return Option(
+            name, words, information, int(seen.sum()), int((seen & apart.all(axis=1)).sum()), detail
+        )
+
+    def with_one_more(channels: Sequence[int], left: Sequence[Place]) -> list[Option]:
+        found = [
+            judged(products, [*channels, beside[place.name]], place.name, place.words, place.component)
+            for place in left
+        ]
+        return sorted(found, key=lambda item: -item.information)
+
+    separation = forms.judged(products.gram(read))
+    now = judged(products, read, "asked", asked, "")
+    progress("plan: further sensors")
+    further = with_one_more(read, places)
+    in_turn, chosen, left = further[:1], [*read], list(places)
+    while in_turn and len(in_turn) < SENSORS_ADDED:
+        chosen.append(beside[in_turn[-1].name])
+        left = [place for place in left if place.name != in_turn[-1].name]
+        in_turn += with_one_more(chosen, left)[:1]
+        if not left:
+            break
+    tests, failed = [], []
+    for number, schedule in enumerate(schedules, 1):
+        progress(f"plan: {schedule.name}")
+        try:
+            own = _products(problem, number, variants, ())
+        except (ConvergenceError, OutOfValidityError, SpecError) as error:
+            failed.append((schedule.name, str(error)))
+            continue
+        tests.append(judged(own, read, schedule.name, schedule.name, schedule.quantity))
+    return MeasurementPlan(
+        machine,
+        hypotheticals,
+        separation,
+        now,
+        tuple(further),
+        tuple(in_turn),
+        tuple(sorted(tests, key=lambda item: -item.information)),
+        tuple(failed),
+    )
+
+
+def _interval_candidates(view: MachineView, duration: float) -> list[Candidate]:
+    """Unrecorded heat and cooling over the intervals that stand for all others, at every spot."""
+    return [
+        effect.over(view, spot, [(first * duration, last * duration)])
+        for effect in interval_effects()
+        for spot in effect.places(view)
+        for first, last in INTERVALS
+    ]
+
+
+def _places(machine: DiagnosedMachine, predictor: Predictor) -> tuple[Place, ...]:
+    """Where a further sensor can be put: probes that are not read, then other places."""
+    model, read = predictor.fast.model, predictor.recordings[0].probes
+    if machine.is_network:
+        return network_places(model.place_names, read)
+    unread = [
+        Place(probe.name, f"probe {probe.name} of the definition", probe.part, True)
+        for probe in machine.spec.probe
+        if probe.name in model.probe_names and probe.name not in read
+    ]
+    return (*unread, *reachable_places(predictor.fast.spec, model.place_names))
+
+
+def _forms(variants: Sequence[Variant]) -> tuple[EffectForms, tuple[Hypothetical, ...]]:
+    """Which variants are forms of one effect at one place, and how likely each is."""
+    effects = catalogue()
+    priors = np.exp(log_priors(variants, {name: effect.prior_weight for name, effect in effects.items()}))
+    priors *= np.array([variant.candidate.likelihood for variant in variants])
+    keys = list(dict.fromkeys(variant.key for variant in variants))
+    owner = np.array([keys.index(variant.key) for variant in variants])
+    # Intervals move their ends: those of one spot are shapes of one law.
+    laws = [(*variant.key, variant.candidate.form) for variant in variants]
+    known = list(dict.fromkeys(laws))
+    forms = EffectForms(
+        owner,
+        np.array([known.index(law) for law in laws]),
+        np.array([len(candidate_coordinates(variant.candidate)) for variant in variants]),
+        np.array([amplitude_spread(variant) for variant in variants]),
+        np.array([is_one_sided(variant) > 0.0 for variant in variants]),
+        priors,
+    )
+    found = []
+    for index, key in enumerate(keys):
+        rows = np.flatnonzero(owner == index)
+        main = variants[int(rows[np.argmax([variants[row].candidate.likelihood for row in rows])])]
+        found.append(Hypothetical(*key, main, float(priors[rows].sum() / priors.sum())))
+    return forms, tuple(found)
+
+
+def _products(
+    problem: Problem, number: int, variants: Sequence[Variant], places: Sequence[Place]
+) -> ChannelProducts:
+    """Answers of the sensors of one test, then of places, whitened."""
+    predictor, belief = problem.predictor, problem.belief
+    model = predictor.fast.model
+    means = np.array(
+        [model.probes[model.probe_names.index(p.name)] if p.is_probe else model.place(p.name) for p in places]
+    ).reshape(-1, model.size)
+    values = {c.name: c.at(u) for c, u in zip(belief.coordinates, belief.mean, strict=True)}
+    told = predictor.predict(number, values, (), [c.name for c in belief.coordinates])
+    scale = np.array([c.sigma for c in belief.coordinates])
+    slopes = np.concatenate((told.sensitivity, told.slopes_at(means)), axis=1) * scale
+    answers = BaseRun(predictor, number, values, places=means).responses(variants)
+    own = [
+        (item, white)
+        for item, white in zip(problem.observations, problem.whiteners, strict=True)
+        if item.recording == number
+    ]
+    # A further sensor reads as often as the others, with their usual noise.
+    first = own[0][0]
+    noise = float(np.median(predictor.recordings[number].sigma))
+    usual = Whitener(replace(first.bins, white=noise), problem.slow)
+    own += [(replace(first, channel=len(predictor.columns[number]) + i), usual) for i in range(len(places))]
+    return ChannelProducts.of(
+        belief.root.T @ belief.root,
+        [white(item.at(slopes[:, item.channel])) for item, white in own],
+        [white(item.at(answers[:, item.channel])) for item, white in own],
+    )

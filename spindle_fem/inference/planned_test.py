@@ -1,0 +1,268 @@
+"""A test that nobody has run yet, as the recording that it would leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.load import find_machine, load_machine, read_definition
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.network_load import is_network_machine, load_network_machine
+from spindle_fem.definition.network_tables import NetworkMachineSpec
+from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.schedules import TEMPERATURE_STEP, Schedule, geometry_schedules, network_schedules
+from spindle_fem.inference.schedules import standard_schedules as standard
+from spindle_fem.machine.view.defined_point import defined_recording
+from spindle_fem.model.lumped.thermal_network import ThermalNetwork
+from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.channel_checks import ChannelNoise
+from spindle_fem.recordings.standard_inputs import standard_inputs
+from spindle_fem.units import ANGULAR_SPEED_UNIT, TEMPERATURE_UNIT, ZERO_CELSIUS_K, registry
+
+Array = NDArray[np.float64]
+
+# White noise of a reading [K] and length of a test of a machine with geometry [s], unless said otherwise.
+NOISE, LENGTH = 0.1, 4.0 * 3600.0
+# A network is watched for so many of its slowest time constants, within these limits [s].
+TIME_CONSTANTS, SHORTEST, LONGEST = 4.0, 600.0, 24.0 * 3600.0
+# Distance of readings, s, and most of them: longer tests are read less often.
+SAMPLE, MOST_SAMPLES = 30.0, 2_000
+# Tests that are compared with the one asked for are no longer than this, s.
+LONGEST_COMPARED = 8.0 * 3600.0
+ROOM = ZERO_CELSIUS_K + 20.0
+STANDARD_TESTS = ("heat_up", "steps", "cool_down")
+# SI base units of the inputs that every machine with geometry has.
+UNITS = {
+    "speed": ANGULAR_SPEED_UNIT,
+    "thrust": "kilogram * meter / second ** 2",
+    "ambient": TEMPERATURE_UNIT,
+    "coolant_inlet": TEMPERATURE_UNIT,
+    "coolant_flow": "meter ** 3 / second",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """Something that reads a temperature.
+
+    Attributes
+    ----------
+    name : str
+        Of its channel.
+    probe : str
+        Probe or node that it reads.
+    noise : float, [K]
+        White, 1 σ.
+    """
+
+    name: str
+    probe: str
+    noise: float
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What drives a machine in a test, and what it holds.
+
+    Attributes
+    ----------
+    usual : mapping of str to float
+        Every input at full load, SI.
+    units : mapping of str to str
+        SI base units of the inputs.
+    driven : tuple of str
+        Inputs that heat the machine.
+    start : float, [K]
+        Of everything, before the test.
+    """
+
+    spec: MachineSpec | NetworkMachineSpec
+    network: ThermalNetwork | None
+    usual: Mapping[str, float]
+    units: Mapping[str, str]
+    driven: tuple[str, ...]
+    start: float
+
+    @property
+    def probes(self) -> tuple[str, ...]:
+        """Everything that the definition can read."""
+        if self.network is not None:
+            return self.network.node_names
+        return tuple(probe.name for probe in self.spec.probe)
+
+    @property
+    def default_length(self) -> float:
+        """How long a test should last, s."""
+        if self.network is None:
+            return LENGTH
+        nodes = self.network.n_nodes
+        root = np.sqrt(self.network.capacity)
+        rates = np.linalg.eigvalsh(self.network.conductance_matrix()[:, :nodes] / np.outer(root, root))
+        slowest = max(float(rates[0]), 1e-9 * float(rates[-1]))
+        return float(np.clip(round(TIME_CONSTANTS / slowest / SHORTEST) * SHORTEST, SHORTEST, LONGEST))
+
+    def standard_tests(self, length: float) -> dict[str, Schedule]:
+        """Heat-up, steps and cool-down of a length [s]."""
+        return standard(self.usual, self.driven, length)
+
+    def family(self, length: float) -> list[Schedule]:
+        """Tests that are compared, of one length [s]."""
+        own = self.standard_tests(length)
+        if self.network is None:
+            has_channel = self.spec.channel is not None
+            others = geometry_schedules(
+                self.usual, self.usual["speed"], has_channel=has_channel, length=length
+            )
+            return [own["heat_up"], *others]
+        ranges = {
+            name: (value, value + TEMPERATURE_STEP) if self.units[name] == TEMPERATURE_UNIT else (0.0, value)
+            for name, value in self.usual.items()
+        }
+        return [*own.values(), *network_schedules(ranges, length / 3.0)]
+
+
+def conditions_of(
+    machine: str, overrides: Sequence[str], given: Mapping[str, tuple[float, str]], *, recorded: bool
+) -> Conditions:
+    """Inputs of a machine at full load: what is given, else what its definition says.
+
+    Parameters
+    ----------
+    given : mapping of str to (float, str)
+        Value (SI) and SI base unit of inputs.
+    recorded : bool
+        Whether a recording drives the test, so that nothing need be known of the inputs.
+
+    Raises
+    ------
+    SpecError
+        An input that the machine does not have, or one whose size nothing says.
+    """
+    if not is_network_machine(read_definition(find_machine(machine))):
+        spec = load_machine(machine, overrides)
+        known = standard_inputs(spec)
+        _require_known(given, known)
+        for name, (_, unit) in given.items():
+            if unit != UNITS[name]:
+                raise SpecError(f"input {name}", f"has the unit {unit}.", f"Allowed: units of {UNITS[name]}.")
+        usual = known | {name: value for name, (value, _) in given.items()}
+        return Conditions(spec, None, usual, UNITS, ("speed",), usual["ambient"])
+    spec = load_network_machine(machine, overrides)
+    network = build_network(spec.network)
+    temperatures = [name for name in network.boundary_input if name is not None]
+    _require_known(given, network.input_names)
+    usual = dict.fromkeys(temperatures, ROOM)
+    units = dict.fromkeys(temperatures, TEMPERATURE_UNIT)
+    for source in spec.network.source:
+        if source.input is not None and source.reference is not None and source.input not in usual:
+            usual[source.input] = source.reference.amount.value
+            units[source.input] = base_name(source.reference.unit)
+    usual |= {name: value for name, (value, _) in given.items()}
+    units |= {name: unit for name, (_, unit) in given.items()}
+    silent = [name for name in network.input_names if name not in usual]
+    if silent and not recorded:
+        raise SpecError(
+            f"input {silent[0]}",
+            "drives the machine, but nothing says how large it is in the test.",
+            f'Give it with its unit, --input {silent[0]}="100 W", or a recording as the test.',
+        )
+    fixed = [float(value) for value in network.boundary_temperature if np.isfinite(value)]
+    start = float(np.mean([usual[name] for name in temperatures] or fixed or [ROOM]))
+    driven = tuple(name for name in network.input_names if name not in temperatures)
+    return Conditions(spec, network, usual, units, driven, start)
+
+
+def base_name(unit: str) -> str:
+    """SI base unit as recordings name it.
+
+    >>> base_name("rad/s"), base_name("W")
+    ('radian / second', 'kilogram * meter ** 2 / second ** 3')
+    """
+    units = registry()
+    return str(units.Quantity(1.0, unit or "dimensionless").to_base_units().units)
+
+
+def _require_known(
+    given: Mapping[str, tuple[float, str]], known: Sequence[str] | Mapping[str, float]
+) -> None:
+    unknown = [name for name in given if name not in known]
+    if unknown:
+        raise SpecError(
+            f"input {unknown[0]}", "is not an input of this machine.", did_you_mean(unknown[0], tuple(known))
+        )
+
+
+def recording_of(conditions: Conditions, schedule: Schedule, sensors: Sequence[Sensor]) -> Recording:
+    """What a test would leave, every reading still at the temperature of the start."""
+    edges = np.cumsum([0.0, *(length for length, _ in schedule.stages)])
+    step = max(SAMPLE, schedule.length / MOST_SAMPLES)
+    times = np.unique(np.round(np.append(np.arange(0.0, schedule.length, step), edges), 6))
+    owner = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(schedule.stages) - 1)
+    rows = np.array(
+        [
+            [{**conditions.usual, **changed}[name] for name in conditions.usual]
+            for _, changed in schedule.stages
+        ]
+    ).reshape(len(schedule.stages), -1)
+    empty = defined_recording(
+        schedule.name,
+        (),
+        conditions.start,
+        {name: (value, value) for name, value in conditions.usual.items()},
+        conditions.units,
+    )
+    bare = replace(
+        empty,
+        name=schedule.name,
+        times=times,
+        inputs=rows[owner],
+        covariates=np.empty((len(times), 0)),
+        segments=np.array([[0, len(times)]]),
+    )
+    return with_sensors(bare, sensors, conditions.start)
+
+
+def with_sensors(recording: Recording, sensors: Sequence[Sensor], start: float) -> Recording:
+    """A recording as these sensors would have read it, at the temperature of its own start throughout.
+
+    Parameters
+    ----------
+    start : float, [K]
+        Where the recording does not read a probe.
+    """
+    first = recording.first_readings() if recording.temperature_names else {}
+    size = (recording.times.size, len(sensors))
+    level = np.array([first.get(item.probe, start) for item in sensors])
+    return replace(
+        recording,
+        temperature_names=tuple(item.name for item in sensors),
+        probes=tuple(item.probe for item in sensors),
+        temperature=np.broadcast_to(level, size).copy(),
+        flags=np.zeros(size, dtype=np.uint8),
+        sigma=np.array([item.noise for item in sensors]),
+        noise=tuple(ChannelNoise(0.0, 0.0, item.noise, 0.0) for item in sensors),
+    )
+
+
+def as_predicted(machine: DiagnosedMachine, recordings: Sequence[Recording]) -> list[Recording]:
+    """The recordings with what the machine as it is known should have the sensors read.
+
+    Parameters
+    ----------
+    machine : DiagnosedMachine
+        Opened on these recordings.
+    """
+    predictor = Predictor(machine.fast, machine.recordings, effects=machine.effects)
+    found = []
+    for number, recording in enumerate(recordings):
+        told = predictor.predict(number, {}).temperature
+        grid = predictor.drives[number].times
+        readings = [np.interp(recording.times, grid, column) for column in told.T]
+        found.append(replace(recording, temperature=np.array(readings).T))
+    return found

@@ -1,0 +1,196 @@
+"""What sensors and a test would tell apart, on machines where it can be said by hand."""
+
+import json
+
+import numpy as np
+import pytest
+
+from spindle_fem.commands.plan_command import plan, planned_measurement
+from spindle_fem.errors import BadInputError
+from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import expected_slow_error
+from spindle_fem.inference.told_apart import (
+    POWER,
+    ChannelProducts,
+    EffectForms,
+    bits,
+    misfit_seen,
+    misfit_told,
+)
+
+MACHINE = """
+schema = "spindle-fem/machine/1"
+name = "two bodies"
+initial = "ambient"
+[[network.node]]
+name = "a"
+capacity = "2000 J/K"
+[[network.node]]
+name = "b"
+capacity = "2000 J/K"
+[[network.boundary]]
+name = "ambient"
+temperature = "20 degC"
+[[network.link]]
+between = ["a", "b"]
+conductance = "{between}"
+[[network.link]]
+between = ["a", "ambient"]
+conductance = "2 W/K"
+[[network.link]]
+between = ["b", "ambient"]
+conductance = "2 W/K"
+[[network.source]]
+node = "a"
+input = "power"
+gain = "1 W/W"
+"""
+
+
+@pytest.fixture
+def machine(tmp_path):
+    def write(between="1 W/K"):
+        path = tmp_path / "machine.toml"
+        path.write_text(MACHINE.format(between=between), encoding="utf-8")
+        return path
+
+    return write
+
+
+def planned(path, *sensors):
+    return planned_measurement(path, test="heat_up:2h", sensors=sensors, inputs=["power=40 W"])
+
+
+def told_from(found, first, second):
+    items = [(item.effect, item.component) for item in found.plan.hypotheticals]
+    return float(found.plan.separation.told_from[items.index(first), items.index(second)])
+
+
+HEAT_AT_A, HEAT_AT_B = ("unrecorded_heat_source", "a"), ("unrecorded_heat_source", "b")
+
+
+def test_heat_at_two_bodies_that_are_one_is_told_apart_by_no_sensor(machine):
+    found = planned(machine("1e6 W/K"), "a=0.01K", "b=0.01K")
+    assert told_from(found, HEAT_AT_B, HEAT_AT_A) > 5.0
+
+
+def test_heat_at_two_bodies_is_told_apart_once_each_is_read(machine):
+    path = machine()
+    one, both = planned(path, "a=0.05K"), planned(path, "a=0.05K", "b=0.05K")
+    assert told_from(both, HEAT_AT_B, HEAT_AT_A) < 1.0 < told_from(one, HEAT_AT_B, HEAT_AT_A)
+    assert one.plan.sensors_in_turn[0].name == "b"
+    assert one.plan.sensors_in_turn[0].information == pytest.approx(both.plan.asked.information, rel=0.1)
+
+
+def test_offset_of_a_sensor_is_seen_from_the_size_that_noise_leaves(machine):
+    found = planned(machine(), "a=0.05K")
+    recording = found.plan.machine.recordings[0]
+    used = [~heldout_stamps(item)[0] for item in found.plan.machine.recordings]
+    slow = expected_slow_error(Predictor(found.plan.machine.fast, found.plan.machine.recordings, used))
+    times = recording.times[used[0]]
+    apart = np.abs(times[:, None] - times)
+    noise = slow.sigma**2 * np.exp(-apart / slow.time) + 0.05**2 * np.eye(len(times))
+    # Nothing of this machine is uncertain: an offset of 1 K against noise alone.
+    misfit = float(np.linalg.solve(noise, np.ones(len(times))).sum())
+    items = found.plan.hypotheticals
+    index = next(i for i, item in enumerate(items) if item.effect == "sensor_offset")
+    name, value, unit = items[index].size(float(found.plan.separation.seen_from[index]))
+    assert (name, unit) == ("offset", "K")
+    assert value == pytest.approx(np.sqrt(misfit_seen(1, len(items)) / misfit), rel=1e-3)
+
+
+def forms(owner, one_sided=False):
+    owner = np.array(owner)
+    count = len(owner)
+    return EffectForms(
+        owner,
+        owner,
+        np.ones(count, dtype=int),
+        np.full(count, 1e6),
+        np.full(count, one_sided),
+        np.ones(count),
+    )
+
+
+def test_what_the_machine_takes_up_counts_only_as_far_as_it_is_unknown():
+    answers = np.ones((4, 1))
+    products = ChannelProducts.of(np.array([[1.0]]), [answers], [answers])
+    # A coordinate with a prior of 1 that answers alike: 4 - 4 / (1 + 4) * 4.
+    assert products.gram([0])[0, 0] == pytest.approx(4.0 / 5.0)
+
+
+def test_an_effect_stands_for_another_by_the_angle_between_them():
+    angle = 0.3
+    columns = 10.0 * np.array([[1.0, np.cos(angle)], [0.0, np.sin(angle)]])
+    _, between = forms([0, 1]).distances(columns.T @ columns)
+    assert between[0, 1] == pytest.approx((10.0 * np.sin(angle)) ** 2, rel=1e-6)
+    assert between[0, 0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_heat_that_cannot_be_negative_stands_for_no_loss():
+    columns = 10.0 * np.array([[1.0, -1.0]])
+    _, between = forms([0, 1], one_sided=True).distances(columns.T @ columns)
+    assert between[0, 1] == pytest.approx(100.0)
+
+
+def test_a_mixture_of_shapes_takes_up_what_no_shape_does_alone():
+    early, late, whole = np.eye(2)[0], np.eye(2)[1], np.ones(2)
+    columns = 10.0 * np.column_stack((whole, early, late))
+    several = forms([0, 1, 1])
+    _, between = several.distances(columns.T @ columns)
+    assert between[0, 1] == pytest.approx(0.0, abs=1e-6)
+    assert between[1, 0] == pytest.approx(50.0)
+
+
+def test_stated_size_is_seen_as_often_as_promised():
+    generator = np.random.default_rng(3)
+    misfit = misfit_seen(1, 1)
+    # One direction of one effect: the likelihood ratio against what chance reaches once in a hundred.
+    gains = (np.sqrt(misfit) + generator.standard_normal(200_000)) ** 2
+    chance = np.quantile(generator.standard_normal(200_000) ** 2, 0.99)
+    assert np.mean(gains > chance) > POWER
+    told = misfit_told()
+    ratio = told + 2.0 * np.sqrt(told) * generator.standard_normal(200_000)
+    assert np.mean(ratio > 14.0) == pytest.approx(POWER, abs=0.005)
+
+
+def test_information_is_that_of_two_normal_hypotheses():
+    generator = np.random.default_rng(5)
+    for squared in (0.3, 2.0, 9.0):
+        ratio = 0.5 * squared + np.sqrt(squared) * generator.standard_normal(400_000)
+        expected = 1.0 - np.mean(np.log2(1.0 + np.exp(-ratio)))
+        assert float(bits(np.array(squared))) == pytest.approx(expected, abs=3e-3)
+
+
+def test_plan_of_a_network_is_written_and_readable(machine, tmp_path):
+    content = plan(machine(), tmp_path / "out", test="steps:1h", sensors=["a"], inputs=["power=40 W"])
+    written = json.loads((tmp_path / "out" / "plan.json").read_text(encoding="utf-8"))
+    assert written["schema"] == "spindle-fem/plan/1"
+    assert {"sensors", "test", "pairs", "detectable", "best_next_sensor", "best_test"} <= set(written)
+    assert written["best_next_sensor"]["name"] == "b"
+    assert set(written["pairs"][0]) >= {"first", "second", "told_apart", "information_bit", "from_size"}
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert content["summary"][0].split(",")[0] in page
+    assert not (tmp_path / "out" / "INCOMPLETE").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"sensors": ["c"]}, '"c" is no sensor of this machine'),
+        ({"sensors": ["a=0.1"]}, "bare number"),
+        ({"sensors": ["a=-0.1 K"]}, "above 0 K"),
+        ({"inputs": ["power=40"]}, "power"),
+        ({"inputs": ["speed=40 W"]}, "not an input of this machine"),
+        ({"inputs": []}, 'input power="100 W"'),
+        ({"test": "soak"}, "heat_up, steps, cool_down"),
+        ({"test": "steps:4"}, "bare number"),
+    ],
+)
+def test_bad_input_is_refused_with_what_is_allowed(machine, tmp_path, options, words):
+    asked = {"inputs": ["power=40 W"], "test": "steps:1h"} | options
+    with pytest.raises(BadInputError) as caught:
+        plan(machine(), tmp_path / "out", **asked)
+    assert caught.value.exit_status == 2
+    assert words in str(caught.value)
