@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from spindle_fem.effects.framework.laws import RPM
 
 MINUTE = 60.0
@@ -187,7 +185,7 @@ def standard_schedules(
 
     rest = REST / HOLD
     hold = length / (3.0 + rest)
-    steps = ((rest * hold, at(0.0)), *((hold, at(share)) for share in np.array([1.0, 2.0, 3.0]) / 3.0))
+    steps = ((rest * hold, at(0.0)), *((hold, at(third / 3.0)) for third in (1.0, 2.0, 3.0)))
     half = 0.5 * length
     words = " and ".join(_plain(name) for name in driven)
     return {
