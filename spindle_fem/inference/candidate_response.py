@@ -117,12 +117,16 @@ class BaseRun:
 
     def march(self, start: Array, end: Array, inlet: Array | None = None) -> Array:
         """Channels' answer to loads (G, r, m) at both ends of the steps."""
+        return self.outputs(self.state_changes(start, end), inlet)
+
+    def state_changes(self, start: Array, end: Array) -> Array:
+        """Changes of the states (G + 1, r, m) that follow from loads (G, r, m) at both ends of the steps."""
         forcing = np.empty_like(start)
         for key, rows in self.run.groups.items():
             propagator = self.run.propagators[key]
             forcing[rows] = np.einsum("rs,nsm->nrm", propagator.from_start, start[rows], optimize=True)
             forcing[rows] += np.einsum("rs,nsm->nrm", propagator.from_end, end[rows], optimize=True)
-        return self.outputs(self.run.tangents(forcing, self.tracks), inlet)
+        return self.run.tangents(forcing, self.tracks)
 
     def place_temperature(self, place: str) -> Array:
         """Mean temperature of a place at the grid, (G + 1,) K."""

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES, OF_ONE_RECORDING
 from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.misdescription_columns import direction_columns
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.schedules import HOLD, geometry_schedules, network_schedules
 from spindle_fem.machine.view.part_roles import Layout
@@ -69,6 +71,8 @@ class TrialPredictor(Predictor):
     def __init__(self, predictor: Predictor, drive: Drive) -> None:
         self.__dict__.update(copy.copy(predictor.__dict__))
         self.drives = (replace(drive, times=drive.grid),)
+        # What its directions do is another thing in another operation.
+        self.misdescribed = ()
         self.recordings, self.columns = predictor.recordings[:1], predictor.columns[:1]
         self.observations, self.heldout = (), ()
 
@@ -128,6 +132,16 @@ def answer(predictor: Predictor, fit: Fit, trial: Trial, places: Sequence[Place]
         means = np.array([_weights(predictor, place) for place in places])
         readings.append(told.states @ means.T)
         slopes.append(told.slopes_at(means))
+    directions = [item for item in predictor.misdescribed if item.coordinate in values]
+    if directions:
+        changes = list(direction_columns(BaseRun(own, 0, values, fit.candidates), directions))
+        if places:
+            changes[1] = np.einsum("pr,grn->gpn", means, changes[1], optimize=True)
+        amounts = np.array([values[item.coordinate] for item in directions])
+        rows = [names.index(item.coordinate) for item in directions]
+        for reading, slope, change in zip(readings, slopes, changes, strict=False):
+            reading += change @ amounts
+            slope[:, :, rows] += change
     grid = own.drives[0].grid
     times = np.arange(grid[0] + spacing, grid[-1] + 0.5 * spacing, spacing)
     times = times[times <= grid[-1]]

@@ -47,13 +47,21 @@ def with_misdescriptions(
     for number in range(len(predictor.recordings)):
         acting = [item for item in directions if item.recording in (None, number)]
         if acting:
-            found = direction_columns(BaseRun(predictor, number, values, candidates), acting)
+            found, _ = direction_columns(BaseRun(predictor, number, values, candidates), acting)
             columns |= {(number, item.coordinate): found[:, :, i] for i, item in enumerate(acting)}
     return predictor.misdescribed_by(directions, columns)
 
 
-def direction_columns(base: BaseRun, directions: Sequence[Misdescription]) -> Array:
-    """Change of every channel for a unit of each direction, (G + 1, c, n) in K over their units."""
+def direction_columns(base: BaseRun, directions: Sequence[Misdescription]) -> tuple[Array, Array]:
+    """What a unit of each direction changes.
+
+    Returns
+    -------
+    (G + 1, c, n) ndarray
+        Of every channel, K over the direction's unit.
+    (G + 1, r, n) ndarray
+        Of the states.
+    """
     changes = [item.change(base) for item in directions]
     steps, size = len(base.drive.steps), base.predictor.fast.model.size
     start, end = (np.zeros((steps, size, len(changes))) for _ in range(2))
@@ -62,8 +70,9 @@ def direction_columns(base: BaseRun, directions: Sequence[Misdescription]) -> Ar
             start[:, :, index] = change.start
         if change.end is not None:
             end[:, :, index] = change.end
-    found = base.march(start, end)
+    states = base.state_changes(start, end)
+    channels = base.outputs(states)
     for index, change in enumerate(changes):
         if change.direct is not None:
-            found[:, :, index] += change.direct
-    return found
+            channels[:, :, index] += change.direct
+    return channels, states
