@@ -61,7 +61,12 @@ def run_machine(
         from spindle_fem.results.run_summary import SUMMARY_SCHEMA
         from spindle_fem.solvers.prepared_machine import prepare_machine
         from spindle_fem.studies.run_checks import require_checks
-        from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared, with_heat_study
+        from spindle_fem.studies.solve_machine import (
+            estimate_refinement,
+            solve_prepared,
+            with_growth,
+            with_heat_study,
+        )
 
         prepared = prepare_machine(spec, progress=tell)
         helpers.prepare(spec, prepared.mesh, prepared.operators.n_unknowns)
@@ -71,7 +76,9 @@ def run_machine(
             result = estimate_refinement(result, spec)
         helpers.begin(result, place)
         tell("heat over speed")
-        write_outputs(with_heat_study(result), place, started=started, notify=tell, helpers=helpers)
+        write_outputs(
+            with_growth(with_heat_study(result)), place, started=started, notify=tell, helpers=helpers
+        )
     require_checks(result.checks, spec.name)
     return read_content(place / "summary.json", SUMMARY_SCHEMA, "run")
 

@@ -147,6 +147,10 @@ def render_run_report(
     over_speed = _drawn(illustrations, *(name for name in CAPTIONS if name.startswith(OVER_SPEED)))
     if over_speed:
         sections.append(Section("over_speed", "Bearings over speed", [_OVER_SPEED_TEXT, *over_speed]))
+    if "growth" in summary:
+        nose = tables.nose_table(summary)
+        shown = [tables.growth_table(summary), *([nose] if nose.rows else [])]
+        sections.append(Section("growth", "Growth and fits", shown))
     coolant = summary.get("coolant")
     if coolant:
         state = [Text(tables.regime_words(coolant)), tables.coolant_table(coolant)]

@@ -213,6 +213,57 @@ def probe_table(summary: Mapping[str, Any]) -> Table:
     return table_of(fields, summary["probes"].items(), "What the probes should read.")
 
 
+def growth_table(summary: Mapping[str, Any]) -> Table:
+    """Fits and radial growth at every bearing."""
+    growth, fits = summary["growth"], summary["fits"]
+
+    def row(bearing: str, side: str, ring: str) -> list[str]:
+        fit = fits[bearing][side]
+        return [
+            bearing,
+            f"{ring} ring on {side}" if side == "shaft" else f"{ring} ring in {side}",
+            number(fit["pressure_MPa"], 2),
+            number(fit["gap_um"], 1),
+            number(growth["seats"][bearing][f"{side}_um"]),
+            number(growth["raceways"][bearing][f"{ring}_um"]),
+        ]
+
+    rows = [
+        row(bearing, side, ring)
+        for bearing in fits
+        for side, ring in (("shaft", "inner"), ("housing", "outer"))
+        if side in fits[bearing]
+    ]
+    columns = (
+        column("bearing"),
+        column("seat"),
+        *(
+            column(name, number=True)
+            for name in ("pressure / MPa", "radial gap / µm", "seat grown / µm", "raceway grown / µm")
+        ),
+    )
+    caption = "Fits, and radial growth since assembly by temperature, rotation, fit and ball load."
+    return Table(columns, rows_of(rows), caption)
+
+
+def nose_table(summary: Mapping[str, Any]) -> Table:
+    """How the nose has moved from the frame that the flange is bolted to."""
+    growth = summary["growth"]
+    entries = [
+        (words, number(growth[key]), unit)
+        for words, key, unit in (
+            ("forward", "nose_axial_um", "µm"),
+            ("up (θ = 0°)", "nose_radial_up_um", "µm"),
+            ("across (θ = 90°)", "nose_radial_across_um", "µm"),
+            ("axis tilted up towards the drive end", "nose_tilt_up_urad", "µrad"),
+            ("axis tilted across", "nose_tilt_across_urad", "µrad"),
+        )
+        if growth[key] is not None
+    ]
+    columns = (column("nose"), column("value", number=True), column("unit"))
+    return Table(columns, rows_of(entries), "Displacement of the nose since assembly, by temperature.")
+
+
 def joint_table(summary: Mapping[str, Any]) -> Table:
     """Heat through joints."""
     fields = (

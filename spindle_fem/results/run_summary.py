@@ -5,10 +5,13 @@ from __future__ import annotations
 import importlib.metadata
 import math
 import platform
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spindle_fem.results.thermal_result import BearingResult, CoolantResult, ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
+
+if TYPE_CHECKING:
+    from spindle_fem.model.elastic.machine_growth import Growth
 
 SUMMARY_SCHEMA = "spindle-fem/summary/1"
 _PACKAGES = (
@@ -70,6 +73,7 @@ def build_summary(result: ThermalResult, wall_time_s: float, peak_rss_MB: float)
                 "max_degC": result.temperature_maximum - ZERO_CELSIUS_K,
                 "max_at_mm": maximum_mm,
             },
+            **({} if result.growth is None else _growth(result.growth)),
             "joints": {name: {"heat_W": value} for name, value in result.heat_flows.items()},
             "iterations": dict(result.iterations),
             "checks": [
@@ -128,6 +132,35 @@ def _coolant(coolant: CoolantResult) -> dict[str, Any]:
         "wetted_area_m2": coolant.wetted_area,
         "length_m": coolant.length,
         "hydraulic_diameter_m": coolant.hydraulic_diameter,
+    }
+
+
+def _growth(growth: Growth) -> dict[str, Any]:
+    """Blocks ``growth`` and ``fits``, lengths in µm."""
+    up, across = growth.nose_radial or (math.nan, math.nan)
+    tilt_up, tilt_across = growth.nose_tilt or (math.nan, math.nan)
+    raceways: dict[str, dict[str, float]] = {}
+    seats: dict[str, dict[str, float]] = {}
+    fits: dict[str, dict[str, dict[str, float]]] = {}
+    for (bearing, side), state in growth.seats.items():
+        ring = "inner" if side == "shaft" else "outer"
+        raceways.setdefault(bearing, {})[f"{ring}_um"] = 1e6 * state.raceway_growth
+        seats.setdefault(bearing, {})[f"{side}_um"] = 1e6 * state.seat_growth
+        fits.setdefault(bearing, {})[side] = {
+            "pressure_MPa": 1e-6 * state.pressure,
+            "gap_um": 1e6 * state.gap,
+        }
+    return {
+        "growth": {
+            "nose_axial_um": None if growth.nose_axial is None else 1e6 * growth.nose_axial,
+            "nose_radial_up_um": 1e6 * up,
+            "nose_radial_across_um": 1e6 * across,
+            "nose_tilt_up_urad": 1e6 * tilt_up,
+            "nose_tilt_across_urad": 1e6 * tilt_across,
+            "raceways": raceways,
+            "seats": seats,
+        },
+        "fits": fits,
     }
 
 

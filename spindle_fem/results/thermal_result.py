@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+    from spindle_fem.model.elastic.machine_growth import Growth
     from spindle_fem.validity import CodedWarning
 
 
@@ -117,6 +118,7 @@ class ThermalResult:
 
     Attributes
     ----------
+    speed : float, [rad/s]
     temperature : (n_nodes,) ndarray, [K]
         At every mesh point (linear solutions interpolated to edge middles).
     air_temperature : mapping of str to float, [K]
@@ -133,9 +135,12 @@ class ThermalResult:
         More entries of the summary.
     heat_study : mapping or None
         Heat over speed at this run's temperatures, where it was asked for.
+    growth : Growth or None
+        Shape against the assembled state, where it was asked for.
     """
 
     spec: MachineSpec
+    speed: float
     mesh: TaggedMesh
     order: int
     n_unknowns: int
@@ -159,6 +164,7 @@ class ThermalResult:
     timings: Mapping[str, float]
     extra: Mapping[str, Any] = field(default_factory=dict)
     heat_study: Mapping[str, Any] | None = None
+    growth: Growth | None = None
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
         """The same result with the seconds of each stage."""

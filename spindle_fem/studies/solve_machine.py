@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
+from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -60,7 +62,7 @@ def solve(
     GeometryError, MeshQualityError, NoSteadyStateError, ConvergenceError, EnergyBalanceError
     """
     spec = machine if isinstance(machine, MachineSpec) else load_machine(machine)
-    return solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress)
+    return with_growth(solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress))
 
 
 def solve_prepared(
@@ -126,6 +128,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     films = coupled.loads.films
     return ThermalResult(
         spec=spec,
+        speed=point.speed,
         mesh=machine.mesh,
         order=operators.order,
         n_unknowns=operators.n_unknowns,
@@ -287,6 +290,24 @@ def with_heat_study(result: ThermalResult) -> ThermalResult:
         for name, bearing in result.bearings.items()
     }
     return replace(result, heat_study=heat_study(spec, temperatures=temperatures))
+
+
+def with_growth(result: ThermalResult) -> ThermalResult:
+    """The same result with what its temperatures, fits and ball loads do to the machine's shape.
+
+    Ball loads are those of the preload that was found; of the assembled one where the heat model gives none.
+    Left as it is where the machine has no bearings.
+    """
+    if not result.bearings:
+        return result
+    model = GrowthModel(result.spec, result.mesh, result.order)
+    forces = dict(model.assembly_forces)
+    for name, bearing in result.bearings.items():
+        if np.isfinite(bearing.preload):
+            angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
+            forces[name] = tuple(bearing.preload / math.tan(angle) for angle in angles)
+    grown = model.at(result.temperature[: result.n_unknowns], result.speed, forces)
+    return replace(result, growth=grown)
 
 
 def estimate_refinement(result: ThermalResult, spec: MachineSpec, ratio: float = 1.5) -> ThermalResult:

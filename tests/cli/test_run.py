@@ -44,6 +44,15 @@ def test_summary_has_the_keys_that_stay_put(small_run):
             "lambda",
         } <= set(bearing)  # fmt: skip
     assert {"min_degC", "max_degC", "max_at_mm"} == set(summary["temperature"])
+    growth = summary["growth"]
+    assert {f"nose_{place}" for place in ("axial_um", "radial_up_um", "radial_across_um")} <= set(growth)
+    assert {"nose_tilt_up_urad", "nose_tilt_across_urad"} <= set(growth)
+    for bearing in summary["bearings"]:
+        assert set(growth["raceways"][bearing]) == {"inner_um", "outer_um"}
+        assert set(growth["seats"][bearing]) == {"shaft_um", "housing_um"}
+        for side in ("shaft", "housing"):
+            fit = summary["fits"][bearing][side]
+            assert min(fit["pressure_MPa"], fit["gap_um"]) == 0.0 < max(fit["pressure_MPa"], fit["gap_um"])
 
 
 @pytest.mark.render

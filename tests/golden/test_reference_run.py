@@ -37,6 +37,8 @@ def outputs(case):
         },
         "coolant_W": summary["coolant"]["heat_W"],
         "film_W_m2K": summary["coolant"]["film_coefficient_W_m2K"]["value"],
+        "nose_axial_um": summary["growth"]["nose_axial_um"],
+        "housing_seats_um": {name: seat["housing_um"] for name, seat in summary["growth"]["seats"].items()},
     }
 
 
@@ -52,6 +54,9 @@ def test_run_gives_what_it_gave(name):
     assert found["ring_difference_K"] == pytest.approx(golden["outputs"]["ring_difference_K"], abs=0.05)
     assert found["coolant_W"] == pytest.approx(golden["outputs"]["coolant_W"], rel=2e-3)
     assert found["film_W_m2K"] == pytest.approx(golden["outputs"]["film_W_m2K"], rel=2e-3)
+    # a kelvin of the housing is 1 µm of its seats
+    assert found["nose_axial_um"] == pytest.approx(golden["outputs"]["nose_axial_um"], abs=0.1)
+    assert found["housing_seats_um"] == pytest.approx(golden["outputs"]["housing_seats_um"], abs=0.05)
 
 
 if __name__ == "__main__":

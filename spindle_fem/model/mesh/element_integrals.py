@@ -58,12 +58,16 @@ def evaluate_shape(element: object, places: NDArray[np.float64]) -> tuple[NDArra
     return values, gradients
 
 
+def tetrahedron_element(order: int) -> ElementTetP1 | ElementTetP2:
+    """scikit-fem's tetrahedron of order 1 or 2."""
+    return ElementTetP1() if order == 1 else ElementTetP2()
+
+
 @cache
 def tetrahedron_table(order: int) -> ReferenceTable:
     """Reference tetrahedron of order 1 or 2 at the element quadrature."""
     places, weights = get_quadrature(RefTet, ELEMENT_QUADRATURE_DEGREE)
-    element = ElementTetP1() if order == 1 else ElementTetP2()
-    return ReferenceTable(weights, *evaluate_shape(element, places))
+    return ReferenceTable(weights, *evaluate_shape(tetrahedron_element(order), places))
 
 
 @cache

@@ -1,0 +1,274 @@
+"""Growth of a machine: seats, raceways and nose at any temperatures, fits and ball loads.
+
+Every elastic body is solved once for its outputs. After that a state is a few inner products with the
+temperatures and one small contact problem over all seats.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.model.elastic.elastic_body import Face
+from spindle_fem.model.elastic.growth_outputs import AXIAL, RADIAL, SIDEWAYS, BodyOutputs
+from spindle_fem.model.elastic.machine_bodies import MachineBodies, Seat, machine_bodies
+from spindle_fem.model.elastic.meridian_field import MeridianField
+from spindle_fem.model.elastic.seat_contact import solve_seats
+from spindle_fem.physics.bearings.mounting import ROOM_TEMPERATURE
+
+Array = NDArray[np.float64]
+Side = Literal["shaft", "housing"]
+
+
+@dataclass(frozen=True, slots=True)
+class SeatState:
+    """One ring on its seat, everything from the assembled state.
+
+    Attributes
+    ----------
+    pressure : float, [Pa]
+        Mean over the seat; 0 where a gap is open.
+    gap : float, [m]
+        Radial; 0 where the ring is tight.
+    seat_growth, raceway_growth : float, [m]
+        Radial shift of shaft or housing under the ring, and of the ring's raceway, from the assembled state.
+    """
+
+    pressure: float
+    gap: float
+    seat_growth: float
+    raceway_growth: float
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """Shape of a machine against its assembled state.
+
+    Attributes
+    ----------
+    seats : mapping of (bearing, side) to SeatState
+        Side ``shaft`` or ``housing``.
+    nose_axial : float or None, [m]
+        How far the nose has moved forward from the frame the flange is bolted to; None where the
+        machine has no shaft, no flange or no bearing.
+    nose_radial : (up, across) or None, [m]
+        Shift of the nose's middle, where the housing bends; None without a second set of bearings.
+        Across is to the left of who looks along the axis from the nose, where θ = 90°.
+    nose_tilt : (up, across) or None, [rad]
+        Turn of the axis: its shift for each metre towards the drive end.
+    """
+
+    seats: Mapping[tuple[str, Side], SeatState]
+    nose_axial: float | None
+    nose_radial: tuple[float, float] | None = None
+    nose_tilt: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Ring:
+    """A ring between its seat and its balls: indices of its outputs."""
+
+    seat: Seat
+    outputs: BodyOutputs
+    rows: Array
+
+    @property
+    def areas(self) -> Array:
+        """Areas of seat and raceway, signed: pressure pushes the outside inwards."""
+        outwards = 1.0 if self.seat.is_inner else -1.0
+        return np.array([outwards * self.seat.face.area, -outwards * self.seat.raceway.area])
+
+
+def _flange_back(layout: Layout) -> Face:
+    """The plane behind the flange that is bolted to the frame."""
+    flange = next(s for s in layout.housing.segment if s.name == layout.flange)
+    below = max(s.outer_diameter for s in layout.housing.segment if s is not flange)
+    return Face((max(flange.z),) * 2, (0.5 * below, 0.5 * flange.outer_diameter))
+
+
+class GrowthModel:
+    """Elastic outputs of a machine over the unknowns of its thermal mesh.
+
+    Parameters
+    ----------
+    mesh : TaggedMesh
+        On which temperatures are given.
+    order : int
+        Of the temperature, 1 or 2.
+    bodies : MachineBodies, optional
+        The machine's own by default.
+    """
+
+    def __init__(
+        self, spec: MachineSpec, mesh: TaggedMesh, order: int, bodies: MachineBodies | None = None
+    ) -> None:
+        self.spec = spec
+        self.bodies = machine_bodies(spec) if bodies is None else bodies
+        self._mesh, self._order = mesh, order
+        self._size = mesh.n_corners if order == 1 else len(mesh.points)
+        self.rings = [self._ring(seat) for seat in self.bodies.seats]
+        self.carriers = {
+            name: self._carrier(name) for name in (self.bodies.shaft, self.bodies.housing) if name
+        }
+        self.bending = self._bending()
+        self._fits = {bearing.name: group.fit for group, bearing in spec.bearings}
+        sets = spec.bearing_set
+        self.assembly_temperature = sets[0].assembly_temperature if sets else ROOM_TEMPERATURE
+        self.assembly_forces = {
+            bearing.name: (force, force)
+            for group in sets
+            for bearing in group.bearing
+            for share in [group.preload / sum(b.takes_thrust == bearing.takes_thrust for b in group.bearing)]
+            for force in [share / math.tan(spec.bearing_types[group.bearing_type].contact_angle)]
+        }
+
+    def _rows(self, outputs: BodyOutputs, body: str) -> Array:
+        field = MeridianField(self._mesh, self._order, self.bodies.parts[body], outputs.body.section)
+        return field.rows(outputs.by_temperature())
+
+    def _ring(self, seat: Seat) -> _Ring:
+        faces = {"seat": seat.face, "raceway": seat.raceway}
+        body = self.bodies.bodies[seat.ring]
+        outputs = BodyOutputs.of(body, {key: body.mean_shift(face, RADIAL) for key, face in faces.items()})
+        return _Ring(seat, outputs, self._rows(outputs, seat.ring))
+
+    def _carrier(self, name: str) -> tuple[BodyOutputs, Array]:
+        body = self.bodies.bodies[name]
+        outputs = {
+            seat.ring: body.mean_shift(seat.face, RADIAL)
+            for seat in self.bodies.seats
+            if seat.carrier == name
+        }
+        forward = self._forward(name)
+        if forward is not None:
+            outputs["forward"] = forward
+        solved = BodyOutputs.of(body, outputs)
+        return solved, self._rows(solved, name)
+
+    def _forward(self, name: str) -> Array | None:
+        """How far the shaft carries the nose forward of its bearing, or the housing that of its flange."""
+        layout, body = Layout(self.spec, set()), self.bodies.bodies[name]
+        held = self._holding_seat(name)
+        ends = layout.flange_ends()
+        if held is None or ends is None or not self.bodies.shaft:
+            return None
+        at_bearing = body.mean_shift(held, AXIAL)
+        if name == self.bodies.shaft:
+            first = min(layout.shaft.segment, key=lambda s: s.z[0])
+            radii = (0.5 * first.inner_diameter, 0.5 * first.outer_diameter)
+            return at_bearing - body.mean_shift(Face((first.z[0],) * 2, radii), AXIAL)
+        return body.mean_shift(_flange_back(layout), AXIAL) - at_bearing
+
+    def _bending(self) -> Array:
+        """Rows (4, n_unknowns): nose up, across; tilt up, across. Empty where they cannot be told."""
+        layout, sets = Layout(self.spec, set()), self.spec.bearing_set
+        if len(sets) < 2 or not self.bodies.shaft or layout.flange_ends() is None:
+            return np.zeros((0, self._size))
+        straight = self.bodies.bodies[self.bodies.housing]
+        body = replace(straight, harmonic=1)
+        back = _flange_back(layout)
+        square = 0.5 * (back.r[0] ** 2 + back.r[1] ** 2)
+        mount = body.mean_shift(back, SIDEWAYS)
+        turn = -body.mean_shift(back, (1.0, 0.0, 0.0), lever=True) / square
+        places, shifts = [], []
+        for group in (sets[0], sets[-1]):
+            names = {bearing.name for bearing in group.bearing}
+            own = [s.face for s in self.bodies.seats if s.bearing in names and not s.is_inner]
+            places.append(float(np.mean([face.z for face in own])))
+            centre = np.mean([body.mean_shift(face, SIDEWAYS) for face in own], axis=0)
+            shifts.append(centre - mount - turn * (places[-1] - back.z[0]))
+        tilt = (shifts[1] - shifts[0]) / (places[1] - places[0])
+        nose = min(segment.z[0] for segment in layout.shaft.segment)
+        outputs = BodyOutputs.of(body, {"nose": shifts[0] + tilt * (nose - places[0]), "tilt": tilt})
+        field = MeridianField(self._mesh, self._order, self.bodies.parts[body.name], body.section)
+        up, across = (field.rows(outputs.by_temperature(), around) for around in ("up", "across"))
+        return np.stack((up, across), axis=1).reshape(4, -1)
+
+    def _holding_seat(self, carrier: str) -> Face | None:
+        """Seat of the bearing that holds the shaft in place: the last of the set that carries thrust."""
+        sets = [group for group in self.spec.bearing_set if group.carries_thrust] or self.spec.bearing_set
+        if not sets:
+            return None
+        held = max(sets[0].bearing, key=lambda bearing: bearing.z[1]).name
+        return next((s.face for s in self.bodies.seats if (s.bearing, s.carrier) == (held, carrier)), None)
+
+    # ------------------------------------------------------------------ a state
+    def at(self, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Growth:
+        """Growth at a temperature field (n_unknowns,) [K], a speed [rad/s] and radial ball forces.
+
+        Parameters
+        ----------
+        forces : mapping of str to (inner, outer), [N]
+            Sum of the radial ball loads on both raceways of each bearing.
+        """
+        found: dict[tuple[str, Side], SeatState] = {}
+        for name in self.carriers:
+            now = self._seats(name, temperature, speed, forces)
+            cold = np.full(self._size, self.assembly_temperature)
+            assembled = self._seats(name, cold, 0.0, self.assembly_forces)
+            for ring, (pressure, gap, seat, raceway), before in zip(
+                self._rings_of(name), now.T, assembled.T, strict=True
+            ):
+                side: Side = "shaft" if ring.seat.is_inner else "housing"
+                found[ring.seat.bearing, side] = SeatState(
+                    float(pressure), float(gap), float(seat - before[2]), float(raceway - before[3])
+                )
+        bent = self.bending @ (temperature - self.assembly_temperature)
+        radial, tilt = (tuple(pair) for pair in bent.reshape(2, 2).tolist()) if len(bent) else (None, None)
+        return Growth(found, self._nose(temperature), radial, tilt)
+
+    def _rings_of(self, carrier: str) -> list[_Ring]:
+        return [ring for ring in self.rings if ring.seat.carrier == carrier]
+
+    def _seats(
+        self, carrier: str, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]
+    ) -> Array:
+        """Pressure, gap, seat and raceway shift (4, n) of every ring on a body, from no pressure or load."""
+        outputs, rows = self.carriers[carrier]
+        rings = self._rings_of(carrier)
+        rise = temperature - self.assembly_temperature
+        turning = speed**2 if carrier == self.bodies.shaft else 0.0
+        count = len(rings)
+        areas = np.array([ring.seat.face.area for ring in rings])
+        inwards = -1.0 if carrier == self.bodies.shaft else 1.0
+        seat = (rows @ rise + turning * outputs.by_spin)[:count]
+        by_seats = inwards * outputs.compliance(np.append(areas, np.zeros(len(rows) - count)))[:count, :count]
+        free, by_pressure = [], []
+        for ring in rings:
+            compliance = ring.outputs.compliance(ring.areas)
+            force = forces[ring.seat.bearing][0 if ring.seat.is_inner else 1]
+            load = force / ring.seat.raceway.area
+            free.append(ring.rows @ rise + turning * ring.outputs.by_spin + compliance[:, 1] * load)
+            by_pressure.append(compliance[:, 0])
+        free, by_pressure = np.array(free), np.array(by_pressure)
+        clearance = np.array([self._clearance(ring.seat) for ring in rings])
+        # the seat less the ring around the gap: outwards for the housing, inwards for the shaft
+        opening = inwards * (seat - free[:, 0]) + clearance
+        yielding = inwards * by_seats - np.diag(inwards * by_pressure[:, 0])
+        pressure, gap = solve_seats(opening, yielding, areas)
+        return np.array(
+            [pressure, gap, seat + by_seats @ pressure, free[:, 1] + by_pressure[:, 1] * pressure]
+        )
+
+    def _clearance(self, seat: Seat) -> float:
+        """Radial clearance of a ring on its seat as assembled, m; a set without a fit just touches."""
+        fit = self._fits[seat.bearing]
+        if fit is None:
+            return 0.0
+        return 0.5 * (-fit.inner_interference if seat.is_inner else fit.outer_clearance)
+
+    def _nose(self, temperature: Array) -> float | None:
+        if any("forward" not in outputs.names for outputs, _ in self.carriers.values()):
+            return None
+        rise = temperature - self.assembly_temperature
+        return float(
+            sum(rows[outputs.names.index("forward")] @ rise for outputs, rows in self.carriers.values())
+        )

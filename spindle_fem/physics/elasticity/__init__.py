@@ -1,0 +1,1 @@
+"""Elastic constants of solids and of walls that a channel has weakened."""
