@@ -29,7 +29,7 @@ from spindle_fem.model.mesh.element_integrals import evaluate_shape, tetrahedron
 Array = NDArray[np.float64]
 # Points of an element; round the axis there are many elements to a cell.
 POINT_DEGREE = 2
-# Weight of the kinks against the misfit: growth changes by less than 2 % from 1 to 10 and from 4 mm to 2 mm cells.
+# Weight of the kinks against the misfit: from 1 to 10 growth changes by less than 2 %.
 DAMPING = 10.0
 Around = Literal["even", "up", "across"]
 
