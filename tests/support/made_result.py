@@ -72,6 +72,7 @@ def make_result(machine: str = "wu_tan_2016", **changes) -> ThermalResult:
     total = 100.0 * len(bearings)
     values = {
         "spec": spec,
+        "speed": 314.159,
         "mesh": mesh,
         "order": 2,
         "n_unknowns": len(mesh.points),
