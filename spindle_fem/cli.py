@@ -363,6 +363,55 @@ def plan(
 
 
 @app.command()
+def watch(
+    machine: Machine,
+    recording: Annotated[
+        Path,
+        typer.Argument(help='Folder or .toml file of a recording that grows; data = "-": standard input.'),
+    ],
+    calibrate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--calibrate",
+            metavar="FILE",
+            help="Recording of the same machine with nothing missing; repeatable.",
+        ),
+    ] = None,
+    warm_up: Annotated[
+        str | None,
+        typer.Option("--warm-up", metavar="TIME", help="Beginning of the recording that is taken as sound."),
+    ] = None,
+    false_alarms: Annotated[
+        str, typer.Option("--false-alarms", metavar="RATE", help='Stated rate: "1/month", "1/week".')
+    ] = "1/month",
+    heartbeat: Annotated[
+        str | None,
+        typer.Option(
+            "--heartbeat", metavar="TIME", help="A line at least so often, by the recording's clock."
+        ),
+    ] = None,
+    until_end: Annotated[
+        bool, typer.Option("--until-end", help="Stop at the end of what is there, instead of waiting.")
+    ] = False,
+    set_: Overrides = None,
+) -> None:
+    """Follow a recording that grows; one JSON object a line when its readings leave the model."""
+    from spindle_fem.commands.watch_command import watch as watch_machine
+
+    for line in watch_machine(
+        machine,
+        recording,
+        calibrate=calibrate or (),
+        overrides=set_ or (),
+        warm_up=warm_up,
+        false_alarms=false_alarms,
+        heartbeat=heartbeat,
+        until_end=until_end,
+    ):
+        typer.echo(json.dumps(line, ensure_ascii=False))
+
+
+@app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier command.")],
 ) -> None:

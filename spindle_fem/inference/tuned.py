@@ -168,3 +168,8 @@ SEPARATES, MOSTLY = 0.9, 0.6
 STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 10.0, 0.1, 2.0
 # Factor on the coupling's tolerance where a run's balance asks for less.
 FINER_COUPLING = 0.25
+
+# ------------------------------------------------------ watch (python -m validation.watch_delay)
+# Time over which what readings taught of the machine's coordinates is forgotten again, s: errors of structure
+# that come and go with the operating conditions must not make a parameter seem known to any precision.
+FORGETTING_TIME = 86400.0

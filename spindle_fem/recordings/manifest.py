@@ -16,6 +16,7 @@ from spindle_fem.units import registry
 
 RECORDING_SCHEMA = "spindle-fem/recording/1"
 DATA_SUFFIXES = (".csv", ".csv.gz", ".parquet")
+STANDARD_INPUT = "-"
 
 # What the machines with geometry know; a network machine may name other boundaries and sources.
 DRIVES_UNITS = {
@@ -139,8 +140,14 @@ def find_manifest(path: str | Path) -> Path:
     return path
 
 
-def load_manifest(path: str | Path) -> tuple[Manifest, Path]:
+def load_manifest(path: str | Path, *, growing: bool = False) -> tuple[Manifest, Path]:
     """Read and check a manifest.
+
+    Parameters
+    ----------
+    growing : bool
+        Whether its data are followed while they are written: the file may be missing yet, and ``-`` stands
+        for standard input.
 
     Returns
     -------
@@ -167,13 +174,15 @@ def load_manifest(path: str | Path) -> tuple[Manifest, Path]:
         raise FaultsError(source, validation_faults(error, source, Manifest)) from error
     faults = manifest_faults(manifest)
     data = file.parent / manifest.data
-    if not manifest.data.endswith(DATA_SUFFIXES):
+    if growing and manifest.data == STANDARD_INPUT:
+        data = Path(STANDARD_INPUT)
+    elif not manifest.data.endswith(DATA_SUFFIXES):
         faults.append(
             SpecError(
                 "data", f'"{manifest.data}" is of unknown kind.', f"Allowed: {', '.join(DATA_SUFFIXES)}."
             )
         )
-    elif not data.is_file():
+    elif not data.is_file() and not growing:
         faults.append(RecordingError("data", f'"{manifest.data}" does not exist beside the manifest.'))
     if faults:
         located = [type(f)(f"{source}: {f.where}", f.what, f.how_to_fix) for f in faults]

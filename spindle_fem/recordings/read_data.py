@@ -99,12 +99,14 @@ def read_table(data: Path, manifest: Manifest) -> RawTable:
     )
 
 
-def _required(manifest: Manifest) -> list[str]:
+def required_columns(manifest: Manifest) -> list[str]:
+    """Columns that a manifest names."""
     return [manifest.time.column, *(channel.column for channel in manifest.channel)]
 
 
-def _require_columns(data: Path, manifest: Manifest, present: list[str]) -> None:
-    missing = [name for name in _required(manifest) if name not in present]
+def require_columns(data: Path, manifest: Manifest, present: list[str]) -> None:
+    """Refuse a header without a column that the manifest names, or with one of them twice."""
+    missing = [name for name in required_columns(manifest) if name not in present]
     if missing:
         listing = ", ".join(f'"{name}"' for name in missing)
         raise RecordingError(
@@ -112,7 +114,7 @@ def _require_columns(data: Path, manifest: Manifest, present: list[str]) -> None
             f"has no column {listing}.",
             did_you_mean(missing[0], present),
         )
-    twice = [name for name in _required(manifest) if present.count(name) > 1]
+    twice = [name for name in required_columns(manifest) if present.count(name) > 1]
     if twice:
         raise RecordingError(f"{data}: line 1", f'names the column "{twice[0]}" twice.')
 
@@ -124,19 +126,17 @@ def _read_parquet(data: Path, manifest: Manifest) -> pd.DataFrame:
         raise RecordingError(str(data), f"is not a readable parquet file ({error}).") from error
     if manifest.time.column not in frame.columns and frame.index.name == manifest.time.column:
         frame = frame.reset_index()
-    _require_columns(data, manifest, [str(name) for name in frame.columns])
+    require_columns(data, manifest, [str(name) for name in frame.columns])
     return frame
 
 
 def _read_csv(data: Path, manifest: Manifest) -> tuple[pd.DataFrame, list[str], int, int, bool]:
     content = _bytes(data)
-    header = content.partition(b"\n")[0].decode("utf-8").strip("\r")
-    separator = max(SEPARATORS, key=header.count)
-    names = [name.strip().strip('"') for name in header.split(separator)]
-    _require_columns(data, manifest, names)
+    names, separator = names_of_header(content.partition(b"\n")[0].decode("utf-8").strip("\r"))
+    require_columns(data, manifest, names)
     content, blank, short, truncated = _check_lines(data, content, separator, len(names))
     decimal = "," if separator != "," and _has_decimal_comma(content) else "."
-    used = set(_required(manifest))
+    used = set(required_columns(manifest))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
@@ -155,6 +155,16 @@ def _read_csv(data: Path, manifest: Manifest) -> tuple[pd.DataFrame, list[str], 
     except (pd.errors.ParserError, pd.errors.ParserWarning, pd.errors.EmptyDataError, ValueError) as error:
         raise RecordingError(str(data), f"is not a readable table ({error}).") from error
     return frame, names, blank, short, truncated
+
+
+def names_of_header(header: str) -> tuple[list[str], str]:
+    """Columns that a first line names, and what separates its cells.
+
+    >>> names_of_header('time;"SP01"')
+    (['time', 'SP01'], ';')
+    """
+    separator = max(SEPARATORS, key=header.count)
+    return [name.strip().strip('"') for name in header.split(separator)], separator
 
 
 def _bytes(data: Path) -> bytes:

@@ -1,0 +1,131 @@
+"""A machine's fast model followed from piece to piece of a recording: each begins where the last one ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import SpecError
+from spindle_fem.inference.coordinate_names import NO_VALUES
+from spindle_fem.inference.drive_steps import coarse_drive
+from spindle_fem.inference.observations import Observation, observe
+from spindle_fem.inference.prediction import Prediction
+from spindle_fem.inference.predictor import STEP, Predictor
+from spindle_fem.model.reduced.defined_effects import ActiveEffects
+from spindle_fem.model.reduced.drive import Drive
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.run_start import Start
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+
+def require_no_memory(effects: ActiveEffects) -> None:
+    """Refuse effects whose own memory would be lost between two pieces.
+
+    Raises
+    ------
+    SpecError
+    """
+    for candidate in effects.candidates:
+        if candidate.reading is not None or any(term.n_states for term in candidate.terms):
+            raise SpecError(
+                f"effect {candidate.label}",
+                "remembers what was before, which is not followed from piece to piece.",
+                "Leave it out of the machine to be watched.",
+            )
+
+
+class _Piece(Predictor):
+    """A machine on a piece of a recording that begins in a given state, or as a recording does."""
+
+    def __init__(
+        self,
+        fast: FastModel,
+        piece: Recording,
+        effects: ActiveEffects,
+        begun: tuple[Array, Mapping[str, Array]] | None,
+    ) -> None:
+        self._begun = begun
+        super().__init__(fast, [piece], effects=effects, drives=[_drive_of(fast, piece)])
+
+    def start(
+        self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
+    ) -> float | Start:
+        """Where the piece before ended."""
+        if self._begun is None:
+            return super().start(number, values, derivatives)
+        state, tangents = self._begun
+        by = {
+            own: tangents[name][None] for name in tangents if (own := self._run_name(0, name, ())) is not None
+        }
+        return Start(np.zeros(1, dtype=np.int64), state[None], by)
+
+
+def _drive_of(fast: FastModel, piece: Recording) -> Drive:
+    """Inputs on steps that end with the piece: of a minute with geometry, from row to row of a network."""
+    if fast.network is None:
+        drive = coarse_drive(fast.spec, piece, STEP)
+    else:
+        drive = fast.inputs.drive(piece, largest_step=np.inf)
+    return replace(drive, times=drive.grid)
+
+
+class ContinuedRun:
+    """The state of a machine over time and its derivatives to named coordinates.
+
+    Parameters
+    ----------
+    effects : ActiveEffects
+        What the definition switches on, none with a memory.
+    """
+
+    def __init__(self, fast: FastModel, effects: ActiveEffects) -> None:
+        require_no_memory(effects)
+        self.fast, self.effects = fast, effects
+        self.begun: tuple[Array, Mapping[str, Array]] | None = None
+
+    def begins(self, piece: Recording) -> Predictor:
+        """The machine where a recording begins with this piece."""
+        return _Piece(self.fast, piece, self.effects, None)
+
+    def follow(
+        self, piece: Recording, values: Mapping[str, float], names: Sequence[str], width: float
+    ) -> tuple[Prediction, tuple[Observation, ...]]:
+        """Follow a further piece, whose first row is the last one of the piece before.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Of the coordinates.
+        names : sequence of str
+            Coordinates to differentiate by.
+        width : float, [s]
+            Over which readings are averaged.
+
+        Returns
+        -------
+        Prediction
+        tuple of Observation
+            Averages of the readings after the first row.
+        """
+        predictor = _Piece(self.fast, piece, self.effects, self.begun)
+        told = predictor.predict(0, values, (), names)
+        slopes = np.zeros((told.states.shape[1], len(names)))
+        inside = told.columns >= 0
+        if told.tangents is not None:
+            slopes[:, inside] = told.tangents[-1][:, told.columns[inside]]
+        self.begun = told.states[-1], dict(zip(names, slopes.T, strict=True))
+        fresh = np.ones(piece.times.size, dtype=bool)
+        fresh[0] = False
+        return told, observe([piece], [fresh], [predictor.drives[0].grid], [width])
+
+    def move(self, changes: Mapping[str, float]) -> None:
+        """Move the state to first order with changes of the coordinates, as derivatives are taken."""
+        state, tangents = self.begun
+        for name, change in changes.items():
+            state = state + change * tangents[name]
+        self.begun = state, tangents

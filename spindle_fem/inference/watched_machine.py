@@ -1,0 +1,295 @@
+"""A machine followed while it is recorded: expectation, evidence against it, and what is learned on the way."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.continued_run import ContinuedRun
+from spindle_fem.inference.coordinate_names import OF_ONE_RECORDING, START_PREFIX
+from spindle_fem.inference.cumulative_sums import CumulativeSums
+from spindle_fem.inference.hypothesis_fit import Belief, Coordinate
+from spindle_fem.inference.innovations import InnovationFilter
+from spindle_fem.inference.missing_heat import conditions_of
+from spindle_fem.inference.observations import Observation
+from spindle_fem.inference.prediction import Prediction
+from spindle_fem.inference.prepared_problem import Calibrated, start_coordinates
+from spindle_fem.recordings.align import LONG_GAP_SECONDS, LONG_GAP_STEPS, Recording
+from spindle_fem.recordings.recording_window import piece_of
+
+Array = NDArray[np.float64]
+
+AS_MODELLED, LEAVING, LEFT = "as modelled", "leaving", "left"
+# Mean length of a month, s.
+MONTH = 365.25 / 12.0 * 86400.0
+# "leaving" may be said by chance this many times as often as "left".
+SOONER = 10.0
+# A slow error this many times its usual size keeps a channel from being as modelled again.
+STILL_OUT = 3.0
+# Instants of one piece: the model is linearised anew after each.
+PIECE_INSTANTS = 60
+# Instants by which heating and cooling are told apart.
+REMEMBERED = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What holds at one instant.
+
+    Attributes
+    ----------
+    time : float, [s]
+        Since the first row.
+    state : str
+        ``as modelled``, ``leaving`` or ``left``.
+    channel : str or None
+        With the most evidence; None while as modelled.
+    departure : float or None, [K]
+        Slow error of the channel: by how much it reads too high.
+    evidence : float
+        Largest sum over the level of an alarm.
+    """
+
+    time: float
+    state: str
+    channel: str | None
+    condition: str
+    departure: float | None
+    evidence: float
+
+
+class WatchedMachine:
+    """The state of a machine, its coordinates and the evidence that readings leave it.
+
+    Parameters
+    ----------
+    known : Calibrated
+        What is known of the machine; only its own coordinates and temperatures at the start count.
+    white : (c,) ndarray, [K]
+        Noise of a single reading of each channel, rounding included.
+    width : float, [s]
+        Readings are averaged over it.
+    alarms : float
+        False alarms a month.
+
+    Attributes
+    ----------
+    used : float, [s]
+        Rows up to here were followed.
+    """
+
+    def __init__(
+        self, run: ContinuedRun, known: Calibrated, white: Array, *, width: float, alarms: float
+    ) -> None:
+        self.run, self.slow, self.white, self.width = run, known.slow, white, width
+        self.used = -np.inf
+        self.coordinates, self._usual, self._prior = _own_part(known.belief)
+        self.position, self._covariance = self._usual.copy(), self._prior.copy()
+        self.sums = CumulativeSums(len(white), MONTH / width / alarms, SOONER)
+        self.state, self._filter = AS_MODELLED, None
+        self._channels: tuple[str, ...] = ()
+        self._past: deque[tuple[float, float, float]] = deque(maxlen=REMEMBERED)
+        self._time: float | None = None
+
+    # ------------------------------------------------------------------ coordinates
+    @property
+    def _values(self) -> dict[str, float]:
+        return {c.name: c.at(u) for c, u in zip(self.coordinates, self.position, strict=True)}
+
+    def _begin(self, piece: Recording) -> None:
+        """Begin with a piece, at the start or after a long gap: temperatures are found from its readings."""
+        own = sum(not c.name.startswith(START_PREFIX) for c in self.coordinates)
+        starts = tuple(
+            c for c in start_coordinates(self.run.begins(piece)) if c.name.startswith(START_PREFIX)
+        )
+        size = own + len(starts)
+        covariance = np.eye(size)
+        covariance[:own, :own] = self._covariance[:own, :own]
+        self.coordinates = (*self.coordinates[:own], *starts)
+        self.position = np.append(self.position[:own], np.zeros(len(starts)))
+        self.run.begun = None
+        self._filter = InnovationFilter(covariance, self.slow, len(self.white))
+
+    # ------------------------------------------------------------------ following
+    def pass_over(self, piece: Recording) -> None:
+        """Follow rows from the beginning without judging them: what is known was learned from them.
+
+        A network begins again from its readings after them.
+        """
+        self.used = float(piece.times[-1])
+        self._begin(piece)
+        self.run.follow(piece, self._values, [c.name for c in self.coordinates], self.width)
+
+    def follow(self, recording: Recording, *, to_end: bool = False) -> list[Told]:
+        """Follow the rows of a recording that are new, as far as whole averages go.
+
+        Parameters
+        ----------
+        recording : Recording
+            Rows around those that are new; the last one used must be among them.
+        to_end : bool
+            Whether nothing follows these rows.
+
+        Returns
+        -------
+        list of Told
+            One an instant.
+        """
+        found: list[Told] = []
+        times = recording.times
+        if not np.isfinite(self.used):
+            self.used = float(times[0])
+            self._begin(piece_of(recording, 0, times.size))
+        gap = long_gap(times) if self.run.fast.network is not None else np.inf
+        while True:
+            begin = int(np.searchsorted(times, self.used - 1e-6))
+            left = float(times[-1] - self.used)
+            whole = int(np.floor(left / self.width + 1e-6))
+            if begin + 1 >= times.size or (whole == 0 and not to_end):
+                return found
+            if times[begin + 1] - times[begin] > gap:
+                self.used = float(times[begin + 1])
+                if begin + 2 >= times.size:
+                    return found
+                self._begin(piece_of(recording, begin + 1, times.size))
+                continue
+            until = self.used + min(max(whole, 1), PIECE_INSTANTS) * self.width
+            stop = max(int(np.searchsorted(times, until + 1e-6)), begin + 2)
+            wide = np.flatnonzero(np.diff(times[begin:stop]) > gap)
+            if wide.size:
+                stop = begin + 1 + int(wide[0])
+            found += self._piece(piece_of(recording, begin, stop))
+            self.used = float(times[stop - 1])
+
+    def _piece(self, piece: Recording) -> list[Told]:
+        names = [c.name for c in self.coordinates]
+        told, observations = self.run.follow(piece, self._values, names, self.width)
+        sigma = np.array([c.sigma for c in self.coordinates])
+        instants = _Instants.of(piece, observations, told, sigma, self.width)
+        self._channels = piece.temperature_names
+        speed = _running(piece, self.run, instants.times)
+        found = []
+        for index, time in enumerate(instants.times.tolist()):
+            elapsed = time - (float(piece.times[0]) if self._time is None else self._time)
+            self._time = time
+            numbers = self._filter.step(
+                elapsed,
+                instants.residual[index],
+                instants.slopes[index],
+                self.white / np.sqrt(instants.number[index]),
+                learn=self.state != LEFT,
+            )
+            self.sums.add(numbers)
+            self._past.append((time, float(speed[index]), float(instants.expected[index])))
+            found.append(self._judge(time))
+        self._recentre(float(piece.times[-1] - piece.times[0]))
+        return found
+
+    def _judge(self, time: float) -> Told:
+        evidence, out = self.sums.evidence, np.abs(self._filter.slow_errors) > STILL_OUT * self.slow.sigma
+        if evidence.max() >= 1.0:
+            self.state = LEFT
+        elif self.state == LEFT:
+            self.state = LEFT if np.any(self.sums.rising | out) else AS_MODELLED
+        else:
+            self.state = LEAVING if self.sums.rising.any() else AS_MODELLED
+        worst = int(np.argmax(evidence))
+        away = self.state != AS_MODELLED
+        return Told(
+            time,
+            self.state,
+            self._channels[worst] if away else None,
+            conditions_of(*np.array(self._past).T)[-1],
+            float(self._filter.slow_errors[worst]) if away else None,
+            float(evidence[worst]),
+        )
+
+    def _recentre(self, elapsed: float) -> None:
+        """Count coordinates from where they are now, and forget a little of what was learned."""
+        own = len(self._usual)
+        kept = np.exp(-elapsed / tuned.FORGETTING_TIME)
+        before = self.position
+        after = before + self._filter.moved()
+        after[:own] = self._usual + kept * (after[:own] - self._usual)
+        lowest, highest = (np.array([getattr(c, end) for c in self.coordinates]) for end in ("low", "high"))
+        self.position = np.clip(after, lowest, highest)
+        moves = (self.position - before) * np.array([c.sigma for c in self.coordinates])
+        self.run.move({c.name: move for c, move in zip(self.coordinates, moves.tolist(), strict=True)})
+        covariance = self._filter.covariance
+        covariance[:own] *= kept
+        covariance[:, :own] *= kept
+        covariance[:own, :own] += (1.0 - kept**2) * self._prior
+        self._covariance = covariance[: len(self.position), : len(self.position)]
+
+
+def _own_part(belief: Belief) -> tuple[tuple[Coordinate, ...], Array, Array]:
+    """The machine's own coordinates, their means and covariance."""
+    chosen = [i for i, c in enumerate(belief.coordinates) if not c.name.startswith(OF_ONE_RECORDING)]
+    covariance = np.linalg.inv(belief.root.T @ belief.root)[np.ix_(chosen, chosen)]
+    return tuple(belief.coordinates[i] for i in chosen), belief.mean[chosen], covariance
+
+
+def long_gap(times: Array) -> float:
+    """Distance of rows, s, beyond which a network begins again from its readings."""
+    return max(LONG_GAP_SECONDS, LONG_GAP_STEPS * float(np.median(np.diff(times))))
+
+
+@dataclass(frozen=True, slots=True)
+class _Instants:
+    """Averages of a piece, one row an instant.
+
+    Attributes
+    ----------
+    times : (k,) ndarray, [s]
+    residual : (k, c) ndarray, [K]
+        Read less predicted; NaN where nothing was read.
+    slopes : (k, c, p) ndarray, [K]
+        Derivatives of the prediction to the coordinates.
+    number : (k, c) ndarray
+        Readings in each average.
+    expected : (k,) ndarray, [K]
+        Predicted mean of the channels.
+    """
+
+    times: Array
+    residual: Array
+    slopes: Array
+    number: Array
+    expected: Array
+
+    @classmethod
+    def of(
+        cls,
+        piece: Recording,
+        observations: Sequence[Observation],
+        told: Prediction,
+        sigma: Array,
+        width: float,
+    ) -> _Instants:
+        """Averages by instant; ``sigma`` are the units of the coordinates."""
+        first, channels = float(piece.times[0]), piece.temperature.shape[1]
+        owners = [np.floor((item.bins.times - first) / width + 1e-9).astype(int) for item in observations]
+        known = np.unique(np.concatenate([np.zeros(0, dtype=int), *owners]))
+        residual = np.full((known.size, channels), np.nan)
+        number, times = np.ones_like(residual), np.full_like(residual, np.nan)
+        slopes, expected = np.zeros((*residual.shape, sigma.size)), np.full_like(residual, np.nan)
+        for item, owner in zip(observations, owners, strict=True):
+            rows, channel = np.searchsorted(known, owner), item.channel
+            expected[rows, channel] = item.at(told.temperature[:, channel])
+            residual[rows, channel] = item.values - expected[rows, channel]
+            slopes[rows, channel] = item.at(told.sensitivity[:, channel]) * sigma
+            number[rows, channel], times[rows, channel] = item.bins.number, item.bins.times
+        return cls(np.nanmean(times, axis=1), residual, slopes, number, np.nanmean(expected, axis=1))
+
+
+def _running(piece: Recording, run: ContinuedRun, times: Array) -> Array:
+    """Something that is zero at standstill: speed, or what a network's sources follow; 1 where neither is read."""
+    network = run.fast.network
+    wanted = {"speed"} if network is None else {"speed", *network.source_input}
+    read = [np.abs(piece.input_at(name, times)) for name in piece.input_names if name in wanted]
+    return np.sum(read, axis=0) if read else np.ones_like(times)

@@ -1,0 +1,235 @@
+"""The watch: whole lines of a growing file, rows of a window, stated false alarms, and a machine that leaves."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.errors import RecordingError
+from spindle_fem.inference.cumulative_sums import CumulativeSums, level_for, run_length
+from spindle_fem.inference.innovations import InnovationFilter
+from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.recordings.growing_file import follow_lines
+from spindle_fem.recordings.manifest import load_manifest
+from spindle_fem.recordings.recording_window import RecordingWindow
+from spindle_fem.studies.watch import Watching, watch_recording
+from tests.conftest import write_recording
+
+MACHINE = """
+schema = "spindle-fem/machine/1"
+name = "block"
+[[network.node]]
+name = "block"
+capacity = {value = "2000 J/K", sigma_rel = 0.2}
+[[network.boundary]]
+name = "ambient"
+temperature = "ambient"
+[[network.link]]
+between = ["block", "ambient"]
+conductance = {value = "2 W/K", sigma_rel = 0.2}
+[[network.source]]
+node = "block"
+input = "power"
+gain = {value = "1 W/W", sigma_rel = 0.1}
+"""
+TEMPERATURES, INPUTS = {"block": "block"}, {"power": "power", "room": "ambient"}
+
+
+def heated(hours, *, cooled_from=np.inf, seed=0):
+    """A block heated on and off; from some hour on it loses twice as much."""
+    times = np.arange(0.0, 3600.0 * hours, 30.0)
+    power = np.where(np.sin(times / 2500.0) > 0.0, 60.0, 0.0)
+    temperature, now = [], 20.0
+    for time, heat in zip(times, power, strict=True):
+        temperature.append(now)
+        loss = 2.0 * (2.0 if time >= 3600.0 * cooled_from else 1.0)
+        now += 30.0 / 2000.0 * (heat - loss * (now - 20.0))
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(times.size)
+    return pd.DataFrame({"time": times, "block": temperature + noise, "power": power, "room": 20.0})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A machine, a sound recording of it, and one that leaves after five hours."""
+    place = tmp_path_factory.mktemp("watched")
+    (place / "machine.toml").write_text(MACHINE)
+    write_recording(place / "sound", heated(6.0), TEMPERATURES, INPUTS)
+    write_recording(place / "leaves", heated(8.0, cooled_from=5.0, seed=1), TEMPERATURES, INPUTS)
+    return place
+
+
+# ------------------------------------------------------------------------------------ statistics
+@pytest.mark.parametrize("reference", [0.125, 0.35, 1.0])
+def test_sums_alarm_as_often_by_chance_as_their_level_says(reference):
+    length, number = 400.0, 1500
+    level = level_for(length, reference)
+    generator = np.random.default_rng(3)
+    sums, run, alive = np.zeros(number), np.zeros(number), np.ones(number, dtype=bool)
+    for _ in range(20 * int(length)):
+        sums = np.maximum(0.0, sums + generator.standard_normal(number) - reference)
+        run += alive
+        alive &= sums < level
+        if not alive.any():
+            break
+    assert run.mean() == pytest.approx(length, rel=0.1)
+
+
+def test_a_run_length_of_a_table():
+    # Montgomery (2013), table 9.3 for one side: twice the two-sided 168 and 465.
+    assert run_length(4.0, 0.5) == pytest.approx(336.0, rel=0.01)
+    assert run_length(5.0, 0.5) == pytest.approx(930.0, rel=0.01)
+
+
+def test_all_channels_together_keep_the_stated_rate():
+    between, runs, last = 100.0, [], 0
+    sums, generator = CumulativeSums(3, between, 10.0), np.random.default_rng(5)
+    for instant in range(15_000):
+        sums.add(generator.standard_normal(3))
+        if sums.evidence.max() >= 1.0:
+            runs.append(instant - last)
+            last = instant
+            sums.sums[:] = 0.0
+    # Sums of one channel find the same chance departures: fewer alarms than stated, never more.
+    assert between < np.mean(runs) < 4.0 * between
+
+
+def test_a_lasting_departure_is_found_and_left_again():
+    sums, generator = CumulativeSums(2, 43_200.0, 10.0), np.random.default_rng(6)
+    for _ in range(40):
+        sums.add(generator.standard_normal(2) + np.array([1.5, np.nan]))
+    assert sums.evidence.tolist() == [1.0, 0.0]
+    for _ in range(120):
+        sums.add(generator.standard_normal(2))
+    assert not sums.rising.any()
+
+
+def test_innovations_are_white_and_of_unit_spread():
+    generator, slow, white = np.random.default_rng(7), SlowError(0.1, 1000.0), np.full(2, 0.05)
+    count, apart = 4000, 60.0
+    filtered = InnovationFilter(np.array([[1.0]]), slow, 2)
+    slopes = np.array([[0.3], [-0.2]])
+    errors, kept, unknown = np.zeros(2), np.exp(-apart / slow.time), generator.standard_normal()
+    found = []
+    for instant in range(count):
+        errors = kept * errors + slow.sigma * np.sqrt(1.0 - kept**2) * generator.standard_normal(2)
+        away = (
+            slopes[:, 0] * np.sin(instant / 300.0) * unknown + errors + white * generator.standard_normal(2)
+        )
+        found.append(filtered.step(apart, away, slopes * np.sin(instant / 300.0), white, learn=True))
+    numbers = np.array(found)[50:]
+    assert np.std(numbers, axis=0) == pytest.approx([1.0, 1.0], abs=0.04)
+    assert np.abs(np.mean(numbers[1:] * numbers[:-1], axis=0)).max() < 0.04
+    assert filtered.mean[0] == pytest.approx(unknown, abs=4.0 * np.sqrt(filtered.covariance[0, 0]))
+
+
+# ----------------------------------------------------------------------------------------- file
+def test_a_growing_file_gives_whole_lines_through_truncation_and_rotation(tmp_path):
+    data, told = tmp_path / "made.csv", []
+    lines = follow_lines(data, to_end=False, poll=0.0, tell=told.append)
+    assert next(lines) == []
+    data.write_bytes(b"time,a\n1,2\n3,")
+    assert next(lines) == [b"time,a", b"1,2"]
+    assert next(lines) == []
+    with data.open("ab") as stream:
+        stream.write(b"4\n")
+    assert next(lines) == [b"3,4"]
+    assert next(lines) == []
+    data.write_bytes(b"time,a\n5,6\n")
+    assert next(lines) == []
+    assert next(lines) == [b"time,a", b"5,6"]
+    assert next(lines) == []
+    os.replace(data, tmp_path / "old.csv")
+    data.write_bytes(b"time,a\n7,8\n")
+    assert next(lines) == []
+    assert next(lines) == [b"time,a", b"7,8"]
+    assert [text.rpartition(": ")[2].partition(";")[0] for text in told] == [
+        "waiting for it",
+        "cut short",
+        "replaced",
+    ]
+
+
+def test_a_window_keeps_the_last_rows_and_leaves_out_what_is_no_row(folder):
+    manifest, data = load_manifest(folder / "sound")
+    told = []
+    window = RecordingWindow(manifest, data, told.append)
+    lines = data.read_bytes().split(b"\n")
+    window.add(lines[:500])
+    window.use(float(window.waiting[-1]))
+    window.add([b"nonsense,1,2,3", b"0,1,2,3", *lines[500:502], lines[0], b""])
+    assert (window.unreadable, window.late, window.waiting.size, len(told)) == (1, 1, 2, 2)
+    recording = window.recording()
+    assert recording.times.size == 302
+    assert recording.times[-1] == 30.0 * 500
+
+
+def test_a_window_begins_with_the_last_reading_of_an_input(folder):
+    manifest, data = load_manifest(folder / "sound")
+    window = RecordingWindow(manifest, data, lambda text: None)
+    window.add([b"time,block,power,room", b"0,20,60,20", *(b"%d,20,,20" % (30 * k) for k in range(1, 700))])
+    window.use(30.0 * 699)
+    window.add([b"%d,20,,20" % (30 * 700)])
+    assert np.all(window.recording().input_at("power", window.recording().times) == 60.0)
+
+
+# -------------------------------------------------------------------------------------- machine
+def test_a_sound_machine_stays_and_a_changed_one_leaves(folder):
+    how = Watching(calibrate=(folder / "sound",), until_end=True)
+    told = list(watch_recording(folder / "machine.toml", folder / "leaves", how))
+    assert [line["state"] for line in told if line["time"] < 5.0 * 3600.0] == ["as modelled"]
+    left = next(line for line in told if line["state"] == "left")
+    assert left["channel"] == "block"
+    assert left["time"] < 5.7 * 3600.0
+    assert left["departure_K"] < 0.0
+    assert left["condition"] in ("standstill", "heating", "cooling", "steady running")
+
+
+def test_rows_that_come_one_by_one_say_what_the_whole_file_says(folder):
+    how = Watching(warm_up=3.0 * 3600.0, heartbeat=600.0, until_end=True)
+    whole = list(watch_recording(folder / "machine.toml", folder / "leaves", how))
+    text = (folder / "leaves" / "made.csv").read_bytes()
+    manifest = (folder / "leaves" / "recording.toml").read_text().replace('"made.csv"', '"-"')
+    (folder / "piped.toml").write_text(manifest)
+    command = [sys.executable, "-m", "spindle_fem", "watch", "machine.toml", "piped.toml"]
+    command += ["--warm-up", "3 h", "--heartbeat", "600 s"]
+    with subprocess.Popen(command, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        for begin in range(0, len(text), 4099):
+            process.stdin.write(text[begin : begin + 4099])
+        found = [json.loads(line) for line in process.communicate()[0].splitlines()]
+    assert process.returncode == 0
+    first, second = (
+        next(line["time"] for line in lines if line["state"] == "left") for lines in (whole, found)
+    )
+    assert abs(first - second) < 300.0
+    assert abs(len(whole) - len(found)) < 6
+
+
+@pytest.mark.parametrize(
+    "options, said",
+    [
+        ((), "whose noise is not known"),
+        (("--warm-up", "9 h"), "Too few"),
+        (("--warm-up", "0 h"), "above 0"),
+        (("--warm-up", "3 h", "--false-alarms", "never"), "1/month"),
+        (("--warm-up", "3 h", "--calibrate", "sound"), "Give one of them"),
+    ],
+)
+def test_bad_input_is_refused(folder, options, said):
+    from typer.testing import CliRunner
+
+    from spindle_fem.cli import app
+
+    asked = ["watch", str(folder / "machine.toml"), str(folder / "leaves"), "--until-end", *options]
+    asked = [str(folder / "sound") if item == "sound" else item for item in asked]
+    error = CliRunner().invoke(app, asked).exception
+    assert error.exit_status == 2
+    assert said in str(error)
+
+
+def test_a_compressed_file_does_not_grow(tmp_path):
+    with pytest.raises(RecordingError, match="cannot grow"):
+        next(follow_lines(tmp_path / "made.csv.gz", to_end=False, poll=0.0, tell=print))
