@@ -1,4 +1,4 @@
-"""A machine's fast model followed from piece to piece of a recording: each begins where the last one ended."""
+"""A fast model followed from piece to piece of a recording: each begins where the last one ended."""
 
 from __future__ import annotations
 

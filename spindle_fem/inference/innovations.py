@@ -1,4 +1,4 @@
-"""What readings say beyond those before them: a Kalman filter over a machine's uncertain parameters and slow errors.
+"""What readings say beyond those before them: a Kalman filter over parameters and slow errors.
 
 Unknown are the machine's coordinates (in units of their priors) and one slow error a channel. A reading is
 the prediction, plus its derivatives times the departure of the coordinates, plus the slow error, plus white

@@ -1,4 +1,4 @@
-"""A machine followed while it is recorded: expectation, evidence against it, and what is learned on the way."""
+"""A machine followed while it is recorded: expectation, evidence against it, what is learned."""
 
 from __future__ import annotations
 
@@ -288,7 +288,7 @@ class _Instants:
 
 
 def _running(piece: Recording, run: ContinuedRun, times: Array) -> Array:
-    """Something that is zero at standstill: speed, or what a network's sources follow; 1 where neither is read."""
+    """Zero at standstill: speed, or what a network's sources follow; 1 where neither is read."""
     network = run.fast.network
     wanted = {"speed"} if network is None else {"speed", *network.source_input}
     read = [np.abs(piece.input_at(name, times)) for name in piece.input_names if name in wanted]

@@ -20,10 +20,10 @@ Tell = Callable[[str], None]
 
 
 class LineSplitter:
-    """Whole lines of a stream of bytes; what follows the last line end waits for its own.
+    r"""Whole lines of a stream of bytes; what follows the last line end waits for its own.
 
     >>> lines = LineSplitter()
-    >>> lines.take(b"1,2\\r\\n3,"), lines.take(b"4\\n"), lines.rest()
+    >>> lines.take(b"1,2\r\n3,"), lines.take(b"4\n"), lines.rest()
     ([b'1,2'], [b'3,4'], b'')
     """
 

@@ -1,4 +1,4 @@
-"""The watch: whole lines of a growing file, rows of a window, stated false alarms, and a machine that leaves."""
+"""The watch: lines of a growing file, rows of a window, stated false alarms, a machine that leaves."""
 
 import json
 import os
@@ -209,7 +209,7 @@ def test_rows_that_come_one_by_one_say_what_the_whole_file_says(folder):
 
 
 @pytest.mark.parametrize(
-    "options, said",
+    ("options", "said"),
     [
         ((), "whose noise is not known"),
         (("--warm-up", "9 h"), "Too few"),
