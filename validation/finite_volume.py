@@ -124,18 +124,20 @@ class _Builder:
         """Cells, areas and half-cell depth of the solid just inside a face.
 
         ``axis`` "r": the cylinder r = place between z = low and high; "z": the plane z = place
-        between r = low and high. ``outward`` is +1 or −1 along the axis.
+        between r = low and high, as drawn. ``outward`` is +1 or −1 along the axis.
         """
         tolerance = 1e-7
         if axis == "r":
-            i = int(np.argmin(np.abs(self.grid.r - place))) - (1 if outward > 0 else 0)
+            line = int(np.argmin(np.abs(self.grid.r_drawn - place)))
+            i, place = line - (1 if outward > 0 else 0), float(self.grid.r[line])
             span = (self.z_mid > low - tolerance) & (self.z_mid < high + tolerance)
             cells = self.index[i][:, span]
             area = np.broadcast_to(place * self.angle * self.dz[span], cells.shape)
             depth = abs(self.r_mid[i] - place) / self.k[i, 0, span].max()
         else:
             k = int(np.argmin(np.abs(self.grid.z - place))) - (1 if outward > 0 else 0)
-            span = (self.r_mid > low - tolerance) & (self.r_mid < high + tolerance)
+            drawn = 0.5 * (self.grid.r_drawn[1:] + self.grid.r_drawn[:-1])
+            span = (drawn > low - tolerance) & (drawn < high + tolerance)
             cells = self.index[span][:, :, k]
             area = np.broadcast_to((self.r_mid * np.diff(self.grid.r) * self.angle)[span, None], cells.shape)
             depth = 0.5 * self.dz[k] / self.k[span][:, 0, k].max()
@@ -263,10 +265,11 @@ def _wall(b: _Builder) -> sparse.csr_matrix:
     rows, columns, values = [], [], []
     station = b.grid.station
     theta_length = b.angle
-    exact_side = 0.5 * (m.CHANNEL_OUTER**2 - m.CHANNEL_INNER**2) * theta_length
+    inner, outer = b.grid.deviation.radius(np.array([m.CHANNEL_INNER, m.CHANNEL_OUTER]))
+    exact_side = 0.5 * (outer**2 - inner**2) * theta_length
     exact = {
-        "inner": m.CHANNEL_INNER * theta_length * m.CHANNEL_WIDTH,
-        "outer": m.CHANNEL_OUTER * theta_length * m.CHANNEL_WIDTH,
+        "inner": inner * theta_length * m.CHANNEL_WIDTH,
+        "outer": outer * theta_length * m.CHANNEL_WIDTH,
         "before": exact_side, "behind": exact_side,
     }  # fmt: skip
     total = sum(exact.values()) * stations
@@ -287,12 +290,14 @@ def _wall(b: _Builder) -> sparse.csr_matrix:
         area = b.dz[k] if only is not None else (b.r_mid * np.diff(b.grid.r))[i]
         area = area * exact[wall] / np.bincount(at, area, minlength=stations)[at] * (m.CHANNEL_AREA / total)
         rows.append(beside), columns.append(at), values.append(area)
+    values = [v * b.grid.deviation.film_factor(stations)[c] for v, c in zip(values, columns, strict=True)]
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     return sparse.coo_matrix(entries, shape=(b.size, stations)).tocsr()
 
 
 def _read(b: _Builder, readings: dict[str, NDArray[np.float64]]) -> None:
-    for probe, (r, z) in m.PROBE_PLACES.items():
+    for (probe, (r, z)), (dr, dz) in zip(m.PROBE_PLACES.items(), b.grid.deviation.probes, strict=True):
+        r, z = r + dr, z + dz
         vector = np.zeros(b.size)
         i = np.clip(np.searchsorted(b.r_mid, r) - 1, 0, b.nr - 2)
         k = np.clip(np.searchsorted(b.z_mid, z) - 1, 0, b.nz - 2)

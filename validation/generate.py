@@ -26,7 +26,7 @@ CLEAR_RATIO, CLEAR_CHI2 = 1.0, 120.0
 LARGEST_CHANGE = 300.0
 # A mimic that leaves less than this cannot be told from the truth.
 TWIN_RATIO, TWIN_CHI2 = 0.4, 14.0
-_HEAVY = ("thermal_preload", "gap_closure", "grease_churning", "unrecorded_heat_source", "starvation")
+HEAVY = ("thermal_preload", "gap_closure", "grease_churning", "unrecorded_heat_source", "starvation")
 
 
 def choose_effects(number: int, rng: np.random.Generator) -> list[str]:
@@ -39,7 +39,7 @@ def choose_effects(number: int, rng: np.random.Generator) -> list[str]:
     if slot in (0, 4):
         return []
     if slot in (3, 7):
-        first = str(rng.choice([*_HEAVY, *MACHINE_EFFECTS]))
+        first = str(rng.choice([*HEAVY, *MACHINE_EFFECTS]))
         rest = [n for n in (SENSOR_EFFECTS if rng.random() < 0.35 else MACHINE_EFFECTS) if n != first]
         return [first, str(rng.choice(rest))]
     names = list(EVERY_EFFECT)
@@ -58,7 +58,7 @@ def _apply(
     return readings
 
 
-def _identify(study: Study, effects: list[Concealed]) -> dict[str, object]:
+def what_is_known(study: Study, effects: list[Concealed]) -> dict[str, object]:
     """Ratio of the effect after a re-fit, its parts, and the best mimics."""
     parts = [[e.machine or e.sensor for e in effects if e is not left] for left in effects]
     whole = [e.machine or e.sensor for e in effects]
@@ -176,7 +176,7 @@ def _draw_effects(
     return effects, target
 
 
-def _draw_stable(
+def draw_stable(
     wanted: list[str], study: Study, plain: Path, plan: Plan, rng: np.random.Generator
 ) -> tuple[list[Concealed], float]:
     """Effects whose explicit laws stay finite in the steps of the identification, too.
@@ -202,7 +202,8 @@ def _verdict_of(effects: list[Concealed]) -> str:
     return "consistent"
 
 
-def _set_of(effects: list[Concealed]) -> list[dict[str, object]]:
+def effects_set(effects: list[Concealed]) -> list[dict[str, object]]:
+    """A set as the answers list it."""
     return [{"effect": e.effect, "components": e.acceptable} for e in effects]
 
 
@@ -215,7 +216,7 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
         "acceptable_verdicts": [verdict],
         "detectable": True,
         "clear": bool(effects),
-        "acceptable_sets": [_set_of(effects)],
+        "acceptable_sets": [effects_set(effects)],
         "indistinguishable": [],
     }
     if not effects or known is None:
@@ -237,12 +238,12 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
         rest = [e for e in effects if e is not effect]
         if _unseen(part["ratio"], part["chi2"]):
             out["clear"] = False
-            out["acceptable_sets"].append(_set_of(rest))
+            out["acceptable_sets"].append(effects_set(rest))
             if _verdict_of(rest) not in verdicts:
                 verdicts.append(_verdict_of(rest))
         elif part["ratio"] < 0.6 or part["chi2"] < CLEAR_CHI2 / 2:
             out["clear"] = False
-            out["acceptable_sets"].append(_set_of(rest))
+            out["acceptable_sets"].append(effects_set(rest))
             verdicts.append(_verdict_of(rest))
     twins = [t for t in (*known["best_mimics"], *known["pair_mimics"]) if _twin(t, total)]
     if twins:
@@ -270,7 +271,8 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
     return out
 
 
-def _effect_answer(effect: Concealed) -> dict[str, object]:
+def effect_answer(effect: Concealed) -> dict[str, object]:
+    """What an answer says of one effect."""
     return {
         "effect": effect.effect,
         "kind": effect.kind,
@@ -294,11 +296,11 @@ def make_case(
     as_built = draw_as_built(rng)
     noise = draw_noise(rng)
     wanted = choose_effects(number, rng)
-    plan = _plan_for(wanted, rng)
+    plan = plan_for(wanted, rng)
     calibration = draw_drive(rng) if rng.random() < 0.5 else None
     plain = run(model, plan.drive, as_built)
     study = Study(model, plan, calibration, as_built, noise) if wanted else None
-    effects, target = _draw_stable(wanted, study, plain, plan, rng) if study else ([], 0.0)
+    effects, target = draw_stable(wanted, study, plain, plan, rng) if study else ([], 0.0)
     readings = _apply(model, plan, as_built, effects)
     inputs = folder / "inputs" / name
     rows = {"recording": record(inputs, "recording", name, plan, readings, noise, rng)}
@@ -309,7 +311,7 @@ def make_case(
         )
     known = None
     if effects and identify:
-        known = _identify(study, effects)
+        known = what_is_known(study, effects)
     answer = {
         "schema": "spindle-fem/answer/1",
         "case": name,
@@ -318,7 +320,7 @@ def make_case(
         "as_built": {k: round(v, 4) for k, v in as_built.items()},
         "identifiability": known,
         **judge(effects, known, calibration is not None),
-        "effects": [_effect_answer(e) for e in effects],
+        "effects": [effect_answer(e) for e in effects],
         "primary_component": [e.component for e in effects],
         "target_ratio": round(target, 3),
         "cycle": plan.cycle,
@@ -331,7 +333,7 @@ def make_case(
     return answer
 
 
-def _plan_for(wanted: list[str], rng: np.random.Generator) -> Plan:
+def plan_for(wanted: list[str], rng: np.random.Generator) -> Plan:
     """A cycle that excites what is asked for, most of the time."""
     cycle, oil = None, None
     if rng.random() < 0.7:

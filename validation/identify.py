@@ -224,7 +224,11 @@ def perturbed(as_built: dict[str, float], name: str, change: float) -> dict[str,
 
 
 class Study:
-    """Fits of one case; answers are every ``EVERY`` steps of the drive."""
+    """Fits of one case; answers are every ``EVERY`` steps of the drive.
+
+    ``always`` acts in every run; ``channels`` are those that are recorded; ``earlier`` what the calibrations
+    truly read, where that is not what this model reads.
+    """
 
     def __init__(
         self,
@@ -233,11 +237,16 @@ class Study:
         calibration: Plan | None,
         as_built: dict[str, float],
         noise: Noise,
+        always: tuple[Law, ...] = (),
+        channels: tuple[int, ...] = tuple(range(6)),
     ) -> None:
         self.model, self.plan, self.as_built, self.noise = model, plan, as_built, noise
+        self.always, self.channels = always, list(channels)
         self.shared: dict[bytes, tuple] = {}
+        self.left = np.zeros(0)
         self.drives = [p.drive.every(EVERY) for p in (plan, calibration) if p is not None]
-        self.plain = [run(model, d, as_built).readings for d in self.drives]
+        self.plain = [run(model, d, as_built, always).readings for d in self.drives]
+        self.earlier = self.plain[1:]
         self.whiteners = [self._whitener(d.time) for d in self.drives]
         self.names = list(PRIORS)
         self.offset = np.log([1.0 if n == "split" else as_built[n] for n in self.names]) / list(
@@ -249,7 +258,10 @@ class Study:
             moved = perturbed(as_built, name, 0.1)
             columns.append(
                 self._stack(
-                    [run(model, d, moved).readings - p for d, p in zip(self.drives, self.plain, strict=True)]
+                    [
+                        run(model, d, moved, always).readings - p
+                        for d, p in zip(self.drives, self.plain, strict=True)
+                    ]
                 )
             )
         self.jacobian = np.stack(columns, axis=1) / 0.1
@@ -266,13 +278,13 @@ class Study:
         return cholesky(white + self.noise.slow_K**2 * np.exp(-apart / self.noise.slow_s), lower=True)
 
     def _stack(self, parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-        return np.concatenate([p.T.ravel() for p in parts])
+        return np.concatenate([p[:, self.channels].T.ravel() for p in parts])
 
     def _whiten(self, block: NDArray[np.float64]) -> NDArray[np.float64]:
         out, at = np.empty_like(block), 0
         for factor in self.whiteners:
             n = factor.shape[0]
-            for _ in range(6):
+            for _ in self.channels:
                 out[at : at + n] = solve_triangular(
                     factor, block[at : at + n], lower=True, check_finite=False
                 )
@@ -291,7 +303,8 @@ class Study:
         drive = self.drives[0]
         machine_effects = tuple(e for e in effects if isinstance(e, Law))
         shared = self.shared if as_built is None else None
-        path = run(self.model, drive, as_built or self.as_built, machine_effects, shared)
+        acting = (*self.always, *machine_effects)
+        path = run(self.model, drive, as_built or self.as_built, acting, shared)
         readings = path.readings
         for sensor in (e for e in effects if isinstance(e, Sensor)):
             readings = sensor.apply(drive.time, readings, drive.ambient)
@@ -299,8 +312,12 @@ class Study:
 
     def ratio(self, left: NDArray[np.float64]) -> float:
         """Rms of the most affected channel over the noise."""
-        n = self.drives[0].time.size
-        return float(np.sqrt((left[: 6 * n].reshape(6, n) ** 2).mean(axis=1)).max() / self.noise.total_K)
+        return float(self.by_channel(left).max() / self.noise.total_K)
+
+    def by_channel(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(channels,) rms on the diagnosed run, K."""
+        number, n = len(self.channels), self.drives[0].time.size
+        return np.sqrt((left[: number * n].reshape(number, n) ** 2).mean(axis=1))
 
     def solve(
         self, change: NDArray[np.float64], extra: NDArray[np.float64]
@@ -354,7 +371,10 @@ class Study:
     def fit_through_model(
         self, truth: NDArray[np.float64], mimic: Mimic | None, column: NDArray[np.float64]
     ) -> tuple[float, float]:
-        """Gauss-Newton through the model itself with the Jacobian of the true machine kept."""
+        """Gauss-Newton through the model itself with the Jacobian of the true machine kept.
+
+        What the best of it leaves stays in ``left``.
+        """
         position = np.zeros(len(self.names) + (mimic is not None))
         best = (np.inf, np.inf)
         reach = np.ones_like(position)
@@ -367,9 +387,9 @@ class Study:
                 built = perturbed(built, name, float(np.clip(x, -8, 8)))
             effects = [mimic.make(position[-1])] if mimic is not None else []
             guess = [self.simulate(effects, built if position.any() else None)]
-            guess += [run(self.model, d, built).readings for d in self.drives[1:]]
+            guess += [run(self.model, d, built, self.always).readings for d in self.drives[1:]]
             change = self._stack(
-                [truth - guess[0], *[p - g for p, g in zip(self.plain[1:], guess[1:], strict=True)]]
+                [truth - guess[0], *[p - g for p, g in zip(self.earlier, guess[1:], strict=True)]]
             )
             chi2 = np.inf
             if np.isfinite(change).all():
@@ -384,6 +404,7 @@ class Study:
                 continue
             gain = best[1] - chi2
             best, anchor, anchor_change = (self.ratio(change), chi2), position.copy(), change
+            self.left = change
             if gain < CONVERGED:
                 break
             saved = self.offset

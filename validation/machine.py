@@ -75,20 +75,54 @@ def material_of(part: str) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
+class Deviation:
+    """What drawings and mounting leave open of a shape; all zero is the machine as drawn.
+
+    ``outer`` relative change of the housing's outer radii; ``depth`` of the channel, outwards, and its
+    ``shift`` along the axis, m; ``film`` relative change of the film along the helix, by cosines;
+    ``probes`` (dr, dz), m.
+    """
+
+    outer: float = 0.0
+    depth: float = 0.0
+    shift: float = 0.0
+    film: tuple[float, ...] = ()
+    probes: tuple[tuple[float, float], ...] = ((0.0, 0.0),) * len(PROBES)
+
+    def radius(self, drawn: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where lines of the drawing, m, truly are."""
+        knots = np.array([0.0, 0.105, CHANNEL_INNER, CHANNEL_OUTER, 0.121, 0.1255, 0.130, 0.2])
+        moved = knots * np.where(knots > 0.1255, 1.0 + self.outer, 1.0)
+        moved[2:4] += self.depth
+        return np.interp(drawn, knots, moved)
+
+    def film_factor(self, stations: int) -> NDArray[np.float64]:
+        """(stations,) film over its mean."""
+        along = (np.arange(stations) + 0.5) / stations
+        return np.ones(stations) + sum(a * np.cos((k + 1) * np.pi * along) for k, a in enumerate(self.film))
+
+
+AS_DRAWN = Deviation()
+
+
+@dataclass(frozen=True, slots=True)
 class Grid:
     """Structured grid in r, angle and z with the part of every cell.
 
     ``part`` is (nr, nz) with −1 for void and an index into ``PARTS`` else; ``wet`` is
     (nr, ntheta, nz), true where the channel was cut out of the housing; ``station`` gives those
-    cells' place along the helix, counted in cells of angle from the inlet.
+    cells' place along the helix, counted in cells of angle from the inlet. ``r_drawn`` is where the drawing
+    has the lines that are at ``r``.
     """
 
     r: NDArray[np.float64]
+    r_drawn: NDArray[np.float64]
     z: NDArray[np.float64]
     sectors: int
     part: NDArray[np.int64]
     wet: NDArray[np.bool_]
     station: NDArray[np.int64]
+    deviation: Deviation = AS_DRAWN
 
 
 def _refined(lines: NDArray[np.float64], refine: int) -> NDArray[np.float64]:
@@ -96,7 +130,7 @@ def _refined(lines: NDArray[np.float64], refine: int) -> NDArray[np.float64]:
     return np.append((lines[:-1, None] + np.diff(lines)[:, None] * steps).ravel(), lines[-1])
 
 
-def build_grid(sectors: int = 32, refine: int = 1) -> Grid:
+def build_grid(sectors: int = 32, refine: int = 1, deviation: Deviation = AS_DRAWN) -> Grid:
     """Lay the grid; ``refine`` divides every cell in r and z."""
     r = _refined(np.array(_R_LINES) * 1e-3, refine)
     lines = [
@@ -115,8 +149,8 @@ def build_grid(sectors: int = 32, refine: int = 1) -> Grid:
     station = np.full((r_mid.size, sectors, z_mid.size), -1)
     depth = (r_mid > CHANNEL_INNER) & (r_mid < CHANNEL_OUTER)
     for turn in range(CHANNEL_TURNS):
-        centre = CHANNEL_START + CHANNEL_PITCH * (turn + theta_mid)
+        centre = CHANNEL_START + deviation.shift + CHANNEL_PITCH * (turn + theta_mid)
         within = np.abs(z_mid[None, :] - centre[:, None]) < 0.5 * CHANNEL_WIDTH
         number = turn * sectors + np.arange(sectors)
         station[depth] = np.where(within, number[:, None], station[depth])
-    return Grid(r, z, sectors, part, station >= 0, station)
+    return Grid(deviation.radius(r), r, z, sectors, part, station >= 0, station, deviation)

@@ -37,6 +37,23 @@ class Noise:
         return asdict(self) | {"total_K": self.total_K}
 
 
+@dataclass(frozen=True, slots=True)
+class Logger:
+    """Steps between rows to choose from, s; channels recorded; how late temperatures are stamped, s."""
+
+    steps: tuple[float, ...] = (15.0, 20.0, 30.0)
+    channels: tuple[int, ...] = tuple(range(len(CHANNELS)))
+    late: float = 0.0
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the channels that are recorded."""
+        return [CHANNELS[c] for c in self.channels]
+
+
+EVERY_CHANNEL = Logger()
+
+
 def draw_noise(rng: np.random.Generator) -> Noise:
     """Draw the noise of one machine's sensors."""
     return Noise(
@@ -69,15 +86,16 @@ def record(
     readings: NDArray[np.float64],
     noise: Noise,
     rng: np.random.Generator,
+    logger: Logger = EVERY_CHANNEL,
 ) -> dict[str, int]:
     """Write ``stem.toml`` and ``stem.csv.gz``; returns what was done to the rows."""
-    step = float(rng.choice([15.0, 20.0, 30.0]))
+    step = float(rng.choice(logger.steps))
     drive = plan.drive
     time = np.arange(0.0, drive.time[-1], step)
     faults = {"gaps": 0, "empty": 0, "spikes": 0, "doubled": 0, "swapped": 0}
     columns = []
-    for channel in range(6):
-        y = np.interp(time, drive.time, readings[:, channel])
+    for channel in logger.channels:
+        y = np.interp(time - logger.late, drive.time, readings[:, channel])
         y += noise.white_K * rng.standard_normal(time.size) + slow_error(
             rng, time, noise.slow_K, noise.slow_s
         )
@@ -86,13 +104,15 @@ def record(
     if rng.random() < 0.25:
         faults["spikes"] = int(rng.integers(1, 6))
         for _ in range(faults["spikes"]):
-            values[rng.integers(5, time.size), rng.integers(6)] += rng.choice([-1, 1]) * rng.uniform(3, 30)
+            values[rng.integers(5, time.size), rng.integers(values.shape[1])] += rng.choice(
+                [-1, 1]
+            ) * rng.uniform(3, 30)
     if noise.rounding_K:
         values = np.round(values / noise.rounding_K) * noise.rounding_K
     cells = [[f"{v:.3f}" for v in row] for row in values]
     if rng.random() < 0.35:
         for _ in range(int(rng.integers(1, 4))):
-            channel = int(rng.integers(6))
+            channel = int(rng.integers(values.shape[1]))
             where = rng.choice(time.size, int(rng.integers(5, 40)), replace=False)
             faults["empty"] += where.size
             for k in where:
@@ -122,14 +142,16 @@ def record(
         rows[k], rows[k + 1] = rows[k + 1], rows[k]
         faults["doubled"], faults["swapped"] = 2, 1
     folder.mkdir(parents=True, exist_ok=True)
-    header = ",".join(["time_s", *CHANNELS, *(n for n, _, _ in _INPUTS)])
+    header = ",".join(["time_s", *logger.names, *(n for n, _, _ in _INPUTS)])
     with gzip.GzipFile(folder / f"{stem}.csv.gz", "wb", mtime=0) as stream:
         stream.write(("\n".join([header, *rows]) + "\n").encode())
-    (folder / f"{stem}.toml").write_text(_manifest(name, f"{stem}.csv.gz", noise.white_K), encoding="utf-8")
+    (folder / f"{stem}.toml").write_text(
+        _manifest(name, f"{stem}.csv.gz", noise.white_K, logger.names), encoding="utf-8"
+    )
     return faults
 
 
-def _manifest(name: str, data: str, sigma: float) -> str:
+def _manifest(name: str, data: str, sigma: float, channels: list[str]) -> str:
     head = (
         f'schema = "spindle-fem/recording/1"\nname = "{name}"\ndata = "{data}"\n'
         'time = {column = "time_s", unit = "s"}\n'
@@ -137,7 +159,7 @@ def _manifest(name: str, data: str, sigma: float) -> str:
     blocks = [
         f'\n[[channel]]\ncolumn = "{c}"\nrole = "temperature"\nprobe = "{c}"\n'
         f'unit = "degC"\nsigma = {sigma:g}\n'
-        for c in CHANNELS
+        for c in channels
     ]
     for column, drives, unit in _INPUTS:
         hold = 'hold = "previous"\n' if column in ("speed", "thrust") else ""

@@ -209,13 +209,19 @@ def project(fv: FiniteVolumes, basis: NDArray[np.float64]) -> ReducedSpindle:
 
 
 def load_reduced(
-    cache: Path | None = None, *, sectors: int = 32, refine: int = 1, size: int = 170, draws: int = 7
+    cache: Path | None = None,
+    *,
+    sectors: int = 32,
+    refine: int = 1,
+    size: int = 170,
+    draws: int = 7,
+    deviation: m.Deviation = m.AS_DRAWN,
 ) -> ReducedSpindle:
     """Read the reduced spindle from the cache, or build it (a minute or two) and keep it."""
     folder = (cache or DEFAULT_CACHE).expanduser()
     here = Path(__file__).parent
     text = b"".join((here / name).read_bytes() for name in ("machine.py", "finite_volume.py", "reduction.py"))
-    key = hashlib.sha256(text + repr((sectors, refine, size, draws)).encode()).hexdigest()[:16]
+    key = hashlib.sha256(text + repr((sectors, refine, size, draws, deviation)).encode()).hexdigest()[:16]
     path = folder / f"spindle_{key}.npz"
     names = ReducedSpindle.__slots__
     if path.exists():
@@ -225,7 +231,7 @@ def load_reduced(
             values[name] = tuple(str(x) for x in values[name])
         values["channel_series"] = float(values["channel_series"])
         return ReducedSpindle(**values)
-    fv = assemble(m.build_grid(sectors, refine))
+    fv = assemble(m.build_grid(sectors, refine, deviation))
     reduced = project(fv, build_basis(fv, size, draws, seed=11))
     folder.mkdir(parents=True, exist_ok=True)
     scratch = path.with_suffix(".tmp.npz")

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from . import laws
 from .concealed_effect import Concealed
 from .cycles import STEP, Plan
-from .generate import _effect_answer, _identify, judge
+from .generate import effect_answer, judge, what_is_known
 from .identify import Study
 from .machine import CHANNELS
 from .recorder import draw_noise, record
@@ -99,7 +99,7 @@ def write(folder: FilePath, seed: int, *, model: ReducedSpindle, calibrated: boo
     if earlier is not None:
         clean = run(model, earlier.drive, as_built).readings
         rows["calibration"] = record(inputs, "calibration", f"{NAME} calibration", earlier, clean, noise, rng)
-    known = _identify(Study(model, plan, earlier, as_built, noise), effects)
+    known = what_is_known(Study(model, plan, earlier, as_built, noise), effects)
     answer = {
         "schema": "spindle-fem/answer/1",
         "case": NAME,
@@ -109,7 +109,7 @@ def write(folder: FilePath, seed: int, *, model: ReducedSpindle, calibrated: boo
         "as_built": {key: round(value, 4) for key, value in as_built.items()},
         "identifiability": known,
         **judge(effects, known, calibrated),
-        "effects": [_effect_answer(effect) for effect in effects],
+        "effects": [effect_answer(effect) for effect in effects],
         "left_out_K": by_speed(plan.drive.time, plan.drive.speed, truth - plain),
         "cycle": plan.cycle,
         "oil": plan.oil,

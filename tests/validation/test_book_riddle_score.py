@@ -72,7 +72,7 @@ def test_riddle_answers_stand_apart_from_inputs(tmp_path, monkeypatch):
 
     model = load_reduced(tmp_path / "cache", sectors=8, size=60, draws=1)
     monkeypatch.setattr(riddle, "_HOLD_S", 600.0)
-    monkeypatch.setattr(riddle, "_identify", lambda study, effects: None)
+    monkeypatch.setattr(riddle, "what_is_known", lambda study, effects: None)
     monkeypatch.setattr(riddle, "Study", lambda *arguments: None)
     answer = riddle.write(tmp_path, 3, model=model, calibrated=True)
     assert [effect["effect"] for effect in answer["effects"]] == ["thermal_preload", "starvation"]

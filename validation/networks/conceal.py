@@ -6,21 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.signal import lfilter
 
+from ..concealed_effect import KINDS
 from .scene import Owner
 from .truth import NOTHING, Array, Change
 from .work import log_uniform, stretches
-
-KINDS = {
-    "joint_conductance": "parameter",
-    "heat_scale": "parameter",
-    "heat_capacity": "parameter",
-    "sensor_offset": "sensor",
-    "sensor_gain": "sensor",
-    "sensor_lag": "sensor",
-    "sensor_drift": "sensor",
-    "sensor_detached": "sensor",
-    "clock_shift": "sensor",
-}
 
 
 def kind_of(effect: str) -> str:

@@ -1,0 +1,207 @@
+"""Conceal effects in machines known roughly: ``python -m validation.generate_rough --cases 60 -o DIR``.
+
+Every machine differs from its definition as :mod:`validation.rough` draws it: a pool of shapes, what hangs
+on each, two to six channels, clocks apart. ``DIR/inputs`` and ``DIR/answers`` as :mod:`validation.generate`
+leaves them; answers count structure into ``noise.total_K``, by which effects are judged.
+"""
+
+import argparse
+import json
+import time as clock
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from .concealed_effect import Concealed
+from .cycles import Plan, draw_drive
+from .draw import EVERY_EFFECT, FOREIGN_EFFECTS, MACHINE_EFFECTS
+from .draw_sensor_errors import SENSOR_EFFECTS
+from .generate import HEAVY, draw_stable, effect_answer, effects_set, judge, plan_for, what_is_known
+from .identify import Study
+from .recorder import Logger, Noise, record
+from .reduction import ReducedSpindle, load_reduced
+from .rough import AsMounted, deviating_machine, draw_channels, draw_mounting
+from .stepping import draw_as_built, run
+
+# What the cases conceal, in turn.
+TURNS = ("consistent", "single", "single", "pair", "consistent", "single", "triple", "sensor_beside")
+# Slow differences between machine and definition last as long as the loads do, s.
+STRUCTURE_S = 4000.0
+
+
+def choose(number: int, rng: np.random.Generator) -> tuple[str, list[str]]:
+    """Family and effects of a case."""
+    turn, slot = divmod(number - 1, len(TURNS))
+    family = TURNS[slot]
+    if family == "consistent":
+        return family, []
+    if family == "single":
+        names = list(EVERY_EFFECT)
+        order = np.random.default_rng(20_011).permutation(len(names))
+        name = names[order[(3 * turn + {1: 0, 2: 1, 5: 2}[slot]) % len(names)]]
+        return "outside_catalogue" if name in FOREIGN_EFFECTS else family, [name]
+    physics = [n for n in MACHINE_EFFECTS if n not in FOREIGN_EFFECTS]
+    chosen = [str(rng.choice([n for n in (*HEAVY, *physics) if n in physics]))]
+    while len(chosen) < (3 if family == "triple" else 2):
+        pool = list(SENSOR_EFFECTS) if family == "sensor_beside" else physics
+        chosen.append(str(rng.choice([n for n in pool if n not in chosen])))
+    return family, chosen
+
+
+def draw_sensors(rng: np.random.Generator) -> Noise:
+    """White and slow noise and rounding of one machine's sensors."""
+    return Noise(
+        float(rng.choice([0.03, 0.05, 0.08, 0.1])),
+        0.05,
+        float(rng.uniform(1800.0, 5000.0)),
+        float(rng.choice([0.0, 0.0, 0.1])),
+    )
+
+
+def structure_left(
+    nominal: ReducedSpindle,
+    plans: list[Plan],
+    truths: list[np.ndarray],
+    known: tuple[dict, Noise, tuple[int, ...]],
+) -> np.ndarray:
+    """(channels,) K that the definition, refitted, leaves of a machine without any effect."""
+    as_built, noise, channels = known
+    study = Study(nominal, plans[0], plans[1] if len(plans) > 1 else None, as_built, noise, (), channels)
+    every = [
+        t[:: t.shape[0] // d.time.size][: d.time.size] for t, d in zip(truths, study.drives, strict=True)
+    ]
+    study.earlier = every[1:]
+    study.fit_through_model(every[0], None, np.empty((0, 0)))
+    return study.by_channel(study.left)
+
+
+def read_channels(effects: list[Concealed], channels: tuple[int, ...]) -> bool:
+    """Whether every sensor that lies is one that is recorded."""
+    return all(e.sensor is None or e.sensor.channel in channels for e in effects)
+
+
+def with_twins(effects: list[Concealed], judged: dict[str, Any]) -> dict[str, Any]:
+    """What reads like the truth counts as right and makes the case ambiguous."""
+    names = [e.effect for e in effects]
+    for twin in judged["indistinguishable"]:
+        at = names.index(twin.get("instead_of", names[0]))
+        other = {"effect": twin["effect"], "components": _place_names(twin["component"])}
+        whole = effects_set(effects)
+        judged["acceptable_sets"].append([*whole[:at], other, *whole[at + 1 :]])
+        judged["verdict"] = "ambiguous"
+    return judged
+
+
+def _place_names(component: str) -> list[str]:
+    sets = {"front_bearings": ["F1", "F2", "F3"], "rear_bearings": ["R1", "R2"]}
+    places = {"housing_middle_top": "housing", "housing_rear_top": "housing", "housing_front_top": "housing"}
+    places |= {"shaft_middle": "shaft"}
+    return [component, *sets.get(component, []), *([places[component]] if component in places else [])]
+
+
+def make_case(
+    folder: FilePath, nominal: ReducedSpindle, pool: list, seed: int, number: int, identified: bool = True
+) -> dict[str, Any]:
+    """Draw, simulate, write one case; returns its answer."""
+    rng = np.random.default_rng([seed, number])
+    name = f"case_{number:04d}"
+    family, wanted = choose(number, rng)
+    deviation, model = pool[int(rng.integers(len(pool)))]
+    mounted: AsMounted = draw_mounting(rng)
+    as_built, sensors, channels = draw_as_built(rng), draw_sensors(rng), draw_channels(rng)
+    logger = Logger((15.0, 20.0, 30.0, 45.0, 60.0, 120.0), channels)
+    if rng.random() < 0.3:
+        logger = replace(logger, late=float(rng.uniform(-40.0, 40.0)))
+    plans = [plan_for(wanted, rng)]
+    if rng.random() < 0.6:
+        plans.append(draw_drive(rng))
+    paths = [run(model, p.drive, as_built, (mounted,)) for p in plans]
+    truths = [p.readings for p in paths]
+    left = structure_left(nominal, plans, truths, (as_built, sensors, channels))
+    structure = float(np.sqrt((left**2).mean()))
+    sensor = float(np.sqrt(sensors.total_K**2 + sensors.rounding_K**2 / 12.0))
+    # What structure leaves is as slow as the loads: effects are judged against both.
+    judged_by = Noise(sensors.white_K, float(np.hypot(sensors.slow_K, structure)), STRUCTURE_S)
+    effects: list[Concealed] = []
+    known = None
+    if wanted:
+        calibration = plans[1] if len(plans) > 1 else None
+        study = Study(model, plans[0], calibration, as_built, judged_by, (mounted,), channels)
+        for _ in range(20):
+            effects, _ = draw_stable(wanted, study, paths[0], plans[0], rng)
+            if read_channels(effects, channels):
+                break
+        known = what_is_known(study, effects) if identified else None
+    readings = run(
+        model, plans[0].drive, as_built, (mounted, *(e.machine for e in effects if e.machine))
+    ).readings
+    for lie in (e.sensor for e in effects if e.sensor):
+        readings = lie.apply(plans[0].drive.time, readings, plans[0].drive.ambient)
+    inputs = folder / "inputs" / name
+    rows = {"recording": record(inputs, "recording", name, plans[0], readings, sensors, rng, logger)}
+    if len(plans) > 1:
+        rows["calibration"] = record(
+            inputs, "calibration", f"{name} calibration", plans[1], truths[1], sensors, rng, logger
+        )
+    answer = {
+        "schema": "spindle-fem/answer/1",
+        "case": name,
+        "family": family,
+        "machine": "recorded_spindle",
+        "profile": plans[0].cycle,
+        "two_recordings": len(plans) > 1,
+        "noise": sensors.answer()
+        | {"sensor_K": sensor, "structure_K": structure, "total_K": float(np.hypot(sensor, structure))},
+        "channels": logger.names,
+        "clock_offset_s": logger.late,
+        "as_built": {k: round(v, 4) for k, v in as_built.items()},
+        "structure": mounted.answer(deviation)
+        | {"refitted_residual_K": dict(zip(logger.names, np.round(left, 4).tolist(), strict=True))},
+        "identifiability": known,
+        **with_twins(effects, judge(effects, known, len(plans) > 1)),
+        "effects": [effect_answer(e) for e in effects],
+        "primary_component": [e.component for e in effects],
+        "rows": rows,
+    }
+    answers = folder / "answers"
+    answers.mkdir(parents=True, exist_ok=True)
+    (answers / f"{name}.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")
+    return answer
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--first", type=int, default=1, help="number of the first case")
+    parser.add_argument("--seed", type=int, default=3)
+    parser.add_argument("--shapes", type=int, default=6, help="machines of deviating shape in the pool")
+    parser.add_argument("-o", "--output", type=FilePath, required=True)
+    parser.add_argument("--cache", type=FilePath, default=None, help="folder of the reduced machines")
+    given = parser.parse_args(arguments)
+    nominal = load_reduced(given.cache)
+    pool = []
+    for number in range(given.shapes):
+        pool.append(deviating_machine(given.seed, number, given.cache))
+        print(f"shape {number + 1} of {given.shapes}", flush=True)
+    given.output.mkdir(parents=True, exist_ok=True)
+    drawn = {"schema": "spindle-fem/concealed-study/1", "seed": given.seed, "cases": given.cases}
+    drawn |= {"generator": "rough", "shapes": given.shapes}
+    (given.output / "study.json").write_text(json.dumps(drawn, indent=1), encoding="utf-8")
+    for number in range(given.first, given.first + given.cases):
+        began = clock.perf_counter()
+        answer = make_case(given.output, nominal, pool, given.seed, number)
+        effects = ", ".join(e["effect"] for e in answer["effects"]) or "none"
+        known = answer["identifiability"]
+        seen = f"ratio {known['ratio']:.2f}" if known else ""
+        print(
+            f"{answer['case']} {answer['family']:16s} {len(answer['channels'])} channels {effects:45s} "
+            f"{seen:12s} noise {answer['noise']['total_K']:.2f} K {clock.perf_counter() - began:.1f} s",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
