@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from spindle_fem.definition.load import write_machine
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.network_tables import base_unit_of
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.inference.diagnosis_content import plain_data
@@ -68,7 +70,8 @@ def plan(
     machine : str or Path
         A definition or the name of one that ships; with geometry or a ``[network]``.
     folder : str or Path
-        Gets ``plan.json``, ``figures/*.png`` and ``report.html``.
+        Gets ``plan.json``, ``figures/*.png``, ``report.html`` and, of a machine with geometry,
+        ``machine.toml``.
     test : str or Path
         A recording, whose inputs are used; or ``heat_up``, ``steps`` or ``cool_down``, with a length
         after a colon (``steps:4h``).
@@ -106,6 +109,9 @@ def plan(
         content = plan_content(planned.plan, planned.sensors, planned.test, planned.compared, planned.notes)
         content["wall_time_s"] = time.perf_counter() - started
         content = plain_data(content)
+        spec = planned.conditions.spec
+        if isinstance(spec, MachineSpec):
+            replace_text(place / "machine.toml", write_machine(spec))
         replace_text(place / "plan.json", json.dumps(content, indent=1) + "\n")
         from spindle_fem.report.plan_report import write_plan_report
 
@@ -122,9 +128,13 @@ def planned_measurement(
     inputs: Sequence[str] = (),
     calibrate: Iterable[str | Path] = (),
     overrides: Iterable[str] = (),
+    compare: bool = True,
     progress: Progress = lambda stage: None,
 ) -> Planned:
-    """What :func:`plan` works out, before anything is written; parameters as there."""
+    """What :func:`plan` works out, before anything is written; parameters as there.
+
+    ``compare`` says whether other tests are simulated too.
+    """
     overrides = tuple(overrides)
     given = dict(_input(text) for text in inputs)
     name, _, length = str(test).partition(":")
@@ -154,7 +164,7 @@ def planned_measurement(
         seconds, words = float(np.ptp(read.times)), f'the inputs of "{read.name}"'
         conditions = _as_recorded(conditions, read)
     compared = min(seconds, LONGEST_COMPARED)
-    schedules = conditions.family(compared)
+    schedules = conditions.family(compared) if compare else []
     recordings = [asked, *(recording_of(conditions, item, chosen) for item in schedules)]
     earlier = [read_recording(path) for path in calibrate]
     opened = open_machine(machine, overrides, recordings, earlier, progress=progress)

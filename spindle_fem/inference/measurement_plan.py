@@ -9,7 +9,7 @@ choose one more sensor and another test.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,10 +22,16 @@ from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, i
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
+from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.diagnosis import overlapping_components
 from spindle_fem.inference.further_tests import Place, network_places, reachable_places
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis_fit import Problem, candidate_coordinates
+from spindle_fem.inference.misdescription_columns import (
+    direction_columns,
+    misdescriptions_of,
+    with_misdescriptions,
+)
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate
@@ -170,7 +176,10 @@ def plan_measurement(
     masks = [~heldout_stamps(item)[0] for item in machine.recordings]
     predictor = Predictor(machine.fast, machine.recordings, masks, machine.effects)
     earlier = Predictor(machine.fast, machine.calibration, effects=machine.effects)
-    calibrated = calibrate(earlier if machine.calibration else None, predictor)
+    directions = misdescriptions_of(predictor)
+    predictor = with_misdescriptions(predictor, directions)
+    earlier = with_misdescriptions(earlier, misdescriptions_of(earlier)) if machine.calibration else None
+    calibrated = calibrate(earlier, predictor)
     candidates = candidates_for(machine.view)
     spots = _interval_candidates(machine.view, float(np.ptp(machine.recordings[0].times)))
     places = _places(machine, predictor)
@@ -180,7 +189,11 @@ def plan_measurement(
     variants = variants_of(candidates) + variants_of(spots)
     forms, hypotheticals = _forms(variants)
     progress(f"plan: {asked}")
-    products = _products(problem, 0, variants, places)
+    acting = [item for item in directions if item.recording in (None, 0)]
+    _, states = direction_columns(BaseRun(predictor, 0, NO_VALUES), acting)
+    at_places = _means(predictor, places) @ states
+    moved = {item.coordinate: at_places[:, :, index] for index, item in enumerate(acting)}
+    products = _products(problem, 0, variants, places, moved)
     read = list(range(len(machine.recordings[0].temperature_names)))
     beside = {place.name: len(read) + index for index, place in enumerate(places)}
     weights = np.array([item.weight for item in hypotheticals])
@@ -216,7 +229,7 @@ def plan_measurement(
     for number, schedule in enumerate(schedules, 1):
         progress(f"plan: {schedule.name}")
         try:
-            own = _products(problem, number, variants, ())
+            own = _products(problem, number, variants)
         except (ConvergenceError, OutOfValidityError, SpecError) as error:
             failed.append((schedule.name, str(error)))
             continue
@@ -282,19 +295,40 @@ def _forms(variants: Sequence[Variant]) -> tuple[EffectForms, tuple[Hypothetical
     return forms, tuple(found)
 
 
-def _products(
-    problem: Problem, number: int, variants: Sequence[Variant], places: Sequence[Place]
-) -> ChannelProducts:
-    """Answers of the sensors of one test, then of places, whitened."""
-    predictor, belief = problem.predictor, problem.belief
+def _means(predictor: Predictor, places: Sequence[Place]) -> Array:
+    """What a sensor at each place reads of the model's unknowns, (k, r)."""
     model = predictor.fast.model
-    means = np.array(
-        [model.probes[model.probe_names.index(p.name)] if p.is_probe else model.place(p.name) for p in places]
-    ).reshape(-1, model.size)
+    rows = [
+        model.probes[model.probe_names.index(place.name)] if place.is_probe else model.place(place.name)
+        for place in places
+    ]
+    return np.array(rows).reshape(-1, model.size)
+
+
+def _products(
+    problem: Problem,
+    number: int,
+    variants: Sequence[Variant],
+    places: Sequence[Place] = (),
+    moved: Mapping[str, Array] = NO_VALUES,
+) -> ChannelProducts:
+    """Answers of the sensors of one test, then of places, whitened.
+
+    Parameters
+    ----------
+    moved : mapping of coordinate to (G + 1, k) ndarray
+        What directions in which the machine may differ do at the places.
+    """
+    predictor, belief = problem.predictor, problem.belief
+    means, read = _means(predictor, places), len(predictor.columns[number])
     values = {c.name: c.at(u) for c, u in zip(belief.coordinates, belief.mean, strict=True)}
     told = predictor.predict(number, values, (), [c.name for c in belief.coordinates])
     scale = np.array([c.sigma for c in belief.coordinates])
-    slopes = np.concatenate((told.sensitivity, told.slopes_at(means)), axis=1) * scale
+    slopes = np.concatenate((told.sensitivity, told.slopes_at(means)), axis=1)
+    for index, coordinate in enumerate(belief.coordinates):
+        if coordinate.name in moved:
+            slopes[:, read:, index] += moved[coordinate.name]
+    slopes = slopes * scale
     answers = BaseRun(predictor, number, values, places=means).responses(variants)
     own = [
         (item, white)
@@ -305,7 +339,7 @@ def _products(
     first = own[0][0]
     noise = float(np.median(predictor.recordings[number].sigma))
     usual = Whitener(replace(first.bins, white=noise), problem.slow)
-    own += [(replace(first, channel=len(predictor.columns[number]) + i), usual) for i in range(len(places))]
+    own += [(replace(first, channel=read + i), usual) for i in range(len(places))]
     return ChannelProducts.of(
         belief.root.T @ belief.root,
         [white(item.at(slopes[:, item.channel])) for item, white in own],

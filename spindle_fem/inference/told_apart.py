@@ -26,7 +26,7 @@ from spindle_fem.inference import tuned
 Array = NDArray[np.float64]
 
 # Probability with which an effect of a stated size is seen, and told from another; and of a false alarm.
-POWER, FALSE_ALARM = 0.95, tuned.SIGNIFICANT
+POWER, FALSE_ALARM = 0.90, tuned.SIGNIFICANT
 # Sizes are stated that suffice for this share of the forms and shapes of an effect's law.
 SHARE_OF_FORMS = 0.75
 # Answers smaller than this share of what they were before the machine's numbers took theirs are rounding.

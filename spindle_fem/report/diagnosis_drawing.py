@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
@@ -61,6 +62,38 @@ def located_on_machine(
     """
     if "spot" not in data:
         return None
+    notes = "Circles: the neighbourhood of each probe. Grey: not asked."
+    if component and regions_of(spec, component):
+        notes += f" Framed in orange: where the diagnosis puts it ({component.replace('_', ' ')})."
+    figure = places_on_machine(
+        explained_shares(data),
+        ColourBar(FILM_MAP.reversed(), 0.0, 100.0, BAR_LABEL),
+        spec,
+        framed=component,
+        assembly=assembly,
+    )
+    set_title(figure, "Where missing heat would explain the readings", notes)
+    return figure
+
+
+@styled
+def places_on_machine(
+    values: Mapping[str, float],
+    bar: ColourBar,
+    spec: MachineSpec,
+    *,
+    framed: str = "",
+    assembly: AssemblyGeometry | None = None,
+) -> Figure:
+    """Half section with places coloured by a value each, and the names of the probes; without a title.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        By place, as :func:`regions_of` takes it.
+    framed : str
+        Component that is outlined.
+    """
     assembly = build_assembly(spec) if assembly is None else assembly
     z_low, z_high, outside = extent(assembly)
     reach = 1.06 * outside
@@ -71,14 +104,12 @@ def located_on_machine(
     total = top + height + 220.0
     figure = new_figure(total)
     axes = meridian_axes(figure, (left, top, width, height), (z_low - pad, z_high + pad), (-4.0, reach))
-    bar = ColourBar(FILM_MAP.reversed(), 0.0, 100.0, BAR_LABEL)
     for segment in (segment for part in assembly.parts for segment in part.segments):
         z, radius = (segment.z_start, segment.z_end), (segment.inner_radius, segment.outer_radius)
         axes.add_patch(box(z, radius, facecolor=PLAIN, edgecolor="none"))
-    shares = explained_shares(data)
     # Large spots first: what lies within them is drawn on top.
     areas = {
-        spot: (regions_of(spec, spot), share) for spot, share in shares.items() if not spot.startswith(NEAR)
+        spot: (regions_of(spec, spot), share) for spot, share in values.items() if not spot.startswith(NEAR)
     }
     for regions, share in sorted(areas.values(), key=lambda item: -sum(r.volume for r in item[0])):
         for region in regions:
@@ -86,7 +117,7 @@ def located_on_machine(
             thick = (inner, max(outer, inner + WALL))
             axes.add_patch(box(region.z, thick, facecolor=bar.colours(share), edgecolor="none"))
     draw_edges(axes, assembly, (1.0,), (0.5, 0.9))
-    for spot, share in shares.items():
+    for spot, share in values.items():
         for region in regions_of(spec, spot) if spot.startswith(NEAR) else ():
             radius, place = region.middle
             axes.add_patch(
@@ -99,7 +130,7 @@ def located_on_machine(
                     zorder=5,
                 )
             )
-    for region in regions_of(spec, component) if component else ():
+    for region in regions_of(spec, framed) if framed else ():
         axes.add_patch(
             Rectangle(
                 (region.z[0] * MM - 1.5, region.r[0] * MM - 1.5),
@@ -114,10 +145,6 @@ def located_on_machine(
     axes.axhline(0.0, color=MUTED, linewidth=0.9, dashes=(12, 3, 2, 3))
     _label_probes(axes, spec, reach, scale)
     draw_colour_bar(pixel_axes(figure, 420.0, total - 92.0, 760.0, 20.0), bar)
-    notes = "Circles: the neighbourhood of each probe. Grey: not asked."
-    if component and regions_of(spec, component):
-        notes += f" Framed in orange: where the diagnosis puts it ({component.replace('_', ' ')})."
-    set_title(figure, "Where missing heat would explain the readings", notes)
     return figure
 
 

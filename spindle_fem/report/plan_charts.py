@@ -10,6 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.view.place_names import NEAR
+from spindle_fem.report.diagnosis_drawing import places_on_machine
 from spindle_fem.report.figure_style import (
     CYCLE,
     FILM_MAP,
@@ -21,6 +24,7 @@ from spindle_fem.report.figure_style import (
     set_title,
     styled,
 )
+from spindle_fem.report.meridian_axes import MM
 from spindle_fem.report.table_rows import plain
 
 # Effects drawn at most, and the side of a cell, px; so many places and tests.
@@ -136,4 +140,32 @@ def options_chart(options: Sequence[Mapping[str, Any]], now: float, title: str) 
     axes.set_ylim(len(shown) - 0.5, -0.5)
     axes.set_xlabel("mean over all pairs / bit; the line: the sensors and the test asked for")
     set_title(figure, title)
+    return figure
+
+
+@styled
+def sensor_places(content: Mapping[str, Any], spec: MachineSpec) -> Figure:
+    """Half section: the sensors, and what one more at each place would add to the information."""
+    probes = {probe.name for probe in spec.probe}
+    gains = {
+        (NEAR if item["name"] in probes else "") + item["name"]: max(0.0, item["gain_bit"])
+        for item in content["further_sensors"]
+    }
+    best = content["best_next_sensor"]["name"]
+    bar = ColourBar(
+        FILM_MAP.reversed(),
+        0.0,
+        max(*gains.values(), 1e-3),
+        "gained by one more sensor, mean over pairs / bit",
+    )
+    figure = places_on_machine(gains, bar, spec, framed=best)
+    read = {sensor["probe"] for sensor in content["sensors"]}
+    at = [
+        (probe.z * MM, probe.r * MM) for probe in spec.probe if probe.kind == "point" and probe.name in read
+    ]
+    if at:
+        x, y = np.array(at).T
+        figure.axes[0].plot(x, y, linestyle="none", marker="o", markersize=7.0, color=CYCLE[1], zorder=8)
+    notes = f"Orange dots: the sensors that are read. Framed: the best place for one more ({plain(best)})."
+    set_title(figure, "Where one more sensor helps", notes)
     return figure

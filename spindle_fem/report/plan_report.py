@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from spindle_fem.definition.load import load_machine
 from spindle_fem.inference.plan_content import SCHEMA
 from spindle_fem.report.block_page import (
     Bullets,
@@ -17,7 +18,7 @@ from spindle_fem.report.block_page import (
     render_document,
 )
 from spindle_fem.report.figure_style import save_png
-from spindle_fem.report.plan_charts import detectable_sizes, options_chart, pair_matrix
+from spindle_fem.report.plan_charts import detectable_sizes, options_chart, pair_matrix, sensor_places
 from spindle_fem.report.table_rows import (
     Field,
     fixed,
@@ -36,6 +37,7 @@ CAPTIONS = {
     "count. Effects that are not seen at their usual size are left out.",
     "sizes": "Effects that would be seen in five times their usual size or less.",
     "sensors": "One further sensor in the same test.",
+    "places": "The sensors on the machine's half section, and what one more would add at each place.",
     "tests": "Other tests with the same sensors.",
 }
 
@@ -58,6 +60,9 @@ def write_plan_report(folder: str | Path) -> Path:
         figures["sensors"] = options_chart(content["further_sensors"], now, "One more sensor")
     if content["tests"]:
         figures["tests"] = options_chart(content["tests"], now, "Other tests")
+    definition = folder / "machine.toml"
+    if definition.is_file() and content["further_sensors"]:
+        figures["places"] = sensor_places(content, load_machine(definition))
     pictures = {
         name: illustration_of(save_png(figure, place / f"{name}.png"), CAPTIONS[name])
         for name, figure in figures.items()
@@ -158,7 +163,8 @@ def _more(content: Mapping[str, Any], pictures: Mapping[str, Any]) -> list[Any]:
             whole("seen", "seen"),
             whole("told from all", "told_from_all"),
         )
-        blocks += [pictures[picture], table_of(fields, content[key])]
+        drawn = [pictures["places"]] if picture == "sensors" and "places" in pictures else []
+        blocks += [*drawn, pictures[picture], table_of(fields, content[key])]
     return blocks
 
 
