@@ -13,16 +13,18 @@ from typer.core import TyperGroup
 
 from spindle_fem import __version__
 
-PLAN_FLAG = "--plan"
+PLAN_FLAG, WORKER_FLAGS = "--plan", ("--jobs", "-j", "--cluster")
 
 
 class _Commands(TyperGroup):
-    """The commands; ``diagnose --plan`` asks other things than a diagnosis and is a command of its own."""
+    """The commands; ``diagnose --plan`` and ``diagnose --jobs`` ask other things than a diagnosis alone."""
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> tuple[str | None, Any, list[str]]:
         """Which command arguments are for, and those that are left."""
         if args[0] == "diagnose" and PLAN_FLAG in args:
             args = ["plan", *(item for item in args[1:] if item != PLAN_FLAG)]
+        elif args[0] == "diagnose" and any(item.partition("=")[0] in WORKER_FLAGS for item in args):
+            args = ["diagnose-folder", *args[1:]]
         return super().resolve_command(ctx, args)
 
 
@@ -285,8 +287,17 @@ def diagnose(
     """Where a recording and the model differ, which physics was left out, and how the fit improves.
 
     ``diagnose --plan MACHINE -o DIR``, before anything is measured: which effects the sensors and a test
-    could tell apart; the same as ``spindle-fem plan``.
+    could tell apart; the same as ``spindle-fem plan``. A folder with several recordings in it is diagnosed
+    one by one; ``diagnose --jobs N`` or ``--cluster ADDRESS`` does so abreast (``spindle-fem
+    diagnose-folder``).
     """
+    from spindle_fem.recordings.recording_folder import recordings_in
+
+    if len(recordings) == 1 and recordings_in(recordings[0], calibrate or ()):
+        _diagnose_folder(
+            _folder_order(machine, calibrate, set_, heldout, full_model), recordings[0], output, "1", as_json
+        )
+        return
     from spindle_fem.commands.console import print_diagnosis, stages
     from spindle_fem.commands.diagnose_command import diagnose as diagnose_machine
 
@@ -302,6 +313,65 @@ def diagnose(
             progress=tell,
         )
     _print_json(content) if as_json else print_diagnosis(content, output)
+
+
+@app.command()
+def diagnose_folder(
+    machine: Machine,
+    recordings: Annotated[Path, typer.Argument(help="Folder with several recordings.")],
+    output: Folder,
+    calibrate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--calibrate",
+            metavar="FILE",
+            help="Recording of the same machine with nothing missing; repeatable.",
+        ),
+    ] = None,
+    full_model: Annotated[
+        str, typer.Option("--full-model", metavar="auto|off|coarse|own", help="As of diagnose.")
+    ] = "auto",
+    jobs: Annotated[
+        str,
+        typer.Option(
+            "--jobs",
+            "-j",
+            "--cluster",
+            metavar="N|ADDRESS",
+            help="Worker processes, 0 for one a core; or the address of a Dask scheduler.",
+        ),
+    ] = "1",
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Every recording of a folder diagnosed by itself, with a table (also diagnose --jobs)."""
+    order = _folder_order(machine, calibrate, set_, "blocks", full_model)
+    _diagnose_folder(order, recordings, output, jobs, as_json)
+
+
+def _folder_order(
+    machine: str, calibrate: list[Path] | None, set_: list[str] | None, heldout: str, full_model: str
+) -> Any:
+    from spindle_fem.commands.diagnose_folder_command import FolderOrder
+
+    return FolderOrder(machine, tuple(calibrate or ()), tuple(set_ or ()), heldout, full_model)
+
+
+def _diagnose_folder(order: Any, recordings: Path, output: Path, jobs: str, as_json: bool) -> None:
+    from spindle_fem.commands.console import print_diagnoses, stages
+    from spindle_fem.commands.diagnose_folder_command import diagnose_folder as diagnose_each
+
+    own = jobs.lstrip("-").isdigit()
+    with stages(not as_json) as tell:
+        content = diagnose_each(
+            order,
+            recordings,
+            output,
+            jobs=int(jobs) if own else 1,
+            scheduler=None if own else jobs,
+            progress=tell,
+        )
+    _print_json(content) if as_json else print_diagnoses(content, output)
 
 
 @app.command()

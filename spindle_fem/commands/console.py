@@ -241,6 +241,26 @@ def print_plan(content: dict[str, Any], folder: Path) -> None:
     console.print(f"Report: {folder / 'report.html'}")
 
 
+def print_diagnoses(content: dict[str, Any], folder: Path) -> None:
+    """Verdict and findings of every recording, and the reasons of those that failed."""
+    console = _console()
+    table = _table("Recordings", "recording", "verdict", "findings", "probability", "before K", "after K")
+    for row in content["rows"]:
+        table.add_row(
+            row["recording"],
+            row["verdict"] or row["status"],
+            row["findings"] or "",
+            _number(row["probability"], 2),
+            _number(row["before_rmse_K"], 3),
+            _number(row["after_rmse_K"], 3),
+        )
+    console.print(table)
+    for row in content["rows"]:
+        if row["status"] != "ok":
+            console.print(f"{row['recording']}: {row['reason']}", markup=False)
+    console.print(f"{content['diagnosed']} of {content['recordings']} diagnosed; {folder / 'report.html'}")
+
+
 def print_sweep(content: dict[str, Any], folder: Path) -> None:
     """How many designs were solved, and where the table is."""
     console = _console()

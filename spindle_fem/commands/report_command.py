@@ -24,6 +24,10 @@ def rebuild(folder: Path) -> Path:
         from spindle_fem.report.diagnosis_report import write_diagnosis_report
 
         return write_diagnosis_report(place)
+    if (place / "diagnoses.json").is_file():
+        from spindle_fem.report.diagnoses_report import write_diagnoses_report
+
+        return write_diagnoses_report(place)
     if (place / "plan.json").is_file():
         from spindle_fem.report.plan_report import write_plan_report
 

@@ -28,6 +28,8 @@ _OWN = frozenset(
         "simulated.csv",
         "calibrated_machine.toml",
         "diagnosis.json",
+        "diagnoses.json",
+        "diagnoses.csv",
         "plan.json",
         "improved_machine.toml",
         "states.csv",

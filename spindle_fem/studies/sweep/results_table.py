@@ -14,7 +14,8 @@ from spindle_fem.errors import BadInputError
 
 RESULTS = "results.csv"
 PARQUET = "results.parquet"
-EARLIER = "earlier_results.csv"
+EARLIER_PREFIX = "earlier_"
+EARLIER = EARLIER_PREFIX + RESULTS
 
 OK, FAILED, IMPOSSIBLE = "ok", "failed", "impossible"
 STATUSES = (OK, FAILED, IMPOSSIBLE)
@@ -28,7 +29,7 @@ Row = dict[str, Any]
 
 
 class ResultTable:
-    """Rows by key, in memory and in ``results.csv``.
+    """Rows by key, in memory and in a CSV file, ``results.csv`` of a sweep.
 
     A row is written with one call and synchronised before it counts, so that a
     process may end at any moment: what is in the file is whole, but for a last
@@ -45,8 +46,8 @@ class ResultTable:
         The folder holds a table with other columns, or one that is damaged.
     """
 
-    def __init__(self, folder: Path, columns: Sequence[str]) -> None:
-        self.path = Path(folder) / RESULTS
+    def __init__(self, folder: Path, columns: Sequence[str], name: str = RESULTS) -> None:
+        self.path = Path(folder) / name
         self.columns = tuple(columns)
         self.rows: dict[str, Row] = {}
         if self.path.exists() and self.path.stat().st_size > 0:
@@ -117,23 +118,23 @@ class ResultTable:
         -------
         list of dict
             Rows of the study; those of an earlier one in this folder are kept
-            in ``earlier_results.csv``.
+            in ``earlier_results.csv`` (``earlier_`` and the name of the table).
         """
         final = [self.rows[head["key"]] | head for head in order]
         wanted = {row["key"] for row in final}
         dropped = [row for key, row in self.rows.items() if key not in wanted]
         heading = self._line(dict(zip(self.columns, self.columns, strict=True)))
         if dropped:
-            earlier = self.path.with_name(EARLIER)
+            earlier = self.path.with_name(EARLIER_PREFIX + self.path.name)
             with earlier.open("ab") as stream:
                 stream.write(b"".join([heading, *map(self._line, dropped)]))
-        partial = self.path.with_name(RESULTS + ".partial")
+        partial = self.path.with_name(self.path.name + ".partial")
         with partial.open("wb") as stream:
             stream.write(b"".join([heading, *map(self._line, final)]))
             stream.flush()
             os.fsync(stream.fileno())
         os.replace(partial, self.path)
-        write_parquet(self.path.with_name(PARQUET), self.columns, final)
+        write_parquet(self.path.with_suffix(".parquet"), self.columns, final)
         return final
 
 

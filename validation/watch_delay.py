@@ -1,0 +1,133 @@
+"""How soon a watch says that a recording has left its machine, and how often it says so wrongly.
+
+``python -m validation.watch_delay RESULTS [--recordings DIR] [--only NAME ...] [--alarms 1/month]`` watches
+every open example to its end, writes ``RESULTS/watch_delay.json`` and prints a table: effect, onset, delay
+to "leaving" and to "left", channel, and for what is sound the number of alarms and the hours it was watched.
+
+A machine with calibration recordings is calibrated by them; a network without begins with a warm-up, the
+first fifth of its recording, but no longer than up to the onset where the effect has one. Delays count from
+the onset, or from where the watch begins.
+"""
+
+import argparse
+import json
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spindle_fem.definition.load import find_machine, read_definition
+from spindle_fem.definition.network_load import is_network_machine
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.studies.watch import Watching, alarms_a_month, watch_recording
+
+from .open_examples import MESH, examples
+
+WARM_UP_SHARE = 0.2
+# Least warm-up worth the name, as a share of a recording: an earlier onset lies within it.
+LEAST_SHARE = 0.02
+
+
+def onset_of(answer: dict[str, Any]) -> float:
+    """First moment at which something is missing, s; 0 where it always is, infinite where nothing is."""
+    if "changes_s" in answer:
+        return float(min(answer["changes_s"]))
+    effects = answer.get("effects", [])
+    starts = [effect["intervals"][0][0] if effect.get("intervals") else 0.0 for effect in effects]
+    return float(min(starts, default=np.inf))
+
+
+def watch_case(name: str, case: Path, machine: str, answer: Path, alarms: str) -> dict[str, Any]:
+    """One line of the table."""
+    onset = onset_of(json.loads(answer.read_text()))
+    times = read_recording(case).times
+    duration = float(times[-1] - times[0])
+    calibration = [path] if (path := case / "calibration.toml").exists() else []
+    warm_up = 0.0
+    if is_network_machine(read_definition(find_machine(machine))) and not calibration:
+        whole = WARM_UP_SHARE * duration
+        warm_up = min(whole, onset) if onset > LEAST_SHARE * duration else whole
+    how = Watching(
+        calibration,
+        () if machine.endswith(".toml") else MESH,
+        warm_up=warm_up,
+        alarms=alarms_a_month(alarms),
+        heartbeat=1.0,
+        until_end=True,
+    )
+    began = time.perf_counter()
+    lines = list(watch_recording(machine, case / "recording.toml", how))
+    start = read_recording(case).start
+    zero = np.datetime64(start.removesuffix("Z")) if start else None
+    at = np.array(
+        [
+            (np.datetime64(line["time"].removesuffix("Z")) - zero) / np.timedelta64(1, "s")
+            if zero is not None
+            else line["time"]
+            for line in lines
+        ]
+    )
+    states = np.array([line["state"] for line in lines])
+    away = np.flatnonzero((states == "left") & (np.append("", states[:-1]) != "left"))
+    counted = max(onset, float(at[0]))
+    found = {
+        word: next((float(at[i]) - counted for i in np.flatnonzero(states == word) if at[i] >= counted), None)
+        for word in ("leaving", "left")
+    }
+    first = next((lines[i] for i in np.flatnonzero(states == "left") if at[i] >= counted), {})
+    return {
+        "case": name,
+        "truth": [effect["effect"] for effect in json.loads(answer.read_text()).get("effects", [])],
+        "onset_s": None if np.isinf(onset) else onset,
+        "watched_h": (duration - float(at[0])) / 3600.0,
+        "sound_h": max(0.0, min(onset, duration) - float(at[0])) / 3600.0,
+        "false_alarms": int(np.sum(at[away] < onset)),
+        "leaving_after_s": found["leaving"],
+        "left_after_s": found["left"],
+        "channel": first.get("channel"),
+        "wall_s": time.perf_counter() - began,
+    }
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Watch what is asked for and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("results", type=Path)
+    parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"))
+    parser.add_argument("--only", nargs="*", default=[], help="names or beginnings of names")
+    parser.add_argument("--alarms", default="1/month")
+    parser.add_argument("--jobs", type=int, default=1)
+    given = parser.parse_args(arguments)
+    given.results.mkdir(parents=True, exist_ok=True)
+    wanted = {
+        name: item
+        for name, item in examples(given.recordings).items()
+        if not given.only or name.startswith(tuple(given.only))
+    }
+    rows = []
+    with ProcessPoolExecutor(given.jobs) as pool:
+        orders = [pool.submit(watch_case, name, *item, given.alarms) for name, item in wanted.items()]
+        for order in orders:
+            rows.append(order.result())
+            print(_line(rows[-1]), flush=True)
+    (given.results / "watch_delay.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    sound = sum(row["sound_h"] for row in rows)
+    print(f"{sum(row['false_alarms'] for row in rows)} false alarms in {sound:.0f} h of sound machines")
+
+
+def _line(row: dict[str, Any]) -> str:
+    def hours(value: float | None) -> str:
+        return "     –" if value is None else f"{value / 3600.0:6.2f}"
+
+    return (
+        f"{row['case']:32s} onset {hours(row['onset_s'])} h  leaving after {hours(row['leaving_after_s'])} h"
+        f"  left after {hours(row['left_after_s'])} h  {row['channel'] or '–':20s}"
+        f" false {row['false_alarms']} in {row['sound_h']:6.1f} h  {row['wall_s']:4.0f} s"
+        f"  {', '.join(row['truth']) or '(consistent)'}"
+    )
+
+
+if __name__ == "__main__":
+    main()
