@@ -10,7 +10,7 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint wheel-check reference study book clean
+.PHONY: run test setup lint wheel-check reference study book proof clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
@@ -55,6 +55,13 @@ EARLIER ?=
 book: $(READY)
 	test -d $(STUDY)/answers || $(MAKE) --no-print-directory study
 	$(BIN)/python -m book -o reports/book --study $(STUDY) --recordings $(RECORDINGS) $(addprefix --earlier ,$(EARLIER))
+
+# What was concealed and what was found, from finished studies: PROOF names their folders, with answers and results.
+# REAL=folder: diagnoses of the real recordings (`python -m validation.open_examples` leaves them).
+PROOF ?= runs/study_rough runs/study_networks $(STUDY)
+REAL ?=
+proof: $(READY)
+	$(BIN)/python -m validation.proof $(PROOF) -o reports/proof $(addprefix --real ,$(REAL)) --recordings $(RECORDINGS)
 
 clean:
 	rm -rf $(VENV) build dist runs .pytest_cache .ruff_cache .hypothesis

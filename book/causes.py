@@ -2,46 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.errors import BadInputError
 from spindle_fem.report.block_page import Table
 from spindle_fem.report.table_rows import column, rows_of
+from validation.causes import OPEN, read_causes, study_seed
+
+__all__ = ["CAUSES", "OPEN", "cause_counts", "read_causes", "study_seed", "wrong_table"]
 
 CAUSES = Path(__file__).parent / "causes.toml"
-OPEN = "not looked into yet"
-
-
-def study_seed(study: Path) -> int | None:
-    """Seed that the study was drawn with; None where it is not written down."""
-    path = study / "study.json"
-    return int(json.loads(path.read_text(encoding="utf-8"))["seed"]) if path.is_file() else None
-
-
-def read_causes(path: Path, seed: int | None) -> dict[str, dict[str, str]]:
-    """Causes written by hand, by case, for one seed.
-
-    Raises
-    ------
-    BadInputError
-        A case stands there twice, or without a cause.
-    """
-    found: dict[str, dict[str, str]] = {}
-    for entry in tomllib.loads(path.read_text(encoding="utf-8")).get("case", []):
-        name = f"{path.name}: {entry.get('case', '?')} of seed {entry.get('seed', '?')}"
-        if not {"seed", "case", "kind", "cause"} <= entry.keys():
-            raise BadInputError(name, "is incomplete.", "Give seed, case, kind and cause.")
-        if entry["seed"] != seed:
-            continue
-        if entry["case"] in found:
-            raise BadInputError(name, "stands there twice.", "Keep one.")
-        found[entry["case"]] = entry
-    return found
 
 
 def wrong_table(wrong: Sequence[Mapping[str, Any]], causes: Mapping[str, Mapping[str, str]]) -> Table:

@@ -22,7 +22,7 @@ from .generate import HEAVY, draw_stable, effect_answer, effects_set, judge, pla
 from .identify import Study
 from .recorder import Logger, Noise, record
 from .reduction import ReducedSpindle, load_reduced
-from .rough import AsMounted, deviating_machine, draw_channels, draw_mounting
+from .rough import GRID, AsMounted, deviating_machine, draw_channels, draw_mounting
 from .stepping import draw_as_built, run
 
 # What the cases conceal, in turn.
@@ -181,7 +181,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("-o", "--output", type=FilePath, required=True)
     parser.add_argument("--cache", type=FilePath, default=None, help="folder of the reduced machines")
     given = parser.parse_args(arguments)
-    nominal = load_reduced(given.cache)
+    nominal = load_reduced(given.cache, **GRID)
     pool = []
     for number in range(given.shapes):
         pool.append(deviating_machine(given.seed, number, given.cache))

@@ -9,6 +9,7 @@ again next time. A case with a ``machine.toml`` of its own is held against that.
 import argparse
 import json
 import os
+import subprocess
 import time
 import traceback
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -63,6 +64,18 @@ def not_concealed() -> list[str]:
     return sorted(set(catalogue()) - set(EVERY_EFFECT))
 
 
+def commit() -> str | None:
+    """Commit of the package that diagnoses, marked where files differ from it; None without git."""
+    told = subprocess.run(
+        ["git", "describe", "--always", "--dirty", "--abbrev=10"],
+        cwd=Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return told.stdout.strip() or None
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(
@@ -85,6 +98,9 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{len(names)} cases to diagnose; concealed in none: {left_out}", flush=True)
     if not names:
         return
+    given.results.mkdir(parents=True, exist_ok=True)
+    about = {"schema": "spindle-fem/study-run/1", "commit": commit(), "mesh": given.mesh}
+    (given.results / "run.json").write_text(json.dumps(about), encoding="utf-8")
     # The first case alone: it builds the fast model that all others then read from the cache.
     first, *rest = names
     common = (given.machine, overrides, given.report)

@@ -1,7 +1,7 @@
 """Score a study family by family: ``python -m validation.score_families STUDY RESULTS [--json FILE]``.
 
 For studies of networks and of machines with geometry alike. A case is right where the first set is one that
-its answer accepts and so is the verdict; a consistent one where the verdict is ``consistent``. Shares come
+its answer accepts, places and verdict, too; a consistent one where the verdict is ``consistent``. Shares come
 with Wilson's 90 % interval. Whatever has both an answer and a diagnosis counts; a case that failed is wrong.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .asked import wilson
-from .score import coverage, first_right, ranked_sets
+from .score import coverage, first_right, matches, ranked_sets
 
 SURE = 0.9
 SEEN_OVER_NOISE = 3.0
@@ -68,6 +68,11 @@ def accepted(answer: dict[str, Any]) -> dict[str, Any]:
     return answer if answer["acceptable_sets"] else answer | {"acceptable_sets": [[]]}
 
 
+def family_of(answer: dict[str, Any]) -> str:
+    """Family of a case; several families together are a pair, whichever they are."""
+    return "pair" if "+" in answer["family"] else answer["family"]
+
+
 def score_row(answer: dict[str, Any], diagnosis: dict[str, Any], folder: Path) -> dict[str, Any]:
     """What one case says."""
     sets = ranked_sets(diagnosis)
@@ -77,6 +82,7 @@ def score_row(answer: dict[str, Any], diagnosis: dict[str, Any], folder: Path) -
     rank = next((k + 1 for k, (one, _) in enumerate(sets) if first_right(right_sets, one)), None)
     verdict_right = diagnosis["verdict"] in answer["acceptable_verdicts"]
     first = rank == 1
+    in_place = any(matches(found, wanted, place=True) for wanted in right_sets["acceptable_sets"])
     here = [
         f
         for f in found
@@ -93,7 +99,7 @@ def score_row(answer: dict[str, Any], diagnosis: dict[str, Any], folder: Path) -
     timing = folder / "timing.json"
     return {
         "case": answer["case"],
-        "family": answer["family"],
+        "family": family_of(answer),
         "machine": answer.get("machine", answer.get("profile", "")),
         "truth": [f"{e['effect']}@{e['component']}" for e in answer["effects"]],
         "found": [f"{f['effect']}@{f['component']}" for f in found],
@@ -104,7 +110,7 @@ def score_row(answer: dict[str, Any], diagnosis: dict[str, Any], folder: Path) -
         "detectable": consistent or answer["detectable"],
         "undecidable": answer["verdict"] == "ambiguous",
         "ratio": (answer.get("identifiability") or {}).get("ratio"),
-        "right": (diagnosis["verdict"] == "consistent") if consistent else first and verdict_right,
+        "right": (diagnosis["verdict"] == "consistent") if consistent else in_place and verdict_right,
         "set_first": first,
         "verdict_right": verdict_right,
         "within_three": rank is not None and rank <= 3,
@@ -132,7 +138,7 @@ def failed_row(answer: dict[str, Any]) -> dict[str, Any]:
     consistent = answer["true_verdict"] == "consistent"
     return {
         "case": answer["case"],
-        "family": answer["family"],
+        "family": family_of(answer),
         "machine": answer.get("machine", answer.get("profile", "")),
         "truth": [f"{e['effect']}@{e['component']}" for e in answer["effects"]],
         "found": [],
@@ -223,11 +229,11 @@ def percent(one: dict[str, Any]) -> str:
     """A share as text.
 
     >>> percent({"share": 0.5, "of": 10, "low": 0.27, "high": 0.73})
-    '50 % (27-73) of 10'
+    '50 % (27–73) of 10'
     """
     if not one["of"]:
-        return "-"
-    return f"{100 * one['share']:.0f} % ({100 * one['low']:.0f}-{100 * one['high']:.0f}) of {one['of']}"
+        return "–"
+    return f"{100 * one['share']:.0f} % ({100 * one['low']:.0f}–{100 * one['high']:.0f}) of {one['of']}"
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -1,0 +1,232 @@
+"""The proof in the open: ``python -m validation.proof STUDY... -o reports/proof`` from finished studies.
+
+Every ``STUDY`` is a folder of one of the generators with ``answers`` and ``results``. Writes ``proof.json``
+(the rows of every case, the figures that follow from them, a worked case, real recordings), pictures, and
+``README.md``, which is rendered from ``proof.json`` alone, so that every number on it stands there.
+"""
+
+import argparse
+import json
+import tomllib
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from .causes import OPEN, SPINDLE, read_causes, study_seed
+from .score import reliability
+from .score_families import percent, score_study, states_of, summary
+
+SCHEMA = "spindle-fem/proof/1"
+HERE = Path(__file__).parent
+CAUSES = HERE.parent / "book" / "causes.toml"
+TITLES = {
+    SPINDLE: "The recorded spindle, known up to its uncertain parameters",
+    "rough": "The recorded spindle, known roughly",
+    "networks": "Machines without drawings",
+}
+DIGITS = 4
+
+
+def rounded(value: Any) -> Any:
+    """The same with every real number to a few significant digits.
+
+    >>> rounded({"a": [1.234567, True, "x"]})
+    {'a': [1.235, True, 'x']}
+    """
+    if isinstance(value, dict):
+        return {k: rounded(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [rounded(v) for v in value]
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+
+
+def read_study(study: Path, results: Path) -> dict[str, Any]:
+    """Rows and figures of one study, with the causes of its wrong cases.
+
+    Raises
+    ------
+    FileNotFoundError
+        No case of it has been diagnosed.
+    """
+    rows = [rounded(row) for row in score_study(study, results)]
+    if not rows:
+        raise FileNotFoundError(f"{results}: holds no diagnosis of {study}.")
+    drawn = json.loads((study / "study.json").read_text(encoding="utf-8"))
+    run = results / "run.json"
+    generator = drawn.get("generator", SPINDLE)
+    causes = read_causes(CAUSES, study_seed(study), generator)
+    return {
+        "name": study.name,
+        "title": TITLES[generator],
+        "generator": generator,
+        "seed": drawn["seed"],
+        "drawn": len(list((study / "answers").glob("*.json"))),
+        "commit": json.loads(run.read_text(encoding="utf-8"))["commit"] if run.exists() else None,
+        "rows": rows,
+        **figures_of(rows),
+        "causes": {
+            r["case"]: {k: causes.get(r["case"], {}).get(k, OPEN) for k in ("kind", "cause")}
+            for r in rows
+            if is_wrong(r)
+        },
+    }
+
+
+def figures_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """What follows from the rows: figures by family, reliability of stated probabilities."""
+    seen = [r for r in rows if r["detectable"] and not r["failed"]]
+    stated = [r | {"first": r["right"], "exact": False} for r in seen]
+    return rounded({"summary": summary(rows), "reliability": reliability(stated)})
+
+
+def is_wrong(row: dict[str, Any]) -> bool:
+    """Whether a case has to be accounted for: what could be seen was not said, or what is not there was."""
+    return bool(row["failed"] or (not row["right"] if row["detectable"] else row["confident_wrong"]))
+
+
+def worked_case(studies: dict[str, tuple[Path, Path, dict]], chosen: str | None) -> dict[str, Any] | None:
+    """One case from recording to held-out fit: the one asked for (STUDY/CASE), else the best with states."""
+    rows = [
+        (name, row)
+        for name, (_, _, told) in studies.items()
+        for row in told["rows"]
+        if (chosen == f"{name}/{row['case']}" if chosen else row["right"] and not row["consistent"])
+    ]
+    if not rows:
+        return None
+
+    def worth(item: tuple[str, dict]) -> tuple:
+        row = item[1]
+        gain = (row["before_over_noise"] or 0.0) / max(row["after_over_noise"] or 1.0, 0.1)
+        return (row.get("states_f1") or 0.0, gain)
+
+    name, row = max(rows, key=worth)
+    study, results, _ = studies[name]
+    answer = json.loads((study / "answers" / f"{row['case']}.json").read_text(encoding="utf-8"))
+    folder = results / row["case"]
+    diagnosis = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+    return rounded(
+        {
+            "study": name,
+            "case": row["case"],
+            "row": row,
+            "truth": [e.get("statement") or f"{e['effect']} at {e['component']}" for e in answer["effects"]],
+            "noise_K": answer["noise"],
+            "fit": {k: diagnosis["fit"][k] for k in ("before", "after", "heldout")},
+            "findings": diagnosis["findings"],
+            "set_probability": diagnosis.get("set_probability"),
+            "true_states": [span for e in answer["effects"] for span in e.get("intervals") or []],
+            "found_states": states_of(folder, diagnosis),
+            "channels": diagnosis["mismatch"]["channels"],
+            "next": (diagnosis.get("next_measurement") or {}).get("why"),
+        }
+    )
+
+
+def real_machines(results: Path | None, recordings: Path | None) -> list[dict[str, Any]]:
+    """What was found on recordings of real machines, with what they are evidence of."""
+    entries = tomllib.loads((HERE / "proof_real.toml").read_text(encoding="utf-8"))["recording"]
+    out = []
+    for entry in entries:
+        path = (results / entry["folder"] / "diagnosis.json") if results else None
+        if path is None or not path.exists():
+            continue
+        diagnosis = json.loads(path.read_text(encoding="utf-8"))
+        known = (recordings / entry["answer"]) if recordings and "answer" in entry else None
+        out.append(
+            entry
+            | {
+                "verdict": diagnosis["verdict"],
+                "set_probability": diagnosis.get("set_probability"),
+                "findings": [
+                    {k: f.get(k) for k in ("effect", "component", "statement")} for f in diagnosis["findings"]
+                ],
+                "fit": {k: diagnosis["fit"][k] for k in ("before", "after", "noise_K")},
+                "known": json.loads(known.read_text(encoding="utf-8")) if known and known.exists() else None,
+            }
+        )
+    return rounded(out)
+
+
+def build(
+    studies: list[tuple[Path, Path]], worked: str | None, real: tuple[Path | None, Path | None]
+) -> dict:
+    """Everything that the page says, as one table of data."""
+    told = {study.name: (study, results, read_study(study, results)) for study, results in studies}
+    return {
+        "schema": SCHEMA,
+        "interval_percent": 90,
+        "studies": [data for _, _, data in told.values()],
+        "worked": worked_case(told, worked),
+        "real": real_machines(*real),
+    }
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """A number as text, a dash where there is none."""
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+def spaced(text: str) -> str:
+    """Names as words.
+
+    >>> spaced("heat_scale@oil")
+    'heat scale at oil'
+    """
+    return text.replace("_", " ").replace("@", " at ").replace("+", " + ").replace("|", "–")
+
+
+def joined(names: list[str]) -> str:
+    """A set of effects in words."""
+    return spaced("+".join(names)) or "nothing"
+
+
+def wrong_of(study: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows that are accounted for, each with its cause."""
+    return [row | study["causes"][row["case"]] for row in study["rows"] if is_wrong(row)]
+
+
+def kinds_of(study: dict[str, Any]) -> list[tuple[str, int]]:
+    """How many wrong cases each kind of cause has."""
+    return Counter(cause["kind"] for cause in study["causes"].values()).most_common()
+
+
+def render(data: dict[str, Any]) -> str:
+    """The page, from the data alone."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(HERE),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {"share": percent, "number": number, "spaced": spaced, "joined": joined}
+    environment.filters |= {"wrong": wrong_of, "kinds": kinds_of, "hours": lambda s: number(s / 3600.0, 1)}
+    return environment.get_template("proof_page.md.j2").render(data)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("study", type=Path, nargs="+", help="folder with answers and results")
+    parser.add_argument("-o", "--output", type=Path, default=Path("reports/proof"))
+    parser.add_argument("--results", default="results", help="name of the results' folder in each study")
+    parser.add_argument("--worked", default=None, help="STUDY/case_0001 to show from end to end")
+    parser.add_argument("--real", type=Path, default=None, help="folder with diagnoses of real recordings")
+    parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"))
+    given = parser.parse_args(arguments)
+    studies = [(study, study / given.results) for study in given.study]
+    data = build(studies, given.worked, (given.real, given.recordings))
+    given.output.mkdir(parents=True, exist_ok=True)
+    from .proof_pictures import draw_all
+
+    draw_all(data, {study.name: (study, results) for study, results in studies}, given.output)
+    (given.output / "proof.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    (given.output / "README.md").write_text(render(data), encoding="utf-8")
+    print(f"{given.output / 'README.md'}: {sum(len(s['rows']) for s in data['studies'])} cases")
+
+
+if __name__ == "__main__":
+    main()
