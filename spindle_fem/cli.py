@@ -44,6 +44,12 @@ Overrides = Annotated[
     typer.Option("--set", metavar="PATH=VALUE", help="Override a value, with its unit: channel.depth=19mm."),
 ]
 Folder = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the results.")]
+Calibrate = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--calibrate", metavar="FILE", help="Recording of the same machine with nothing missing; repeatable."
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")]
 
 
@@ -255,14 +261,7 @@ def diagnose(
         list[Path], typer.Argument(help="Folders or .toml files of the recordings to be explained.")
     ],
     output: Folder,
-    calibrate: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--calibrate",
-            metavar="FILE",
-            help="Recording of the same machine with nothing missing; repeatable.",
-        ),
-    ] = None,
+    calibrate: Calibrate = None,
     heldout: Annotated[
         str,
         typer.Option(
@@ -320,14 +319,7 @@ def diagnose_folder(
     machine: Machine,
     recordings: Annotated[Path, typer.Argument(help="Folder with several recordings.")],
     output: Folder,
-    calibrate: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--calibrate",
-            metavar="FILE",
-            help="Recording of the same machine with nothing missing; repeatable.",
-        ),
-    ] = None,
+    calibrate: Calibrate = None,
     full_model: Annotated[
         str, typer.Option("--full-model", metavar="auto|off|coarse|own", help="As of diagnose.")
     ] = "auto",
@@ -403,14 +395,7 @@ def plan(
             help='Input at full load in a standard test, with its unit, repeatable: speed="3000 rpm".',
         ),
     ] = None,
-    calibrate: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--calibrate",
-            metavar="FILE",
-            help="Recording of the same machine with nothing missing; repeatable.",
-        ),
-    ] = None,
+    calibrate: Calibrate = None,
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
@@ -439,14 +424,7 @@ def watch(
         Path,
         typer.Argument(help='Folder or .toml file of a recording that grows; data = "-": standard input.'),
     ],
-    calibrate: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--calibrate",
-            metavar="FILE",
-            help="Recording of the same machine with nothing missing; repeatable.",
-        ),
-    ] = None,
+    calibrate: Calibrate = None,
     warm_up: Annotated[
         str | None,
         typer.Option("--warm-up", metavar="TIME", help="Beginning of the recording that is taken as sound."),
