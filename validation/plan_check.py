@@ -57,19 +57,12 @@ def multiple_of(item: Any, effect: dict[str, Any]) -> float:
 
     A quantity whose logarithm counts is compared by its logarithm.
     """
-    from spindle_fem.effects.registry import effect_of
-    from spindle_fem.inference.screening import amplitude_value
-
     stated = {name: float(entry["value"]) for name, entry in effect.get("parameters", {}).items()}
     multiples = np.geomspace(0.01, 30.0, 400)
-    told = []
-    for multiple in multiples:
-        value = amplitude_value(item.main, float(multiple))
-        reported = effect_of(item.effect).report(item.main.candidate, item.main.values(value))
-        name, first = next(iter(reported.items()))
-        if name not in stated:
-            return 1.0
-        told.append(first.value)
+    name = item.reported(1.0)[0]
+    if name not in stated:
+        return 1.0
+    told = [item.reported(float(multiple))[1] for multiple in multiples]
     wanted, null = stated[name], 1.0 if name in ("factor", "gain") else 0.0
     size, sizes = wanted - null, np.array(told) - null
     if name == "factor":

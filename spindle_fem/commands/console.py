@@ -225,8 +225,10 @@ def print_plan(content: dict[str, Any], folder: Path) -> None:
     console = _console()
     for sentence in content["summary"]:
         console.print(sentence, markup=False)
-    for key, title in (("sensors_in_turn", "Further sensors, one after another"), ("tests", "Tests")):
+    hours = f"Tests of {content['best_test']['length_s'] / 3600.0:.3g} h" if content["best_test"] else ""
+    for key, title in (("sensors_in_turn", "Further sensors, one after another"), ("tests", hours)):
         table = _table(title, "", "information bit", "seen", "told from all")
+        table.columns[0].no_wrap = False
         for item in content[key]:
             table.add_row(
                 item["words"],

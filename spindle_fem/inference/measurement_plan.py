@@ -71,17 +71,27 @@ class Hypothetical:
     main: Variant
     weight: float
 
+    def reported(self, multiple: float) -> tuple[str, float, str]:
+        """Parameter, value and unit that a finding states at a multiple of the usual size."""
+        candidate = self.main.candidate
+        told, half = (
+            effect_of(self.effect).report(
+                candidate, self.main.values(amplitude_value(self.main, factor * multiple))
+            )
+            for factor in (1.0, 0.5)
+        )
+        # The first that follows the size: of a swing the amplitude, not the period.
+        name = next((n for n, item in told.items() if item.value != half[n].value), next(iter(told)))
+        return name, told[name].value, told[name].unit
+
     def size(self, multiple: float) -> tuple[str, float, str] | None:
-        """Parameter, value and unit at a multiple of the usual size; None beyond what can be."""
+        """The same; None beyond what can be."""
         candidate = self.main.candidate
         item = candidate.parameters[candidate.amplitude]
-        value = amplitude_value(self.main, multiple)
         limit = item.high if candidate.reference > candidate.null else item.low
-        if multiple > LARGEST_MULTIPLE or value == limit:
+        if multiple > LARGEST_MULTIPLE or amplitude_value(self.main, multiple) == limit:
             return None
-        told = effect_of(self.effect).report(candidate, self.main.values(value))
-        name, reported = next(iter(told.items()))
-        return name, reported.value, reported.unit
+        return self.reported(multiple)
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,7 +75,7 @@ def plan_content(
         "sensors_in_turn": [_option(item, plan.asked) for item in plan.sensors_in_turn],
         "tests": [_option(item, plan.asked) for item in plan.tests],
         "not_simulated": [{"description": name, "reason": why} for name, why in plan.not_simulated],
-        "summary": summary(plan, sensors),
+        "summary": summary(plan, sensors, compared),
         "notes": [*plan.machine.notes, *notes],
     }
 
@@ -128,8 +128,8 @@ def confused_with(plan: MeasurementPlan, index: int) -> list[int]:
     return sorted(found, key=lambda j: plan.separation.information[index, j])
 
 
-def summary(plan: MeasurementPlan, sensors: Sequence[Sensor]) -> list[str]:
-    """What to read from it, in sentences."""
+def summary(plan: MeasurementPlan, sensors: Sequence[Sensor], compared: float) -> list[str]:
+    """What to read from it, in sentences; ``compared`` as :func:`plan_content` takes it."""
     items, now = plan.hypotheticals, plan.asked
     names = [item.name for item in sensors]
     shown = ", ".join(names[:-1]) + f" and {names[-1]}" if len(names) > 1 else names[0]
@@ -164,5 +164,7 @@ def summary(plan: MeasurementPlan, sensors: Sequence[Sensor]) -> list[str]:
                 f"{best.told} told from every other."
             )
         else:
-            found.append("No other test that was compared tells more with these sensors.")
+            found.append(
+                f"No other test that was compared (of {compared / 3600.0:.3g} h) tells more with these sensors."
+            )
     return found

@@ -187,10 +187,10 @@ def standard_schedules(
     hold = length / (3.0 + rest)
     steps = ((rest * hold, at(0.0)), *((hold, at(third / 3.0)) for third in (1.0, 2.0, 3.0)))
     half = 0.5 * length
-    words = " and ".join(_plain(name) for name in driven)
+    words = " and ".join(_plain(name) for name in driven) if len(driven) < 3 else "load"
     return {
         "heat_up": Schedule(f"{_minutes(length)} from rest at full {words}", words, 1, ((length, at(1.0)),)),
-        "steps": Schedule(f"a third, two thirds and all of {words}, {_minutes(hold)} each", words, 1, steps),
+        "steps": Schedule(f"{words} at a third, two thirds and all, {_minutes(hold)} each", words, 1, steps),
         "cool_down": Schedule(
             f"{_minutes(half)} at full {words}, then {_minutes(half)} at rest",
             words,

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from spindle_fem.commands.plan_command import plan, planned_measurement
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError
+from spindle_fem.inference import measurement_plan, opened_machine
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import expected_slow_error
@@ -18,6 +20,8 @@ from spindle_fem.inference.told_apart import (
     misfit_seen,
     misfit_told,
 )
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from tests.support.lumped_spindle import lumped_model
 
 MACHINE = """
 schema = "spindle-fem/machine/1"
@@ -98,6 +102,45 @@ def test_offset_of_a_sensor_is_seen_from_the_size_that_noise_leaves(machine):
     name, value, unit = items[index].size(float(found.plan.separation.seen_from[index]))
     assert (name, unit) == ("offset", "K")
     assert value == pytest.approx(np.sqrt(misfit_seen(1, len(items)) / misfit), rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def spindles():
+    """Plans of the lumped reference spindle read by one probe: as it is, and as if it were as defined."""
+    spec = load_machine("recorded_spindle")
+    fast = fast_spindle(lumped_model(spec), spec)
+    asked = {"test": "cool_down:1h", "sensors": ["SP01"], "compare": False}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(opened_machine, "fast_model_for", lambda *_, **__: fast)
+        found = [planned_measurement("recorded_spindle", **asked).plan]
+        patch.setattr(measurement_plan, "misdescriptions_of", lambda predictor: ())
+        patch.setattr(measurement_plan, "_places", lambda *_: ())
+        return (*found, planned_measurement("recorded_spindle", **asked).plan)
+
+
+def test_one_more_sensor_never_tells_less(spindles):
+    plan, _ = spindles
+    names = [item.name for item in plan.further_sensors]
+    assert {"SP02", "SP03", "SP04", "SP05"} <= set(names)
+    assert "SP01" not in names
+    gained = [item.information for item in plan.further_sensors]
+    assert min(gained) >= plan.asked.information - 1e-9
+    assert gained == sorted(gained, reverse=True)
+    in_turn = [item.information for item in plan.sensors_in_turn]
+    assert in_turn == sorted(in_turn)
+
+
+def test_directions_in_which_the_machine_may_differ_take_their_part(spindles):
+    plan, as_defined = spindles
+    assert plan.asked.information < as_defined.asked.information
+    assert as_defined.further_sensors == ()
+
+
+def test_size_of_a_swing_is_its_amplitude(spindles):
+    [cycling] = [item for item in spindles[0].hypotheticals if item.effect == "chiller_cycling"]
+    name, value, unit = cycling.size(0.5)
+    assert (name, unit) == ("amplitude", "K")
+    assert value == pytest.approx(0.5 * cycling.size(1.0)[1])
 
 
 def forms(owner, one_sided=False):
