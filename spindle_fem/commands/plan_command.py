@@ -23,6 +23,7 @@ from spindle_fem.inference.planned_test import (
     LONGEST_COMPARED,
     NOISE,
     STANDARD_TESTS,
+    USUAL_RISE,
     Conditions,
     Sensor,
     as_predicted,
@@ -34,7 +35,7 @@ from spindle_fem.inference.planned_test import (
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.results.output_folder import output_folder, replace_text
-from spindle_fem.units import TEMPERATURE_UNIT, to_si
+from spindle_fem.units import TEMPERATURE_UNIT, registry, to_si
 
 Progress = Callable[[str], None]
 ALL = "all"
@@ -48,6 +49,7 @@ class Planned:
     conditions: Conditions
     sensors: tuple[Sensor, ...]
     test: str
+    inputs: Mapping[str, tuple[float, str]]
     compared: float
     notes: tuple[str, ...]
 
@@ -106,7 +108,14 @@ def plan(
         progress=tell,
     )
     with output_folder(folder) as place:
-        content = plan_content(planned.plan, planned.sensors, planned.test, planned.compared, planned.notes)
+        content = plan_content(
+            planned.plan,
+            planned.sensors,
+            planned.test,
+            planned.inputs,
+            planned.compared,
+            planned.notes,
+        )
         content["wall_time_s"] = time.perf_counter() - started
         content = plain_data(content)
         spec = planned.conditions.spec
@@ -154,6 +163,7 @@ def planned_measurement(
         schedule = conditions.standard_tests(seconds)[name]
         chosen = _sensors(sensors, {probe: Sensor(probe, probe, NOISE) for probe in conditions.probes})
         asked, words = recording_of(conditions, schedule, chosen), schedule.name
+        full = {name: (value, conditions.units[name]) for name, value in conditions.usual.items()}
     else:
         read = read_recording(test)
         if given:
@@ -161,7 +171,7 @@ def planned_measurement(
                 "input", "belongs to a standard test.", "Leave it out: the recording has its own."
             )
         asked, chosen = _of_recording(read, sensors, conditions)
-        seconds, words = float(np.ptp(read.times)), f'the inputs of "{read.name}"'
+        seconds, words, full = float(np.ptp(read.times)), f'the inputs of "{read.name}"', {}
         conditions = _as_recorded(conditions, read)
     compared = min(seconds, LONGEST_COMPARED)
     schedules = conditions.family(compared) if compare else []
@@ -172,8 +182,24 @@ def planned_measurement(
     opened = open_machine(machine, overrides, as_predicted(opened, recordings), earlier, progress=progress)
     found = plan_measurement(opened, schedules, asked=words, progress=progress)
     little = says_too_little(_only_first(opened))
-    notes = (f"A diagnosis of such a recording would refuse it: {little}",) if little else ()
-    return Planned(found, conditions, tuple(chosen), words, compared, notes)
+    notes = [f"A diagnosis of such a recording would refuse it: {little}"] if little else []
+    if conditions.assumed:
+        sizes = ", ".join(f"{name} {_quantity_text(*full[name])}" for name in conditions.assumed)
+        notes.insert(
+            0,
+            f"Nothing says how large these inputs are; each is taken to warm the hottest node by "
+            f"{USUAL_RISE:.0f} K in the end: {sizes}. Give what the test would run at with --input.",
+        )
+    return Planned(found, conditions, tuple(chosen), words, full, compared, tuple(notes))
+
+
+def _quantity_text(value: float, unit: str) -> str:
+    """A value in SI with a readable unit."""
+    shown = registry().Quantity(value, unit).to_compact()
+    watts = registry().Unit("W")
+    if shown.is_compatible_with(watts):
+        shown = shown.to(watts)
+    return f"{shown.magnitude:.3g} {shown.units:~P}".strip()
 
 
 def _input(text: str) -> tuple[str, tuple[float, str]]:

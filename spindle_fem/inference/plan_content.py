@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,12 @@ WORTH = 0.005
 
 
 def plan_content(
-    plan: MeasurementPlan, sensors: Sequence[Sensor], test: str, compared: float, notes: Sequence[str]
+    plan: MeasurementPlan,
+    sensors: Sequence[Sensor],
+    test: str,
+    inputs: Mapping[str, tuple[float, str]],
+    compared: float,
+    notes: Sequence[str],
 ) -> dict[str, Any]:
     """Everything that is written of a plan.
 
@@ -34,6 +39,8 @@ def plan_content(
     ----------
     test : str
         In words.
+    inputs : mapping of str to (float, str)
+        At full load of a standard test, SI, and their units.
     compared : float, [s]
         Length of the tests compared with it.
     """
@@ -55,6 +62,9 @@ def plan_content(
             "description": test,
             "length_s": float(np.ptp(recording.times)),
             "interval_s": float(np.median(np.diff(recording.times))),
+            "inputs": [
+                {"name": name, "value": value, "unit": unit} for name, (value, unit) in inputs.items()
+            ],
         },
         "power": POWER,
         "false_alarm": FALSE_ALARM,
@@ -164,7 +174,5 @@ def summary(plan: MeasurementPlan, sensors: Sequence[Sensor], compared: float) -
                 f"{best.told} told from every other."
             )
         else:
-            found.append(
-                f"No other test that was compared (of {compared / 3600.0:.3g} h) tells more with these sensors."
-            )
+            found.append(f"No other test of {compared / 3600.0:.3g} h tells more with these sensors.")
     return found

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from spindle_fem.definition.load import find_machine, load_machine, read_definition
 from spindle_fem.definition.machine_spec import MachineSpec
@@ -36,6 +37,8 @@ SAMPLE, MOST_SAMPLES = 30.0, 2_000
 # Tests that are compared with the one asked for are no longer than this, s.
 LONGEST_COMPARED = 8.0 * 3600.0
 ROOM = ZERO_CELSIUS_K + 20.0
+# Inputs of a network whose size nothing says warm its hottest node by this in the end, others at rest, K.
+USUAL_RISE = 30.0
 STANDARD_TESTS = ("heat_up", "steps", "cool_down")
 # SI base units of the inputs that every machine with geometry has.
 UNITS = {
@@ -80,6 +83,8 @@ class Conditions:
         Inputs that heat the machine.
     start : float, [K]
         Of everything, before the test.
+    assumed : tuple of str
+        Inputs whose size nothing says: as large as warms the hottest node by ``USUAL_RISE``.
     """
 
     spec: MachineSpec | NetworkMachineSpec
@@ -88,6 +93,7 @@ class Conditions:
     units: Mapping[str, str]
     driven: tuple[str, ...]
     start: float
+    assumed: tuple[str, ...] = ()
 
     @property
     def probes(self) -> tuple[str, ...]:
@@ -142,7 +148,7 @@ def conditions_of(
     Raises
     ------
     SpecError
-        An input that the machine does not have, or one whose size nothing says.
+        An input that the machine does not have, or one that warms nothing and has no size.
     """
     if not is_network_machine(read_definition(find_machine(machine))):
         spec = load_machine(machine, overrides)
@@ -166,16 +172,44 @@ def conditions_of(
     usual |= {name: value for name, (value, _) in given.items()}
     units |= {name: unit for name, (_, unit) in given.items()}
     silent = [name for name in network.input_names if name not in usual]
-    if silent and not recorded:
-        raise SpecError(
-            f"input {silent[0]}",
-            "drives the machine, but nothing says how large it is in the test.",
-            f'Give it with its unit, --input {silent[0]}="100 W", or a recording as the test.',
-        )
+    for name in () if recorded else silent:
+        usual[name], units[name] = _warming_size(spec, network, name)
     fixed = [float(value) for value in network.boundary_temperature if np.isfinite(value)]
     start = float(np.mean([usual[name] for name in temperatures] or fixed or [ROOM]))
     driven = tuple(name for name in network.input_names if name not in temperatures)
-    return Conditions(spec, network, usual, units, driven, start)
+    return Conditions(spec, network, usual, units, driven, start, () if recorded else tuple(silent))
+
+
+def _warming_size(spec: NetworkMachineSpec, network: ThermalNetwork, name: str) -> tuple[float, str]:
+    """Size of an input that in the end warms the hottest node by ``USUAL_RISE``, others at rest; its unit.
+
+    Raises
+    ------
+    SpecError
+        It warms nothing, or without end.
+    """
+    sources = [(i, item) for i, item in enumerate(spec.network.source) if item.input == name]
+    nodes = network.n_nodes
+    matrix = network.conductance_matrix()[:, :nodes]
+
+    def rise(size: float) -> float:
+        heat = np.zeros(nodes)
+        for index, item in sources:
+            heat[network.source_node[index]] += network.source_gain[index] * size**item.exponent
+        return float(np.max(np.linalg.solve(matrix, heat)))
+
+    first = sources[0][1]
+    watts = registry().Unit("W") / registry().Unit(first.gain.unit or "dimensionless")
+    unit = base_name(str(watts ** (1.0 / first.exponent)))
+    try:
+        exponent = brentq(lambda power: np.log(rise(10.0**power) / USUAL_RISE), -12.0, 12.0)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise SpecError(
+            f"input {name}",
+            "drives the machine, but nothing says how large it is in the test.",
+            f'Give it with its unit, --input {name}="100 W", or a recording as the test.',
+        ) from error
+    return float(10.0**exponent), unit
 
 
 def base_name(unit: str) -> str:

@@ -24,6 +24,7 @@ from spindle_fem.report.table_rows import (
     fixed,
     number,
     plain,
+    rounded,
     significant,
     table_of,
     whole,
@@ -79,6 +80,11 @@ def write_plan_report(folder: str | Path) -> Path:
     subtitle = f"{content['test']['description']}, {number(content['test']['length_s'] / 3600.0, 1)} h"
     page = render_document("Plan of a measurement", content["machine"], sections, subtitle)
     return replace_text(folder / "report.html", page)
+
+
+def _summary(content: Mapping[str, Any]) -> list[Any]:
+    notes = [Text(note) for note in content["notes"]]
+    return [Bullets(content["summary"]), Cards(_cards(content)), *notes]
 
 
 def _cards(content: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -180,8 +186,11 @@ def _how(content: Mapping[str, Any]) -> list[Any]:
         "have. What is left decides: as much as a diagnosis asks before it no longer names both.",
         f"Unrecorded heat and cooling come in {content['intervals']} intervals that stand for all others.",
     ]
-    blocks = [table_of(fields, content["sensors"]), Bullets(steps)]
-    blocks += [Text(note) for note in content["notes"]]
+    blocks = [table_of(fields, content["sensors"])]
+    if content["test"]["inputs"]:
+        given = (words("input", "name"), rounded("at full load", "value", 4), words("unit", "unit"))
+        blocks.append(table_of(given, content["test"]["inputs"]))
+    blocks.append(Bullets(steps))
     blocks += [
         Text(f"Not simulated: {item['description']}. {item['reason']}") for item in content["not_simulated"]
     ]

@@ -10,6 +10,7 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError
 from spindle_fem.inference import measurement_plan, opened_machine
 from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.inference.planned_test import base_name, conditions_of
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import expected_slow_error
 from spindle_fem.inference.told_apart import (
@@ -218,6 +219,14 @@ def test_plan_of_a_network_is_written_and_readable(machine, tmp_path):
     assert not (tmp_path / "out" / "INCOMPLETE").exists()
 
 
+def test_inputs_of_unknown_size_warm_the_hottest_node_by_thirty_kelvin(machine):
+    found = conditions_of(str(machine()), (), {}, recorded=False)
+    # Power at a, which has 2 W/K to the room and 1 W/K to b with 2 W/K to the room: 2 + 2/3 W/K.
+    assert found.assumed == ("power",)
+    assert found.usual["power"] == pytest.approx(30.0 * (2.0 + 2.0 / 3.0))
+    assert found.units["power"] == base_name("W")
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -226,7 +235,6 @@ def test_plan_of_a_network_is_written_and_readable(machine, tmp_path):
         ({"sensors": ["a=-0.1 K"]}, "above 0 K"),
         ({"inputs": ["power=40"]}, "power"),
         ({"inputs": ["speed=40 W"]}, "not an input of this machine"),
-        ({"inputs": []}, 'input power="100 W"'),
         ({"test": "soak"}, "heat_up, steps, cool_down"),
         ({"test": "steps:4"}, "bare number"),
     ],
