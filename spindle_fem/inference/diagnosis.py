@@ -31,6 +31,7 @@ from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
+from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
 from spindle_fem.parallel import thread_count
 
 Array = NDArray[np.float64]
@@ -59,6 +60,8 @@ class Diagnosis:
     heldout : str
         How the held-out readings were chosen.
     seconds : mapping of stage to float
+    wrong : WrongDirection or None
+        Direction whose prior was given up.
     """
 
     predictor: Predictor
@@ -72,6 +75,7 @@ class Diagnosis:
     heldout: str
     candidates_tried: int
     seconds: Mapping[str, float]
+    wrong: WrongDirection | None = None
 
     @property
     def machine_coordinates(self) -> tuple[Coordinate, ...]:
@@ -135,7 +139,16 @@ def diagnose_recordings(
     progress("diagnosis: final fits")
     best = rank(found)[0].best
     slow = slow_error_of(problem, best.fit)
-    final = Problem(predictor, calibrated.belief, slow, predictor.observations)
+    trials = len({(c.effect, c.component) for c in candidates})
+    empty = next(h for h in found if not h.fit.candidates)
+    wrong = wrong_direction(problem.belief, empty.fit, directions, trials)
+    if wrong is not None and wrong.log_gain > max(0.0, best.score - empty.score):
+        belief = wrong.belief
+        problem = Problem(small, belief, slow, small.observations)
+        slow = slow_error_of(problem, problem.fit((), empty.fit.values))
+    else:
+        wrong, belief = None, calibrated.belief
+    final = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
     readings = _Readings(predictor, slow.sigma)
     refitted = _refit(final, found, workers, overlapping, readings)
@@ -143,12 +156,13 @@ def diagnose_recordings(
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
     judgement = judge(
         refitted,
-        trials=len({(c.effect, c.component) for c in candidates}),
+        trials=trials,
         calibrated=bool(calibration),
         overlapping=overlapping,
         apart=readings.apart,
     )
     null = next(h.fit for h in refitted if not h.fit.candidates)
+    judgement = with_wrong_definition(judgement, null, wrong)
     progress("diagnosis: where and when")
     explanations = []
     about = problem.fit((), null.values)
@@ -170,6 +184,7 @@ def diagnose_recordings(
         chosen[0][1],
         tried,
         clock.laps,
+        wrong,
     )
 
 

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDESCRIBED_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import channel_errors, findings_of, noise_level, rmse
+from spindle_fem.inference.misdescription_content import misdescription_content
 from spindle_fem.inference.mismatch_place import where_of
 from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.opened_machine import DiagnosedMachine
@@ -68,6 +70,7 @@ def diagnosis_content(
         },
         "improved_model": "improved_machine.toml",
         "machine_parameters": _machine_parameters(diagnosis),
+        "misdescription": misdescription_content(diagnosis),
         "slow_error": {"sigma_K": diagnosis.final.slow.sigma, "time_s": diagnosis.final.slow.time},
         "candidates_tried": diagnosis.candidates_tried,
         "hypotheses_fitted": len(diagnosis.hypotheses),
@@ -86,9 +89,11 @@ def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, 
 
 
 def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The machine's own parameters before and after."""
+    """The machine's own parameters before and after, those apart that no key of the definition has."""
     rows = []
     for coordinate in diagnosis.machine_coordinates:
+        if coordinate.name.startswith((MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)):
+            continue
         low, high = diagnosis.final.interval(coordinate.name, 1.645)
         rows.append(
             {

@@ -182,6 +182,10 @@ class Predictor:
         found.misdescribed, found._columns = tuple(directions), dict(columns)
         return found
 
+    def column_of(self, number: int, coordinate: str) -> Array | None:
+        """Change of every channel of a recording for a unit of a direction, (G + 1, c) K; None for none."""
+        return self._columns.get((number, coordinate))
+
     def misdescribed_like(self, other: Predictor) -> Predictor:
         """The same with the directions of another predictor of the same recordings."""
         return self.misdescribed_by(other.misdescribed, other._columns)

@@ -31,6 +31,7 @@ from spindle_fem.report.diagnosis_tables import (
     channel_table,
     defect_blocks,
     fit_table,
+    misdescription_blocks,
     next_blocks,
     place_tables,
     set_tables,
@@ -213,6 +214,10 @@ def render(content: Mapping[str, Any], pictures: Mapping[str, list[Any]]) -> str
     if content["verdict"] != "consistent":
         located = [*where_text(content), *of("where", "missing_heat"), *place_tables(content)]
         sections.append(Section("where", "Where and when", located))
+    if open_directions := misdescription_blocks(content):
+        sections.append(
+            Section("definition", "How the machine may differ from its definition", open_directions)
+        )
     sections += [
         Section("next", "What to measure next", next_blocks(content)),
         Section(

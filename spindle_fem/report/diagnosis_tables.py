@@ -56,6 +56,44 @@ def fit_table(content: Mapping[str, Any]) -> Table:
     return table_of(fields, ("before", "after"), caption)
 
 
+def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:
+    """How the machine may differ from its definition: what is most moved, and what to measure."""
+    told = content.get("misdescription") or {}
+    if not told.get("directions"):
+        return []
+    blocks: list[Table | Text] = []
+    captions = {
+        "instead": "Would explain the recording instead of what was found, all of it together:",
+        "left_open": "As fitted with what was found:" if content["findings"] else "As fitted:",
+    }
+    for key, caption in captions.items():
+        if told.get(key):
+            fields = (
+                *recording_fields(told[key]),
+                words("key of the definition", "key"),
+                words("what", "statement"),
+                rounded("value", "value"),
+                rounded("low", "low"),
+                rounded("high", "high"),
+                words("unit", "unit"),
+                fixed("in widths of its prior", "sigmas", 1),
+                fixed("moves a channel by up to / K", "largest_K", 2),
+                words("channel", "channel"),
+            )
+            blocks.append(table_of(fields, told[key], caption))
+    if measure := told.get("measure"):
+        amount = f"{significant(measure['expected'])} {measure['unit']}".strip()
+        blocks.append(
+            Text(
+                f"Worth measuring on the machine: {measure['key']} (expected to be off by {amount}); "
+                f"{measure['why']}."
+            )
+        )
+    if not blocks:
+        blocks = [Text("The recording moves none of them beyond 0.7 of the width of its prior.")]
+    return blocks
+
+
 def recording_fields(items: Sequence[Mapping[str, Any]]) -> tuple[Field, ...]:
     """Column that names the recording of a row, where there are several."""
     several = any("recording" in item for item in items)

@@ -47,6 +47,11 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
             f"{_when(content)}the readings differ from the model by more than noise and uncertain "
             f"parameters, but the data cannot tell apart {_or(options)}: {reason}. {_improvement(fit)}"
         )
+    wrong = (content.get("misdescription") or {}).get("wrong")
+    if wrong is not None:
+        return (
+            f"{misdescription_words(wrong)} The definition is off there ({wrong['key']}). {_improvement(fit)}"
+        )
     statements = " ".join(item["statement"] for item in content["findings"])
     lead = "" if verdict == "sensor" else _heat_words(content)
     probability = content.get("set_probability")
@@ -64,6 +69,18 @@ def set_words(findings: Sequence[Mapping[str, Any]]) -> str:
     return " with ".join(
         f"{item['effect'].replace('_', ' ')} at {place_words(item['component'])}" for item in findings
     )
+
+
+def misdescription_words(row: Mapping[str, Any]) -> str:
+    """A direction in which the machine differs from its definition, with its value and interval.
+
+    >>> row = {"statement": "outer diameter", "value": 1.5, "low": 1.25, "high": 1.75, "unit": "mm"}
+    >>> misdescription_words(row)
+    'Outer diameter: 1.5 mm (1.25 to 1.75 mm).'
+    """
+    unit = f" {row['unit']}" if row["unit"] else ""
+    middle, low, high = (significant(row[key]) for key in ("value", "low", "high"))
+    return f"{capital(row['statement'])}: {middle}{unit} ({low} to {high}{unit})."
 
 
 def chance(value: float | None) -> str:

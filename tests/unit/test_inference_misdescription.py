@@ -2,21 +2,29 @@
 
 import copy
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX
 from spindle_fem.inference.heat_misdescriptions import SpeedConductance, SpeedShape, clock_change, shape_modes
+from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
+from spindle_fem.inference.misdescription_content import misdescription_content
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
+from spindle_fem.inference.verdict import Judgement, Ranked
+from spindle_fem.inference.wrong_definition import WIDER, with_wrong_definition, wrong_direction
+from spindle_fem.report.diagnosis_tables import misdescription_blocks
+from spindle_fem.report.diagnosis_words import verdict_sentence
 from tests.support.diagnosed_spindle import TIMES, Case, written
 
 FRONT = ("F1", "F2", "F3")
 SHAPE = "heat_shape.front.1"
+ALWAYS = (0.0, 1000.0), (1.0, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +44,7 @@ def column_of(predictor, change):
 
 
 def test_more_heat_at_all_speeds_is_the_heat_factor(predictor):
-    column = column_of(predictor, SpeedShape(FRONT, (0.0, 1000.0), (1.0, 1.0)))
+    column = column_of(predictor, SpeedShape(FRONT, *ALWAYS))
     expected = predictor.predict(0, {}, (), ["heat.front"]).sensitivity[:, :, 0]
     np.testing.assert_allclose(column, expected, atol=2e-3 * np.abs(expected).max())
 
@@ -78,7 +86,7 @@ def test_modes_are_apart_and_without_a_mean():
 
 
 def test_a_machine_off_in_a_direction_is_explained_by_it_and_calibration_remembers(case, predictor):
-    one = Misdescription("F1", "", "", 0.1, "", SpeedShape(("F1",), (0.0, 1000.0), (1.0, 1.0)))
+    one = Misdescription("F1", "", "", 0.1, "", SpeedShape(("F1",), *ALWAYS))
     clock = Misdescription("clock", "", "s", 30.0, "", clock_change, 0)
     true = predictor.predict(0, {"heat.F1": 1.3}).temperature
     at_stamps = np.array([np.interp(TIMES, predictor.drives[0].grid, column) for column in true.T]).T
@@ -102,6 +110,59 @@ def test_a_machine_off_in_a_direction_is_explained_by_it_and_calibration_remembe
     assert after.mean[names.index(clock.coordinate)] == 0.0
 
 
+@pytest.fixture(scope="module")
+def off_at(case, predictor):
+    """Problem and fit with nothing missing of a machine whose bearing F1 heats by another factor."""
+
+    def made(factor):
+        one = Misdescription("F1", "heat.table", "", 0.02, "heat of F1", SpeedShape(("F1",), *ALWAYS))
+        two = Misdescription("R1", "heat.table", "", 0.02, "heat of R1", SpeedShape(("R1",), *ALWAYS))
+        true = predictor.predict(0, {"heat.F1": factor}).temperature
+        at_stamps = np.array([np.interp(TIMES, predictor.drives[0].grid, column) for column in true.T]).T
+        noise = np.random.default_rng(2).normal(0.0, 0.1, at_stamps.shape)
+        seen = Predictor(case.fast, [written(case.folder, at_stamps - 273.15 + noise)])
+        seen = with_misdescriptions(seen, (two, one))
+        problem = Problem(seen, calibrate(None, seen).belief, EXPECTED_SLOW, seen.observations)
+        return problem, problem.fit()
+
+    return made
+
+
+def test_a_definition_far_off_in_one_direction_is_found_there(off_at):
+    problem, null = off_at(1.6)
+    wrong = wrong_direction(problem.belief, null, problem.predictor.misdescribed, 100)
+    assert wrong.direction.name == "F1"
+    assert wrong.log_gain > 0.0
+    refitted = Problem(problem.predictor, wrong.belief, EXPECTED_SLOW, problem.observations).fit()
+    low, high = refitted.interval(wrong.direction.coordinate, 2.0)
+    assert low < 0.6 < high
+    assert refitted.misfit_with_prior < null.misfit_with_prior - 20.0
+    # What was foreseen to second order is what the wider prior then gives.
+    gain = refitted.log_evidence - null.log_evidence
+    assert gain == pytest.approx(foreseen(problem, null, wrong), rel=0.2)
+    nothing = Judgement("consistent", 0.5, Ranked(Hypothesis(refitted, 0.0), 1.0), (), 0.0, "")
+    judged = with_wrong_definition(nothing, refitted, wrong)
+    assert judged.verdict == "parameter"
+    assert "heat.table" in judged.reason
+    assert judged.p_value < 0.01
+
+
+def foreseen(problem, null, wrong):
+    """Gain of the evidence without what the wrong direction pays beforehand, and undivided."""
+    names = [c.name for c in problem.belief.coordinates]
+    row = names.index(wrong.direction.coordinate)
+    left = 1.0 - null.covariance[row, row]
+    return 0.5 * null.position[row] ** 2 / (left + WIDER**-2) - 0.5 * np.log1p(WIDER**2 * left)
+
+
+def test_a_definition_within_its_prior_is_not_wrong(off_at):
+    problem, null = off_at(1.02)
+    wrong = wrong_direction(problem.belief, null, problem.predictor.misdescribed, 100)
+    assert wrong.log_gain < 0.0
+    nothing = Judgement("consistent", 0.5, Ranked(Hypothesis(null, 0.0), 1.0), (), 0.0, "")
+    assert with_wrong_definition(nothing, null, wrong) is nothing
+
+
 def test_columns_go_where_the_predictor_goes(predictor):
     own = with_misdescriptions(predictor, misdescriptions_of(predictor))
     name = MISDESCRIBED_PREFIX + SHAPE
@@ -109,3 +170,32 @@ def test_columns_go_where_the_predictor_goes(predictor):
     for other in (pickle.loads(pickle.dumps(own)), own.with_model(own.fast), copy.copy(own)):
         np.testing.assert_array_equal(other.predict(0, {name: 0.1}).temperature, expected)
     assert np.abs(expected - own.predict(0, {}).temperature).max() > 0.1
+
+
+def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
+    problem, null = off_at(1.6)
+    directions = problem.predictor.misdescribed
+    wrong = wrong_direction(problem.belief, null, directions, 100)
+    fit = Problem(problem.predictor, wrong.belief, EXPECTED_SLOW, problem.observations).fit()
+    verdict = SimpleNamespace(verdict="parameter")
+    content = misdescription_content(
+        SimpleNamespace(predictor=problem.predictor, final=fit, null=fit, judgement=verdict, wrong=wrong)
+    )
+    assert content["directions"] == len(directions)
+    told = content["wrong"]
+    assert told["key"] == content["measure"]["key"] == "heat.table"
+    assert told["low"] < 0.6 < told["high"]
+    assert told["largest_K"] > 1.0
+    assert told["channel"] == "SP01"
+    assert content["instead"] == []
+    assert content["left_open"][0] == told
+    whole = {
+        "verdict": "parameter",
+        "findings": [],
+        "misdescription": content,
+        "fit": {when: {"heldout_rmse_K": 0.1} for when in ("before", "after")} | {"noise_K": 0.1},
+    }
+    assert "Heat of F1: 0." in verdict_sentence(whole)
+    table, text = misdescription_blocks(whole)
+    assert "heat of F1" in table.rows[0]["cells"]
+    assert "heat.table" in text.text

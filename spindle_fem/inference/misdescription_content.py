@@ -1,0 +1,101 @@
+"""What a diagnosis says about how the machine differs from its definition: ``misdescription`` of its file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.calibration import LEVEL
+from spindle_fem.inference.diagnosis import Diagnosis
+from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.misdescription import Misdescription
+
+# Directions that are listed: those moved by this many standard deviations of their priors, so many at most.
+MOVED, MOST_LISTED = 0.7, 8
+
+
+def misdescription_content(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Directions most moved, with what was found and with nothing missing; which one to measure.
+
+    Returns
+    -------
+    dict
+        ``directions`` (how many were open), ``left_open`` (rows of the chosen set's fit), ``instead`` (rows
+        of the fit with nothing missing: what would have to hold if nothing of the found were there; empty
+        when nothing was found), ``measure`` (the direction that is worth measuring most, and why; None where
+        none moves), ``wrong`` (the row of a definition that is wrong; None else).
+    """
+    directions = diagnosis.predictor.misdescribed
+    final, null = diagnosis.final, diagnosis.null
+    found = bool(final.candidates)
+    about = null if found else final
+    wrong = diagnosis.wrong.direction if diagnosis.judgement.verdict == "parameter" and not found else None
+    return {
+        "directions": len(directions),
+        "left_open": _rows(diagnosis, final, directions),
+        "instead": _rows(diagnosis, null, directions) if found else [],
+        "measure": _to_measure(diagnosis, about, directions),
+        "wrong": None if wrong is None else _row(diagnosis, final, wrong),
+    }
+
+
+def _rows(diagnosis: Diagnosis, fit: Fit, directions: Sequence[Misdescription]) -> list[dict[str, Any]]:
+    rows = [_row(diagnosis, fit, item) for item in directions]
+    moved = [row for row in rows if abs(row["sigmas"]) >= MOVED]
+    return sorted(moved, key=lambda row: -abs(row["sigmas"]))[:MOST_LISTED]
+
+
+def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]:
+    """One direction in one fit."""
+    predictor = diagnosis.predictor
+    value = fit.values[item.coordinate]
+    low, high = fit.interval(item.coordinate, float(norm.ppf(0.5 + 0.5 * LEVEL)) * tuned.INTERVAL_WIDENING)
+    largest, channel = 0.0, ""
+    for number, recording in enumerate(predictor.recordings):
+        column = predictor.column_of(number, item.coordinate)
+        if column is not None:
+            moved = np.abs(value * column).max(axis=0)
+            if moved.max() > largest:
+                largest = float(moved.max())
+                channel = recording.temperature_names[int(np.argmax(moved))]
+    several = item.recording is not None and len(predictor.recordings) > 1
+    return {
+        "name": item.name,
+        "key": item.key,
+        "statement": item.statement,
+        "unit": item.unit,
+        "prior_sigma": item.sigma,
+        "value": value,
+        "low": low,
+        "high": high,
+        "sigmas": value / item.sigma,
+        "largest_K": largest,
+        "channel": channel,
+        **({"recording": predictor.recordings[item.recording].name} if several else {}),
+    }
+
+
+def _to_measure(
+    diagnosis: Diagnosis, fit: Fit, directions: Sequence[Misdescription]
+) -> dict[str, Any] | None:
+    """The direction without which the fit would become worst: what to measure.
+
+    Were it found to be as the definition has it, the misfit would rise by the square of its value in standard
+    deviations of its posterior.
+    """
+    names = [c.name for c in fit.coordinates]
+    best, most = None, 1.0
+    for item in directions:
+        row = names.index(item.coordinate)
+        rise = fit.position[row] ** 2 / fit.covariance[row, row]
+        if rise > most:
+            best, most = item, float(rise)
+    if best is None:
+        return None
+    row = _row(diagnosis, fit, best)
+    why = f"were it as the definition has it, the misfit would rise by {most:.0f}"
+    return {"key": best.key, "name": best.name, "expected": row["value"], "unit": best.unit, "why": why}

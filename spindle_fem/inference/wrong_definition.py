@@ -1,0 +1,102 @@
+"""Whether the definition itself is wrong in one direction, by more than its prior allows.
+
+A misdescription is small by its prior. Where one direction explains a recording far beyond that, and better
+than any effect does, its prior is given up and everything is fitted again: what is off is the definition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.hypothesis_fit import THETA_BOUND, Belief, Fit
+from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.verdict import PRIOR_SIGMAS, Judgement
+
+# Width of the prior of what is wrong, in standard deviations of the one that is given up.
+WIDER = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class WrongDirection:
+    """A direction whose prior does not hold.
+
+    Attributes
+    ----------
+    belief : Belief
+        With that prior given up.
+    log_gain : float
+        What the data become likelier by, priors and the wider one's complexity included.
+    p_value : float
+        Probability of so large a gain in any of the directions if the definition were right.
+    """
+
+    direction: Misdescription
+    belief: Belief
+    log_gain: float
+    p_value: float
+
+
+def wrong_direction(
+    belief: Belief, null: Fit, directions: Sequence[Misdescription], trials: int
+) -> WrongDirection | None:
+    """The direction whose prior had best be given up; None where there are no directions.
+
+    An offset of the prior's mean in one direction, itself normal with the width ``w = WIDER``, changes the
+    cost of a fit with nothing missing to second order: with ``g`` the prior's pull there and ``h`` what is
+    left of its curvature once everything else follows, the gain is ``g² / (h + 1/w²)``.
+
+    Parameters
+    ----------
+    null : Fit
+        With nothing missing, on that belief.
+    trials : int
+        Candidates that might explain the recording instead: each as likely beforehand as one direction.
+    """
+    names = [c.name for c in belief.coordinates]
+    owned = [item for item in directions if item.recording is None and item.coordinate in names]
+    if not owned:
+        return None
+    rows = [names.index(item.coordinate) for item in owned]
+    count = len(names)
+    precision = belief.root.T @ belief.root
+    pull = (precision @ (null.position[:count] - belief.mean))[rows]
+    left = np.diag(precision - precision @ null.covariance[:count, :count] @ precision)[rows]
+    left = np.maximum(left, 0.0)
+    misfit = pull**2 / (left + WIDER**-2)
+    prior = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(len(owned) + trials)
+    gains = 0.5 * misfit / tuned.GAIN_DIVISOR - 0.5 * np.log1p(WIDER**2 * left) + prior
+    best = int(np.argmax(gains))
+    level = float(chi2.sf(misfit[best] / tuned.CHANCE_DIVISOR, 1))
+    p_value = float(-np.expm1(len(owned) * np.log1p(-min(level, 1.0 - 1e-16))))
+    return WrongDirection(owned[best], without_prior(belief, rows[best]), float(gains[best]), p_value)
+
+
+def without_prior(belief: Belief, row: int) -> Belief:
+    """The same with another ``WIDER`` standard deviations of one coordinate, and bounds as much wider."""
+    unit = np.zeros(len(belief.mean))
+    unit[row] = WIDER
+    covariance = np.linalg.inv(belief.root.T @ belief.root) + np.outer(unit, unit)
+    precision = np.linalg.inv(covariance)
+    root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
+    coordinates = list(belief.coordinates)
+    bound = THETA_BOUND * WIDER
+    coordinates[row] = replace(coordinates[row], low=-bound, high=bound)
+    return Belief(tuple(coordinates), belief.mean, root)
+
+
+def with_wrong_definition(judgement: Judgement, null: Fit, wrong: WrongDirection | None) -> Judgement:
+    """A judgement that nothing is missing, told as a wrong definition where its direction says so."""
+    if wrong is None or judgement.verdict != "consistent":
+        return judgement
+    item = wrong.direction
+    index = next(i for i, c in enumerate(null.coordinates) if c.name == item.coordinate)
+    if abs(null.position[index]) <= PRIOR_SIGMAS or wrong.p_value > tuned.SIGNIFICANT:
+        return judgement
+    amount = f"{null.values[item.coordinate]:.3g} {item.unit}".strip()
+    reason = f"the definition is off at {item.key}: {item.statement}, by {amount}"
+    return replace(judgement, verdict="parameter", p_value=wrong.p_value, reason=reason)
