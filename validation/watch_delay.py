@@ -6,7 +6,8 @@ to "leaving" and to "left", channel, and for what is sound the number of alarms 
 
 A machine with calibration recordings is calibrated by them; a network without begins with a warm-up, the
 first fifth of its recording, but no longer than up to the onset where the effect has one. Delays count from
-the onset, or from where the watch begins.
+the onset, or from where the watch begins. Calibration recordings, in which nothing is missing, are watched
+as well: their second half, by what the first tells.
 """
 
 import argparse
@@ -26,6 +27,8 @@ from spindle_fem.studies.watch import Watching, alarms_a_month, watch_recording
 from .open_examples import MESH, examples
 
 WARM_UP_SHARE = 0.2
+# Calibration recordings are watched as well: the second half, calibrated by the first.
+SOUND, HALF = "_sound", 0.5
 # Least warm-up worth the name, as a share of a recording: an earlier onset lies within it.
 LEAST_SHARE = 0.02
 
@@ -40,13 +43,15 @@ def onset_of(answer: dict[str, Any]) -> float:
 
 
 def watch_case(name: str, case: Path, machine: str, answer: Path, alarms: str) -> dict[str, Any]:
-    """One line of the table."""
-    onset = onset_of(json.loads(answer.read_text()))
-    times = read_recording(case).times
-    duration = float(times[-1] - times[0])
-    calibration = [path] if (path := case / "calibration.toml").exists() else []
-    warm_up = 0.0
-    if is_network_machine(read_definition(find_machine(machine))) and not calibration:
+    """One line of the table; names that end in ``SOUND`` are those of calibration recordings."""
+    truth, path, earlier = json.loads(answer.read_text()), case / "recording.toml", case / "calibration.toml"
+    calibration = [earlier] if earlier.exists() else []
+    if name.endswith(SOUND):
+        truth, path, calibration = {}, earlier, []
+    onset, recording = onset_of(truth), read_recording(path)
+    duration = float(recording.times[-1] - recording.times[0])
+    warm_up = HALF * duration if name.endswith(SOUND) else 0.0
+    if is_network_machine(read_definition(find_machine(machine))) and not (calibration or warm_up):
         whole = WARM_UP_SHARE * duration
         warm_up = min(whole, onset) if onset > LEAST_SHARE * duration else whole
     how = Watching(
@@ -58,17 +63,8 @@ def watch_case(name: str, case: Path, machine: str, answer: Path, alarms: str) -
         until_end=True,
     )
     began = time.perf_counter()
-    lines = list(watch_recording(machine, case / "recording.toml", how))
-    start = read_recording(case).start
-    zero = np.datetime64(start.removesuffix("Z")) if start else None
-    at = np.array(
-        [
-            (np.datetime64(line["time"].removesuffix("Z")) - zero) / np.timedelta64(1, "s")
-            if zero is not None
-            else line["time"]
-            for line in lines
-        ]
-    )
+    lines = list(watch_recording(machine, path, how))
+    at = np.array([_seconds(line["time"], recording.start) for line in lines])
     states = np.array([line["state"] for line in lines])
     away = np.flatnonzero((states == "left") & (np.append("", states[:-1]) != "left"))
     counted = max(onset, float(at[0]))
@@ -79,7 +75,7 @@ def watch_case(name: str, case: Path, machine: str, answer: Path, alarms: str) -
     first = next((lines[i] for i in np.flatnonzero(states == "left") if at[i] >= counted), {})
     return {
         "case": name,
-        "truth": [effect["effect"] for effect in json.loads(answer.read_text()).get("effects", [])],
+        "truth": [effect["effect"] for effect in truth.get("effects", truth.get("acceptable", []))],
         "onset_s": None if np.isinf(onset) else onset,
         "watched_h": (duration - float(at[0])) / 3600.0,
         "sound_h": max(0.0, min(onset, duration) - float(at[0])) / 3600.0,
@@ -89,6 +85,14 @@ def watch_case(name: str, case: Path, machine: str, answer: Path, alarms: str) -
         "channel": first.get("channel"),
         "wall_s": time.perf_counter() - began,
     }
+
+
+def _seconds(stamp: float | str, start: str | None) -> float:
+    """A time of a line since the first row, s."""
+    if start is None:
+        return float(stamp)
+    ends = (np.datetime64(text.removesuffix("Z")) for text in (stamp, start))
+    return float((next(ends) - next(ends)) / np.timedelta64(1, "s"))
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -106,6 +110,7 @@ def main(arguments: list[str] | None = None) -> None:
         for name, item in examples(given.recordings).items()
         if not given.only or name.startswith(tuple(given.only))
     }
+    wanted |= {name + SOUND: item for name, item in wanted.items() if (item[0] / "calibration.toml").exists()}
     rows = []
     with ProcessPoolExecutor(given.jobs) as pool:
         orders = [pool.submit(watch_case, name, *item, given.alarms) for name, item in wanted.items()]

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import SpecError
+from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.drive_steps import coarse_drive
+from spindle_fem.inference.misdescription_columns import direction_columns, misdescriptions_of
 from spindle_fem.inference.observations import Observation, observe
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import STEP, Predictor
@@ -86,11 +88,18 @@ class ContinuedRun:
     def __init__(self, fast: FastModel, effects: ActiveEffects) -> None:
         require_no_memory(effects)
         self.fast, self.effects = fast, effects
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin with the next piece as a recording does."""
         self.begun: tuple[Array, Mapping[str, Array]] | None = None
+        # Derivatives of the state to directions of misdescription, which it does not follow itself.
+        self._directions: dict[str, Array] = {}
 
     def begins(self, piece: Recording) -> Predictor:
         """The machine where a recording begins with this piece."""
-        return _Piece(self.fast, piece, self.effects, None)
+        found = _Piece(self.fast, piece, self.effects, None)
+        return found.misdescribed_by(misdescriptions_of(found), {})
 
     def follow(
         self, piece: Recording, values: Mapping[str, float], names: Sequence[str], width: float
@@ -114,6 +123,7 @@ class ContinuedRun:
         """
         predictor = _Piece(self.fast, piece, self.effects, self.begun)
         told = predictor.predict(0, values, (), names)
+        self._misdescribe(predictor, told, values, names)
         slopes = np.zeros((told.states.shape[1], len(names)))
         inside = told.columns >= 0
         if told.tangents is not None:
@@ -122,6 +132,24 @@ class ContinuedRun:
         fresh = np.ones(piece.times.size, dtype=bool)
         fresh[0] = False
         return told, observe([piece], [fresh], [predictor.drives[0].grid], [width])
+
+    def _misdescribe(
+        self, predictor: Predictor, told: Prediction, values: Mapping[str, float], names: Sequence[str]
+    ) -> None:
+        """What directions of misdescription do to the readings, to first order, in place."""
+        directions = [item for item in misdescriptions_of(predictor) if item.coordinate in names]
+        if not directions:
+            return
+        base = BaseRun(predictor, 0, values)
+        channels, states = direction_columns(base, directions)
+        if self._directions:
+            start = np.column_stack([self._directions[item.coordinate] for item in directions])
+            carried = base.run.tangents(np.zeros_like(states[1:]), base.tracks, start=start[None])
+            channels, states = channels + base.outputs(carried), states + carried
+        self._directions = {item.coordinate: states[-1, :, i] for i, item in enumerate(directions)}
+        for index, item in enumerate(directions):
+            told.temperature[:] += values[item.coordinate] * channels[:, :, index]
+            told.sensitivity[:, :, names.index(item.coordinate)] += channels[:, :, index]
 
     def move(self, changes: Mapping[str, float]) -> None:
         """Move the state to first order with changes of the coordinates, as derivatives are taken."""

@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 REFERENCES = (0.125, 0.35, 1.0)
 # A number beyond this counts as this far out, so that no single reading raises an alarm.
 OUTLIER = 4.0
+# Spreads that are tried for the numbers of a sound machine.
+LARGEST_SPREAD, SPREADS = 8.0, 32
+# Sound numbers pass the levels of their own length by chance once in so many times.
+CERTAIN = 10.0
 # How far a discrete sum overshoots its level on average: ρ+ of the normal distribution, on both ends.
 _OVERSHOOT = 1.166
 
@@ -50,6 +54,33 @@ def level_for(length: float, reference: float) -> float:
     """
     highest = np.log(1.0 + 2.0 * reference**2 * length + 2.0) / reference + 10.0
     return float(brentq(lambda level: run_length(level, reference) - length, 0.0, highest))
+
+
+def spread_of_sound(numbers: Array) -> float:
+    """Spread that numbers of a sound machine must be given, no less than one.
+
+    The least at which their sums stay below levels that are passed by chance once in ten times as many
+    instants: what a noise model does not know (heavier tails, errors that last longer) is taken from where
+    nothing is wrong.
+
+    Parameters
+    ----------
+    numbers : (n, channels) ndarray
+        NaN where a channel says nothing.
+
+    >>> generator = np.random.default_rng(2)
+    >>> spread_of_sound(generator.standard_normal((1000, 3)))
+    1.0
+    >>> 1.8 < spread_of_sound(2.5 * generator.standard_normal((1000, 3))) < 2.8
+    True
+    """
+    spreads = np.geomspace(1.0, LARGEST_SPREAD, SPREADS)
+    trial = CumulativeSums(numbers.shape[1] * SPREADS, max(1.0, CERTAIN * len(numbers) / SPREADS), 1.0)
+    passed = np.zeros(SPREADS, dtype=bool)
+    for row in numbers:
+        trial.add((row / spreads[:, None]).ravel())
+        passed |= trial.evidence.reshape(SPREADS, -1).max(axis=1) >= 1.0
+    return float(spreads[np.argmin(passed)] if not passed.all() else LARGEST_SPREAD)
 
 
 class CumulativeSums:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.continued_run import ContinuedRun
-from spindle_fem.inference.coordinate_names import OF_ONE_RECORDING, START_PREFIX
-from spindle_fem.inference.cumulative_sums import CumulativeSums
+from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, OF_ONE_RECORDING, START_PREFIX
+from spindle_fem.inference.cumulative_sums import CumulativeSums, spread_of_sound
 from spindle_fem.inference.hypothesis_fit import Belief, Coordinate
 from spindle_fem.inference.innovations import InnovationFilter
 from spindle_fem.inference.missing_heat import conditions_of
@@ -33,6 +34,10 @@ SOONER = 10.0
 STILL_OUT = 3.0
 # Instants of one piece: the model is linearised anew after each.
 PIECE_INSTANTS = 60
+# Coordinates of the recording itself that are followed: temperatures at its start, its clocks.
+_OWN_HERE = (START_PREFIX, MISDESCRIBED_IN_PREFIX)
+# Innovations by which the spread is judged, at most.
+MOST_NUMBERS = 20_000
 # Instants by which heating and cooling are told apart.
 REMEMBERED = 300
 
@@ -81,6 +86,8 @@ class WatchedMachine:
     ----------
     used : float, [s]
         Rows up to here were followed.
+    spread : float
+        Of innovations where nothing is wrong, in units of what the noise model says.
     """
 
     def __init__(
@@ -91,10 +98,26 @@ class WatchedMachine:
         self.coordinates, self._usual, self._prior = _own_part(known.belief)
         self.position, self._covariance = self._usual.copy(), self._prior.copy()
         self.sums = CumulativeSums(len(white), MONTH / width / alarms, SOONER)
-        self.state, self._filter = AS_MODELLED, None
+        self.state = AS_MODELLED
+        self._filter: InnovationFilter | None = None
         self._channels: tuple[str, ...] = ()
         self._past: deque[tuple[float, float, float]] = deque(maxlen=REMEMBERED)
         self._time: float | None = None
+        self.spread = 1.0
+        self._numbers: deque[Array] = deque(maxlen=MOST_NUMBERS)
+
+    def learn_spread(self, sound: Sequence[Recording]) -> None:
+        """Take the spread of innovations from recordings with nothing missing."""
+        numbers = []
+        for recording in sound:
+            trial = copy.copy(self)
+            trial.run = ContinuedRun(self.run.fast, self.run.effects)
+            trial.position, trial.sums = self.position.copy(), copy.deepcopy(self.sums)
+            trial._past, trial._numbers = deque(maxlen=REMEMBERED), deque(maxlen=MOST_NUMBERS)
+            trial.follow(recording, to_end=True)
+            numbers += trial._numbers
+        if numbers:
+            self.spread = spread_of_sound(np.array(numbers))
 
     # ------------------------------------------------------------------ coordinates
     @property
@@ -103,16 +126,14 @@ class WatchedMachine:
 
     def _begin(self, piece: Recording) -> None:
         """Begin with a piece, at the start or after a long gap: temperatures are found from its readings."""
-        own = sum(not c.name.startswith(START_PREFIX) for c in self.coordinates)
-        starts = tuple(
-            c for c in start_coordinates(self.run.begins(piece)) if c.name.startswith(START_PREFIX)
-        )
+        own = len(self._usual)
+        starts = tuple(c for c in start_coordinates(self.run.begins(piece)) if c.name.startswith(_OWN_HERE))
         size = own + len(starts)
         covariance = np.eye(size)
         covariance[:own, :own] = self._covariance[:own, :own]
         self.coordinates = (*self.coordinates[:own], *starts)
         self.position = np.append(self.position[:own], np.zeros(len(starts)))
-        self.run.begun = None
+        self.run.restart()
         self._filter = InnovationFilter(covariance, self.slow, len(self.white))
 
     # ------------------------------------------------------------------ following
@@ -184,7 +205,8 @@ class WatchedMachine:
                 self.white / np.sqrt(instants.number[index]),
                 learn=self.state != LEFT,
             )
-            self.sums.add(numbers)
+            self._numbers.append(numbers)
+            self.sums.add(numbers / self.spread)
             self._past.append((time, float(speed[index]), float(instants.expected[index])))
             found.append(self._judge(time))
         self._recentre(float(piece.times[-1] - piece.times[0]))

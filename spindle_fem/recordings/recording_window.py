@@ -188,14 +188,15 @@ class RecordingWindow:
 
 
 def piece_of(recording: Recording, begin: int, stop: int) -> Recording:
-    """The rows ``begin <= k < stop`` as one stretch without a long gap."""
+    """The rows ``begin <= k < stop`` as one stretch without a long gap, inputs bridged as each is held."""
     rows = slice(begin, stop)
+    inputs = [recording.input_at(name, recording.times[rows]) for name in recording.input_names]
     return replace(
         recording,
         times=recording.times[rows],
         temperature=recording.temperature[rows],
         flags=recording.flags[rows],
-        inputs=recording.inputs[rows],
+        inputs=np.column_stack(inputs) if inputs else recording.inputs[rows],
         covariates=recording.covariates[rows],
         segments=np.array([[0, stop - begin]], dtype=np.int64),
     )

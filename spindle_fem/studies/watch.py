@@ -13,6 +13,7 @@ from spindle_fem.definition.load import find_machine, read_definition
 from spindle_fem.definition.network_load import is_network_machine
 from spindle_fem.errors import BadInputError, RecordingError
 from spindle_fem.inference.continued_run import ContinuedRun
+from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.opened_machine import open_machine
 from spindle_fem.inference.predictor import LONGEST_BIN, STEP, Predictor
 from spindle_fem.inference.prepared_problem import Calibrated, calibrate
@@ -177,6 +178,7 @@ def _begin(
     if opened.calibration:
         progress("calibration")
         earlier = Predictor(opened.fast, opened.calibration, effects=opened.effects)
+        earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
     known = calibrate(earlier, run.begins(piece_of(first, 0, first.times.size)))
     rounding = np.array([noise.resolution for noise in first.noise]) / np.sqrt(12.0)
     watched = WatchedMachine(
@@ -186,6 +188,7 @@ def _begin(
         width=_width(known, first, opened.is_network),
         alarms=how.alarms,
     )
+    watched.learn_spread(opened.calibration)
     if how.warm_up:
         watched.pass_over(sound[0])
     return watched

@@ -10,12 +10,16 @@ import pandas as pd
 import pytest
 
 from spindle_fem.errors import RecordingError
+from spindle_fem.inference.continued_run import ContinuedRun
 from spindle_fem.inference.cumulative_sums import CumulativeSums, level_for, run_length
 from spindle_fem.inference.innovations import InnovationFilter
+from spindle_fem.inference.prepared_problem import machine_coordinates
 from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
+from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.growing_file import follow_lines
 from spindle_fem.recordings.manifest import load_manifest
-from spindle_fem.recordings.recording_window import RecordingWindow
+from spindle_fem.recordings.recording_window import RecordingWindow, piece_of
 from spindle_fem.studies.watch import Watching, watch_recording
 from tests.conftest import write_recording
 
@@ -174,6 +178,42 @@ def test_a_window_begins_with_the_last_reading_of_an_input(folder):
     window.use(30.0 * 699)
     window.add([b"%d,20,,20" % (30 * 700)])
     assert np.all(window.recording().input_at("power", window.recording().times) == 60.0)
+
+
+# ---------------------------------------------------------------------------------------- model
+def test_pieces_of_a_run_are_the_run(fast, tmp_path):
+    times = np.arange(0.0, 7200.0, 60.0)
+    frame = pd.DataFrame(
+        {
+            "time": times,
+            "SP01": 20.0,
+            "SP03": 20.0,
+            "speed": np.select([times < 1800.0, times < 5400.0], [0.0, 3000.0], 1500.0),
+            "room": 20.0 + np.sin(times / 900.0),
+            "oil": 16.0,
+        }
+    )
+    inputs = {"speed": "speed", "room": "ambient", "oil": "coolant_inlet"}
+    recording = read_recording(
+        write_recording(tmp_path / "r", frame, {"SP01": "SP01", "SP03": "SP03"}, inputs)
+    )
+    run = ContinuedRun(fast, NO_EFFECTS)
+    coordinates = machine_coordinates(run.begins(recording))
+    names = [c.name for c in coordinates]
+    assert any(name.startswith("misdescribed.") for name in names)
+    values = {c.name: c.at(0.5) for c in coordinates}
+    whole, _ = run.follow(recording, values, names, 60.0)
+    run.restart()
+    for begin, stop in ((0, 25), (24, 31), (30, 91), (90, 120)):
+        piece, observed = run.follow(piece_of(recording, begin, stop), values, names, 60.0)
+    assert sum(item.bins.number.sum() for item in observed) == 2 * 29
+    assert piece.temperature[-1] == pytest.approx(whole.temperature[-1], abs=1e-3)
+    assert piece.sensitivity[-1] == pytest.approx(whole.sensitivity[-1], rel=1e-3, abs=2e-3)
+    # A small change of a coordinate moves the state that is carried on as its derivative says.
+    name = names[0]
+    before = run.begun[0].copy()
+    run.move({name: 0.01, names[-1]: 1.0})
+    assert run.begun[0] - before == pytest.approx(0.01 * run.begun[1][name], abs=1e-12)
 
 
 # -------------------------------------------------------------------------------------- machine
