@@ -1,4 +1,4 @@
-"""The command line as a user runs it: a process of its own."""
+"""The command line as a user runs it, and the same in this process."""
 
 import os
 import subprocess
@@ -6,19 +6,25 @@ import sys
 
 import pytest
 
+from tests.support.command_line import run_here
+
 
 @pytest.fixture(scope="session")
 def command():
-    """Run ``spindle-fem`` with arguments; gives status, standard output and standard error."""
+    """Run ``spindle-fem`` with arguments in this process; gives status, standard output and error."""
+    return run_here
 
-    def run(*arguments, cwd=None):
-        environment = {**os.environ, "COLUMNS": "200"}
+
+@pytest.fixture(scope="session")
+def process():
+    """The same in a process of its own: for what only shows there."""
+
+    def run(*arguments):
         return subprocess.run(
             [sys.executable, "-m", "spindle_fem", *map(str, arguments)],
             capture_output=True,
             text=True,
-            cwd=cwd,
-            env=environment,
+            env={**os.environ, "COLUMNS": "200"},
             check=False,
         )
 
@@ -26,8 +32,7 @@ def command():
 
 
 @pytest.fixture(scope="session")
-def small_run(command, tmp_path_factory):
+def small_run(process, tmp_path_factory):
     """One run of the small two-start spindle, shared by the tests that look at its files."""
     folder = tmp_path_factory.mktemp("run") / "out"
-    process = command("run", "small_two_start", "--set", "mesh.preset=coarse", "-o", folder, "--json")
-    return folder, process
+    return folder, process("run", "small_two_start", "--set", "mesh.preset=coarse", "-o", folder, "--json")

@@ -2,14 +2,13 @@
 
 import json
 import math
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
+
+from tests.support.command_line import run_here
 
 MACHINE = """
 schema = "spindle-fem/machine/1"
@@ -75,22 +74,10 @@ def files(tmp_path_factory):
     return folder
 
 
-def command(*arguments):
-    code = "from spindle_fem.cli import main; main()"
-    settings = os.environ | {"PYTHONWARNINGS": "ignore"}
-    return subprocess.run(
-        [sys.executable, "-c", code, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=settings,
-    )
-
-
 @pytest.fixture(scope="module")
 def done(files):
     out = files / "out"
-    process = command("diagnose", files / "pump.toml", files / "recording.toml", "-o", out, "--json")
+    process = run_here("diagnose", files / "pump.toml", files / "recording.toml", "-o", out, "--json")
     return process, out
 
 
@@ -172,7 +159,7 @@ def test_report_builds_the_page_again(done):
     _, out = done
     page = out / "report.html"
     page.unlink()
-    process = command("report", out)
+    process = run_here("report", out)
     assert process.returncode == 0, process.stderr
     assert page.stat().st_size > 5000
 
@@ -188,7 +175,7 @@ def test_report_builds_the_page_again(done):
 def test_bad_input_ends_with_two_and_says_why(files, tmp_path, change, words):
     (tmp_path / "data.csv").write_text((files / "data.csv").read_text())
     (tmp_path / "recording.toml").write_text(MANIFEST.replace(*change))
-    process = command("diagnose", files / "pump.toml", tmp_path / "recording.toml", "-o", tmp_path / "out")
+    process = run_here("diagnose", files / "pump.toml", tmp_path / "recording.toml", "-o", tmp_path / "out")
     assert process.returncode == 2
     assert all(word in process.stderr for word in words)
     assert "Traceback" not in process.stderr
@@ -200,7 +187,7 @@ def test_too_little_ends_with_zero_and_a_reason(files, tmp_path):
     frame.to_csv(tmp_path / "data.csv", index=False)
     (tmp_path / "recording.toml").write_text(MANIFEST)
     out = tmp_path / "out"
-    process = command("diagnose", files / "pump.toml", tmp_path / "recording.toml", "-o", out)
+    process = run_here("diagnose", files / "pump.toml", tmp_path / "recording.toml", "-o", out)
     assert process.returncode == 0, process.stderr
     content = json.loads((out / "diagnosis.json").read_text())
     assert content["verdict"] == "unexplained"
