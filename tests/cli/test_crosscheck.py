@@ -11,7 +11,7 @@ from spindle_fem.errors import FaultsError, SpindleFemError
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.solvers.network_steady import solve_steady
 
-OVERRIDES = ("mesh.preset=coarse", "heat.model=palmgren")
+OVERRIDES = ("mesh.preset=coarse", "mesh.order=1", "heat.model=palmgren")
 
 
 @pytest.fixture(scope="module")

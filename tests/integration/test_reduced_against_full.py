@@ -156,18 +156,23 @@ def test_ring_spot_and_sides_stand_for_heat_on_a_part_of_the_housing(machine, fa
     assert amplitudes[:2].sum() == pytest.approx(1.0, abs=0.1)
 
 
-def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fast):
-    times = np.arange(0.0, 5401.0, 20.0)
-    speed = RPM * np.select([times < 600, times < 2400, times < 4200], [0.0, 3000.0, 4500.0], 500.0)
+@pytest.mark.parametrize(
+    ("length", "swing"), [(0.25, 1.0), pytest.param(1.0, 3.0, marks=pytest.mark.slow)], ids=["short", "long"]
+)
+def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fast, length, swing):
+    end = 5400.0 * length
+    times = np.arange(0.0, end + 1.0, 20.0)
+    switched = [times < length * instant for instant in (600, 2400, 4200)]
+    speed = RPM * np.select(switched, [0.0, 3000.0, 4500.0], 500.0)
     values = history(times, speed, 293.15 + 1e-4 * times, 290.0 + 0.5 * np.sin(times / 1000.0))
     inputs = InputHistory(times, STANDARD, values, HELD)
-    samples = np.arange(0.0, 5401.0, 60.0)
+    samples = np.arange(0.0, end + 1.0, 60.0)
     full = simulate_full(machine, inputs, sample_times=samples, options=TransientOptions(error=0.01))
     run = simulate_fast(fast, make_drive(times, STANDARD, values, HELD), 293.15)
     for probe in full.probes:
-        reduced = run.temperature[::3, fast.channels.index(probe)]
+        reduced = run.temperature[::3, fast.channels.index(probe)][: len(samples)]
         assert np.abs(reduced - full.reading(probe)).max() < 0.02, probe
-    assert np.ptp(full.reading("SP05")) > 3.0
+    assert np.ptp(full.reading("SP05")) > swing
 
 
 def test_it_is_found_again_in_the_cache(machine, fast, monkeypatch, tmp_path):

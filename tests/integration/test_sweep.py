@@ -138,12 +138,14 @@ def test_the_folder_is_complete_and_the_report_stands_alone(grid):
     }
 
 
+@pytest.mark.usefixtures("unpictured")
 def test_processes_give_the_same_file(grid, tmp_path):
     path, folder, _ = grid
     sweep_machine(MACHINE, path, tmp_path / "out", QUICK, jobs=2)
     assert (tmp_path / "out" / RESULTS).read_bytes() == (folder / RESULTS).read_bytes()
 
 
+@pytest.mark.usefixtures("unpictured")
 def test_nothing_runs_twice(grid, tmp_path, monkeypatch):
     """A study that was stopped in the middle of a line solves the rest only."""
     path, folder, _ = grid
@@ -167,6 +169,7 @@ def test_nothing_runs_twice(grid, tmp_path, monkeypatch):
     assert (place / RESULTS).read_bytes() == whole
 
 
+@pytest.mark.usefixtures("unpictured")
 def test_killed_in_the_middle_and_run_again(grid, tmp_path):
     path, folder, _ = grid
     place = tmp_path / "out"
@@ -208,6 +211,7 @@ def test_a_bad_study_writes_nothing(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("unpictured")
 def test_a_design_that_fails_is_a_row_with_its_reason(tmp_path):
     text = """
 schema = "spindle-fem/study/1"
@@ -223,6 +227,7 @@ outputs = ["temperature.max_degC"]
     assert rows[1]["reason"]
 
 
+@pytest.mark.usefixtures("unpictured")
 def test_search_repeats_itself_and_carries_the_band(tmp_path):
     path = study_file(tmp_path, SEARCH)
     summary = sweep_machine(MACHINE, path, tmp_path / "one", QUICK)

@@ -12,6 +12,7 @@ from spindle_fem.studies.sweep.results_table import RESULTS
 
 distributed = pytest.importorskip("distributed")
 
+pytestmark = pytest.mark.usefixtures("unpictured")
 QUICK = ("mesh.preset=coarse", "mesh.order=1", "heat.model=table")
 STUDY = """
 schema = "spindle-fem/study/1"
@@ -49,7 +50,9 @@ def test_a_killed_worker_loses_no_row_and_changes_no_digit(tmp_path, monkeypatch
     assert (tmp_path / "dask" / RESULTS).read_bytes() == (tmp_path / "serial" / RESULTS).read_bytes()
 
 
-def test_no_scheduler_there_is_bad_input(tmp_path):
+def test_no_scheduler_there_is_bad_input(tmp_path, monkeypatch):
+    client = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout="300ms"))
     path = tmp_path / "study.toml"
     path.write_text(STUDY, encoding="utf-8")
     with pytest.raises(BadInputError, match="no Dask scheduler answers"):
