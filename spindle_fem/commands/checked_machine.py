@@ -22,7 +22,6 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
     from spindle_fem.definition.load import examine_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
-    from spindle_fem.model.reduced.defined_effects import check_effects, require_known_effects
 
     overrides = tuple(overrides)
 
@@ -32,6 +31,9 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
     def has_possible_effects(spec: MachineSpec) -> None:
         if not spec.effects:
             return
+        # The catalogue and what it stands on take a second to load.
+        from spindle_fem.model.reduced.defined_effects import check_effects, require_known_effects
+
         examination = examine_machine(machine, overrides)
         entries = _by_number(spec.effects, [fault.where for fault in examination.faults])
         others = [fault for fault in examination.faults if not _ENTRY.search(fault.where)]
@@ -71,7 +73,6 @@ def load_network(machine: str | Path, overrides: Iterable[str]) -> NetworkMachin
     from spindle_fem.definition.network_load import validate_network_machine
     from spindle_fem.definition.network_tables import NetworkMachineSpec, NetworkSpec
     from spindle_fem.model.lumped.written_network import build_network
-    from spindle_fem.model.reduced.defined_effects import check_network_effects, require_known_effects
 
     path = find_machine(machine)
     content = read_toml(path)
@@ -103,13 +104,16 @@ def load_network(machine: str | Path, overrides: Iterable[str]) -> NetworkMachin
         entries.append(None)
         with contextlib.suppress(ValidationError):
             entries[-1] = EffectEntry.model_validate(item)
-    try:
-        if network is None or between:
-            require_known_effects(entries)
-        else:
-            check_network_effects(entries, build_network(network))
-    except FaultsError as error:
-        add(error.faults)
+    if entries:
+        from spindle_fem.model.reduced.defined_effects import check_network_effects, require_known_effects
+
+        try:
+            if network is None or between:
+                require_known_effects(entries)
+            else:
+                check_network_effects(entries, build_network(network))
+        except FaultsError as error:
+            add(error.faults)
     if faults or spec is None:
         raise FaultsError(path.name, faults)
     return spec

@@ -180,11 +180,12 @@ def test_reading_a_definition_loads_nothing_heavy():
     assert answer.stdout.strip() == "[]"
 
 
-def test_run_and_check_load_nothing_of_diagnosis():
+def test_run_and_check_load_nothing_of_diagnosis_and_check_no_solver():
     code = (
         "import sys; from spindle_fem.commands.machine_commands import check_machine, run_machine; "
-        "check_machine('wu_tan_2016'); "
-        "print([name for name in sys.modules if name.startswith('spindle_fem.inference')])"
+        "check_machine('wu_tan_2016'); check_machine('bench_motor'); "
+        "slow = {'numba', 'pandas', 'scipy.stats', 'skfem', 'gmsh'}; "
+        "print([n for n in sys.modules if n.startswith('spindle_fem.inference') or n in slow])"
     )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"

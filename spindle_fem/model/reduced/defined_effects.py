@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.machine_spec import MachineSpec
@@ -17,11 +18,13 @@ from spindle_fem.machine.view.defined_point import at_the_defined_point
 from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.model.lumped.network_view import day_of_a_network, view_of_network
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
-from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.operation.named_places import named_places
 from spindle_fem.recordings.align import Recording
-from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics
-from spindle_fem.solvers.prepared_machine import PreparedMachine
+
+# `check` asks here about definitions and needs no solver, whose compiled loops take a second to load.
+if TYPE_CHECKING:
+    from spindle_fem.model.reduced.fast_model import FastModel
+    from spindle_fem.solvers.mesh_terms import Physics
+    from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,6 +258,8 @@ def physics_of(machine: PreparedMachine) -> Physics:
     ------
     FaultsError
     """
+    from spindle_fem.solvers.mesh_terms import NO_PHYSICS, Physics
+
     entries = machine.spec.effects
     if not entries:
         return NO_PHYSICS
@@ -264,6 +269,8 @@ def physics_of(machine: PreparedMachine) -> Physics:
 
 def _names_of(machine: PreparedMachine) -> MachineNames:
     """Names of a machine without the slices of parts that its mesh cannot tell apart."""
+    from spindle_fem.operation.named_places import named_places
+
     names = MachineNames.of(machine.spec)
     balls = tuple(
         node for _, bearing in machine.spec.bearings for node in machine.builder.ball_nodes(bearing.name)
