@@ -33,9 +33,10 @@ from spindle_fem.inference.planned_test import (
     with_sensors,
 )
 from spindle_fem.inference.sufficiency import says_too_little
+from spindle_fem.machine.view.usual_sizes import short_unit
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.results.output_folder import output_folder, replace_text
-from spindle_fem.units import TEMPERATURE_UNIT, registry, to_si
+from spindle_fem.units import TEMPERATURE_UNIT, to_si
 
 Progress = Callable[[str], None]
 ALL = "all"
@@ -163,7 +164,7 @@ def planned_measurement(
         schedule = conditions.standard_tests(seconds)[name]
         chosen = _sensors(sensors, {probe: Sensor(probe, probe, NOISE) for probe in conditions.probes})
         asked, words = recording_of(conditions, schedule, chosen), schedule.name
-        full = {name: (value, conditions.units[name]) for name, value in conditions.usual.items()}
+        full = {name: (value, short_unit(conditions.units[name])) for name, value in conditions.usual.items()}
     else:
         read = read_recording(test)
         if given:
@@ -184,22 +185,15 @@ def planned_measurement(
     little = says_too_little(_only_first(opened))
     notes = [f"A diagnosis of such a recording would refuse it: {little}"] if little else []
     if conditions.assumed:
-        sizes = ", ".join(f"{name} {_quantity_text(*full[name])}" for name in conditions.assumed)
+        sizes = ", ".join(
+            f"{name} {full[name][0]:.3g} {full[name][1]}".strip() for name in conditions.assumed
+        )
         notes.insert(
             0,
             f"Nothing says how large these inputs are; each is taken to warm the hottest node by "
             f"{USUAL_RISE:.0f} K in the end: {sizes}. Give what the test would run at with --input.",
         )
     return Planned(found, conditions, tuple(chosen), words, full, compared, tuple(notes))
-
-
-def _quantity_text(value: float, unit: str) -> str:
-    """A value in SI with a readable unit."""
-    shown = registry().Quantity(value, unit).to_compact()
-    watts = registry().Unit("W")
-    if shown.is_compatible_with(watts):
-        shown = shown.to(watts)
-    return f"{shown.magnitude:.3g} {shown.units:~P}".strip()
 
 
 def _input(text: str) -> tuple[str, tuple[float, str]]:

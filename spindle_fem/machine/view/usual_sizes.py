@@ -82,11 +82,18 @@ def _quantity(
         passed = np.cumsum(np.gradient(times)[order]) if order.size else np.zeros(0)
         wanted = (np.arange(QUANTILES) + 0.5) / QUANTILES
         levels = np.interp(wanted * passed[-1], passed, size[order]) if order.size else order
-    short = f"{registry().Unit(unit):~C}"
     varies = float(np.ptp(size)) / max(highest, 1e-300)
-    return RecordedQuantity(
-        name, own, highest, varies, tuple(levels.tolist()), NAMED.get(short, short), changes
-    )
+    return RecordedQuantity(name, own, highest, varies, tuple(levels.tolist()), short_unit(unit), changes)
+
+
+def short_unit(unit: str) -> str:
+    """An SI base unit as people write it.
+
+    >>> short_unit("kilogram * meter ** 2 / second ** 3"), short_unit("radian / second")
+    ('W', 'rad/s')
+    """
+    short = f"{registry().Unit(unit or 'dimensionless'):~C}"
+    return NAMED.get(short, short)
 
 
 def common_quantities(
