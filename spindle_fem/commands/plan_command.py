@@ -36,7 +36,7 @@ from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.machine.view.usual_sizes import short_unit
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.results.output_folder import output_folder, replace_text
-from spindle_fem.units import TEMPERATURE_UNIT, to_si
+from spindle_fem.units import TEMPERATURE_UNIT, ZERO_CELSIUS_K, to_si
 
 Progress = Callable[[str], None]
 ALL = "all"
@@ -164,7 +164,7 @@ def planned_measurement(
         schedule = conditions.standard_tests(seconds)[name]
         chosen = _sensors(sensors, {probe: Sensor(probe, probe, NOISE) for probe in conditions.probes})
         asked, words = recording_of(conditions, schedule, chosen), schedule.name
-        full = {name: (value, short_unit(conditions.units[name])) for name, value in conditions.usual.items()}
+        full = {name: _shown(value, conditions.units[name]) for name, value in conditions.usual.items()}
     else:
         read = read_recording(test)
         if given:
@@ -194,6 +194,11 @@ def planned_measurement(
             f"{USUAL_RISE:.0f} K in the end: {sizes}. Give what the test would run at with --input.",
         )
     return Planned(found, conditions, tuple(chosen), words, full, compared, tuple(notes))
+
+
+def _shown(value: float, unit: str) -> tuple[float, str]:
+    """A value in SI as people read it, temperatures in °C."""
+    return (value - ZERO_CELSIUS_K, "degC") if unit == TEMPERATURE_UNIT else (value, short_unit(unit))
 
 
 def _input(text: str) -> tuple[str, tuple[float, str]]:

@@ -40,7 +40,7 @@ def plan_content(
     test : str
         In words.
     inputs : mapping of str to (float, str)
-        At full load of a standard test, SI, and their units.
+        At full load of a standard test, SI or °C, and their units.
     compared : float, [s]
         Length of the tests compared with it.
     """
@@ -97,7 +97,7 @@ def _pair(plan: MeasurementPlan, first: int, second: int) -> dict[str, Any]:
         "first": {"effect": one.effect, "component": one.component},
         "second": {"effect": other.effect, "component": other.component},
         "told_apart": size <= 1.0,
-        "information_bit": float(plan.separation.information[first, second]),
+        "information_bit": _rounded(plan.separation.information[first, second]),
         **{key: value for key, value in _stated(one, size).items() if key in ("from_size", "unit")},
     }
 
@@ -106,12 +106,16 @@ def _stated(item: Hypothetical, multiple: float) -> dict[str, Any]:
     """A size in the effect's own parameter, the usual one, and the unit of both."""
     usual, found = item.size(1.0), item.size(multiple)
     return {
-        "from_size": None if found is None else {found[0]: found[1]},
-        "usual_size": None if usual is None else {usual[0]: usual[1]},
+        "from_size": None if found is None else {found[0]: _rounded(found[1])},
+        "usual_size": None if usual is None else {usual[0]: _rounded(usual[1])},
         "unit": "" if usual is None else usual[2],
         "multiple": multiple if multiple <= LARGEST_MULTIPLE else None,
         "at_usual_size": multiple <= 1.0,
     }
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}")
 
 
 def _option(item: Option, now: Option) -> dict[str, Any]:

@@ -188,7 +188,11 @@ def _how(content: Mapping[str, Any]) -> list[Any]:
     ]
     blocks = [table_of(fields, content["sensors"])]
     if content["test"]["inputs"]:
-        given = (words("input", "name"), rounded("at full load", "value", 4), words("unit", "unit"))
+        given = (
+            words("input", "name"),
+            rounded("at full load", "value", 4),
+            words("unit", lambda item: item["unit"].replace("degC", "°C")),
+        )
         blocks.append(table_of(given, content["test"]["inputs"]))
     blocks.append(Bullets(steps))
     blocks += [
