@@ -1,0 +1,55 @@
+"""How a machine with geometry may differ in what drawings and mounting leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.misdescription import Change, Misdescription
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.model.reduced.structural_model import structural_model_of
+
+Array = NDArray[np.float64]
+
+# Columns of all directions (G + 1, c, n), which one march gives together.
+_known: WeakKeyDictionary[BaseRun, dict[str, Array]] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, slots=True)
+class StructuralChange:
+    """What a unit of a direction changes of the readings."""
+
+    name: str
+
+    def __call__(self, base: BaseRun) -> Change:
+        """Derivative of the same run on the model that has the directions."""
+        if base not in _known:
+            _known[base] = structural_columns(base)
+        return Change(direct=_known[base][self.name])
+
+
+def structural_columns(base: BaseRun) -> dict[str, Array]:
+    """Change of every channel for a unit of each direction, (G + 1, c) K, by direction."""
+    model = structural_model_of(base.predictor.fast)
+    names = tuple(item.name for item in model.structural)
+    own = base.predictor.with_model(model)
+    told = own.predict(base.number, base.values, base.candidates, names)
+    return {name: told.sensitivity[:, :, column] for column, name in enumerate(names)}
+
+
+def structural_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
+    """Directions of a machine with geometry; widths are those of its definition.
+
+    None of a model that was not projected from a mesh: it has no faces to move.
+    """
+    if predictor.is_network or not predictor.fast.model.n_full:
+        return
+    for item in structural_model_of(predictor.fast).structural:
+        yield Misdescription(
+            item.name, item.key, item.unit, item.sigma, item.statement, StructuralChange(item.name)
+        )
