@@ -89,10 +89,17 @@ def test_columns_are_those_of_a_machine_that_really_differs(name, made, full, di
 
     def readings(of, solve):
         matrix = of.conduction(sample.coefficients, sample.channel_film)
-        return of.probes @ solve(matrix + 3e-4 * of.capacity(sample.capacities), physical_loads(of, sample, spec))
+        return of.probes @ solve(
+            matrix + 3e-4 * of.capacity(sample.capacities), physical_loads(of, sample, spec)
+        )
 
     def in_full(of):
-        return readings(of, lambda matrix, loads: splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(loads))
+        return readings(
+            of,
+            lambda matrix, loads: splu(
+                matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+            ).solve(loads),
+        )
 
     step = 1e-3 * direction.sigma
     column = readings(changes[name].applied(model, step), np.linalg.solve) - readings(model, np.linalg.solve)

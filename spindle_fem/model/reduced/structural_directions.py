@@ -138,9 +138,7 @@ class Moved:
     def difference(self, full: FullMachine, sigma: float) -> Difference:
         """From the same elements with their nodes moved a little."""
         step = STEP * sigma
-        return Difference(
-            difference_of(self.moved(full, step), full.model, step), channel=self.channel_keys
-        )
+        return Difference(difference_of(self.moved(full, step), full.model, step), channel=self.channel_keys)
 
     def moved(self, full: FullMachine, amount: float) -> MeshModel:
         """Model with some units of the direction, on the same elements."""
@@ -228,9 +226,7 @@ class WarmAbove:
         for name in self.surfaces:
             height = facet_centres(mesh.points, mesh.surfaces[name])[:, 1] / (2.0 * highest)
             row = full.model.fluid_names.index(f"film.{name}")
-            warmth[row, : operators.n_unknowns] = operators.facet_vector(
-                height, operators.surface_rows[name]
-            )
+            warmth[row, : operators.n_unknowns] = operators.facet_vector(height, operators.surface_rows[name])
         return Difference({WARMTH: warmth})
 
 
@@ -383,7 +379,12 @@ def _channel(spec: MachineSpec) -> Iterator[StructuralDirection]:
         sigma = sigma_of(getattr(channel, key), PLACE)
         beyond = words if key == "z_start" else f"{words} beyond the definition"
         yield StructuralDirection(
-            f"channel.{key}", f"channel.{key}", "m", sigma, beyond, Moved(channel=move, channel_keys={key: 1.0})
+            f"channel.{key}",
+            f"channel.{key}",
+            "m",
+            sigma,
+            beyond,
+            Moved(channel=move, channel_keys={key: 1.0}),
         )
     for mode in range(1, FILM_MODES + 1):
         yield StructuralDirection(

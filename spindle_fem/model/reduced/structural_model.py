@@ -20,6 +20,7 @@ from scipy.sparse.linalg import splu
 from spindle_fem.cache import cache_directory, load_record, save_record, source_digest
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import Term
+from spindle_fem.model.mesh.moved_faces import MovableMesh
 from spindle_fem.model.reduced.build_reduced import SHIFTS, nominal_channel_film, physical_loads
 from spindle_fem.model.reduced.class_operators import NO_CHANGES, ClassOperators
 from spindle_fem.model.reduced.fast_model import FastModel
@@ -37,7 +38,6 @@ from spindle_fem.model.reduced.structural_directions import (
     structural_directions,
     with_channel,
 )
-from spindle_fem.model.mesh.moved_faces import MovableMesh
 from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads
 from spindle_fem.model.thermal_model import ThermalModel, project
 from spindle_fem.operation.coefficient_table import build_coefficient_table
@@ -153,9 +153,7 @@ class StructuralModel(FastModel):
         values = self._values(point, factors, changes)
         for name in (item for item in parameters if item in self.changes):
             step = self._steps[name]
-            other = self._changed[name].operators(
-                point, factors, changes=changes, conductances=conductances
-            )
+            other = self._changed[name].operators(point, factors, changes=changes, conductances=conductances)
             found.conduction_by[name] = (other.conduction - found.conduction) / step
             found.loads_by[name] = (other.loads - found.loads) / step
             found.outputs_by[name] = (other.outputs - found.outputs) / step
@@ -346,9 +344,7 @@ class _Record:
     values: Array
 
     @classmethod
-    def of(
-        cls, changes: Mapping[str, AffineChange], directions: Sequence[StructuralDirection]
-    ) -> _Record:
+    def of(cls, changes: Mapping[str, AffineChange], directions: Sequence[StructuralDirection]) -> _Record:
         entries = [
             (number, FIELDS.index(name), row, values)
             for number, change in enumerate(changes.values())
