@@ -24,6 +24,7 @@ class TolerancedLength(float):
     sigma: float
 
     def __new__(cls, value: float, sigma: float) -> TolerancedLength:
+        """A float that carries its standard deviation."""
         found = super().__new__(cls, value)
         found.sigma = sigma
         return found

@@ -1,4 +1,4 @@
-"""A mesh whose faces have moved a little: dimensions and positions that differ from the drawing, on the same elements.
+"""A mesh whose faces have moved a little, on the same elements: dimensions that differ from the drawing.
 
 Moved cylinders and planes carry their neighbourhood along: the displacement within is harmonic, radially
 with every cylinder held where it belongs, axially with every plane. The parts of a contact move together.
@@ -53,7 +53,7 @@ class MovedFace:
 
 @dataclass(frozen=True, slots=True)
 class MovedChannel:
-    """How far the walls of the cooling channel move for one unit, m: radially inner and outer, axially all."""
+    """How far the walls of the cooling channel move for one unit, m: inner and outer along r, all along z."""
 
     inner: float = 0.0
     outer: float = 0.0

@@ -149,7 +149,7 @@ class Moved:
 
 @dataclass(frozen=True, slots=True)
 class FilmAlong:
-    """A film that is better in some places along the channel than in others, in a cosine of some half waves."""
+    """A film better in some places along the channel than in others, in a cosine of some half waves."""
 
     half_waves: int
 

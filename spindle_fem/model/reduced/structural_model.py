@@ -54,7 +54,7 @@ COARSE = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
 TOLERANCE, LARGEST = 2e-5, 160
 # Fields of one direction that join the basis, for each frequency.
 FIELDS_EACH = 4
-# Shares of the highest speed at which the loads are solved, the usual one first, and Laplace frequencies of each.
+# Shares of the highest speed at which the loads are solved, the usual one first, and each one's frequencies.
 SPEEDS = ((0.5, SHIFTS), (0.0, SHIFTS[1:2]), (1.0, SHIFTS[1:2]))
 # Entries of a difference below this share of the model's are round-off.
 ROUND_OFF = 1e-9
