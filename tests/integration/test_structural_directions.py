@@ -56,7 +56,7 @@ def radii(mesh, nodes):
 
 
 def test_an_outer_diameter_moves_its_cylinders_and_no_other(full, directions):
-    """Circles stay circles to their middles, contacts stay closed, and the volume grows by that of the shell."""
+    """Circles stay circles to their middles, contacts stay closed, the volume grows by that of the shell."""
     faces = directions[0].cause.faces
     amount = 4e-3
     mesh = full.movable.moved(full.movable.displacement(faces, None), amount)
