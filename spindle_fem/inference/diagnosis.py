@@ -148,6 +148,8 @@ def diagnose_recordings(
         slow = slow_error_of(problem, problem.fit((), empty.fit.values))
     else:
         wrong, belief = None, calibrated.belief
+    if directions:
+        predictor = with_misdescriptions(predictor, directions, best.fit.values, best.fit.candidates)
     final = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
     readings = _Readings(predictor, slow.sigma)

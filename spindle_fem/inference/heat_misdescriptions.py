@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.misdescription import Change, Misdescription
@@ -50,6 +51,16 @@ class SpeedShape:
 
         return Change(added(run.friction_start, base.start_inputs), added(run.friction_end, base.end_inputs))
 
+    def corrected(self, spec: MachineSpec, value: float) -> MachineSpec:
+        """The machine with a table that is right."""
+        table = spec.heat.table
+        factor = 1.0 + value * np.interp(table.speed, self.speed, self.share)
+        heat = {
+            name: tuple(factor * own) if name in self.bearings else own for name, own in table.heat.items()
+        }
+        changed = table.model_copy(update={"heat": heat})
+        return spec.model_copy(update={"heat": spec.heat.model_copy(update={"table": changed})})
+
 
 @dataclass(frozen=True, slots=True)
 class SpeedConductance:
@@ -81,8 +92,23 @@ class SpeedConductance:
 
 def clock_change(base: BaseRun) -> Change:
     """Temperatures stamped a second later than the inputs: readings are those of a second before."""
-    told = base.told()
-    return Change(direct=-np.gradient(told, base.drive.grid, axis=0))
+    return Change(direct=-np.gradient(base.told(), base.drive.grid, axis=0))
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """A channel that tells what was there some seconds before: its sensor answers with a delay."""
+
+    channel: str
+
+    def __call__(self, base: BaseRun) -> Change:
+        """To first order a delay and a lag are the same."""
+        names = base.predictor.recordings[base.number].temperature_names
+        late = np.zeros_like(base.told())
+        if self.channel in names:
+            column = names.index(self.channel)
+            late[:, column] = -np.gradient(base.told()[:, column], base.drive.grid)
+        return Change(direct=late)
 
 
 def shape_modes(speed: Array, length: float) -> list[tuple[float, Array]]:
@@ -113,9 +139,9 @@ def shape_modes(speed: Array, length: float) -> list[tuple[float, Array]]:
 
 
 def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
-    """Shape of the heat over speed, balls that conduct better with speed, and clocks.
+    """Shape of the heat over speed, balls that conduct better with speed, sensors' response, and clocks.
 
-    Widths: ``tuned.HEAT_SHAPE_SIGMA``, ``tuned.BALL_SPEED_SIGMA`` and ``tuned.CLOCK_SIGMA``.
+    Widths: ``tuned.HEAT_SHAPE_SIGMA``, ``BALL_SPEED_SIGMA``, ``RESPONSE_SIGMA`` and ``CLOCK_SIGMA``.
     """
     if predictor.is_network:
         return
@@ -144,6 +170,16 @@ def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             tuned.BALL_SPEED_SIGMA,
             f"share by which balls conduct better at {highest * 30.0 / np.pi:.0f} rpm than at rest",
             SpeedConductance(rows, highest),
+        )
+    channels = dict.fromkeys(name for item in predictor.recordings for name in item.temperature_names)
+    for channel in channels:
+        yield Misdescription(
+            f"response.{channel}",
+            f"sensor {channel}",
+            "s",
+            tuned.RESPONSE_SIGMA,
+            f"time by which {channel} answers later than the machine",
+            Response(channel),
         )
     for number in range(len(predictor.recordings)):
         yield Misdescription(

@@ -20,7 +20,8 @@ from spindle_fem.units import Uncertain
 def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     """Text of the definition with the fitted parameters and an ``[[effect]]`` for each finding.
 
-    Parameters keep what is left of their uncertainty. Where a probe sits
+    Parameters keep what is left of their uncertainty. Directions of misdescription
+    that a key of the definition stands for are put right; where a probe sits
     within its hole is left as the definition has it.
     """
     fit = diagnosis.final
@@ -36,6 +37,9 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     }
     if not machine.is_network:
         spec = with_parameters(machine.spec, {name: value for name, (value, _) in own.items()})
+        for item in diagnosis.predictor.misdescribed:
+            if hasattr(item.change, "corrected"):
+                spec = item.change.corrected(spec, values[item.coordinate])
         return write_machine(spec.model_copy(update={"effects": (*machine.spec.effects, *entries)}))
     moved = {}
     for name, (factor, _) in own.items():

@@ -55,6 +55,7 @@ class Misdescription:
     change : callable
         Takes the :class:`spindle_fem.inference.candidate_response.BaseRun` of a recording. A function of a
         module or a frozen dataclass, as other processes get it too.
+        May have a method ``corrected(spec, value)``: the machine with the definition put right.
     recording : int or None
         The only recording that it concerns; None for the machine itself.
     """

@@ -157,9 +157,16 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
         problem = Problem(earlier, prior, slow, earlier.observations)
         fit = problem.fit((), None if fit is None else fit.values)
         slow = slow_error_of(problem, fit)
-    count, total = len(shared), len(shared) + len(begun)
-    precision = np.linalg.inv(fit.covariance[:count, :count])
-    root, mean = np.eye(total), np.zeros(total)
-    root[:count, :count] = np.linalg.cholesky(0.5 * (precision + precision.T)).T
-    mean[:count] = fit.position[:count]
+    # Channels that only the diagnosed recordings have stay as they were known before.
+    belief = known_before(predictor)
+    place = {c.name: index for index, c in enumerate(fit.coordinates)}
+    rows = [index for index, c in enumerate(shared) if c.name in place]
+    fitted = [place[shared[index].name] for index in rows]
+    covariance = np.linalg.inv(belief.root.T @ belief.root)
+    covariance[rows, :] = covariance[:, rows] = 0.0
+    covariance[np.ix_(rows, rows)] = fit.covariance[np.ix_(fitted, fitted)]
+    precision = np.linalg.inv(covariance)
+    mean = belief.mean.copy()
+    mean[rows] = fit.position[fitted]
+    root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
     return Calibrated(Belief((*shared, *begun), mean, root), slow, fit)

@@ -36,6 +36,8 @@ GAP_SIGMA = 0.3
 HEAT_SHAPE_SIGMA, HEAT_SHAPE_LENGTH = 0.05, 0.3
 BALL_SPEED_SIGMA = 0.15
 CLOCK_SIGMA = 30.0
+# Time by which a sensor in its hole, or in the stream, answers later than what it touches, s.
+RESPONSE_SIGMA = 10.0
 # A network of a few nodes is a coarse picture: its slow error as multiples of the larger of the noise and
 # this share of what the temperatures move.
 NETWORK_SLOW_SIGMAS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX
-from spindle_fem.inference.heat_misdescriptions import SpeedConductance, SpeedShape, clock_change, shape_modes
+from spindle_fem.inference.heat_misdescriptions import (
+    Response,
+    SpeedConductance,
+    SpeedShape,
+    clock_change,
+    shape_modes,
+)
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.misdescription import Misdescription
@@ -71,6 +77,33 @@ def test_a_clock_moves_readings_along_their_own_slope(predictor):
     later = np.array([np.interp(grid - 20.0, grid, one) for one in told.T]).T
     smooth = (grid > 200.0) & (np.abs(grid - 1800.0) > 200.0) & (np.abs(grid - 8100.0) > 200.0)
     np.testing.assert_allclose(20.0 * column[smooth], (later - told)[smooth], atol=0.02)
+
+
+def test_a_slow_sensor_moves_its_own_channel_only(predictor):
+    column = column_of(predictor, Response("SP02"))
+    np.testing.assert_allclose(column[:, 1], column_of(predictor, clock_change)[:, 1])
+    assert not np.delete(column, 1, axis=1).any()
+    assert not column_of(predictor, Response("elsewhere")).any()
+
+
+def test_the_improved_machine_has_the_table_put_right(case):
+    share = 0.1
+    shape = SpeedShape(FRONT, (0.0, 1000.0), (0.0, 1.0))
+    before, after = case.spec.heat.table, shape.corrected(case.spec, share).heat.table
+    np.testing.assert_allclose(after.heat["R1"], before.heat["R1"])
+    factor = 1.0 + share * np.array(before.speed) / 1000.0
+    np.testing.assert_allclose(after.heat["F1"], factor * np.array(before.heat["F1"]))
+
+
+def test_a_channel_without_calibration_is_known_as_before(case, predictor):
+    named = Misdescription("response.other", "", "s", 10.0, "", Response("other"))
+    earlier = with_misdescriptions(predictor, misdescriptions_of(predictor)[:-3])
+    whole = with_misdescriptions(predictor, (named, *misdescriptions_of(predictor)))
+    belief = calibrate(earlier, whole).belief
+    names = [c.name for c in belief.coordinates]
+    row = names.index(named.coordinate)
+    assert belief.mean[row] == 0.0
+    assert np.linalg.inv(belief.root.T @ belief.root)[row, row] == pytest.approx(1.0)
 
 
 def test_modes_are_apart_and_without_a_mean():
