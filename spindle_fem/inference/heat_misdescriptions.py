@@ -1,8 +1,8 @@
-"""How a machine with geometry may differ in what follows its speed, and its clocks."""
+"""How a machine with geometry may differ in its heat and balls over speed, materials, sensors and clocks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,11 +52,14 @@ class SpeedShape:
         return Change(added(run.friction_start, base.start_inputs), added(run.friction_end, base.end_inputs))
 
     def corrected(self, spec: MachineSpec, value: float) -> MachineSpec:
-        """The machine with a table that is right."""
+        """The machine with a table that is right, where its heat is by table."""
         table = spec.heat.table
+        if spec.heat.model != "table":
+            return spec
         factor = 1.0 + value * np.interp(table.speed, self.speed, self.share)
         heat = {
-            name: tuple(factor * own) if name in self.bearings else own for name, own in table.heat.items()
+            name: tuple((factor * own).tolist()) if name in self.bearings else own
+            for name, own in table.heat.items()
         }
         changed = table.model_copy(update={"heat": heat})
         return spec.model_copy(update={"heat": spec.heat.model_copy(update={"table": changed})})
@@ -78,16 +81,34 @@ class SpeedConductance:
 
     def __call__(self, base: BaseRun) -> Change:
         """Loads of what they conduct more."""
-        ends = []
-        for before, inputs in ((True, base.start_inputs), (False, base.end_inputs)):
-            share = inputs["speed"] / self.highest
-            ends.append(
-                -sum(
-                    (share * base.strength(name))[:, None] * base.flow(name, before)
-                    for name in self.coefficients
-                )
-            )
-        return Change(*ends)
+        start, end = (inputs["speed"] / self.highest for inputs in (base.start_inputs, base.end_inputs))
+        return _more(base, self.coefficients, start, end)
+
+
+@dataclass(frozen=True, slots=True)
+class Conductivity:
+    """Another conductivity of one material."""
+
+    material: str
+
+    def __call__(self, base: BaseRun) -> Change:
+        """Loads of what it conducts more, for as much again."""
+        return _more(base, (f"conductivity.{self.material}",), 1.0, 1.0)
+
+    def corrected(self, spec: MachineSpec, value: float) -> MachineSpec:
+        """The machine with the conductivity that it has."""
+        own = spec.materials[self.material]
+        changed = own.model_copy(update={"thermal_conductivity": own.thermal_conductivity * (1.0 + value)})
+        return spec.model_copy(update={"materials": {**spec.materials, self.material: changed}})
+
+
+def _more(base: BaseRun, coefficients: Sequence[str], start: Array | float, end: Array | float) -> Change:
+    """Loads of coefficients that are larger by shares at both ends of the steps, (G,)."""
+    loads = []
+    for share, before in ((start, True), (end, False)):
+        flows = [(share * base.strength(name))[:, None] * base.flow(name, before) for name in coefficients]
+        loads.append(-np.sum(flows, axis=0))
+    return Change(*loads)
 
 
 def clock_change(base: BaseRun) -> Change:
@@ -139,12 +160,49 @@ def shape_modes(speed: Array, length: float) -> list[tuple[float, Array]]:
 
 
 def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
-    """Shape of the heat over speed, balls that conduct better with speed, sensors' response, and clocks.
+    """Heat over speed, balls that conduct better with speed, conductivities, sensors' response, and clocks.
 
-    Widths: ``tuned.HEAT_SHAPE_SIGMA``, ``BALL_SPEED_SIGMA``, ``RESPONSE_SIGMA`` and ``CLOCK_SIGMA``.
+    Widths: ``HEAT_SHAPE_SIGMA``, ``BALL_SPEED_SIGMA``, ``CONDUCTIVITY_SIGMA``, ``RESPONSE_SIGMA`` and
+    ``CLOCK_SIGMA`` of :mod:`spindle_fem.inference.tuned`.
     """
     if predictor.is_network:
         return
+    if predictor.fast.spec.heat.table is not None:
+        yield from _over_speed(predictor)
+    for material in predictor.fast.spec.materials:
+        if f"conductivity.{material}" in predictor.fast.model.coefficient_names:
+            yield Misdescription(
+                f"conductivity.{material}",
+                f"materials.{material}.thermal_conductivity",
+                "",
+                tuned.CONDUCTIVITY_SIGMA,
+                f"share by which {material} conducts better",
+                Conductivity(material),
+            )
+    channels = dict.fromkeys(name for item in predictor.recordings for name in item.temperature_names)
+    for channel in channels:
+        yield Misdescription(
+            f"response.{channel}",
+            f"sensor {channel}",
+            "s",
+            tuned.RESPONSE_SIGMA,
+            f"time by which {channel} answers later than the machine",
+            Response(channel),
+        )
+    for number in range(len(predictor.recordings)):
+        yield Misdescription(
+            "clock",
+            "clock of the recording",
+            "s",
+            tuned.CLOCK_SIGMA,
+            "time by which temperatures are stamped later than inputs",
+            clock_change,
+            number,
+        )
+
+
+def _over_speed(predictor: Predictor) -> Iterator[Misdescription]:
+    """What follows speed."""
     spec = predictor.fast.spec
     highest = float(max(spec.heat.table.speed))
     speed = np.linspace(0.0, highest, MODE_POINTS)
@@ -170,24 +228,4 @@ def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             tuned.BALL_SPEED_SIGMA,
             f"share by which balls conduct better at {highest * 30.0 / np.pi:.0f} rpm than at rest",
             SpeedConductance(rows, highest),
-        )
-    channels = dict.fromkeys(name for item in predictor.recordings for name in item.temperature_names)
-    for channel in channels:
-        yield Misdescription(
-            f"response.{channel}",
-            f"sensor {channel}",
-            "s",
-            tuned.RESPONSE_SIGMA,
-            f"time by which {channel} answers later than the machine",
-            Response(channel),
-        )
-    for number in range(len(predictor.recordings)):
-        yield Misdescription(
-            "clock",
-            "clock of the recording",
-            "s",
-            tuned.CLOCK_SIGMA,
-            "time by which temperatures are stamped later than inputs",
-            clock_change,
-            number,
         )

@@ -7,8 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX
 from spindle_fem.inference.heat_misdescriptions import (
+    Conductivity,
     Response,
     SpeedConductance,
     SpeedShape,
@@ -104,6 +106,16 @@ def test_a_channel_without_calibration_is_known_as_before(case, predictor):
     row = names.index(named.coordinate)
     assert belief.mean[row] == 0.0
     assert np.linalg.inv(belief.root.T @ belief.root)[row, row] == pytest.approx(1.0)
+
+
+def test_a_corrected_machine_can_be_written_and_read(case, tmp_path):
+    changed = SpeedShape(FRONT, (0.0, 1000.0), (0.0, 1.0)).corrected(case.spec, 0.1)
+    changed = Conductivity("cast_iron").corrected(changed, 0.05)
+    (tmp_path / "machine.toml").write_text(write_machine(changed), encoding="utf-8")
+    again = load_machine(tmp_path / "machine.toml")
+    np.testing.assert_allclose(again.heat.table.heat["F1"], changed.heat.table.heat["F1"])
+    before = case.spec.materials["cast_iron"].thermal_conductivity
+    assert again.materials["cast_iron"].thermal_conductivity == pytest.approx(1.05 * before)
 
 
 def test_modes_are_apart_and_without_a_mean():
