@@ -19,6 +19,7 @@ from spindle_fem.inference.predictor import STEP, Predictor
 from spindle_fem.model.reduced.defined_effects import ActiveEffects
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.reduced_transient import TransientRun
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.recordings.align import Recording
 
@@ -95,6 +96,7 @@ class ContinuedRun:
         self.begun: tuple[Array, Mapping[str, Array]] | None = None
         # Derivatives of the state to directions of misdescription, which it does not follow itself.
         self._directions: dict[str, Array] = {}
+        self._run: TransientRun | None = None
 
     def begins(self, piece: Recording) -> Predictor:
         """The machine where a recording begins with this piece."""
@@ -128,6 +130,7 @@ class ContinuedRun:
         inside = told.columns >= 0
         if told.tangents is not None:
             slopes[:, inside] = told.tangents[-1][:, told.columns[inside]]
+        self._run = told.run
         self.begun = told.states[-1], dict(zip(names, slopes.T, strict=True))
         fresh = np.ones(piece.times.size, dtype=bool)
         fresh[0] = False
@@ -150,6 +153,13 @@ class ContinuedRun:
         for index, item in enumerate(directions):
             told.temperature[:] += values[item.coordinate] * channels[:, :, index]
             told.sensitivity[:, :, names.index(item.coordinate)] += channels[:, :, index]
+
+    def slowest_time(self) -> float:
+        """Longest time constant of the machine as it ran last, s."""
+        operators = self._run.operators[int(self._run.step_class[-1])]
+        return float(
+            np.linalg.eigvals(np.linalg.solve(operators.conduction, self._run.built.storage)).real.max()
+        )
 
     def move(self, changes: Mapping[str, float]) -> None:
         """Move the state to first order with changes of the coordinates, as derivatives are taken."""

@@ -32,6 +32,8 @@ MONTH = 365.25 / 12.0 * 86400.0
 SOONER = 10.0
 # A slow error this many times its usual size keeps a channel from being as modelled again.
 STILL_OUT = 3.0
+# Times the slowest time constant after which an unknown state has faded to a twentieth.
+FADED = 3.0
 # Instants of one piece: the model is linearised anew after each.
 PIECE_INSTANTS = 60
 # Coordinates of the recording itself that are followed: temperatures at its start, its clocks.
@@ -103,6 +105,7 @@ class WatchedMachine:
         self._channels: tuple[str, ...] = ()
         self._past: deque[tuple[float, float, float]] = deque(maxlen=REMEMBERED)
         self._time: float | None = None
+        self._gap, self._unknown_until = np.inf, -np.inf
         self.spread = 1.0
         self._numbers: deque[Array] = deque(maxlen=MOST_NUMBERS)
 
@@ -166,7 +169,8 @@ class WatchedMachine:
         if not np.isfinite(self.used):
             self.used = float(times[0])
             self._begin(piece_of(recording, 0, times.size))
-        gap = long_gap(times) if self.run.fast.network is not None else np.inf
+        self._gap = long_gap(times)
+        gap = self._gap if self.run.fast.network is not None else np.inf
         while True:
             begin = int(np.searchsorted(times, self.used - 1e-6))
             left = float(times[-1] - self.used)
@@ -193,7 +197,14 @@ class WatchedMachine:
         sigma = np.array([c.sigma for c in self.coordinates])
         instants = _Instants.of(piece, observations, told, sigma, self.width)
         self._channels = piece.temperature_names
-        speed = _running(piece, self.run, instants.times)
+        if np.diff(piece.times).max() > self._gap:
+            # What a machine with geometry did meanwhile nobody saw: its state is unknown until that has faded.
+            self._unknown_until = float(piece.times[-1]) + FADED * self.run.slowest_time()
+        if not instants.times.size:
+            return []
+        running = _running(piece, self.run, instants.times)
+        self._past += zip(instants.times, running, instants.expected, strict=True)
+        words = conditions_of(*np.array(self._past).T)[-len(instants.times) :]
         found = []
         for index, time in enumerate(instants.times.tolist()):
             elapsed = time - (float(piece.times[0]) if self._time is None else self._time)
@@ -203,16 +214,16 @@ class WatchedMachine:
                 instants.residual[index],
                 instants.slopes[index],
                 self.white / np.sqrt(instants.number[index]),
-                learn=self.state != LEFT,
+                learn=self.state != LEFT and time >= self._unknown_until,
             )
-            self._numbers.append(numbers)
-            self.sums.add(numbers / self.spread)
-            self._past.append((time, float(speed[index]), float(instants.expected[index])))
-            found.append(self._judge(time))
+            if time >= self._unknown_until:
+                self._numbers.append(numbers)
+                self.sums.add(numbers / self.spread)
+            found.append(self._judge(time, words[index]))
         self._recentre(float(piece.times[-1] - piece.times[0]))
         return found
 
-    def _judge(self, time: float) -> Told:
+    def _judge(self, time: float, condition: str) -> Told:
         evidence, out = self.sums.evidence, np.abs(self._filter.slow_errors) > STILL_OUT * self.slow.sigma
         if evidence.max() >= 1.0:
             self.state = LEFT
@@ -226,7 +237,7 @@ class WatchedMachine:
             time,
             self.state,
             self._channels[worst] if away else None,
-            conditions_of(*np.array(self._past).T)[-1],
+            condition,
             float(self._filter.slow_errors[worst]) if away else None,
             float(evidence[worst]),
         )
@@ -257,7 +268,7 @@ def _own_part(belief: Belief) -> tuple[tuple[Coordinate, ...], Array, Array]:
 
 
 def long_gap(times: Array) -> float:
-    """Distance of rows, s, beyond which a network begins again from its readings."""
+    """Distance of rows, s, over which a machine is not followed."""
     return max(LONG_GAP_SECONDS, LONG_GAP_STEPS * float(np.median(np.diff(times))))
 
 

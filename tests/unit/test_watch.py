@@ -13,8 +13,9 @@ from spindle_fem.errors import RecordingError
 from spindle_fem.inference.continued_run import ContinuedRun
 from spindle_fem.inference.cumulative_sums import CumulativeSums, level_for, run_length
 from spindle_fem.inference.innovations import InnovationFilter
-from spindle_fem.inference.prepared_problem import machine_coordinates
+from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates
 from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.inference.watched_machine import WatchedMachine
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.growing_file import follow_lines
@@ -273,3 +274,28 @@ def test_bad_input_is_refused(folder, options, said):
 def test_a_compressed_file_does_not_grow(tmp_path):
     with pytest.raises(RecordingError, match="cannot grow"):
         next(follow_lines(tmp_path / "made.csv.gz", to_end=False, poll=0.0, tell=print))
+
+
+def test_after_a_gap_a_network_begins_again_and_geometry_waits(fast, folder, tmp_path):
+    frame = heated(8.0, seed=2)
+    frame = frame[(frame.time < 4.0 * 3600.0) | (frame.time > 5.5 * 3600.0)]
+    write_recording(tmp_path / "gap", frame, TEMPERATURES, INPUTS)
+    how = Watching(calibrate=(folder / "sound",), until_end=True)
+    told = list(watch_recording(folder / "machine.toml", tmp_path / "gap", how))
+    assert {line["state"] for line in told} == {"as modelled"}
+    assert told[-1]["time"] > 7.9 * 3600.0
+    times = np.append(np.arange(0.0, 3600.0, 60.0), 9000.0 + np.arange(0.0, 3600.0, 60.0))
+    cold = pd.DataFrame({"time": times, "SP01": 20.0, "speed": 0.0, "room": 20.0, "oil": 20.0})
+    # Heat that nobody saw: the machine comes out of the gap warm.
+    cold.loc[cold.time >= 9000.0, "SP01"] += 5.0
+    inputs = {"speed": "speed", "room": "ambient", "oil": "coolant_inlet"}
+    recording = read_recording(
+        write_recording(tmp_path / "r", cold, {"SP01": "SP01"}, inputs), long_gap=np.inf
+    )
+    run = ContinuedRun(fast, NO_EFFECTS)
+    known = calibrate(None, run.begins(recording))
+    watched = WatchedMachine(run, known, np.array([0.1]), width=60.0, alarms=1.0)
+    assert run.begun is None
+    told = watched.follow(recording, to_end=True)
+    assert {item.state for item in told} == {"as modelled"}
+    assert 300.0 < run.slowest_time() < 1e6
