@@ -198,7 +198,7 @@ class WatchedMachine:
         instants = _Instants.of(piece, observations, told, sigma, self.width)
         self._channels = piece.temperature_names
         if np.diff(piece.times).max() > self._gap:
-            # What a machine with geometry did meanwhile nobody saw: its state is unknown until that has faded.
+            # What a machine with geometry did meanwhile nobody saw: its state is unknown until it has faded.
             self._unknown_until = float(piece.times[-1]) + FADED * self.run.slowest_time()
         if not instants.times.size:
             return []
