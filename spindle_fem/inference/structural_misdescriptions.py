@@ -16,21 +16,24 @@ from spindle_fem.model.reduced.structural_model import structural_model_of
 
 Array = NDArray[np.float64]
 
+# Unit in which a report tells of a direction, and its size in the model's.
+TOLD_IN = {"m": ("mm", 1e-3)}
 # Columns of all directions (G + 1, c, n), which one march gives together.
 _known: WeakKeyDictionary[BaseRun, dict[str, Array]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
 class StructuralChange:
-    """What a unit of a direction changes of the readings."""
+    """What some units of a direction change of the readings."""
 
     name: str
+    amount: float = 1.0
 
     def __call__(self, base: BaseRun) -> Change:
         """Derivative of the same run on the model that has the directions."""
         if base not in _known:
             _known[base] = structural_columns(base)
-        return Change(direct=_known[base][self.name])
+        return Change(direct=self.amount * _known[base][self.name])
 
 
 def structural_columns(base: BaseRun) -> dict[str, Array]:
@@ -50,6 +53,6 @@ def structural_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]
     if predictor.is_network or not predictor.fast.model.n_full:
         return
     for item in structural_model_of(predictor.fast).structural:
-        yield Misdescription(
-            item.name, item.key, item.unit, item.sigma, item.statement, StructuralChange(item.name)
-        )
+        unit, scale = TOLD_IN.get(item.unit, (item.unit, 1.0))
+        change = StructuralChange(item.name, scale)
+        yield Misdescription(item.name, item.key, unit, item.sigma / scale, item.statement, change)

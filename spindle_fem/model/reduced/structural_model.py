@@ -7,6 +7,7 @@ coarse mesh with linear temperatures: enough for derivatives.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -387,8 +388,10 @@ def _row_shape(model: ThermalModel, name: str) -> tuple[int, ...]:
 
 def _projected(spec: MachineSpec, progress: Progress) -> Projected:
     """Model, changes and directions of a machine, from the cache where they were made before."""
-    digest = reduced_digest(spec, {"structural": float(int(source_digest(__name__)[:12], 16))})
-    return _read_or_made(cache_directory() / f"structural-{digest}.npz", spec, progress)
+    # The reduced model's own does not know tolerances.
+    solids = spec.model_dump_json(include={"part", "channel"})
+    digest = hashlib.sha256((reduced_digest(spec, {}) + source_digest(__name__) + solids).encode())
+    return _read_or_made(cache_directory() / f"structural-{digest.hexdigest()}.npz", spec, progress)
 
 
 _known: dict[Path, Projected] = {}
