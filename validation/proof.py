@@ -24,6 +24,7 @@ CAUSES = HERE.parent / "book" / "causes.toml"
 TITLES = {
     SPINDLE: "The recorded spindle, known up to its uncertain parameters",
     "rough": "The recorded spindle, known roughly",
+    "meridian": "Belt-driven spindles of other sizes, without cooling",
     "networks": "Machines without drawings",
 }
 DIGITS = 4

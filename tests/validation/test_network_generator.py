@@ -84,9 +84,10 @@ def test_what_reads_like_the_truth_counts_as_right():
 
 
 def test_generators_share_nothing_with_the_package():
-    alone = "cycles draw draw_sensor_errors finite_volume generate generate_networks generate_rough identify"
-    alone += " concealed_effect laws machine oil recorder reduction rough sensor_errors stepping"
-    for path in [*(FOLDER / "networks").glob("*.py"), *(FOLDER / f"{name}.py" for name in alone.split())]:
+    alone = """concealed_effect cycles draw draw_sensor_errors finite_volume generate generate_meridian
+        generate_networks generate_rough identify laws machine oil recorder reduction rough sensor_errors stepping"""
+    folders = [*(FOLDER / "networks").glob("*.py"), *(FOLDER / "meridian").glob("*.py")]
+    for path in [*folders, *(FOLDER / f"{name}.py" for name in alone.split())]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
