@@ -29,6 +29,7 @@ from .stepping import draw_as_built, run
 TURNS = ("consistent", "single", "single", "pair", "consistent", "single", "triple", "sensor_beside")
 # Slow differences between machine and definition last as long as the loads do, s.
 STRUCTURE_S = 4000.0
+MOST_MACHINES = 8
 
 
 def choose(number: int, rng: np.random.Generator) -> tuple[str, list[str]]:
@@ -104,8 +105,26 @@ def _place_names(component: str) -> list[str]:
 def make_case(
     folder: FilePath, nominal: ReducedSpindle, pool: list, seed: int, number: int, identified: bool = True
 ) -> dict[str, Any]:
-    """Draw, simulate, write one case; returns its answer."""
-    rng = np.random.default_rng([seed, number])
+    """Draw, simulate, write one case; returns its answer.
+
+    Raises
+    ------
+    ArithmeticError
+        None of several machines shows what is wanted.
+    """
+    for attempt in range(MOST_MACHINES):
+        try:
+            return _attempt(folder, nominal, pool, (seed, number, attempt), identified)
+        except ArithmeticError:
+            continue
+    raise ArithmeticError(f"case {number}: no machine shows what is wanted")
+
+
+def _attempt(
+    folder: FilePath, nominal: ReducedSpindle, pool: list, seeds: tuple[int, int, int], identified: bool
+) -> dict[str, Any]:
+    rng = np.random.default_rng(seeds)
+    number = seeds[1]
     name = f"case_{number:04d}"
     family, wanted = choose(number, rng)
     deviation, model = pool[int(rng.integers(len(pool)))]

@@ -67,7 +67,7 @@ class AsMounted(Law):
         """Forget the run before."""
         self.memory.clear()
         capacity = TOOL_J_KG_K * self.tool_kg
-        self.tool = ExtraMass("nose", capacity, 12.0 * self.tool_kg) if capacity else None
+        self.tool = ExtraMass("nose", capacity, 6.0 * self.tool_kg) if capacity else None
 
     def factor(self, where: str, speed: float) -> float:
         """Heat of a set over its table's at a speed."""

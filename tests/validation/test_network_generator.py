@@ -85,7 +85,8 @@ def test_what_reads_like_the_truth_counts_as_right():
 
 def test_generators_share_nothing_with_the_package():
     alone = """concealed_effect cycles draw draw_sensor_errors finite_volume generate generate_meridian
-        generate_networks generate_rough identify laws machine oil recorder reduction rough sensor_errors stepping"""
+        generate_networks generate_rough identify laws machine oil recorder reduction rough sensor_errors
+        stepping"""
     folders = [*(FOLDER / "networks").glob("*.py"), *(FOLDER / "meridian").glob("*.py")]
     for path in [*folders, *(FOLDER / f"{name}.py" for name in alone.split())]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
