@@ -47,6 +47,13 @@ study: $(READY)
 	$(BIN)/python -m validation.run_study $(STUDY) $(STUDY)/results --jobs 2 --mesh coarse
 	$(BIN)/python -m validation.score $(STUDY) $(STUDY)/results --json $(STUDY)/score.json
 
+# The same for machines known roughly, for other machines and for networks: `make study_rough study_meridian study_networks`.
+SEED ?= 50
+study_%: $(READY)
+	$(BIN)/python -m validation.generate_$* --cases 100 --seed $(SEED) -o runs/$@
+	$(BIN)/python -m validation.run_study runs/$@ runs/$@/results --jobs 2 --mesh coarse
+	$(BIN)/python -m validation.score_families runs/$@ runs/$@/results
+
 # The verification and validation book. STUDY=folder names another concealed study, RECORDINGS another folder of
 # real recordings; chapters without their data are left out by name. PEER_PYTHONS: interpreters with other solvers.
 # EARLIER="folder folder": studies with other seeds to show beside it.
@@ -58,7 +65,7 @@ book: $(READY)
 
 # What was concealed and what was found, from finished studies: PROOF names their folders, with answers and results.
 # REAL=folder: diagnoses of the real recordings (`python -m validation.open_examples` leaves them).
-PROOF ?= runs/study_rough runs/study_networks $(STUDY)
+PROOF ?= runs/study_rough runs/study_meridian runs/study_networks
 REAL ?=
 proof: $(READY)
 	$(BIN)/python -m validation.proof $(PROOF) -o reports/proof $(addprefix --real ,$(REAL)) --recordings $(RECORDINGS)

@@ -27,6 +27,7 @@ CYCLE = 5
 PAIR_SHARE = 0.18
 STRENGTHS = ((3.0, 20.0), (0.8, 2.5))
 FAINT_SHARE = 0.08
+MOST_MACHINES, TRIES_OF_FAMILY = 16, 4
 WEAKEST, STRONGEST = 0.15, 1.8  # times what the families draw
 # A mimic cannot be told from the truth where what it leaves beyond it is a third of noise and structure.
 SAME_AS_TRUTH = 0.35
@@ -265,8 +266,10 @@ def make_case(folder: Path, seed: int, number: int) -> dict[str, Any]:
     rng = np.random.default_rng([seed, number])
     wanted = choose(number, rng)
     needs = any(CONCEALED[name][1] for name in wanted)
-    for _ in range(12):
-        family = list(FAMILIES)[int(rng.integers(len(FAMILIES)))]
+    for attempt in range(MOST_MACHINES):
+        # Several machines of a family are tried before another, so that none is rare for being hard.
+        if attempt % TRIES_OF_FAMILY == 0:
+            family = list(FAMILIES)[int(rng.integers(len(FAMILIES)))]
         calibrated = needs or bool(rng.random() < 0.3)
         try:
             case = draw_machine(rng, family, calibrated)
