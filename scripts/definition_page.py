@@ -22,6 +22,7 @@ from spindle_fem.definition.schema import (
     shape_of,
     value_text,
 )
+from spindle_fem.definition.tolerances import DIAMETER_SHARE, PLACE
 from spindle_fem.registry import Registry
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
 from spindle_fem.validity import range_text
@@ -49,6 +50,14 @@ refused wherever a unit is needed. A temperature takes `degC` or `K`. Rotational
 An **uncertain** value takes a quantity, which is then fixed, or a prior: `{{value = "10 W/m**2/K",
 sigma_rel = 0.3}}` (sigma_rel is one standard deviation of the logarithm) or `{{low = "5 W/m**2/K", high =
 "20 W/m**2/K"}}` (between them lie 90 %). `[[factor]]` makes one factor common to several values.
+
+A length that says so takes a **tolerance**: `{{value = "280 mm", sigma = "1 mm"}}` (one standard
+deviation) or `{{value = "280 mm", sigma_rel = 0.01}}`; `sigma = "0 mm"` says that it was measured. It tells
+`diagnose` what may be misdescribed rather than missing physics, and changes no other result. Where the
+definition does not say, one standard deviation is {100.0 * DIAMETER_SHARE:g} % of the outer diameters of a
+standing part, which then are wrong in proportion, and {1e3 * PLACE:g} mm of a channel's radius, depth and
+place: what drawings and mounting leave open of a machine that nobody has measured, not a machinist's
+tolerance.
 
 **Marks** say where a value comes from: {_MARKS}.
 `marks = "A"` holds for the whole table, `marks = {{default = "A", bore_diameter = "C"}}` key by key. Every
@@ -195,6 +204,8 @@ def _entries(shape: Shape) -> str:
 def _value(annotation: Any) -> str:
     rule = quantity_rule(annotation)
     text = value_text(annotation)
+    if rule is not None and rule.toleranced:
+        return f"{text}, or one with a tolerance"
     return f"uncertain: {text}" if rule is not None and rule.uncertain else text
 
 

@@ -13,7 +13,6 @@ from spindle_fem.definition.field_types import (
     FilmOrPerfect,
     Flag,
     Fraction,
-    Length,
     Name,
     Place,
     PositiveLength,
@@ -21,7 +20,9 @@ from spindle_fem.definition.field_types import (
     SpecModel,
     Temperature,
     UncertainFilm,
+    UncertainLength,
     UncertainNumber,
+    UncertainPlace,
     VolumeFlow,
     choice_field,
     quantity_field,
@@ -54,9 +55,9 @@ class Channel(SpecModel):
 
     part: Name
     """The standing part that it is milled into."""
-    inner_radius: PositiveLength
+    inner_radius: UncertainLength
     """Radius of the wall nearer to the axis."""
-    depth: PositiveLength
+    depth: UncertainLength
     """Radial height of the section."""
     width: PositiveLength
     """Axial width of the section; width + 3 mm must not exceed pitch / starts."""
@@ -68,7 +69,7 @@ class Channel(SpecModel):
     """Channels side by side, evenly around the axis."""
     hand: Literal["right", "left"] = "right"
     """Right-handed advances to the rear as the angle grows."""
-    z_start: Length
+    z_start: UncertainPlace
     """Centre line of the section at angle 0, where the oil enters."""
     ports: Ports | None = None
     """None leaves the channel closed in the solid at both ends."""

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, NoReturn
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, field_validator
 from pydantic_core import PydanticCustomError
 
+from spindle_fem.definition.tolerances import TolerancedLength, toleranced_to_si
 from spindle_fem.errors import SpindleFemError, did_you_mean
 from spindle_fem.registry import Registry, registry
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain, to_si, uncertain_to_si
@@ -68,6 +69,8 @@ class QuantityRule:
         Texts that stand for a value, such as ``"ambient"``.
     uncertain : bool
         Whether a prior may be given.
+    toleranced : bool
+        Whether one standard deviation may be given.
     laws : Registry or None
         Laws that may give the value, ``{law = NAME, quantity = ..., ...}``.
     """
@@ -80,6 +83,7 @@ class QuantityRule:
     words: tuple[str, ...] = ()
     uncertain: bool = False
     laws: Registry | None = None
+    toleranced: bool = False
 
     def allowed(self) -> str:
         """The limits in words, ``""`` where there are none."""
@@ -113,6 +117,8 @@ class QuantityRule:
                 return self._read_law(value)
             if self.uncertain:
                 return self._read_uncertain(value)
+            if self.toleranced:
+                return self._read_toleranced(value)
             # Conversion leaves "410 mm" at 0.41000000000000003 m; 13 digits make equal texts equal.
             result = _rounded(to_si(value, self.unit, where="", kind=self.kind))
         except SpindleFemError as error:
@@ -124,6 +130,12 @@ class QuantityRule:
         read = uncertain_to_si(value, self.unit, where="")
         result = Uncertain(_rounded(read.value), _rounded(read.sigma_log))
         self._require_limits(result.value, value)
+        return result
+
+    def _read_toleranced(self, value: Any) -> TolerancedLength:
+        read = toleranced_to_si(value, self.unit)
+        result = TolerancedLength(_rounded(read), read.sigma)
+        self._require_limits(result, value)
         return result
 
     def _read_law(self, value: dict[str, Any]) -> Uncertain:
@@ -156,6 +168,10 @@ class QuantityRule:
         if isinstance(value, Uncertain):
             text = self._plain(value.value)
             return text if value.is_fixed else {"value": text, "sigma_rel": value.sigma_log}
+        if isinstance(value, TolerancedLength) and value.sigma is not None:
+            return {"value": self._plain(float(value)), "sigma": self._plain(value.sigma)}
+        if isinstance(value, TolerancedLength):
+            value = float(value)
         return self._plain(value)
 
     def _plain(self, value: float) -> Any:
@@ -203,7 +219,14 @@ def uncertain_field(
     return _field(Uncertain | str if words else Uncertain, rule)
 
 
+def toleranced_field(*, above: float | None = None) -> Any:
+    """Annotated :class:`TolerancedLength`: a length, or one with one standard deviation."""
+    return _field(TolerancedLength, QuantityRule("m", above=above, toleranced=True))
+
+
 Length = quantity_field("m")
+UncertainPlace = toleranced_field()
+UncertainLength = toleranced_field(above=0.0)
 PositiveLength = quantity_field("m", above=0.0)
 Radius = quantity_field("m", at_least=0.0)
 Angle = quantity_field("rad")

@@ -28,6 +28,7 @@ from spindle_fem.definition.field_types import (
     SpecModel,
     Temperature,
     UncertainConductance,
+    UncertainLength,
     UncertainNumber,
     choice_field,
     quantity_field,
@@ -75,8 +76,8 @@ class AnnulusSegment(SpecModel):
     """From and to along the axis; z = 0 is the spindle nose."""
     inner_diameter: Radius
     """0 for a solid shaft."""
-    outer_diameter: PositiveLength
-    """Larger than the inner one."""
+    outer_diameter: UncertainLength
+    """Larger than the inner one; with a `sigma` where it is an outside of a standing part."""
 
     @model_validator(mode="after")
     def _check(self) -> AnnulusSegment:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.tolerances import DIAMETER_SHARE, PLACE
 from spindle_fem.model.reduced import structural_model
 from spindle_fem.model.reduced.build_reduced import nominal_channel_film, physical_loads
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
@@ -75,6 +77,21 @@ def test_an_outer_diameter_moves_its_cylinders_and_no_other(full, directions):
     row = moved.storage_names.index("capacity.cast_iron")
     volume = [float(item.storage[row].sum()) for item in (full.model, moved)]
     assert volume[1] - volume[0] == pytest.approx(shell, rel=0.03)
+
+
+def test_widths_are_those_of_the_definition(small):
+    """A diameter with a tolerance goes its own way, one that was measured nowhere, the others together."""
+    path = "part.housing.segment.%s.outer_diameter={value = '%s', sigma = '%s'}"
+    changes = (path % ("front_body", "300 mm", "1 mm"), path % ("rear_body", "260 mm", "0 mm"))
+    spec = load_machine("recorded_spindle", (*changes, "channel.depth={value = '10 mm', sigma_rel = 0.05}"))
+    found = {item.name: item for item in structural_directions(spec, small.mesh)}
+    assert found["housing.front_body.outer_diameter"].sigma == 1e-3
+    assert "housing.rear_body.outer_diameter" not in found
+    assert found["channel.depth"].sigma == pytest.approx(0.5e-3)
+    assert found["channel.z_start"].sigma == PLACE
+    together = found["housing.outer_diameter"]
+    assert together.sigma == pytest.approx(DIAMETER_SHARE * 0.38)
+    assert sorted(face.place for face in together.cause.faces) == [0.15, 0.19]
 
 
 @pytest.mark.slow

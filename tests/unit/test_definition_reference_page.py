@@ -45,7 +45,8 @@ def test_every_key_is_explained_and_listed(model):
 def test_limits_units_and_defaults_stand_in_the_page():
     page = reference_page()
     for line in (
-        '| `depth` | Radial height of the section. | a quantity such as "19 mm", above 0 m | **required** |',
+        '| `depth` | Radial height of the section. | a quantity such as "19 mm", above 0 m, or one with a '
+        "tolerance | **required** |",
         "| `hand` | Right-handed advances to the rear as the angle grows. | right, left | `right` |",
         "| `starts` | Channels side by side, evenly around the axis. | a whole number from 1 to 4 | `1` |",
         "### `[[bearing_set.bearing]]`",

@@ -37,6 +37,17 @@ def _content(spec: MachineSpec) -> dict[str, Any]:
     # The operating point and the words change nothing in the operators.
     for key in ("operation", "name", "title", "description", "initial", "effects"):
         content.pop(key, None)
+    return _without_tolerances(content)
+
+
+def _without_tolerances(content: Any) -> Any:
+    """The same with lengths that have a tolerance as plain ones."""
+    if isinstance(content, dict):
+        if content.keys() == {"value", "sigma"}:
+            return content["value"]
+        return {key: _without_tolerances(item) for key, item in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_without_tolerances(item) for item in content]
     return content
 
 
