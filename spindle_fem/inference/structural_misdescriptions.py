@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.misdescription import Change, Misdescription
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.model.reduced.structural_model import structural_model_of
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.structural_model import StructuralModel, structural_model_of
 
 Array = NDArray[np.float64]
 
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 TOLD_IN = {"m": ("mm", 1e-3)}
 # Columns of all directions (G + 1, c, n), which one march gives together.
 _known: WeakKeyDictionary[BaseRun, dict[str, Array]] = WeakKeyDictionary()
+# The model with the directions of every fast model in use.
+_models: WeakKeyDictionary[FastModel, StructuralModel] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +41,7 @@ class StructuralChange:
 
 def structural_columns(base: BaseRun) -> dict[str, Array]:
     """Change of every channel for a unit of each direction, (G + 1, c) K, by direction."""
-    model = structural_model_of(base.predictor.fast)
+    model = _model_of(base.predictor.fast)
     names = tuple(item.name for item in model.structural)
     own = base.predictor.with_model(model)
     told = own.predict(base.number, base.values, base.candidates, names)
@@ -52,7 +55,13 @@ def structural_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]
     """
     if predictor.is_network or not predictor.fast.model.n_full:
         return
-    for item in structural_model_of(predictor.fast).structural:
+    for item in _model_of(predictor.fast).structural:
         unit, scale = TOLD_IN.get(item.unit, (item.unit, 1.0))
         change = StructuralChange(item.name, scale)
         yield Misdescription(item.name, item.key, unit, item.sigma / scale, item.statement, change)
+
+
+def _model_of(fast: FastModel) -> StructuralModel:
+    if fast not in _models:
+        _models[fast] = structural_model_of(fast)
+    return _models[fast]
