@@ -110,3 +110,12 @@ def test_the_command_takes_a_folder_with_and_without_workers(folder, asked, tmp_
     for more in ([], ["--jobs", "1"]):
         result = CliRunner().invoke(app, [*given, *more])
         assert json.loads(result.stdout)["diagnosed"] == 3
+
+
+def test_a_dask_scheduler_does_the_same(folder, asked, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    order = FolderOrder("bench_motor", (folder / "earlier.toml",))
+    with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster:
+        content = diagnose_folder(order, folder, tmp_path / "out", scheduler=cluster.scheduler_address)
+    assert sorted(asked) == ["first", "second", "third"]
+    assert (content["diagnosed"], content["failed"]) == (2, 1)

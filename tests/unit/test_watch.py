@@ -229,6 +229,20 @@ def test_a_sound_machine_stays_and_a_changed_one_leaves(folder):
     assert left["condition"] in ("standstill", "heating", "cooling", "steady running")
 
 
+@pytest.mark.slow
+def test_a_sound_machine_raises_no_more_alarms_than_stated(folder):
+    days, alarms_a_day = 4.0, 30.0
+    write_recording(folder / "long", heated(24.0 * days, seed=4), TEMPERATURES, INPUTS)
+    alarms = alarms_a_day * 365.25 / 12.0
+    how = Watching(calibrate=(folder / "sound",), until_end=True, alarms=alarms)
+    states = [line["state"] for line in watch_recording(folder / "machine.toml", folder / "long", how)]
+    found = sum(
+        now == "left" and before != "left" for before, now in zip(["", *states], states, strict=False)
+    )
+    # Fewer, as Bonferroni has it: sums of one channel find the same chance departures.
+    assert 0.1 * alarms_a_day * days < found < alarms_a_day * days
+
+
 def test_rows_that_come_one_by_one_say_what_the_whole_file_says(folder):
     how = Watching(warm_up=3.0 * 3600.0, heartbeat=600.0, until_end=True)
     whole = list(watch_recording(folder / "machine.toml", folder / "leaves", how))
