@@ -57,7 +57,7 @@ class Told:
     channel : str or None
         With the most evidence; None while as modelled.
     departure : float or None, [K]
-        Slow error of the channel: by how much it reads too high.
+        What the channel read last beyond what the machine, as it is known, should read.
     evidence : float
         Largest sum over the level of an alarm.
     """
@@ -105,6 +105,7 @@ class WatchedMachine:
         self._channels: tuple[str, ...] = ()
         self._past: deque[tuple[float, float, float]] = deque(maxlen=REMEMBERED)
         self._time: float | None = None
+        self._away = np.zeros(len(white))
         self._gap, self._unknown_until = np.inf, -np.inf
         self.spread = 1.0
         self._numbers: deque[Array] = deque(maxlen=MOST_NUMBERS)
@@ -219,6 +220,8 @@ class WatchedMachine:
             if time >= self._unknown_until:
                 self._numbers.append(numbers)
                 self.sums.add(numbers / self.spread)
+            read = np.isfinite(instants.residual[index])
+            self._away = np.where(read, instants.residual[index], self._away)
             found.append(self._judge(time, words[index]))
         self._recentre(float(piece.times[-1] - piece.times[0]))
         return found
@@ -238,7 +241,7 @@ class WatchedMachine:
             self.state,
             self._channels[worst] if away else None,
             condition,
-            float(self._filter.slow_errors[worst]) if away else None,
+            float(self._away[worst]) if away else None,
             float(evidence[worst]),
         )
 
