@@ -250,7 +250,7 @@ def _seconds(intervals: Sequence[tuple[Any, Any]], where: str) -> Intervals:
             float(end) if isinstance(end, (int, float)) else to_si(end, "s", where=f"{where}.intervals")
             for end in pair
         ]
-        if len(ends) != 2 or ends[1] <= ends[0] or (found and ends[0] <= found[-1][1]):
+        if len(ends) != 2 or ends[1] <= ends[0] or (found and ends[0] < found[-1][1]):
             raise SpecError(
                 f"{where}.intervals[{number}]",
                 f"is {list(pair)}.",

@@ -26,12 +26,14 @@ DRAWS = 400
 
 
 def candidate_values(candidate: Candidate, values: Mapping[str, float]) -> dict[str, float]:
-    """Values of a candidate's parameters by the names that it gives them."""
+    """Values of a candidate's parameters by the names that it gives them, sizes in their own units."""
     factors = {item.name for item in candidate.factors}
-    return {
+    found = {
         name: values.get(EFFECT_PREFIX + name if name in factors else name, item.value)
         for name, item in candidate.parameters.items()
     }
+    found[candidate.amplitude] *= values.get(candidate.sized_by, 1.0)
+    return found
 
 
 def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[str, dict[str, Any]]:

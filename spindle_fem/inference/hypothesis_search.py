@@ -151,12 +151,7 @@ class Search:
 
         ``trust`` as :meth:`screened` takes it.
         """
-        patterns = [
-            (effect, Pattern(spot, self.view.spots[spot], effect.takes_heat_away))
-            for effect in self.interval_effects
-            for spot in effect.places(self.view)
-            if not self.view.switched_on(effect.name, self.view.component(spot))
-        ]
+        patterns = self.patterns()
         found: list[tuple[IntervalEffect, OnOff]] = []
         for recording in range(len(self.problem.predictor.recordings)):
             answers: list[Onsets] = onset_answers(
@@ -189,6 +184,29 @@ class Search:
                     ),
                 )
 
+    def patterns(self) -> list[tuple[IntervalEffect, Pattern]]:
+        """Every effect of intervals at every spot that it may act at."""
+        recorded = self.problem.predictor.drives[0].names
+        return [
+            (
+                effect,
+                Pattern(
+                    spot,
+                    effect.acts_on(self.view, spot),
+                    effect.takes_heat_away,
+                    "ambient" if "ambient" in recorded else self.view.reference_temperature,
+                    effect.link(self.view, spot),
+                ),
+            )
+            for effect in self.interval_effects
+            for spot in effect.places(self.view)
+            if not self.view.switched_on(effect.name, self.view.component(spot))
+        ]
+
+    def remember_cost(self, candidate: Candidate, paid: float) -> None:
+        """Keep what the choice of a candidate's intervals costs, as a logarithm."""
+        self._paid[identity((candidate,))] = paid
+
     def task(
         self, fit: Fit, additions: Sequence[tuple[Variant, float]], intervals: Mapping[int, OnOff]
     ) -> Task:
@@ -200,8 +218,7 @@ class Search:
             values = dict(variant.shape) | {variant.candidate.amplitude: amplitude_value(variant, scaled)}
             start |= {EFFECT_PREFIX + n if n in factors else n: v for n, v in values.items()}
             if id(variant.candidate) in intervals:
-                cost = intervals_cost(intervals[id(variant.candidate)])
-                self._paid[identity((variant.candidate,))] = cost
+                self.remember_cost(variant.candidate, intervals_cost(intervals[id(variant.candidate)]))
         return candidates, start
 
     def fit_all(self, tasks: Sequence[Task]) -> None:

@@ -44,12 +44,31 @@ class Pattern:
     places : tuple of str
         Places of the model, which share the heat evenly.
     cooling : bool
-        True: a unit conductance to the ambient; False: unit heat.
+        True: a unit conductance to the surroundings; False: unit heat.
+    fluid : str or float
+        Input that is the temperature of these surroundings, or that temperature [K].
+    link : str
+        Coefficient that ends at them, where there is one.
     """
 
     spot: str
     places: tuple[str, ...]
     cooling: bool = False
+    fluid: str | float = "ambient"
+    link: str = ""
+
+    def surroundings(self, base: BaseRun) -> Array:
+        """Temperature of the surroundings along a run, (G + 1,) K."""
+        ends = []
+        for inputs in (base.start_inputs, base.end_inputs):
+            if self.link:
+                fast = base.predictor.fast
+                factors = [base.values.get(name, 1.0) for name in fast.inputs.fluid_parameters(self.link)]
+                found = fast.fluid_temperature(self.link, inputs) * float(np.prod(factors))
+            else:
+                found = inputs[self.fluid] if isinstance(self.fluid, str) else self.fluid
+            ends.append(np.broadcast_to(found, len(base.drive.steps)))
+        return np.append(ends[0], ends[1][-1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,8 +205,7 @@ def _march(base: BaseRun, patterns: Sequence[Pattern], onsets: Array) -> Array:
     strength = np.ones((drive.grid.size, len(patterns)))
     for index, pattern in enumerate(patterns):
         if pattern.cooling:
-            ambient = np.append(base.start_inputs["ambient"], base.end_inputs["ambient"][-1])
-            strength[:, index] = ambient - base.states @ loads[:, index]
+            strength[:, index] = pattern.surroundings(base) - base.states @ loads[:, index]
     # Share of each step for which heat that begins at an onset is on.
     on = np.clip((drive.grid[1:, None] - onsets) / drive.steps[:, None], 0.0, 1.0)
     steps, size = len(drive.steps), model.size

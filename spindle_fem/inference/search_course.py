@@ -10,6 +10,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
+from spindle_fem.inference.state_search import add_states
 
 
 def run_search(search: Search) -> list[Hypothesis]:
@@ -37,6 +38,9 @@ def run_search(search: Search) -> list[Hypothesis]:
             tuned.SINGLES_FITTED[len(starts) - 1],
             always=tuned.SINGLES_ALWAYS_FITTED,
         )
+    if not search.is_explained(search.ranked()[0]):
+        search.progress("diagnosis: states that switch")
+        add_states(search, null)
     if not search.is_explained(search.ranked()[0]):
         search.progress("diagnosis: 2 effects")
         for fit, screened, intervals in reversed(starts):

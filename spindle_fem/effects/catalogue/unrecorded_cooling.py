@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Reported, place_words, quantity
-from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature
+from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature, rows
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
 from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import TermContext, TermParameter
@@ -41,6 +41,26 @@ class CoolingTerm(UnrecordedTerm):
             return self.spread.heat(context, -size * (self.spread.temperature(context) - fluid))
         # Each place by its own temperature.
         return -size * self.spread.shares(context) * (context.temperatures - fluid)
+
+
+class LinkTerm(UnrecordedTerm):
+    """A link to the surroundings that conducts better: ``1 + G / G_0`` times as well.
+
+    Parameters
+    ----------
+    coefficient : str
+    nominal : float, [W/K]
+        What the definition gives the link; the size counts in units of what a fit makes of that.
+    """
+
+    def __init__(self, name: str, size: TermParameter, on: Share, coefficient: str, nominal: float) -> None:
+        super().__init__(name, size, Spread(()), on)
+        self.coefficients, self._nominal = (coefficient,), nominal
+
+    def factor(self, context: TermContext) -> Complex:
+        """Factor on the link, (1, k)."""
+        more = context.parameters["conductance"] * self.on.share(context) / self._nominal
+        return rows(context, 1.0 + more)
 
 
 class UnrecordedCooling(UnrecordedEffect):
@@ -78,11 +98,32 @@ class UnrecordedCooling(UnrecordedEffect):
         """What was recorded beside the inputs: inputs that cool have laws of their own."""
         return tuple(item for item in machine.quantities if item.beside and not item.changes)
 
-    def term(self, machine: MachineView, name: str, spread: Spread, on: Share, form: str) -> UnrecordedTerm:
+    def places(self, machine: MachineView) -> tuple[str, ...]:
+        """Links of a network to its surroundings, and spots that have none."""
+        if machine.kind != "network":
+            return super().places(machine)
+        joined = {machine.walls[film] for films in machine.films.values() for film in films}
+        return (*(spot for spot in super().places(machine) if spot not in joined), *machine.films)
+
+    def acts_on(self, machine: MachineView, spot: str) -> tuple[str, ...]:
+        """Places that a spot stands for; the end of a link."""
+        link = self.link(machine, spot)
+        return (machine.walls[link],) if link else super().acts_on(machine, spot)
+
+    def link(self, machine: MachineView, spot: str) -> str:
+        """Coefficient of a network's link."""
+        return machine.films[spot][0] if machine.kind == "network" and spot in machine.films else ""
+
+    def term(
+        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, link: str = ""
+    ) -> UnrecordedTerm:
         """Loss over a spot."""
         usual = self.usual(machine, form)
         if form == "heat":
             return UnrecordedHeatTerm(name, amplitude("heat", usual, "W"), spread, on, sign=-1.0)
+        if link:
+            size = amplitude("conductance", max(usual, machine.conductance[link]), "W/K")
+            return LinkTerm(name, size, on, link, machine.conductance[link])
         fluid = "ambient" if "ambient" in machine.inputs else machine.reference_temperature
         return CoolingTerm(name, amplitude("conductance", usual, "W/K"), spread, on, fluid)
 

@@ -49,7 +49,7 @@ class UnrecordedHeatSource(UnrecordedEffect):
         return machine.quantities
 
     def term(
-        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str
+        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, link: str = ""
     ) -> UnrecordedHeatTerm:
         """Heat over a spot."""
         return UnrecordedHeatTerm(name, amplitude("heat", self.usual(machine, form), "W"), spread, on)

@@ -162,6 +162,8 @@ class Candidate:
         Numbers of the machine that a report needs.
     likelihood : float
         How likely this form is before the data, beside the other forms at its place.
+    sized_by : str
+        Parameter of the machine whose factor the amplitude is fitted in units of; none when empty.
     """
 
     effect: str
@@ -179,6 +181,7 @@ class Candidate:
     recording: int | None = None
     constants: Mapping[str, float] = field(default_factory=dict)
     likelihood: float = 1.0
+    sized_by: str = ""
 
     @property
     def label(self) -> str:
@@ -402,11 +405,24 @@ class IntervalEffect(Effect):
     def places(self, machine: MachineView) -> tuple[str, ...]:
         """Where it can act: spots of the view, finer than the components that findings name."""
 
+    def acts_on(self, machine: MachineView, spot: str) -> tuple[str, ...]:
+        """Places of the model that a spot stands for."""
+        return machine.spots[spot]
+
+    def link(self, machine: MachineView, spot: str) -> str:
+        """Coefficient through which it acts at a spot; empty where it acts on places."""
+        return ""
+
     @abstractmethod
     def over(
-        self, machine: MachineView, component: str, intervals: Intervals, form: str | None = None
+        self,
+        machine: MachineView,
+        component: str,
+        intervals: Intervals,
+        form: str | None = None,
+        course: str = "pulses",
     ) -> Candidate:
-        """Candidate that begins from intervals, [s]; their ends are free.
+        """Candidate that begins from intervals, [s].
 
         Parameters
         ----------
@@ -415,7 +431,13 @@ class IntervalEffect(Effect):
         intervals : sequence of (float, float), [s]
         form : str, optional
             One of :attr:`interval_forms`; the first when None.
+        course : str
+            What is free about them.
         """
+
+    @abstractmethod
+    def sizes(self, candidate: Candidate, values: Mapping[str, float]) -> list[float]:
+        """Fitted size in every interval, in the unit of the amplitude."""
 
     @abstractmethod
     def intervals(self, candidate: Candidate, values: Mapping[str, float]) -> list[tuple[float, float]]:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +22,16 @@ from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
 
 # Width of the edges where the lag is short, s.
 EDGE_WIDTH = 20.0
-# 1 σ of an edge that a search found, s, and of the factors that one interval has beside the common size.
+# 1 σ of an edge that a search found, s, and of the factors that one interval has beside the common size: of
+# intervals of one size, and of steps that each have their own.
 EDGE_SIGMA = 300.0
-JITTER = 0.1
+JITTER, STEP_SIGMA = 0.1, 0.7
+# Courses over time that intervals may describe.
+PULSES, STEPS, STATES = "pulses", "steps", "states"
+# Intervals that are nearer than this touch, s.
+TOUCHING = 1e-6
+# Widths or lags after which an edge is over.
+FAR = 40.0
 FOLLOWING = "following"
 # Share of its beginning at which a pulse after a change counts as over.
 PULSE_ENDS = 0.05
@@ -62,48 +70,94 @@ def _lag() -> TermParameter:
 class InIntervals:
     """On in intervals, with a warm-up lag.
 
+    An interval that begins where the one before it ends shares that edge with it.
+
     Parameters
     ----------
     intervals : sequence of (float, float), [s]
+    course : str
+        ``PULSES``: few intervals of about one size, edges free; ``STEPS``: as well, each of a size of its
+        own; ``STATES``: any number of one size, their edges as they are.
     """
 
     n_states = 0
     follows = ()
 
-    def __init__(self, intervals: Intervals) -> None:
+    def __init__(self, intervals: Intervals, course: str = PULSES) -> None:
         self._number = len(intervals)
-        # Edges stay nearer to their own interval than to what is beside it.
-        edges: list[TermParameter] = []
-        for number, (start, end) in enumerate(intervals, 1):
-            room = 0.45 * (end - start)
-            before = intervals[number - 2][1] if number > 1 else start - 4.0 * EDGE_SIGMA
-            after = intervals[number][0] if number < len(intervals) else end + 4.0 * EDGE_SIGMA
-            sigma = min(EDGE_SIGMA, max(room, EDGE_WIDTH))
-            edges.append(
-                linear(f"start_{number}", start, sigma, "s", low=0.5 * (before + start), high=start + room)
-            )
-            edges.append(linear(f"end_{number}", end, sigma, "s", low=end - room, high=0.5 * (end + after)))
+        self._shared = {
+            number
+            for number in range(1, self._number)
+            if intervals[number][0] <= intervals[number - 1][1] + TOUCHING
+        }
+        if course == STATES:
+            edges = [linear(name, value, 0.0, "s") for name, value in self._named(intervals)]
+            self.parameters = (shape("lag", EDGE_WIDTH, 0.0, "s"), *edges)
+            return
+        jitter = STEP_SIGMA if course == STEPS else JITTER
         factors = (
-            tuple(shape(f"factor_{number}", 1.0, JITTER, low=0.1) for number in range(1, len(intervals) + 1))
-            if len(intervals) > 1
+            tuple(shape(f"factor_{number}", 1.0, jitter, low=0.01) for number in range(1, self._number + 1))
+            if self._number > 1
             else ()
         )
-        self.parameters = (_lag(), *edges, *factors)
+        self.parameters = (_lag(), *self._free_edges(intervals), *factors)
+
+    def _named(self, intervals: Intervals) -> list[tuple[str, float]]:
+        """Edges by name, each once."""
+        found = []
+        for number, (start, end) in enumerate(intervals, 1):
+            found.append((f"start_{number}", start))
+            if number not in self._shared:
+                found.append((f"end_{number}", end))
+        return found
+
+    def _free_edges(self, intervals: Intervals) -> list[TermParameter]:
+        """Edges that stay nearer to their own interval than to what is beside it."""
+        named = self._named(intervals)
+        found = []
+        for position, (name, value) in enumerate(named):
+            before = named[position - 1][1] if position else value - 4.0 * EDGE_SIGMA
+            after = named[position + 1][1] if position + 1 < len(named) else value + 4.0 * EDGE_SIGMA
+            sigma = min(EDGE_SIGMA, max(0.45 * min(value - before, after - value), EDGE_WIDTH))
+            low, high = value - 0.45 * (value - before), value + 0.45 * (after - value)
+            found.append(linear(name, value, sigma, "s", low=low, high=high))
+        return found
+
+    def edges(self, own: Mapping[str, Any]) -> list[tuple[Any, Any]]:
+        """Start and end of every interval, from values by inner name."""
+        return [
+            (own[f"start_{n}"], own[f"start_{n + 1}"] if n in self._shared else own[f"end_{n}"])
+            for n in range(1, self._number + 1)
+        ]
 
     def share(self, context: TermContext) -> Complex:
         """How far it is on, (k,)."""
-        own = context.parameters
-        found: Complex | float = 0.0
-        for number in range(1, self._number + 1):
-            on = switched(context.time, own[f"start_{number}"], own[f"end_{number}"], own["lag"], EDGE_WIDTH)
-            found = found + (own[f"factor_{number}"] * on if self._number > 1 else on)
+        own, time = context.parameters, np.asarray(context.time, dtype=float)
+        lag = own["lag"]
+        width = max(time.size, np.size(lag))
+        time = np.broadcast_to(time, (width,))
+        found = np.zeros(width, dtype=complex)
+        reach = FAR * max(EDGE_WIDTH, float(np.max(np.real(lag))))
+        for number, (start, end) in enumerate(self.edges(own), 1):
+            # Far from an interval nothing is left of it.
+            first, last = np.min(np.real(start)) - FAR * EDGE_WIDTH, np.max(np.real(end)) + reach
+            rows = np.flatnonzero((time > first) & (time < last))
+            if rows.size == 0:
+                continue
+            begin, stop, slow, factor = (
+                np.broadcast_to(value, (width,))[rows]
+                for value in (start, end, lag, own.get(f"factor_{number}", 1.0))
+            )
+            found[rows] += factor * switched(time[rows], begin, stop, slow, EDGE_WIDTH)
         return found
+
+    def factors(self, own: Mapping[str, float]) -> list[float]:
+        """Size of every interval beside the common one."""
+        return [own.get(f"factor_{number}", 1.0) for number in range(1, self._number + 1)]
 
     def mean_share(self, own: Mapping[str, float]) -> float:
         """Mean of the share over the intervals, by their length."""
-        numbers = range(1, self._number + 1)
-        lengths = [own[f"end_{number}"] - own[f"start_{number}"] for number in numbers]
-        return float(np.average([own.get(f"factor_{number}", 1.0) for number in numbers], weights=lengths))
+        return float(np.average(self.factors(own), weights=[end - start for start, end in self.edges(own)]))
 
     def advance(self, context: TermContext, step: float | Array) -> Complex:
         """Nothing is remembered."""
@@ -208,8 +262,10 @@ class UnrecordedEffect(IntervalEffect):
         return tuple(machine.spots)
 
     @abstractmethod
-    def term(self, machine: MachineView, name: str, spread: Spread, on: Share, form: str) -> UnrecordedTerm:
-        """Term in one of :attr:`interval_forms`."""
+    def term(
+        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, link: str = ""
+    ) -> UnrecordedTerm:
+        """Term in one of :attr:`interval_forms`, on places or through a link."""
 
     @abstractmethod
     def usual(self, machine: MachineView, form: str) -> float:
@@ -238,11 +294,16 @@ class UnrecordedEffect(IntervalEffect):
         return quantity is None or quantity.varies > SMALLEST_VARIATION
 
     def over(
-        self, machine: MachineView, component: str, intervals: Intervals, form: str | None = None
+        self,
+        machine: MachineView,
+        component: str,
+        intervals: Intervals,
+        form: str | None = None,
+        course: str = PULSES,
     ) -> Candidate:
-        """Candidate at a spot that begins from intervals; their ends are free."""
+        """Candidate at a spot that begins from intervals; a ``course`` as :class:`InIntervals` has it."""
         chosen = self.interval_forms[0] if form is None else form
-        return self._candidate(machine, component, InIntervals(tuple(intervals)), chosen, None)
+        return self._candidate(machine, component, InIntervals(tuple(intervals), course), chosen, None)
 
     def _candidate(
         self, machine: MachineView, spot: str, on: Share, form: str, quantity: RecordedQuantity | None
@@ -250,15 +311,20 @@ class UnrecordedEffect(IntervalEffect):
         own = "" if form == self.interval_forms[0] else form
         if quantity is not None:
             own = f"{own} {FOLLOWING} {quantity.name}".strip()
-        spread = Spread(machine.spots[spot], machine.sides.get(spot, ()), machine.focal.get(spot, ""))
-        term = self.term(machine, self.term_name(spot, own), spread, on, form)
-        return self.candidate(
+        spread = Spread(self.acts_on(machine, spot), machine.sides.get(spot, ()), machine.focal.get(spot, ""))
+        link = self.link(machine, spot)
+        term = self.term(machine, self.term_name(spot, own), spread, on, form, link)
+        found = self.candidate(
             machine.component(spot),
             term,
             amplitude=term.parameters[0].name,
             reference=self.usual(machine, form),
             form=machine.form(spot, own),
+            constants={"conductance": machine.conductance[link]} if link else None,
         )
+        parameter = next((seat.parameter for seat in machine.seats if seat.coefficients == (link,)), "")
+        sized = bool(term.coefficients) and parameter in machine.parameters
+        return replace(found, sized_by=parameter) if sized else found
 
     def check_of(self, candidate: Candidate) -> str:
         """What runs in its intervals, or with what it follows."""
@@ -267,9 +333,14 @@ class UnrecordedEffect(IntervalEffect):
 
     def intervals(self, candidate: Candidate, values: Mapping[str, float]) -> list[tuple[float, float]]:
         """Fitted intervals, [s]; none where it follows a law."""
-        own = candidate.terms[0].values(values)
-        count = sum(name.startswith("start_") for name in own)
-        return [(own[f"start_{number}"], own[f"end_{number}"]) for number in range(1, count + 1)]
+        term = candidate.terms[0]
+        return term.on.edges(term.values(values)) if isinstance(term.on, InIntervals) else []
+
+    def sizes(self, candidate: Candidate, values: Mapping[str, float]) -> list[float]:
+        """Size in every interval, in the unit of the amplitude."""
+        term = candidate.terms[0]
+        own = term.values(values)
+        return [own[term.parameters[0].name] * factor for factor in term.on.factors(own)]
 
     def report(self, candidate: Candidate, values: Mapping[str, float]) -> dict[str, Reported]:
         """Mean size while on, and the lag, with its power where it follows a law and how it lies about."""

@@ -1,0 +1,120 @@
+"""Heat or cooling that switches, in a machine: from one of its fits to the course that explains what it leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference.hypothesis_fit import Fit, Problem, candidate_coordinates
+from spindle_fem.inference.missing_heat import Pattern
+from spindle_fem.inference.switching_model import LinearAnswer, Readings
+
+Array = NDArray[np.float64]
+
+# An input counts as zero up to this share of its largest; it tells something where it is so, and not so, for at
+# least this share of the time.
+ZERO_SHARE, LEAST_SHARE = 0.01, 0.03
+
+
+def answer_of(base: BaseRun, pattern: Pattern) -> LinearAnswer:
+    """How a machine about one of its runs answers to a unit of heat, or of conductance, at a spot."""
+    run, model = base.run, base.predictor.fast.model
+    load = np.mean([model.place(place) for place in pattern.places], axis=0)
+    steps, size = len(base.drive.steps), model.size
+    group = np.zeros(steps, dtype=np.int64)
+    entering = np.empty((steps, size))
+    strength = np.ones(steps + 1)
+    if pattern.cooling:
+        strength = pattern.surroundings(base) - base.states @ load
+    advance, loss = [], []
+    for number, (key, rows) in enumerate(run.groups.items()):
+        propagator = run.propagators[key]
+        group[rows] = number
+        start, end = propagator.from_start @ load, propagator.from_end @ load
+        entering[rows] = strength[rows, None] * start + strength[rows + 1, None] * end
+        advance.append(np.asarray(propagator.advance))
+        taken = np.outer(start, load) + np.outer(end, load @ advance[-1])
+        loss.append(taken if pattern.cooling else np.zeros_like(taken))
+    begins = np.zeros(steps, dtype=bool)
+    begins[[0, *base.drive.restarts]] = True
+    outputs = run.operators[int(run.step_class[0])].outputs[base.columns]
+    return LinearAnswer(np.array(advance), np.array(loss), group, entering, begins, np.array(outputs))
+
+
+def without(fit: Fit, left_out: Candidate) -> tuple[tuple[Candidate, ...], dict[str, float]]:
+    """The other candidates of a fit, and the values of what is left."""
+    own = {c.name for c in candidate_coordinates(left_out)}
+    values = {name: value for name, value in fit.values.items() if name not in own}
+    return tuple(c for c in fit.candidates if c is not left_out), values
+
+
+def readings_about(
+    problem: Problem, fit: Fit, number: int, left_out: Candidate | None = None, *, everything: bool = False
+) -> Readings:
+    """What a fit leaves of the readings of one recording, at the ends of the steps of its run.
+
+    Parameters
+    ----------
+    left_out : Candidate, optional
+        One of the fit's, whose part is given back to what is left.
+    everything : bool
+        Readings that are held out as well.
+    """
+    predictor = problem.predictor
+    recording, grid = predictor.recordings[number], predictor.drives[number].grid
+    predicted = predictor.predict(number, fit.values, fit.candidates, [c.name for c in fit.coordinates])
+    root = np.eye(len(fit.coordinates))
+    machine = len(problem.belief.coordinates)
+    root[:machine, :machine] = problem.belief.root
+    mean = np.concatenate((problem.belief.mean, np.zeros(len(fit.coordinates) - machine)))
+    by = predicted.sensitivity * np.array([c.sigma for c in fit.coordinates])
+    model = predicted.temperature
+    own = np.zeros(len(fit.coordinates), dtype=bool)
+    if left_out is not None:
+        rest, values = without(fit, left_out)
+        model = predictor.predict(number, values, rest).temperature
+        names = {c.name for c in candidate_coordinates(left_out)}
+        own = np.array([c.name in names for c in fit.coordinates])
+    by, root = by[:, :, ~own], root[np.ix_(~own, ~own)]
+    # Coordinates count from what is known of them before, in units of what is not known.
+    model = model - by @ (fit.position - mean)[~own]
+    slopes = np.linalg.solve(root.T, by.reshape(-1, by.shape[2]).T).T.reshape(by.shape)
+    usable = recording.usable & (True if everything else predictor.use[number][:, None])
+    owner = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), recording.times)
+    residual = np.full((len(grid), usable.shape[1]), np.nan)
+    variance = np.ones_like(residual)
+    for channel in range(usable.shape[1]):
+        rows = np.flatnonzero(usable[:, channel])
+        left = recording.temperature[rows, channel]
+        left = left - np.interp(recording.times[rows], grid, model[:, channel])
+        count = np.bincount(owner[rows], minlength=len(grid))
+        seen = count > 0
+        residual[seen, channel] = np.bincount(owner[rows], left, minlength=len(grid))[seen] / count[seen]
+        rounding = recording.noise[channel].resolution / np.sqrt(12.0)
+        variance[seen, channel] = np.hypot(recording.sigma[channel], rounding) ** 2 / count[seen]
+    return Readings(
+        residual[1:],
+        variance[1:],
+        np.ascontiguousarray(slopes[1:]),
+        np.diff(grid),
+        problem.slow.sigma,
+        problem.slow.time,
+    )
+
+
+def intervals_of(on: NDArray[np.bool_], grid: Array) -> list[tuple[float, float]]:
+    """Intervals of steps that are on, from values (T,) and the ends of the steps (T + 1,) [s]."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], on, [False])).astype(int)))
+    return [(float(grid[a]), float(grid[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def conditions_of_inputs(base: BaseRun) -> dict[str, NDArray[np.int64]]:
+    """Whether each input is zero in each step, of those that are now and then, by name."""
+    found = {}
+    for name, values in base.start_inputs.items():
+        zero = np.abs(values) <= ZERO_SHARE * np.abs(values).max(initial=0.0)
+        if LEAST_SHARE < zero.mean() < 1.0 - LEAST_SHARE:
+            found[name] = zero.astype(np.int64)
+    return found

@@ -1,0 +1,159 @@
+"""Hypotheses of what switches at times nobody recorded: found, fitted and followed again in turn.
+
+The course of a state and the parameters of the machine are found in turn: the course that explains what a fit
+leaves, the fit with heat or cooling on in just these intervals, the course about that fit, as long as it gains. A
+set with a state has one more free number than without; what the choice of its course costs is its likelihood over
+that of all courses under the fitted chain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
+from spindle_fem.effects.framework.unrecorded import STATES
+from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
+from spindle_fem.inference import tuned
+from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.hidden_states import answer_of, conditions_of_inputs, intervals_of, readings_about, without
+from spindle_fem.inference.hypothesis import Hypothesis, identity
+from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
+from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.missing_heat import Pattern
+from spindle_fem.inference.switching_model import QUICK, THOROUGH, Chain, Course, ReadingFilter, find_course
+
+# Places whose courses are settled, and rounds of course and fit in turn.
+PLACES_SETTLED, ROUNDS = 2, 4
+# Gain of a round from which another one follows (natural logarithm).
+WORTH_ANOTHER = 2.0
+# Shares of the usual size from which courses are looked for.
+START_SIZES = (0.3, 1.5)
+# Fewer intervals than this are single events, whose edges are free.
+FEWEST = 4
+
+
+@dataclass(frozen=True, slots=True)
+class StatePlace:
+    """Where something may switch: an effect, its spot, and the recording."""
+
+    effect: IntervalEffect
+    pattern: Pattern
+    recording: int
+
+
+def state_places(search: Search) -> list[StatePlace]:
+    """Every spot of every effect in every recording."""
+    return [
+        StatePlace(effect, pattern, number)
+        for number in range(len(search.problem.predictor.recordings))
+        for effect, pattern in search.patterns()
+    ]
+
+
+def add_states(search: Search, fit: Fit, number: int = PLACES_SETTLED) -> None:
+    """Fit the sets with a state beside what a fit holds, at the most promising places."""
+    if any(search.in_intervals(c) for c in fit.candidates):
+        return
+    problem = search.problem
+    numbers = range(len(problem.predictor.recordings))
+    readings = [ReadingFilter(readings_about(problem, fit, n)) for n in numbers]
+    bases = [BaseRun(problem.predictor, n, fit.values, fit.candidates) for n in numbers]
+    found: list[tuple[float, StatePlace, Course]] = []
+    for place in state_places(search):
+        answer = answer_of(bases[place.recording], place.pattern)
+        chain = Chain.usual(np.zeros(len(answer.group), dtype=np.int64))
+        usual = _usual(search, place)
+        for share in START_SIZES:
+            course = find_course(
+                answer, readings[place.recording], chain, share * usual, 2.0 * usual, QUICK
+            )
+            if course is not None and course.log_evidence > 0.0:
+                found.append((course.log_evidence, place, course))
+    found.sort(key=lambda item: -item[0])
+    settled: list[StatePlace] = []
+    for evidence, place, course in found:
+        if len(settled) == number or evidence < tuned.FAIR_SHARE * found[0][0]:
+            break
+        if place not in settled:
+            settled.append(place)
+            settle(search, fit, place, course)
+
+
+def settle(search: Search, fit: Fit, place: StatePlace, course: Course, left_out: Candidate | None = None) -> None:
+    """Course and fit in turn, the best of them kept."""
+    problem = search.problem
+    rest = tuple(c for c in fit.candidates if c is not left_out)
+    values = dict(fit.values)
+    best: Hypothesis | None = None
+    for _ in range(ROUNDS):
+        grid = problem.predictor.drives[place.recording].grid
+        intervals = intervals_of(course.on, grid)
+        if len(intervals) < FEWEST:
+            return
+        candidate = _candidate(search, place, intervals, course)
+        factor = values.get(candidate.sized_by, 1.0)
+        start = values | {amplitude_name(candidate): course.size / factor}
+        try:
+            fitted = problem.fit((*rest, candidate), start)
+        except (ConvergenceError, OutOfValidityError, SpecError):
+            return
+        paid = course.log_choice + 0.5 * len(course.chain.begin) * 2.0 * float(np.log(len(course.on)))
+        hypothesis = Hypothesis(fitted, search.log_prior((*rest, candidate)) - paid)
+        better = best is None or hypothesis.score > best.score
+        enough = best is not None and hypothesis.score < best.score + WORTH_ANOTHER
+        if better:
+            best = hypothesis
+            search.remember_cost(candidate, paid)
+        if enough:
+            break
+        values = fitted.values
+        again = course_about(search, fitted, place, candidate, course)
+        if again is None or np.array_equal(again.on, course.on):
+            break
+        course = again
+    known = search.found.get(identity(best.fit.candidates))
+    if known is None or known.score < best.score:
+        search.keep(best)
+
+
+def course_about(
+    search: Search, fit: Fit, place: StatePlace, candidate: Candidate, course: Course, *, everything: bool = False
+) -> Course | None:
+    """The course again, about a fit that holds one already."""
+    problem = search.problem
+    rest, values = without(fit, candidate)
+    base = BaseRun(problem.predictor, place.recording, values, rest)
+    readings = ReadingFilter(readings_about(problem, fit, place.recording, candidate, everything=everything))
+    usual = _usual(search, place)
+    size = fit.values[amplitude_name(candidate)] * fit.values.get(candidate.sized_by, 1.0)
+    chain = best_chain(base, course.chain, course)
+    return find_course(answer_of(base, place.pattern), readings, chain, size, max(2.0 * usual, 2.0 * size), THOROUGH)
+
+
+def best_chain(base: BaseRun, chain: Chain, course: Course) -> Chain:
+    """Rates of their own while an input is zero, where that makes the course more likely than it costs."""
+    best, gain = chain, -np.inf
+    for condition in (np.zeros(len(course.on), dtype=np.int64), *conditions_of_inputs(base).values()):
+        trial = Chain.usual(condition).fitted(course.probability)
+        own = trial.log_likelihood(course.on) - len(trial.begin) * float(np.log(len(course.on)))
+        if own > gain:
+            best, gain = trial, own
+    return best
+
+
+def _usual(search: Search, place: StatePlace) -> float:
+    probe = place.effect.over(search.view, place.pattern.spot, [(0.0, 1.0)])
+    return float(probe.parameters[probe.amplitude].sigma)
+
+
+def _candidate(
+    search: Search, place: StatePlace, intervals: Sequence[tuple[float, float]], course: Course
+) -> Candidate:
+    found = place.effect.over(search.view, place.pattern.spot, intervals, course=STATES)
+    several = len(search.problem.predictor.recordings) > 1
+    return replace(
+        found, reference=max(course.size, 1e-3), recording=place.recording if several else None
+    )
