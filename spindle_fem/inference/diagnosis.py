@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.registry import candidates_for, catalogue, interval_effects
 from spindle_fem.inference import tuned
@@ -29,6 +30,7 @@ from spindle_fem.inference.prepared_problem import (
 )
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
+from spindle_fem.inference.state_search import Told, told_states
 from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
@@ -62,6 +64,8 @@ class Diagnosis:
     seconds : mapping of stage to float
     wrong : WrongDirection or None
         Direction whose prior was given up.
+    states : mapping of str to Told
+        Hidden states of the chosen set as all readings tell them, by the name of their amplitude.
     """
 
     predictor: Predictor
@@ -76,6 +80,13 @@ class Diagnosis:
     candidates_tried: int
     seconds: Mapping[str, float]
     wrong: WrongDirection | None = None
+    states: Mapping[str, Told] = field(default_factory=dict)
+
+    def told(self, candidate: Candidate) -> Candidate:
+        """A candidate of the chosen set, with the intervals that all readings tell where it switches."""
+        chosen = any(c is candidate for c in self.final.candidates)
+        own = self.states.get(candidate.amplitude) if chosen else None
+        return candidate if own is None else own.candidate
 
     @property
     def machine_coordinates(self) -> tuple[Coordinate, ...]:
@@ -187,6 +198,7 @@ def diagnose_recordings(
         tried,
         clock.laps,
         wrong,
+        told_states(search, final, judgement.chosen.fit),
     )
 
 

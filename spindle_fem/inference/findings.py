@@ -75,21 +75,29 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
 def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: float) -> dict[str, Any]:
     """One finding of a set."""
     effect = effect_of(candidate.effect)
-    values = candidate_values(candidate, fit.values)
     parameters = reported_parameters(fit, candidate)
     reported = {name: Reported(item["value"], item["unit"]) for name, item in parameters.items()}
-    intervals = (
-        [
+    state = diagnosis.states.get(candidate.amplitude)
+    candidate = diagnosis.told(candidate)
+    values = candidate_values(candidate, fit.values)
+    intervals = []
+    if in_intervals(effect, candidate):
+        pairs = effect.intervals(candidate, values)
+        intervals = [
             {
                 "start": diagnosis.stamp(start, candidate.recording or 0),
                 "end": diagnosis.stamp(end, candidate.recording or 0),
+                "value": size,
             }
             | _named(diagnosis, candidate)
-            for start, end in effect.intervals(candidate, values)
+            for (start, end), size in zip(pairs, effect.sizes(candidate, values), strict=True)
         ]
-        if in_intervals(effect, candidate)
-        else []
-    )
+    words = ""
+    if state is not None and state.candidate is candidate:
+        words = state.words
+        intervals = [
+            item | {"probability": share} for item, share in zip(intervals, state.probability, strict=True)
+        ]
     return {
         "effect": candidate.effect,
         "component": candidate.component,
@@ -99,7 +107,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
         "parameters": parameters,
         "intervals": intervals,
         "follows": followed_name(candidate) or None,
-        "statement": effect.statement(candidate, reported),
+        "statement": effect.statement(candidate, reported) + words,
         "check": effect.check_of(candidate),
     }
 
@@ -134,7 +142,7 @@ def states_of(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                     "end": interval["end"],
                     "effect": item["effect"],
                     "component": item["component"],
-                    "value": size["value"],
+                    "value": interval["value"],
                     "unit": size["unit"] or name,
                 }
                 | ({"recording": interval["recording"]} if "recording" in interval else {})

@@ -1,20 +1,20 @@
-"""Heat or cooling that switches, in a machine: from one of its fits to the course that explains what it leaves."""
+"""Heat or cooling that switches: from a fit of a machine to the course that explains what it leaves."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.hypothesis_fit import Fit, Problem, candidate_coordinates
 from spindle_fem.inference.missing_heat import Pattern
 from spindle_fem.inference.switching_model import LinearAnswer, Readings
 
 Array = NDArray[np.float64]
 
-# An input counts as zero up to this share of its largest; it tells something where it is so, and not so, for at
-# least this share of the time.
+# An input counts as zero up to this share of its largest; it tells something where it is so, and not so, for
+# at least this share of the time.
 ZERO_SHARE, LEAST_SHARE = 0.01, 0.03
 
 

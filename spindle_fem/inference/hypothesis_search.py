@@ -10,18 +10,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffect, in_intervals
 from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.unrecorded import PULSES, STEPS
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant, variants_of
+from spindle_fem.inference.change_points import choice
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
-from spindle_fem.inference.missing_heat import OnOff, Onsets, Pattern, find_intervals, onset_answers
+from spindle_fem.inference.missing_heat import (
+    OnOff,
+    Onsets,
+    Pattern,
+    find_intervals,
+    find_steps,
+    onset_answers,
+)
 from spindle_fem.inference.screening import Screened, amplitude_value, screen
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 
@@ -63,6 +73,8 @@ class Search:
     workers: Workers = field(default_factory=Workers)
     found: dict[frozenset, Hypothesis] | None = None
     screenings: dict[frozenset, Screened] = field(default_factory=dict)
+    # Places and courses of what switches, by the name of its amplitude.
+    courses: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     _paid: dict[frozenset, float] = field(default_factory=dict)
 
     def _families(self) -> dict[str, str]:
@@ -159,6 +171,7 @@ class Search:
                 fit,
                 [pattern for _, pattern in patterns],
                 recording,
+                number=tuned.ONSETS_OF_NETWORK if self.problem.predictor.is_network else tuned.ONSETS,
                 trust=trust,
                 workers=self.workers,
             )
@@ -167,13 +180,18 @@ class Search:
                 probe = effect.over(self.view, pattern.spot, [(0.0, stop)])
                 spread = probe.parameters[probe.amplitude].sigma
                 options = find_intervals(onsets, spread, stop)
+                steps = find_steps(onsets, spread, stop)
+                options += [] if steps is None else [steps]
                 options = [o for o in options if not self._within_gaps(o.intervals, recording)]
                 if options:
                     found.append((effect, max(options, key=lambda item: item.gain)))
         found.sort(key=lambda item: -item[1].gain)
         for effect, item in found[:SPOTS_SCREENED]:
             if item.gain > 0.0:
-                candidate = effect.over(self.view, item.pattern.spot, item.intervals)
+                course = STEPS if item.sizes else PULSES
+                candidate = effect.over(
+                    self.view, item.pattern.spot, item.intervals, course=course, sizes=item.sizes
+                )
                 several = len(self.problem.predictor.recordings) > 1
                 yield (
                     item,
@@ -301,6 +319,8 @@ class Search:
 
 def intervals_cost(item: OnOff) -> float:
     """What choosing the intervals costs, as a logarithm."""
-    options = tuned.ONSETS * (tuned.ONSETS + 1) / 2
+    if item.sizes:
+        return choice(item.options, len({edge for pair in item.intervals for edge in pair}))
+    options = item.options * (item.options + 1) / 2
     number = len(item.intervals)
     return number * float(np.log(options)) - float(np.sum(np.log(np.arange(1, number + 1))))

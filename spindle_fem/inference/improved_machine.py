@@ -28,7 +28,7 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     values = fit.values
     entries = tuple(
         EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))
-        for item in fit.candidates
+        for item in map(diagnosis.told, fit.candidates)
     )
     own = {
         coordinate.name: (values[coordinate.name], coordinate.sigma)

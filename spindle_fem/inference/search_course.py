@@ -11,6 +11,7 @@ from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
 from spindle_fem.inference.state_search import add_states
+from spindle_fem.inference.step_search import add_steps
 
 
 def run_search(search: Search) -> list[Hypothesis]:
@@ -39,7 +40,8 @@ def run_search(search: Search) -> list[Hypothesis]:
             always=tuned.SINGLES_ALWAYS_FITTED,
         )
     if not search.is_explained(search.ranked()[0]):
-        search.progress("diagnosis: states that switch")
+        search.progress("diagnosis: changes and states that switch")
+        add_steps(search, null)
         add_states(search, null)
     if not search.is_explained(search.ranked()[0]):
         search.progress("diagnosis: 2 effects")

@@ -1,9 +1,9 @@
 """Hypotheses of what switches at times nobody recorded: found, fitted and followed again in turn.
 
 The course of a state and the parameters of the machine are found in turn: the course that explains what a fit
-leaves, the fit with heat or cooling on in just these intervals, the course about that fit, as long as it gains. A
-set with a state has one more free number than without; what the choice of its course costs is its likelihood over
-that of all courses under the fitted chain.
+leaves, the fit with heat or cooling on in just these intervals, the course about that fit, as long as it
+gains. A set with a state has one more free number than without; what the choice of its course costs is its
+likelihood over that of all courses under the fitted chain.
 """
 
 from __future__ import annotations
@@ -18,9 +18,15 @@ from spindle_fem.effects.framework.unrecorded import STATES
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
-from spindle_fem.inference.hidden_states import answer_of, conditions_of_inputs, intervals_of, readings_about, without
+from spindle_fem.inference.hidden_states import (
+    answer_of,
+    conditions_of_inputs,
+    intervals_of,
+    readings_about,
+    without,
+)
 from spindle_fem.inference.hypothesis import Hypothesis, identity
-from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
+from spindle_fem.inference.hypothesis_fit import Fit, Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.missing_heat import Pattern
 from spindle_fem.inference.switching_model import QUICK, THOROUGH, Chain, Course, ReadingFilter, find_course
@@ -33,6 +39,9 @@ WORTH_ANOTHER = 2.0
 START_SIZES = (0.3, 1.5)
 # Fewer intervals than this are single events, whose edges are free.
 FEWEST = 4
+# Share of the time on within which an input is zero that makes it its gate, that it exceeds chance by, and
+# from which there is nothing else.
+MOSTLY_INSIDE, TELLS, ONLY = 0.75, 0.1, 0.97
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +76,7 @@ def add_states(search: Search, fit: Fit, number: int = PLACES_SETTLED) -> None:
         chain = Chain.usual(np.zeros(len(answer.group), dtype=np.int64))
         usual = _usual(search, place)
         for share in START_SIZES:
-            course = find_course(
-                answer, readings[place.recording], chain, share * usual, 2.0 * usual, QUICK
-            )
+            course = find_course(answer, readings[place.recording], chain, share * usual, 2.0 * usual, QUICK)
             if course is not None and course.log_evidence > 0.0:
                 found.append((course.log_evidence, place, course))
     found.sort(key=lambda item: -item[0])
@@ -82,11 +89,83 @@ def add_states(search: Search, fit: Fit, number: int = PLACES_SETTLED) -> None:
             settle(search, fit, place, course)
 
 
-def settle(search: Search, fit: Fit, place: StatePlace, course: Course, left_out: Candidate | None = None) -> None:
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A hidden state as all readings tell it, those that are held out from fits included.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        With these intervals.
+    probability : tuple of float
+        Of being on, mean over each interval.
+    gate : str
+        Input that is zero while it is mostly on; empty where none is.
+    inside : float
+        Share of its time for which that input is zero.
+    filled : float
+        Share of the time for which the input is zero that it is on.
+    """
+
+    candidate: Candidate
+    probability: tuple[float, ...]
+    gate: str = ""
+    inside: float = 0.0
+    filled: float = 0.0
+
+    @property
+    def words(self) -> str:
+        """When it is on, as a sentence; empty where no input says so."""
+        if not self.gate:
+            return ""
+        often = "only" if self.inside > ONLY else "mostly"
+        always = (
+            "" if self.filled > ONLY else f", but not always then ({100.0 * self.filled:.0f} % of that time)"
+        )
+        return f" It is on {often} while {self.gate} is zero{always}."
+
+
+def told_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Told]:
+    """Every hidden state of a fit as all readings tell it, by the name of its amplitude."""
+    found = {}
+    for candidate in fit.candidates:
+        if candidate.amplitude not in search.courses or candidate.free.keys() != {candidate.amplitude}:
+            continue
+        place, course = search.courses[candidate.amplitude]
+        again = course_about(replace(search, problem=problem), fit, place, candidate, course, everything=True)
+        if again is None:
+            continue
+        drive = problem.predictor.drives[place.recording]
+        intervals = intervals_of(again.on, drive.grid)
+        middle = 0.5 * (drive.grid[1:] + drive.grid[:-1])
+        within = [(middle > start) & (middle < end) for start, end in intervals]
+        probability = tuple(float(again.probability[rows].mean()) for rows in within)
+        told = Told(_candidate(search, place, intervals, again), probability)
+        length = np.diff(drive.grid)
+        on = np.where(again.on, length, 0.0)
+        conditions = conditions_of_inputs(BaseRun(problem.predictor, place.recording, *_bare(fit, candidate)))
+        inside = {name: float(on[zero == 1].sum() / on.sum()) for name, zero in conditions.items()}
+        usual = {name: float(length[zero == 1].sum() / length.sum()) for name, zero in conditions.items()}
+        # The input that says most of what is on: nearly all of it, in least of the time.
+        best = max(inside, key=lambda name: inside[name] - usual[name], default="")
+        if best and inside[best] > MOSTLY_INSIDE and inside[best] - usual[best] > TELLS:
+            filled = float(on[conditions[best] == 1].sum() / length[conditions[best] == 1].sum())
+            told = replace(told, gate=best, inside=inside[best], filled=filled)
+        found[candidate.amplitude] = told
+    return found
+
+
+def _bare(fit: Fit, candidate: Candidate) -> tuple[dict[str, float], tuple[Candidate, ...]]:
+    rest, values = without(fit, candidate)
+    return values, rest
+
+
+def settle(
+    search: Search, fit: Fit, place: StatePlace, course: Course, left_out: Candidate | None = None
+) -> None:
     """Course and fit in turn, the best of them kept."""
     problem = search.problem
-    rest = tuple(c for c in fit.candidates if c is not left_out)
-    values = dict(fit.values)
+    rest, values = fit.candidates, dict(fit.values)
     best: Hypothesis | None = None
     for _ in range(ROUNDS):
         grid = problem.predictor.drives[place.recording].grid
@@ -107,6 +186,7 @@ def settle(search: Search, fit: Fit, place: StatePlace, course: Course, left_out
         if better:
             best = hypothesis
             search.remember_cost(candidate, paid)
+            search.courses[candidate.amplitude] = place, course
         if enough:
             break
         values = fitted.values
@@ -120,7 +200,13 @@ def settle(search: Search, fit: Fit, place: StatePlace, course: Course, left_out
 
 
 def course_about(
-    search: Search, fit: Fit, place: StatePlace, candidate: Candidate, course: Course, *, everything: bool = False
+    search: Search,
+    fit: Fit,
+    place: StatePlace,
+    candidate: Candidate,
+    course: Course,
+    *,
+    everything: bool = False,
 ) -> Course | None:
     """The course again, about a fit that holds one already."""
     problem = search.problem
@@ -130,7 +216,9 @@ def course_about(
     usual = _usual(search, place)
     size = fit.values[amplitude_name(candidate)] * fit.values.get(candidate.sized_by, 1.0)
     chain = best_chain(base, course.chain, course)
-    return find_course(answer_of(base, place.pattern), readings, chain, size, max(2.0 * usual, 2.0 * size), THOROUGH)
+    return find_course(
+        answer_of(base, place.pattern), readings, chain, size, max(2.0 * usual, 2.0 * size), THOROUGH
+    )
 
 
 def best_chain(base: BaseRun, chain: Chain, course: Course) -> Chain:
@@ -154,6 +242,4 @@ def _candidate(
 ) -> Candidate:
     found = place.effect.over(search.view, place.pattern.spot, intervals, course=STATES)
     several = len(search.problem.predictor.recordings) > 1
-    return replace(
-        found, reference=max(course.size, 1e-3), recording=place.recording if several else None
-    )
+    return replace(found, reference=max(course.size, 1e-3), recording=place.recording if several else None)

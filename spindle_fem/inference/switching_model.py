@@ -1,14 +1,15 @@
 """Something that is on or off at times nobody recorded: a linear model with a state that switches.
 
-What is read is the sum of what is known, of what a hidden state adds through a linear model, of what uncertain
-coordinates add, of a slow error of each channel and of white noise. Given the course of the state all of it is
-linear and Gaussian, so that a Kalman filter tells how likely a course is, coordinates and slow errors integrated
-out. Its gains do not depend on the course: many courses are followed side by side, each with its own mean, and
-those that differ only in what lies before their last two changes are joined. Nothing is approximated within a
-course; only unlikely ones are dropped.
+What is read is the sum of what is known, of what a hidden state adds through a linear model, of what
+uncertain coordinates add, of a slow error of each channel and of white noise. Given the course of the state
+all of it is linear and Gaussian, so that a Kalman filter tells how likely a course is, coordinates and slow
+errors integrated out. Its gains do not depend on the course: many courses are followed side by side, each
+with its own mean, and those that differ only in what lies before their last two changes are joined. Nothing
+is approximated within a course; only unlikely ones are dropped.
 
-Source: Doucet, Gordon & Krishnamurthy (2001), IEEE Trans. Signal Processing 49, 613-624 (filters of linear models
-that jump); Fearnhead & Clifford (2003), J. R. Statist. Soc. B 65, 887-899 (keeping the most likely courses).
+Source: Doucet, Gordon & Krishnamurthy (2001), IEEE Trans. Signal Processing 49, 613-624 (filters of linear
+models that jump); Fearnhead & Clifford (2003), J. R. Statist. Soc. B 65, 887-899 (keeping the most likely
+courses).
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ Whole = NDArray[np.int64]
 
 # Steps after which what was on is taken as decided.
 DECIDED_AFTER = 48
-# Courses that are followed side by side, and rounds of course and size in turn: to compare many places, and to settle.
+# Courses that are followed side by side, and rounds of course and size in turn: to compare many places, and
+# to settle.
 QUICK, THOROUGH = (24, 3), (96, 8)
 # Changes that a chain is believed to have had before the data: one of each kind in this many steps.
 USUAL_STAY = 50.0
@@ -352,14 +354,19 @@ def _follow(
     parent = np.zeros((steps, courses), dtype=np.int32)
     chosen = np.zeros((steps, courses), dtype=np.int8)
     most = 2 * courses
-    # Of every course: state, mean of the nuisances, weight, likelihood, what is on, its last two changes, its past.
+    # Of every course: state, mean of the nuisances, weight, likelihood, what is on, its last two changes,
+    # its past.
     state, mean = np.zeros((most, n)), np.zeros((most, m))
     weight, likelihood = np.zeros(most), np.zeros(most)
     on, last, before = np.zeros(most, np.int8), np.zeros(most, np.int64), np.zeros(most, np.int64)
     past = np.zeros((most, after), np.int8)
     next_state, next_mean = np.zeros((most, n)), np.zeros((most, m))
     next_weight, next_likelihood = np.zeros(most), np.zeros(most)
-    next_on, next_last, next_before = np.zeros(most, np.int8), np.zeros(most, np.int64), np.zeros(most, np.int64)
+    next_on, next_last, next_before = (
+        np.zeros(most, np.int8),
+        np.zeros(most, np.int64),
+        np.zeros(most, np.int64),
+    )
     origin = np.zeros(most, np.int64)
     joined = np.zeros(most)
     probability = np.zeros(steps)
@@ -422,7 +429,11 @@ def _follow(
             twin = -1
             for other in range(kept_courses):
                 d = selected[other]
-                if next_on[d] == next_on[c] and next_last[d] == next_last[c] and next_before[d] == next_before[c]:
+                if (
+                    next_on[d] == next_on[c]
+                    and next_last[d] == next_last[c]
+                    and next_before[d] == next_before[c]
+                ):
                     twin = other
                     break
             if twin >= 0:

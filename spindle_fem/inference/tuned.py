@@ -71,10 +71,14 @@ PAIRS_FOR_TRIPLES = 40
 SETS_WITHIN_BOUNDS, SINGLES_WITHIN_BOUNDS = 120, 24
 # Places of one combination of effects in a short list: one effect must not crowd out the others.
 PLACES_OF_ONE_EFFECT = 2
-# Instants in a recording at which heat may begin, and intervals of one strength at most.
-ONSETS, MOST_INTERVALS = 40, 3
+# Instants in a recording at which heat may begin, of a network, which is quick, and intervals of one
+# strength at most.
+ONSETS, ONSETS_OF_NETWORK, MOST_INTERVALS = 40, 120, 3
 # Sizes tried for the steps of missing heat over time, W.
 WALK_SCALES = (1.0, 3.0, 10.0, 30.0, 100.0)
+
+# A change of level that gains less than this share of what all changes gain is left out.
+LEAST_SHARE_OF_A_CHANGE = 0.02
 
 # ---------------------------------------------------------------------------------------------- search
 # Prior probability of 0, 1, 2 and 3 effects.

@@ -421,6 +421,7 @@ class IntervalEffect(Effect):
         intervals: Intervals,
         form: str | None = None,
         course: str = "pulses",
+        sizes: Sequence[float] = (),
     ) -> Candidate:
         """Candidate that begins from intervals, [s].
 
@@ -433,6 +434,8 @@ class IntervalEffect(Effect):
             One of :attr:`interval_forms`; the first when None.
         course : str
             What is free about them.
+        sizes : sequence of float
+            Usual size in each beside the common one.
         """
 
     @abstractmethod

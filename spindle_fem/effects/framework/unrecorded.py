@@ -78,12 +78,14 @@ class InIntervals:
     course : str
         ``PULSES``: few intervals of about one size, edges free; ``STEPS``: as well, each of a size of its
         own; ``STATES``: any number of one size, their edges as they are.
+    sizes : sequence of float
+        Usual size of every interval beside the common one; 1 where empty.
     """
 
     n_states = 0
     follows = ()
 
-    def __init__(self, intervals: Intervals, course: str = PULSES) -> None:
+    def __init__(self, intervals: Intervals, course: str = PULSES, sizes: Sequence[float] = ()) -> None:
         self._number = len(intervals)
         self._shared = {
             number
@@ -95,12 +97,13 @@ class InIntervals:
             self.parameters = (shape("lag", EDGE_WIDTH, 0.0, "s"), *edges)
             return
         jitter = STEP_SIGMA if course == STEPS else JITTER
-        factors = (
-            tuple(shape(f"factor_{number}", 1.0, jitter, low=0.01) for number in range(1, self._number + 1))
-            if self._number > 1
-            else ()
-        )
-        self.parameters = (_lag(), *self._free_edges(intervals), *factors)
+        usual = sizes or (1.0,) * self._number
+        factors = [shape(f"factor_{n}", size, jitter, low=0.01) for n, size in enumerate(usual, 1)]
+        if self._number == 1:
+            factors = []
+        # A level that changes is another state of the machine, at once: its lag is that of the masses.
+        lag = shape("lag", EDGE_WIDTH, 0.0, "s") if course == STEPS else _lag()
+        self.parameters = (lag, *self._free_edges(intervals), *factors)
 
     def _named(self, intervals: Intervals) -> list[tuple[str, float]]:
         """Edges by name, each once."""
@@ -300,10 +303,11 @@ class UnrecordedEffect(IntervalEffect):
         intervals: Intervals,
         form: str | None = None,
         course: str = PULSES,
+        sizes: Sequence[float] = (),
     ) -> Candidate:
-        """Candidate at a spot that begins from intervals; a ``course`` as :class:`InIntervals` has it."""
+        """Candidate at a spot that begins from intervals, as :class:`InIntervals` has it."""
         chosen = self.interval_forms[0] if form is None else form
-        return self._candidate(machine, component, InIntervals(tuple(intervals), course), chosen, None)
+        return self._candidate(machine, component, InIntervals(tuple(intervals), course, sizes), chosen, None)
 
     def _candidate(
         self, machine: MachineView, spot: str, on: Share, form: str, quantity: RecordedQuantity | None

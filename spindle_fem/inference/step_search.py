@@ -1,0 +1,310 @@
+"""Hypotheses of levels that changed at unknown moments: segmented, fitted and segmented again about the fit.
+
+A conductance acts by its product with temperatures that it moves itself: the instants that are best to first
+order about a constant level are not those of large steps. So the readings are segmented again about each
+fit, the course of levels that it holds given back, as long as the evidence grows.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
+from spindle_fem.effects.framework.unrecorded import PULSES, STEPS
+from spindle_fem.effects.registry import fixed
+from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
+from spindle_fem.inference import tuned
+from spindle_fem.inference.change_points import NOTHING, choice, find_changes, levels_over_lowest
+from spindle_fem.inference.hypothesis import Hypothesis, identity
+from spindle_fem.inference.hypothesis_fit import Fit, Problem, amplitude_name
+from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.missing_heat import Onsets, Pattern, onset_answers
+from spindle_fem.inference.prepared_problem import slow_error_of
+
+Array = NDArray[np.float64]
+
+# Rounds of segmentation and fit, and places that get them.
+ROUNDS, PLACES_SETTLED = 4, 2
+# Gain of a round from which another one follows (natural logarithm).
+WORTH_ANOTHER = 2.0
+# Misfit beyond that of a course of levels from which one with a change less is not followed to its optimum.
+HOPELESS = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class StepPlace:
+    """Where levels may change, and at how many instants."""
+
+    effect: IntervalEffect
+    pattern: Pattern
+    recording: int
+    instants: int
+
+
+def add_steps(search: Search, fit: Fit) -> None:
+    """Fit the sets with changes of level beside what a fit holds, at the most promising places."""
+    if any(search.in_intervals(c) for c in fit.candidates):
+        return
+    predictor = search.problem.predictor
+    found = []
+    patterns = search.patterns()
+    for recording in range(len(predictor.recordings)):
+        answers = onset_answers(
+            search.problem,
+            fit,
+            [pattern for _, pattern in patterns],
+            recording,
+            number=_instants(search),
+            workers=search.workers,
+        )
+        for (effect, pattern), onsets in zip(patterns, answers, strict=True):
+            changes = find_changes(onsets.gram, onsets.data, _spread(search, effect, pattern))
+            if changes is not None:
+                found.append((changes.gain, effect, onsets))
+    found.sort(key=lambda item: -item[0])
+    for gain, effect, onsets in found[:PLACES_SETTLED]:
+        if gain > tuned.FAIR_SHARE * found[0][0]:
+            _settle(search, fit, effect, onsets)
+
+
+def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) -> None:
+    """Segmentation and fit in turn, changes left out that do not pay, the best of them kept.
+
+    What a fit with changes leaves says how large the slow error is; with that of a fit without them, or with
+    a guess, drift of the machine would be cut into steps.
+    """
+    problem = search.problem
+    place = StepPlace(effect, onsets.pattern, onsets.recording, len(onsets.times))
+    stop = float(problem.predictor.drives[onsets.recording].grid[-1])
+    spread = _spread(search, effect, onsets.pattern)
+    values, best = dict(fit.values), None
+    for _ in range(ROUNDS):
+        changes = find_changes(onsets.gram, onsets.data, spread)
+        if changes is None:
+            break
+        spans = levels_over_lowest(changes, onsets.times, stop)
+        found = _fitted(search, problem, fit, place, *spans, values)
+        if found is None:
+            break
+        slow = slow_error_of(problem, found.fit)
+        again = replace(problem, slow=slow)
+        found = _simplest(search, again, fit, place, found)
+        if best is not None:
+            known = _fitted(search, again, fit, place, *_spans(effect, best.fit), best.fit.values)
+            if known is not None and found.score <= known.score + WORTH_ANOTHER:
+                best = known if known.score > found.score else found
+                break
+        best, problem, values = found, again, found.fit.values
+        onsets = _again(search, problem, best.fit, effect, onsets)
+    if best is None:
+        return
+    # Compared with all other sets under the noise that they were fitted with.
+    last = _fitted(search, search.problem, fit, place, *_spans(effect, best.fit), best.fit.values)
+    if last is not None:
+        known = search.found.get(identity(last.fit.candidates))
+        if known is None or known.score < last.score:
+            search.remember_cost(last.fit.candidates[-1], _paid(place, _spans(effect, last.fit)[0]))
+            search.keep(last)
+
+
+def _simplest(search: Search, problem: Problem, fit: Fit, place: StepPlace, found: Hypothesis) -> Hypothesis:
+    """Changes left out one after the other, as long as those that are left say nearly as much.
+
+    A model that is not exact leaves a residual in proportion to what the levels do, which a further change
+    may always fit a little.
+    """
+    nothing = problem.fit(fit.candidates, fit.values, iterations=0).log_evidence
+    least = tuned.LEAST_SHARE_OF_A_CHANGE * max(0.0, found.fit.log_evidence - nothing)
+    spans = _over_lowest(*_course(*_spans(place.effect, found.fit), problem, place))
+    if spans is None:
+        return found
+    values = _raised(place, search, found.fit.values, spans[2])
+    best = _fitted(search, problem, fit, place, *spans[:2], values) or found
+    while True:
+        trials = [
+            _fitted(
+                search,
+                problem,
+                fit,
+                place,
+                *spans,
+                _raised(place, search, best.fit.values, lowest),
+                best.fit.misfit_with_prior + HOPELESS,
+            )
+            for *spans, lowest in _with_one_less(*_spans(place.effect, best.fit), problem, place)
+        ]
+        better = max((t for t in trials if t is not None), key=lambda t: t.score, default=None)
+        if better is None or better.score <= best.score - least:
+            return best
+        best = better
+
+
+def _course(
+    intervals: Sequence[tuple[float, float]], levels: Sequence[float], problem: Problem, place: StepPlace
+) -> tuple[list[float], list[float]]:
+    """Edges and sizes of all stretches; one in which nothing was read has the size of that before it."""
+    predictor = problem.predictor
+    grid, recording = predictor.drives[place.recording].grid, predictor.recordings[place.recording]
+    edges, sizes = [float(grid[0])], []
+    for (start, end), level in zip(intervals, levels, strict=True):
+        if start > edges[-1] + 1.0:
+            sizes.append(0.0)
+            edges.append(start)
+        sizes.append(level)
+        edges.append(end)
+    if edges[-1] < grid[-1] - 1.0:
+        sizes.append(0.0)
+        edges.append(float(grid[-1]))
+    read = recording.times[recording.usable.any(axis=1) & predictor.use[place.recording]]
+    spacing = float(np.median(np.diff(recording.times)))
+    seen = np.histogram(read, edges)[0] * spacing > (1.0 - tuned.MOST_IN_GAPS) * np.diff(edges)
+    position = 1
+    while position < len(sizes):
+        if not seen[position]:
+            edges = [*edges[:position], *edges[position + 1 :]]
+            sizes, seen = [*sizes[:position], *sizes[position + 1 :]], np.delete(seen, position)
+        else:
+            position += 1
+    return edges, sizes
+
+
+def _over_lowest(
+    edges: Sequence[float], sizes: Sequence[float]
+) -> tuple[list[tuple[float, float]], list[float], float] | None:
+    """Intervals above the lowest size, by how much, and that size; None where there is one size only."""
+    lowest = min(sizes)
+    top = max(sizes) - lowest
+    spans = [
+        (pair, size - lowest)
+        for pair, size in zip(itertools.pairwise(edges), sizes, strict=True)
+        if size - lowest > NOTHING * top and pair[1] > pair[0] + 1.0
+    ]
+    return ([pair for pair, _ in spans], [size for _, size in spans], lowest) if spans else None
+
+
+def _with_one_less(
+    intervals: list[tuple[float, float]], levels: list[float], problem: Problem, place: StepPlace
+) -> list[tuple[list[tuple[float, float]], list[float], float]]:
+    """Courses of levels without one of their changes, and their lowest: its neighbours have their mean."""
+    edges, sizes = _course(intervals, levels, problem, place)
+    found = []
+    for inner in range(1, len(edges) - 1):
+        lengths = np.maximum(np.diff(edges)[inner - 1 : inner + 1], 1e-3)
+        merged = float(np.average(sizes[inner - 1 : inner + 1], weights=lengths))
+        found.append(
+            _over_lowest(
+                [*edges[:inner], *edges[inner + 1 :]], [*sizes[: inner - 1], merged, *sizes[inner + 1 :]]
+            )
+        )
+    return [item for item in found if item is not None]
+
+
+def _raised(place: StepPlace, search: Search, values: Mapping[str, float], lowest: float) -> dict[str, float]:
+    """Values with what every level has in common given to the link itself."""
+    probe = place.effect.over(search.view, place.pattern.spot, [(0.0, 1.0)])
+    if not probe.sized_by:
+        return dict(values)
+    now = values.get(probe.sized_by, 1.0)
+    return dict(values) | {probe.sized_by: now + lowest / probe.constants["conductance"]}
+
+
+def _fitted(
+    search: Search,
+    problem: Problem,
+    fit: Fit,
+    place: StepPlace,
+    intervals: Sequence[tuple[float, float]],
+    levels: Sequence[float],
+    values: Mapping[str, float],
+    hopeless: float = np.inf,
+) -> Hypothesis | None:
+    """A set with levels in intervals; None where nothing is left of them, or it cannot be simulated."""
+    if not levels or min(levels) < 0.0 or max(levels) <= 0.0:
+        return None
+    candidate = _candidate(search, place, intervals, levels)
+    lengths = [end - start for start, end in intervals]
+    name = candidate.terms[0].name
+    start = {key: value for key, value in values.items() if not key.startswith(f"{name}.")}
+    size = float(np.average(levels, weights=lengths)) / values.get(candidate.sized_by, 1.0)
+    candidates = (*fit.candidates, candidate)
+    try:
+        fitted = problem.fit(candidates, start | {amplitude_name(candidate): size}, hopeless=hopeless)
+    except (ConvergenceError, OutOfValidityError, SpecError):
+        return None
+    return Hypothesis(fitted, search.log_prior(candidates) - _paid(place, intervals))
+
+
+def _paid(place: StepPlace, intervals: Sequence[tuple[float, float]]) -> float:
+    """What the choice of the changes costs, as a logarithm."""
+    return choice(place.instants, len({edge for pair in intervals for edge in pair}))
+
+
+def _spans(effect: IntervalEffect, fit: Fit) -> tuple[list[tuple[float, float]], list[float]]:
+    """Intervals and levels that a fit holds, W or W/K."""
+    candidate = fit.candidates[-1]
+    factor = fit.values.get(candidate.sized_by, 1.0)
+    pairs = [(float(a), float(b)) for a, b in effect.intervals(candidate, fit.values)]
+    return pairs, [float(factor * size) for size in effect.sizes(candidate, fit.values)]
+
+
+def _again(search: Search, problem: Problem, fit: Fit, effect: IntervalEffect, onsets: Onsets) -> Onsets:
+    """Inner products about a fit, the course of levels that it holds given back."""
+    candidate = fit.candidates[-1]
+    term = candidate.terms[0]
+    inner = term.values(fit.values)
+    held = fixed(candidate, inner)
+    machine = [i for i, c in enumerate(fit.coordinates) if not c.name.startswith(f"{term.name}.")]
+    frozen = replace(
+        fit,
+        candidates=tuple(held if c is candidate else c for c in fit.candidates),
+        coordinates=tuple(fit.coordinates[i] for i in machine),
+        position=fit.position[machine],
+    )
+    (found,) = onset_answers(problem, frozen, [onsets.pattern], onsets.recording, number=len(onsets.times))
+    steps = np.zeros(len(found.times))
+    for (start, end), size in zip(*_spans(effect, fit), strict=True):
+        steps += size * (_at(found.times, start) - _at(found.times, end))
+    return replace(found, data=found.data + found.gram @ steps)
+
+
+def _at(times: Array, edge: float) -> Array:
+    """Weights of the row of instants that stand for a step between two of them; none after the last."""
+    weights = np.zeros(len(times))
+    if edge >= times[-1] + (times[-1] - times[-2]):
+        return weights
+    place = float(np.interp(edge, times, np.arange(len(times))))
+    low = int(place)
+    weights[low] = 1.0 - (place - low)
+    if low + 1 < len(times):
+        weights[low + 1] = place - low
+    return weights
+
+
+def _candidate(
+    search: Search, place: StepPlace, intervals: Sequence[tuple[float, float]], levels: Sequence[float]
+) -> Candidate:
+    mean = float(np.average(levels, weights=[end - start for start, end in intervals]))
+    several = len(search.problem.predictor.recordings) > 1
+    alike = len(intervals) == 1
+    found = place.effect.over(
+        search.view,
+        place.pattern.spot,
+        intervals,
+        course=PULSES if alike else STEPS,
+        sizes=() if alike else [level / mean for level in levels],
+    )
+    return replace(found, reference=max(mean, 1e-3), recording=place.recording if several else None)
+
+
+def _instants(search: Search) -> int:
+    return tuned.ONSETS_OF_NETWORK if search.problem.predictor.is_network else tuned.ONSETS
+
+
+def _spread(search: Search, effect: IntervalEffect, pattern: Pattern) -> float:
+    probe = effect.over(search.view, pattern.spot, [(0.0, 1.0)])
+    return float(probe.parameters[probe.amplitude].sigma)

@@ -1,0 +1,115 @@
+"""Courses of hidden states and changes of level, found in small linear systems whose truth is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spindle_fem.inference.change_points import find_changes, levels_over_lowest
+from spindle_fem.inference.switching_model import (
+    Chain,
+    LinearAnswer,
+    ReadingFilter,
+    Readings,
+    find_course,
+    size_of,
+)
+
+STEPS, STEP, CAPACITY, LOSS, HEAT = 700, 60.0, 20_000.0, 25.0, 300.0
+
+
+def one_mass(conductance: bool = False) -> LinearAnswer:
+    """A mass that loses heat to its surroundings, 20 K below it where a conductance is asked for."""
+    kept = np.exp(-LOSS / CAPACITY * STEP)
+    unit = (1.0 - kept) / LOSS
+    return LinearAnswer(
+        np.array([[[kept]]]),
+        np.array([[[unit if conductance else 0.0]]]),
+        np.zeros(STEPS, dtype=np.int64),
+        np.full((STEPS, 1), -20.0 * unit if conductance else unit),
+        np.arange(STEPS) == 0,
+        np.ones((1, 1)),
+    )
+
+
+def truth(generator: np.random.Generator, condition: np.ndarray) -> np.ndarray:
+    """A sticky course that begins only where a condition holds."""
+    on = np.zeros(STEPS, dtype=bool)
+    for t in range(1, STEPS):
+        chance = 0.9 if on[t - 1] else 0.06 * condition[t]
+        on[t] = generator.random() < chance
+    return on
+
+
+def readings(answer: LinearAnswer, on: np.ndarray, size: float, generator: np.random.Generator) -> Readings:
+    """What a channel reads with noise of 0.2 K, beside an offset of unit prior that nobody knows."""
+    state, found = np.zeros(1), np.zeros((STEPS, 1))
+    for t in range(STEPS):
+        added = answer.entering[t] - answer.loss[0] @ state
+        state = answer.advance[0] @ state + size * on[t] * added
+        found[t] = answer.outputs @ state
+    noisy = found + 0.7 + 0.2 * generator.standard_normal((STEPS, 1))
+    noisy[100:130] = np.nan
+    slopes = np.ones((STEPS, 1, 1))
+    return Readings(noisy, np.full((STEPS, 1), 0.04), slopes, np.full(STEPS, STEP), 0.02, 1800.0)
+
+
+def overlap(one: np.ndarray, other: np.ndarray) -> float:
+    """F1 of two courses by time."""
+    return 2.0 * float((one & other).sum()) / float(one.sum() + other.sum())
+
+
+@pytest.mark.parametrize("conductance", [False, True])
+def test_a_course_and_its_size_are_found_together(conductance):
+    generator = np.random.default_rng(3)
+    condition = (np.arange(STEPS) // 70) % 2
+    on, answer = truth(generator, condition), one_mass(conductance)
+    size = 40.0 if conductance else HEAT
+    filter_ = ReadingFilter(readings(answer, on, size, generator))
+    found = find_course(answer, filter_, Chain.usual(condition), 0.3 * size, 4.0 * size)
+    assert overlap(found.on, on) > 0.85
+    assert found.size == pytest.approx(size, rel=0.1)
+    assert found.log_evidence > 100.0
+    # The probability says how sure the course is.
+    assert found.probability[found.on].mean() > 0.85
+    assert found.probability[~found.on].mean() < 0.1
+    assert found.chain.begin[1] > 2.0 * found.chain.begin[0]
+
+
+def test_nothing_is_found_in_noise():
+    generator = np.random.default_rng(5)
+    answer = one_mass()
+    filter_ = ReadingFilter(readings(answer, np.zeros(STEPS, dtype=bool), 0.0, generator))
+    found = find_course(answer, filter_, Chain.usual(np.zeros(STEPS, dtype=np.int64)), HEAT, 3.0 * HEAT)
+    assert found is None or found.log_evidence < 3.0
+
+
+def test_the_size_of_a_known_course_has_the_error_that_it_states():
+    generator = np.random.default_rng(7)
+    answer = one_mass()
+    on = truth(generator, np.ones(STEPS))
+    apart = []
+    for _ in range(30):
+        filter_ = ReadingFilter(readings(answer, on, HEAT, generator))
+        size, sigma = size_of(answer, filter_, on, HEAT, 10.0 * HEAT)
+        apart.append((size - HEAT) / sigma)
+    assert 0.6 < np.std(apart) < 1.5
+
+
+def test_changes_are_found_and_no_more():
+    generator = np.random.default_rng(11)
+    count, kept = 90, 0.9
+    # Answers of one lag to a unit step at each instant, four readings to an instant.
+    times = np.arange(4 * count) / 4.0
+    answers = np.where(
+        times[:, None] >= np.arange(count), 1.0 - kept ** (times[:, None] - np.arange(count)), 0.0
+    )
+    read = 3.0 * answers[:, 30] - 2.0 * answers[:, 62] + 0.3 * generator.standard_normal(len(times))
+    found = find_changes(answers.T @ answers / 0.09, answers.T @ read / 0.09, 3.0)
+    assert found.at == (30, 62)
+    np.testing.assert_allclose(found.steps, [3.0, -2.0], atol=0.2)
+    intervals, levels = levels_over_lowest(found, np.arange(count, dtype=float), float(count))
+    assert intervals == [(30.0, 62.0), (62.0, 90.0)]
+    np.testing.assert_allclose(levels, [3.0, 1.0], atol=0.2)
+    noise = 0.3 * generator.standard_normal(len(times))
+    assert find_changes(answers.T @ answers / 0.09, answers.T @ noise / 0.09, 3.0) is None
