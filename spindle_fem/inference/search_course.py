@@ -10,7 +10,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
-from spindle_fem.inference.state_search import add_states
+from spindle_fem.inference.state_search import add_states, settle_best
 from spindle_fem.inference.step_search import add_steps
 
 
@@ -59,6 +59,7 @@ def run_search(search: Search) -> list[Hypothesis]:
             screened, intervals = search.screened(hypothesis.fit)
             search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS)
     improve(search)
+    settle_best(search)
     return search.ranked()
 
 

@@ -129,7 +129,7 @@ def told_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Told]:
     """Every hidden state of a fit as all readings tell it, by the name of its amplitude."""
     found = {}
     for candidate in fit.candidates:
-        if candidate.amplitude not in search.courses or candidate.free.keys() != {candidate.amplitude}:
+        if candidate.amplitude not in search.courses or not _is_state(candidate):
             continue
         place, course = search.courses[candidate.amplitude]
         again = course_about(replace(search, problem=problem), fit, place, candidate, course, everything=True)
@@ -158,6 +158,22 @@ def told_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Told]:
 def _bare(fit: Fit, candidate: Candidate) -> tuple[dict[str, float], tuple[Candidate, ...]]:
     rest, values = without(fit, candidate)
     return values, rest
+
+
+def settle_best(search: Search) -> None:
+    """Follow the state of the best set again, about a fit that holds its other effects too."""
+    fit = search.ranked()[0].fit
+    for candidate in fit.candidates:
+        if len(fit.candidates) > 1 and candidate.amplitude in search.courses and _is_state(candidate):
+            place, course = search.courses[candidate.amplitude]
+            again = course_about(search, fit, place, candidate, course)
+            if again is not None:
+                settle(search, fit, place, again, candidate)
+
+
+def _is_state(candidate: Candidate) -> bool:
+    """Whether nothing but its size is free."""
+    return candidate.free.keys() == {candidate.amplitude}
 
 
 def settle(
