@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffect, in_intervals
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.framework.unrecorded import PULSES, STEPS
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant, variants_of
-from spindle_fem.inference.change_points import choice
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
@@ -29,7 +27,6 @@ from spindle_fem.inference.missing_heat import (
     Onsets,
     Pattern,
     find_intervals,
-    find_steps,
     onset_answers,
 )
 from spindle_fem.inference.screening import Screened, amplitude_value, screen
@@ -180,18 +177,13 @@ class Search:
                 probe = effect.over(self.view, pattern.spot, [(0.0, stop)])
                 spread = probe.parameters[probe.amplitude].sigma
                 options = find_intervals(onsets, spread, stop)
-                steps = find_steps(onsets, spread, stop)
-                options += [] if steps is None else [steps]
                 options = [o for o in options if not self._within_gaps(o.intervals, recording)]
                 if options:
                     found.append((effect, max(options, key=lambda item: item.gain)))
         found.sort(key=lambda item: -item[1].gain)
         for effect, item in found[:SPOTS_SCREENED]:
             if item.gain > 0.0:
-                course = STEPS if item.sizes else PULSES
-                candidate = effect.over(
-                    self.view, item.pattern.spot, item.intervals, course=course, sizes=item.sizes
-                )
+                candidate = effect.over(self.view, item.pattern.spot, item.intervals)
                 several = len(self.problem.predictor.recordings) > 1
                 yield (
                     item,
@@ -319,8 +311,6 @@ class Search:
 
 def intervals_cost(item: OnOff) -> float:
     """What choosing the intervals costs, as a logarithm."""
-    if item.sizes:
-        return choice(item.options, len({edge for pair in item.intervals for edge in pair}))
     options = item.options * (item.options + 1) / 2
     number = len(item.intervals)
     return number * float(np.log(options)) - float(np.sum(np.log(np.arange(1, number + 1))))

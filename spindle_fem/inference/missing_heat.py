@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
-from spindle_fem.inference.change_points import find_changes, levels_over_lowest
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.worker_processes import Workers
@@ -125,8 +124,6 @@ class OnOff:
         Logarithm of the evidence over nothing, choice of the instants paid for.
     options : int
         Instants that an edge could be at.
-    sizes : tuple of float
-        Of the strength, in each interval; empty where it is one for all.
     """
 
     pattern: Pattern
@@ -135,7 +132,6 @@ class OnOff:
     strength: float
     gain: float
     options: int = tuned.ONSETS
-    sizes: tuple[float, ...] = ()
 
 
 def onset_answers(
@@ -299,30 +295,6 @@ def find_intervals(onsets: Onsets, spread: float, stop: float) -> list[OnOff]:
             )
         )
     return found
-
-
-def find_steps(onsets: Onsets, spread: float, stop: float) -> OnOff | None:
-    """Levels that change a few times, over the lowest of them; None for one, which intervals have as well.
-
-    Parameters as :func:`find_intervals`.
-    """
-    changes = find_changes(onsets.gram, onsets.data, spread)
-    if changes is None:
-        return None
-    intervals, levels = levels_over_lowest(changes, onsets.times, stop)
-    if len(intervals) < 2:
-        return None
-    weights = [end - start for start, end in intervals]
-    mean = float(np.average(levels, weights=weights))
-    return OnOff(
-        onsets.pattern,
-        onsets.recording,
-        tuple(intervals),
-        mean,
-        changes.gain,
-        len(onsets.times),
-        tuple(level / mean for level in levels),
-    )
 
 
 def _weights(edges: Sequence[int], size: int) -> Array:

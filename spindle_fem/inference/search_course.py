@@ -8,6 +8,7 @@ import numpy as np
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
 from spindle_fem.inference.state_search import add_states, settle_best
@@ -39,10 +40,9 @@ def run_search(search: Search) -> list[Hypothesis]:
             tuned.SINGLES_FITTED[len(starts) - 1],
             always=tuned.SINGLES_ALWAYS_FITTED,
         )
-    if not search.is_explained(search.ranked()[0]):
-        search.progress("diagnosis: changes and states that switch")
-        add_steps(search, null)
-        add_states(search, null)
+    is_network = search.problem.predictor.is_network
+    if is_network:
+        _what_changes(search, null)
     if not search.is_explained(search.ranked()[0]):
         search.progress("diagnosis: 2 effects")
         for fit, screened, intervals in reversed(starts):
@@ -59,8 +59,19 @@ def run_search(search: Search) -> list[Hypothesis]:
             screened, intervals = search.screened(hypothesis.fit)
             search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS)
     improve(search)
+    # With geometry laws come first: fits take long there, and something that switches fits most of them.
+    if not is_network and search.ranked()[0].fit.reduced_misfit > tuned.UNEXPLAINED_MISFIT**2:
+        _what_changes(search, null)
     settle_best(search)
     return search.ranked()
+
+
+def _what_changes(search: Search, null: Fit) -> None:
+    """Add what changed its level at unknown moments, and what switches."""
+    if not search.is_explained(search.ranked()[0]):
+        search.progress("diagnosis: changes and states that switch")
+        add_steps(search, null)
+        add_states(search, null)
 
 
 def improve(search: Search) -> None:

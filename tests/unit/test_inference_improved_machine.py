@@ -108,7 +108,10 @@ def found(request, opened, tmp_path_factory):
     problem = Problem(predictor, calibrated.belief, expected_slow_error(predictor), predictor.observations)
     fit = problem.fit((candidate,), own)
     outcome = SimpleNamespace(
-        final=fit, predictor=predictor, machine_coordinates=calibrated.belief.coordinates
+        told=lambda item: item,
+        final=fit,
+        predictor=predictor,
+        machine_coordinates=calibrated.belief.coordinates,
     )
     return outcome, folder
 
