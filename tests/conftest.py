@@ -6,36 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-HEAD = """
-schema = "spindle-fem/recording/1"
-name = "made"
-data = "made.csv"
-time = {column = "time", unit = "s"}
-"""
-READ = """
-[[channel]]
-column = "%s"
-role = "temperature"
-probe = "%s"
-unit = "degC"
-sigma = 0.1
-"""
-DRIVEN = """
-[[channel]]
-column = "%s"
-role = "input"
-drives = "%s"
-unit = "%s"
-hold = "%s"
-"""
-# Unit of an input and how it goes on between two stamps.
-INPUTS = {
-    "speed": ("rpm", "previous"),
-    "thrust": ("N", "previous"),
-    "power": ("W", "previous"),
-    "ambient": ("degC", "linear"),
-    "coolant_inlet": ("degC", "linear"),
-}
+from tests.support.written_texts import manifest_text
 
 
 def write_recording(
@@ -55,9 +26,8 @@ def write_recording(
     """
     folder.mkdir(exist_ok=True)
     frame.to_csv(folder / "made.csv", index=False)
-    channels = [READ % item for item in temperatures.items()]
-    channels += [DRIVEN % (column, name, *INPUTS[name]) for column, name in inputs.items()]
-    (folder / "recording.toml").write_text("".join([HEAD, *channels]), encoding="utf-8")
+    text = manifest_text("made", temperatures, inputs, data="made.csv", time="time")
+    (folder / "recording.toml").write_text(text, encoding="utf-8")
     return folder
 
 

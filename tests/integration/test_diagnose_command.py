@@ -9,42 +9,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.support.command_line import run_here
+from tests.support.written_texts import manifest_text, network_text
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "pump"
-[[network.node]]
-name = "motor"
-capacity = {value = "500 J/K", sigma_rel = 0.1}
-[[network.node]]
-name = "casing"
-capacity = {value = "900 J/K", sigma_rel = 0.1}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.link]]
-between = ["motor", "casing"]
-conductance = {value = "3 W/K", sigma_rel = 0.1}
-[[network.link]]
-between = ["casing", "ambient"]
-conductance = {value = "2 W/K", sigma_rel = 0.1}
-[[network.source]]
-node = "motor"
-input = "power"
-gain = {value = "1 W/W", sigma_rel = 0.05}
-"""
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "shift"
-data = "data.csv"
-time = {column = "t", unit = "s"}
-channel = [
-{column = "T1", role = "temperature", probe = "motor", unit = "degC", sigma = 0.1},
-{column = "T2", role = "temperature", probe = "casing", unit = "degC", sigma = 0.1},
-{column = "room", role = "input", drives = "ambient", unit = "degC"},
-{column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
-]
-"""
+MACHINE = network_text(
+    "pump",
+    {"motor": ("500 J/K", 0.1), "casing": ("900 J/K", 0.1)},
+    {"motor|casing": ("3 W/K", 0.1), "casing|ambient": ("2 W/K", 0.1)},
+    [("motor", "power", ("1 W/W", 0.05))],
+)
+MANIFEST = manifest_text(
+    "shift", {"T1": "motor", "T2": "casing"}, {"room": "ambient", "P": "power"}, time="t"
+)
 BEGIN, END, HEAT = 4200.0, 6600.0, 45.0
 VERDICTS = {"consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"}
 

@@ -11,30 +11,14 @@ from spindle_fem.commands.console import print_simulation
 from spindle_fem.commands.report_command import rebuild
 from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.errors import BadInputError, RecordingError
+from tests.support.written_texts import network_text
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "two lumps"
-[[network.node]]
-name = "winding"
-capacity = {value = "300 J/K", sigma_rel = 0.4}
-[[network.node]]
-name = "body"
-capacity = {value = "900 J/K", sigma_rel = 0.4}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.link]]
-between = ["winding", "body"]
-conductance = {value = "2 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "ambient"]
-conductance = {value = "1 W/K", sigma_rel = 0.5}
-[[network.source]]
-node = "winding"
-input = "power"
-gain = "1 W/W"
-"""
+MACHINE = network_text(
+    "two lumps",
+    {"winding": ("300 J/K", 0.4), "body": ("900 J/K", 0.4)},
+    {"winding|body": ("2 W/K", 0.5), "body|ambient": ("1 W/K", 0.5)},
+    [("winding", "power", "1 W/W")],
+)
 
 TEMPERATURES, INPUTS = {"W": "winding", "B": "body"}, {"P": "power", "room": "ambient"}
 # winding and body [J/K], between them and to the room [W/K]

@@ -16,6 +16,7 @@ from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import read_recording
 from tests.support.lumped_spindle import lumped_model
+from tests.support.written_texts import network_text
 
 PROBES = ("SP01", "SP02", "SP03", "SP04", "SP05", "COOLANT_OUT")
 SPINDLE_RECORDING = """
@@ -40,49 +41,19 @@ hold = "%s"
 drives = "%s"
 unit = "%s"
 """
-NETWORK = """
-schema = "spindle-fem/machine/1"
-name = "small motor"
-[[network.node]]
-name = "winding"
-capacity = {value = "180 J/K", sigma_rel = 0.5}
-[[network.node]]
-name = "body"
-capacity = {value = "500 J/K", sigma_rel = 0.5}
-[[network.node]]
-name = "jacket"
-capacity = {value = "300 J/K", sigma_rel = 0.5}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.boundary]]
-name = "coolant"
-temperature = "18 degC"
-[[network.link]]
-between = ["winding", "body"]
-conductance = {value = "2.3 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "ambient"]
-conductance = {value = "0.5 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "jacket"]
-conductance = {value = "1.5 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["jacket", "coolant"]
-conductance = {value = "0.8 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "coolant"]
-conductance = {value = "0.4 W/K", sigma_rel = 0.5}
-[[network.source]]
-node = "winding"
-input = "power"
-gain = {value = "0.8 W/W", sigma_rel = 0.1}
-[[network.source]]
-node = "body"
-input = "speed"
-gain = {value = "15 W", sigma_rel = 0.3}
-reference = "1000 rpm"
-"""
+NETWORK = network_text(
+    "small motor",
+    {"winding": ("180 J/K", 0.5), "body": ("500 J/K", 0.5), "jacket": ("300 J/K", 0.5)},
+    {
+        "winding|body": ("2.3 W/K", 0.5),
+        "body|ambient": ("0.5 W/K", 0.5),
+        "body|jacket": ("1.5 W/K", 0.5),
+        "jacket|coolant": ("0.8 W/K", 0.5),
+        "body|coolant": ("0.4 W/K", 0.5),
+    },
+    [("winding", "power", ("0.8 W/W", 0.1)), ("body", "speed", ("15 W", 0.3), {"reference": "1000 rpm"})],
+    boundaries={"ambient": "ambient", "coolant": "18 degC"},
+)
 
 
 def _spindle(folder):

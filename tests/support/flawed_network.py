@@ -6,55 +6,23 @@ import numpy as np
 import pandas as pd
 from scipy.integrate import solve_ivp
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "drive"
-[[network.node]]
-name = "winding"
-capacity = {value = "400 J/K", sigma_rel = 0.1}
-[[network.node]]
-name = "bearing"
-capacity = {value = "250 J/K", sigma_rel = 0.1}
-[[network.node]]
-name = "body"
-capacity = {value = "1500 J/K", sigma_rel = 0.1}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.link]]
-between = ["winding", "body"]
-conductance = {value = "4 W/K", sigma_rel = 0.15}
-[[network.link]]
-between = ["bearing", "body"]
-conductance = {value = "3 W/K", sigma_rel = 0.15}
-[[network.link]]
-between = ["body", "ambient"]
-conductance = {value = "2.5 W/K", sigma_rel = 0.15}
-[[network.source]]
-node = "winding"
-input = "power"
-gain = {value = "0.9 W/W", sigma_rel = 0.05}
-[[network.source]]
-node = "bearing"
-input = "speed"
-gain = {value = "12 W", sigma_rel = 0.1}
-reference = "1000 rpm"
-exponent = 1.5
-"""
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "%s"
-data = "data.csv"
-time = {column = "t", unit = "s"}
-channel = [
-{column = "Tw", role = "temperature", probe = "winding", unit = "degC", sigma = 0.1},
-{column = "Tl", role = "temperature", probe = "bearing", unit = "degC", sigma = 0.1},
-{column = "Tb", role = "temperature", probe = "body", unit = "degC", sigma = 0.1},
-{column = "room", role = "input", drives = "ambient", unit = "degC"},
-{column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
-{column = "n", role = "input", drives = "speed", unit = "rpm", hold = "previous"},
-]
-"""
+from tests.support.written_texts import manifest_text, network_text
+
+MACHINE = network_text(
+    "drive",
+    {"winding": ("400 J/K", 0.1), "bearing": ("250 J/K", 0.1), "body": ("1500 J/K", 0.1)},
+    {"winding|body": ("4 W/K", 0.15), "bearing|body": ("3 W/K", 0.15), "body|ambient": ("2.5 W/K", 0.15)},
+    [
+        ("winding", "power", ("0.9 W/W", 0.05)),
+        ("bearing", "speed", ("12 W", 0.1), {"reference": "1000 rpm", "exponent": 1.5}),
+    ],
+)
+MANIFEST = manifest_text(
+    "%s",
+    {"Tw": "winding", "Tl": "bearing", "Tb": "body"},
+    {"room": "ambient", "P": "power", "n": "speed"},
+    time="t",
+)
 SPREADS = {
     "winding": ("C", 400.0, 0.1),
     "bearing": ("C", 250.0, 0.1),

@@ -25,30 +25,14 @@ from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.studies.simulate import simulate_recordings
 from tests.support.lumped_spindle import lumped_model
+from tests.support.written_texts import manifest_text, network_text
 
-NETWORK = """
-schema = "spindle-fem/machine/1"
-name = "small motor"
-[[network.node]]
-name = "winding"
-capacity = {value = "180 J/K", sigma_rel = 0.5}
-[[network.node]]
-name = "body"
-capacity = {value = "500 J/K", sigma_rel = 0.5}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.link]]
-between = ["winding", "body"]
-conductance = {value = "2.3 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "ambient"]
-conductance = {value = "0.5 W/K", sigma_rel = 0.5}
-[[network.source]]
-node = "winding"
-input = "power"
-gain = {value = "0.8 W/W", sigma_rel = 0.1}
-"""
+NETWORK = network_text(
+    "small motor",
+    {"winding": ("180 J/K", 0.5), "body": ("500 J/K", 0.5)},
+    {"winding|body": ("2.3 W/K", 0.5), "body|ambient": ("0.5 W/K", 0.5)},
+    [("winding", "power", ("0.8 W/W", 0.1))],
+)
 
 SOURCE = """
 [[effect]]
@@ -67,18 +51,9 @@ component = "body"
 parameters = {time_constant = "200 s"}
 """
 
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "synthetic"
-data = "data.csv"
-time = {column = "time_s", unit = "s"}
-channel = [
-{column = "T_winding", role = "temperature", probe = "winding", unit = "degC", sigma = 0.1},
-{column = "T_body", role = "temperature", probe = "body", unit = "degC", sigma = 0.1},
-{column = "T_room", role = "input", drives = "ambient", unit = "degC"},
-{column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
-]
-"""
+MANIFEST = manifest_text(
+    "synthetic", {"T_winding": "winding", "T_body": "body"}, {"T_room": "ambient", "P": "power"}
+)
 
 
 @pytest.fixture(scope="module")

@@ -29,57 +29,22 @@ from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.recordings.align import read_recording
+from tests.support.written_texts import manifest_text, network_text
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "small motor"
-[[network.node]]
-name = "winding"
-capacity = {value = "180 J/K", sigma_rel = 0.3}
-[[network.node]]
-name = "body"
-capacity = {value = "500 J/K", sigma_rel = 0.3}
-[[network.node]]
-name = "foot"
-capacity = "900 J/K"
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.link]]
-between = ["winding", "body"]
-conductance = {value = "2.3 W/K", sigma_rel = 0.3}
-[[network.link]]
-between = ["body", "ambient"]
-conductance = {value = "0.5 W/K", sigma_rel = 0.3}
-[[network.link]]
-between = ["body", "foot"]
-conductance = "1.5 W/K"
-[[network.link]]
-between = ["foot", "ambient"]
-conductance = "0.8 W/K"
-[[network.source]]
-node = "winding"
-input = "power"
-gain = {value = "0.8 W/W", sigma_rel = 0.1}
-[[network.source]]
-node = "body"
-input = "speed"
-gain = "15 W"
-reference = "1000 rpm"
-"""
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "synthetic"
-data = "data.csv"
-time = {column = "time_s", unit = "s"}
-channel = [
-{column = "T_winding", role = "temperature", probe = "winding", unit = "degC", sigma = 0.1},
-{column = "T_body", role = "temperature", probe = "body", unit = "degC", sigma = 0.1},
-{column = "T_room", role = "input", drives = "ambient", unit = "degC"},
-{column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
-{column = "n", role = "input", drives = "speed", unit = "rpm", hold = "previous"},
-]
-"""
+MACHINE = network_text(
+    "small motor",
+    {"winding": ("180 J/K", 0.3), "body": ("500 J/K", 0.3), "foot": "900 J/K"},
+    {
+        "winding|body": ("2.3 W/K", 0.3),
+        "body|ambient": ("0.5 W/K", 0.3),
+        "body|foot": "1.5 W/K",
+        "foot|ambient": "0.8 W/K",
+    },
+    [("winding", "power", ("0.8 W/W", 0.1)), ("body", "speed", "15 W", {"reference": "1000 rpm"})],
+)
+MANIFEST = manifest_text(
+    "synthetic", {"T_winding": "winding", "T_body": "body"}, {"T_room": "ambient", "P": "power", "n": "speed"}
+)
 TRUTH = {
     "capacity.winding": 1.2,
     "capacity.body": 0.8,

@@ -16,43 +16,18 @@ from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate, expected_slow_error
 from spindle_fem.inference.sufficiency import response_time, says_too_little
 from spindle_fem.recordings.align import read_recording
+from tests.support.written_texts import manifest_text, network_text
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "small motor"
-initial = "ambient"
-[[network.node]]
-name = "winding"
-capacity = {value = "180 J/K", sigma_rel = 0.3}
-[[network.node]]
-name = "body"
-capacity = {low = "400 J/K", high = "700 J/K"}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.link]]
-between = ["winding", "body"]
-conductance = {value = "2.3 W/K", sigma_rel = 0.3}
-[[network.link]]
-between = ["body", "ambient"]
-conductance = "0.9 W/K"
-[[network.source]]
-node = "winding"
-input = "power"
-gain = {value = "0.8 W/W", sigma_rel = 0.1}
-"""
-MANIFEST = """
-schema = "spindle-fem/recording/1"
-name = "synthetic"
-data = "data.csv"
-time = {column = "time_s", unit = "s"}
-channel = [
-{column = "T_winding", role = "temperature", probe = "winding", unit = "degC", sigma = 0.1},
-{column = "T_body", role = "temperature", probe = "body", unit = "degC", sigma = 0.1},
-{column = "T_room", role = "input", drives = "ambient", unit = "degC"},
-{column = "P", role = "input", drives = "power", unit = "W", hold = "previous"},
-]
-"""
+MACHINE = network_text(
+    "small motor",
+    {"winding": ("180 J/K", 0.3), "body": {"low": "400 J/K", "high": "700 J/K"}},
+    {"winding|body": ("2.3 W/K", 0.3), "body|ambient": "0.9 W/K"},
+    [("winding", "power", ("0.8 W/W", 0.1))],
+    initial="ambient",
+)
+MANIFEST = manifest_text(
+    "synthetic", {"T_winding": "winding", "T_body": "body"}, {"T_room": "ambient", "P": "power"}
+)
 
 
 def written(folder, temperatures=None):

@@ -18,48 +18,23 @@ from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.solvers.network_start import initial_state, magnitude_history
 from tests.support.network_runs import modal_solution
+from tests.support.written_texts import network_text
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "small motor"
-[[network.node]]
-name = "winding"
-capacity = {value = "180 J/K", sigma_rel = 0.5}
-[[network.node]]
-name = "body"
-capacity = {value = "500 J/K", sigma_rel = 0.5}
-[[network.node]]
-name = "foot"
-capacity = {value = "900 J/K", sigma_rel = 0.5}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.boundary]]
-name = "bench"
-temperature = {low = "15 degC", high = "25 degC"}
-[[network.link]]
-between = ["winding", "body"]
-conductance = {value = "2.3 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "ambient"]
-conductance = {value = "0.5 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["body", "foot"]
-conductance = {value = "1.5 W/K", sigma_rel = 0.5}
-[[network.link]]
-between = ["foot", "bench"]
-conductance = {value = "0.8 W/K", sigma_rel = 0.5}
-[[network.source]]
-node = "winding"
-input = "power"
-gain = {value = "0.8 W/W", sigma_rel = 0.1}
-[[network.source]]
-node = "body"
-input = "speed"
-gain = {value = "15 W", sigma_rel = 0.3}
-reference = "1000 rpm"
-exponent = 1.5
-"""
+MACHINE = network_text(
+    "small motor",
+    {"winding": ("180 J/K", 0.5), "body": ("500 J/K", 0.5), "foot": ("900 J/K", 0.5)},
+    {
+        "winding|body": ("2.3 W/K", 0.5),
+        "body|ambient": ("0.5 W/K", 0.5),
+        "body|foot": ("1.5 W/K", 0.5),
+        "foot|bench": ("0.8 W/K", 0.5),
+    },
+    [
+        ("winding", "power", ("0.8 W/W", 0.1)),
+        ("body", "speed", ("15 W", 0.3), {"reference": "1000 rpm", "exponent": 1.5}),
+    ],
+    boundaries={"ambient": "ambient", "bench": {"low": "15 degC", "high": "25 degC"}},
+)
 
 MANIFEST = """
 schema = "spindle-fem/recording/1"

@@ -18,38 +18,14 @@ from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.network_start import initial_parameters, initial_state, magnitude_history
 from tests.support.network_runs import modal_solution, run_on_recording
+from tests.support.written_texts import network_text
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "spindle on a bench"
-[[network.node]]
-name = "bearing"
-capacity = {value = "400 J/K", sigma_rel = 0.3}
-[[network.node]]
-name = "shaft"
-capacity = {value = "900 J/K", sigma_rel = 0.3}
-[[network.node]]
-name = "housing"
-capacity = {value = "3 kJ/K", sigma_rel = 0.3}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.link]]
-between = ["bearing", "housing"]
-conductance = {value = "8 W/K", sigma_rel = 0.3}
-[[network.link]]
-between = ["bearing", "shaft"]
-conductance = {value = "3 W/K", sigma_rel = 0.3}
-[[network.link]]
-between = ["housing", "ambient"]
-conductance = {value = "4 W/K", sigma_rel = 0.3}
-[[network.source]]
-node = "bearing"
-input = "speed"
-gain = {value = "80 W", sigma_rel = 0.3}
-reference = "1000 rpm"
-exponent = 1.5
-"""
+MACHINE = network_text(
+    "spindle on a bench",
+    {"bearing": ("400 J/K", 0.3), "shaft": ("900 J/K", 0.3), "housing": ("3 kJ/K", 0.3)},
+    {"bearing|housing": ("8 W/K", 0.3), "bearing|shaft": ("3 W/K", 0.3), "housing|ambient": ("4 W/K", 0.3)},
+    [("bearing", "speed", ("80 W", 0.3), {"reference": "1000 rpm", "exponent": 1.5})],
+)
 
 MANIFEST = """
 schema = "spindle-fem/recording/1"
