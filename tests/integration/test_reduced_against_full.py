@@ -157,9 +157,11 @@ def test_ring_spot_and_sides_stand_for_heat_on_a_part_of_the_housing(machine, fa
 
 
 @pytest.mark.parametrize(
-    ("length", "swing"), [(0.25, 1.0), pytest.param(1.0, 3.0, marks=pytest.mark.slow)], ids=["short", "long"]
+    ("length", "swing", "step"),
+    [(0.2, 0.5, 20.0), pytest.param(1.0, 3.0, None, marks=pytest.mark.slow)],
+    ids=["short, even steps", "long, steps by their error"],
 )
-def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fast, length, swing):
+def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fast, length, swing, step):
     end = 5400.0 * length
     times = np.arange(0.0, end + 1.0, 20.0)
     switched = [times < length * instant for instant in (600, 2400, 4200)]
@@ -167,7 +169,9 @@ def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fa
     values = history(times, speed, 293.15 + 1e-4 * times, 290.0 + 0.5 * np.sin(times / 1000.0))
     inputs = InputHistory(times, STANDARD, values, HELD)
     samples = np.arange(0.0, end + 1.0, 60.0)
-    full = simulate_full(machine, inputs, sample_times=samples, options=TransientOptions(error=0.01))
+    full = simulate_full(
+        machine, inputs, sample_times=samples, options=TransientOptions(error=0.01, fixed_step=step)
+    )
     run = simulate_fast(fast, make_drive(times, STANDARD, values, HELD), 293.15)
     for probe in full.probes:
         reduced = run.temperature[::3, fast.channels.index(probe)][: len(samples)]
