@@ -194,20 +194,14 @@ def test_random_designs_mesh(number):
         assert max(map(abs, area_errors(mesh).values())) < 1e-3
 
 
-def test_cache_returns_the_same_mesh(machine, tmp_path, monkeypatch):
+def test_same_input_same_mesh_made_or_from_the_cache(machine, mesh, tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
-    made = build_mesh(machine, "coarse", threads=1)
+    made = build_mesh(machine, "coarse")
     monkeypatch.setattr("spindle_fem.machine.meshing.build_mesh.generate_mesh", None)
-    read = build_mesh(machine, "coarse", threads=1)
-    assert np.array_equal(made.points, read.points)
-    assert made.digest == read.digest
-
-
-def test_same_input_same_mesh(machine, mesh):
-    again = build_mesh(machine, "coarse", use_cache=False)
-    assert np.array_equal(again.points, mesh.points)
-    assert np.array_equal(again.tetrahedra, mesh.tetrahedra)
-    assert again.digest == mesh.digest
+    for again in (made, build_mesh(machine, "coarse")):
+        assert np.array_equal(again.points, mesh.points)
+        assert np.array_equal(again.tetrahedra, mesh.tetrahedra)
+        assert again.digest == mesh.digest
 
 
 def test_second_attempt_is_noted(machine, monkeypatch):

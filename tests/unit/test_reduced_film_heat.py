@@ -227,8 +227,8 @@ def test_values_at_an_operating_point_are_remembered_and_do_not_mix(spec, fricti
 def lumped(spec, friction, table):
     """The tabulated machine with one unknown a part, and a drive through two speeds and a rest."""
     fast = fast_spindle(lumped_model(table), table, (FilmHeat(friction, spec, table),))
-    times = np.arange(0.0, 5400.0, 60.0)
-    return fast, drive_of(times, np.select([times < 2400, times < 3600], [3000.0, 1000.0], 0.0))
+    times = np.arange(0.0, 2700.0, 60.0)
+    return fast, drive_of(times, np.select([times < 1200, times < 1800], [3000.0, 1000.0], 0.0))
 
 
 def test_given_terms_are_always_there_and_stay_on_a_smaller_basis(lumped):
