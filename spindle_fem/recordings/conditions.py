@@ -39,14 +39,6 @@ class Conditions:
         """Stamps at which a condition holds."""
         return self.marks[:, self.names.index(name)]
 
-    def dominant(self, start: int, stop: int) -> str:
-        """The most frequent condition of some stamps, machine state and trend joined."""
-        share = self.marks[start:stop].mean(axis=0)
-        trends = [k for k, name in enumerate(self.names) if name in ("heating", "cooling", "steady")]
-        states = [k for k in range(len(self.names)) if k not in trends]
-        chosen = [max(group, key=lambda k: share[k]) for group in (states, trends) if group]
-        return ", ".join(self.names[k] for k in chosen)
-
 
 def operating_conditions(recording: Recording) -> Conditions:
     """Classify every stamp of a recording.

@@ -176,12 +176,6 @@ def select_triangles(shape: TriangleSet, chosen: NDArray[np.bool_]) -> TriangleS
     )
 
 
-def triangle_area(shape: TriangleSet) -> NDArray[np.float64]:
-    """Area of each flat triangle, (m,) in m²."""
-    a, b, c = (shape.points[shape.triangles[:, k]] for k in range(3))
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-
-
 def all_facets(mesh: TaggedMesh) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Every facet (n, 6) of every part, those in joints included, and its part."""
     part_index = {name: index for index, name in enumerate(mesh.part_names)}
