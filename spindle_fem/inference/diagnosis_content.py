@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDESCRIBED_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
-from spindle_fem.inference.findings import channel_errors, findings_of, noise_level, rmse
+from spindle_fem.inference.findings import (
+    channel_errors,
+    findings_of,
+    noise_level,
+    predictions_at_stamps,
+    rmse,
+)
 from spindle_fem.inference.misdescription_content import misdescription_content
 from spindle_fem.inference.mismatch_place import where_of
 from spindle_fem.inference.missing_heat import stretches
@@ -59,7 +66,7 @@ def diagnosis_content(
         },
         "fit": {
             "before": _errors(diagnosis, before),
-            "after": _errors(diagnosis, after),
+            "after": _errors(diagnosis, after) | _told(diagnosis),
             "noise_K": noise_level(predictor),
             "heldout": diagnosis.heldout,
             "heldout_s": [
@@ -79,6 +86,16 @@ def diagnosis_content(
         "defects": [recording.defects.to_json() for recording in predictor.recordings],
         "versions": package_versions(),
     }
+
+
+def _told(diagnosis: Diagnosis) -> dict[str, float]:
+    """Held-out error with the states that all readings tell, at parameters that saw no held-out reading."""
+    if not diagnosis.states:
+        return {}
+    final = diagnosis.final
+    told = replace(final, candidates=tuple(diagnosis.told(item) for item in final.candidates))
+    predicted = predictions_at_stamps(diagnosis.predictor, told)
+    return {"heldout_states_told_rmse_K": rmse(diagnosis.predictor, predicted, heldout=True)}
 
 
 def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, float]:

@@ -78,9 +78,13 @@ def readings_about(
         names = {c.name for c in candidate_coordinates(left_out)}
         own = np.array([c.name in names for c in fit.coordinates])
     by, root = by[:, :, ~own], root[np.ix_(~own, ~own)]
-    # Coordinates count from what is known of them before, in units of what is not known.
-    model = model - by @ (fit.position - mean)[~own]
-    slopes = np.linalg.solve(root.T, by.reshape(-1, by.shape[2]).T).T.reshape(by.shape)
+    if everything:
+        # Parameters stay as they were fitted, as far as that knows them.
+        slopes = by @ np.linalg.cholesky(fit.covariance[np.ix_(~own, ~own)])
+    else:
+        # Coordinates count from what is known of them before, in units of what is not known.
+        model = model - by @ (fit.position - mean)[~own]
+        slopes = np.linalg.solve(root.T, by.reshape(-1, by.shape[2]).T).T.reshape(by.shape)
     usable = recording.usable & (True if everything else predictor.use[number][:, None])
     owner = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), recording.times)
     residual = np.full((len(grid), usable.shape[1]), np.nan)
