@@ -12,10 +12,12 @@ from spindle_fem.errors import SpecError
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.drive_steps import coarse_drive
+from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import direction_columns, misdescriptions_of
 from spindle_fem.inference.observations import Observation, observe
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import STEP, Predictor
+from spindle_fem.inference.structural_misdescriptions import StructuralChange, model_with_directions
 from spindle_fem.model.reduced.defined_effects import ActiveEffects
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.model.reduced.fast_model import FastModel
@@ -77,6 +79,28 @@ def _drive_of(fast: FastModel, piece: Recording) -> Drive:
     return replace(drive, times=drive.grid)
 
 
+def _end_of(told: Prediction, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
+    """State at the end of a piece and its derivatives to coordinates, zero where they do not enter."""
+    slopes = np.zeros((told.states.shape[1], len(names)))
+    inside = told.columns >= 0
+    if told.tangents is not None:
+        slopes[:, inside] = told.tangents[-1][:, told.columns[inside]]
+    return told.states[-1], dict(zip(names, slopes.T, strict=True))
+
+
+def _add(
+    told: Prediction,
+    directions: Sequence[Misdescription],
+    columns: Array,
+    values: Mapping[str, float],
+    names: Sequence[str],
+) -> None:
+    """Add what directions do to the readings, columns (G + 1, c, n), in place."""
+    for index, item in enumerate(directions):
+        told.temperature[:] += values[item.coordinate] * columns[:, :, index]
+        told.sensitivity[:, :, names.index(item.coordinate)] += columns[:, :, index]
+
+
 class ContinuedRun:
     """The state of a machine over time and its derivatives to named coordinates.
 
@@ -96,6 +120,7 @@ class ContinuedRun:
         self.begun: tuple[Array, Mapping[str, Array]] | None = None
         # Derivatives of the state to directions of misdescription, which it does not follow itself.
         self._directions: dict[str, Array] = {}
+        self._structural: tuple[Array, Mapping[str, Array]] | None = None
         self._run: TransientRun | None = None
 
     def begins(self, piece: Recording) -> Predictor:
@@ -125,13 +150,8 @@ class ContinuedRun:
         """
         predictor = _Piece(self.fast, piece, self.effects, self.begun)
         told = predictor.predict(0, values, (), names)
+        self.begun, self._run = _end_of(told, names), told.run
         self._misdescribe(predictor, told, values, names)
-        slopes = np.zeros((told.states.shape[1], len(names)))
-        inside = told.columns >= 0
-        if told.tangents is not None:
-            slopes[:, inside] = told.tangents[-1][:, told.columns[inside]]
-        self._run = told.run
-        self.begun = told.states[-1], dict(zip(names, slopes.T, strict=True))
         fresh = np.ones(piece.times.size, dtype=bool)
         fresh[0] = False
         return told, observe([piece], [fresh], [predictor.drives[0].grid], [width])
@@ -140,7 +160,17 @@ class ContinuedRun:
         self, predictor: Predictor, told: Prediction, values: Mapping[str, float], names: Sequence[str]
     ) -> None:
         """What directions of misdescription do to the readings, to first order, in place."""
-        directions = [item for item in misdescriptions_of(predictor) if item.coordinate in names]
+        asked = [item for item in misdescriptions_of(predictor) if item.coordinate in names]
+        structural = [item for item in asked if isinstance(item.change, StructuralChange)]
+        if structural:
+            # Their model carries them in its own state.
+            model, own = model_with_directions(self.fast), [item.change.name for item in structural]
+            beside = _Piece(model, predictor.recordings[0], self.effects, self._structural)
+            differs = beside.predict(0, values, (), own)
+            self._structural = _end_of(differs, own)
+            amounts = np.array([item.change.amount for item in structural])
+            _add(told, structural, differs.sensitivity * amounts, values, names)
+        directions = [item for item in asked if not isinstance(item.change, StructuralChange)]
         if not directions:
             return
         base = BaseRun(predictor, 0, values)
@@ -150,9 +180,7 @@ class ContinuedRun:
             carried = base.run.tangents(np.zeros_like(states[1:]), base.tracks, start=start[None])
             channels, states = channels + base.outputs(carried), states + carried
         self._directions = {item.coordinate: states[-1, :, i] for i, item in enumerate(directions)}
-        for index, item in enumerate(directions):
-            told.temperature[:] += values[item.coordinate] * channels[:, :, index]
-            told.sensitivity[:, :, names.index(item.coordinate)] += channels[:, :, index]
+        _add(told, directions, channels, values, names)
 
     def slowest_time(self) -> float:
         """Longest time constant of the machine as it ran last, s."""

@@ -41,7 +41,7 @@ class StructuralChange:
 
 def structural_columns(base: BaseRun) -> dict[str, Array]:
     """Change of every channel for a unit of each direction, (G + 1, c) K, by direction."""
-    model = _model_of(base.predictor.fast)
+    model = model_with_directions(base.predictor.fast)
     names = tuple(item.name for item in model.structural)
     own = base.predictor.with_model(model)
     told = own.predict(base.number, base.values, base.candidates, names)
@@ -55,13 +55,14 @@ def structural_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]
     """
     if predictor.is_network or not predictor.fast.model.n_full:
         return
-    for item in _model_of(predictor.fast).structural:
+    for item in model_with_directions(predictor.fast).structural:
         unit, scale = TOLD_IN.get(item.unit, (item.unit, 1.0))
         change = StructuralChange(item.name, scale)
         yield Misdescription(item.name, item.key, unit, item.sigma / scale, item.statement, change)
 
 
-def _model_of(fast: FastModel) -> StructuralModel:
+def model_with_directions(fast: FastModel) -> StructuralModel:
+    """The fast model that may be differentiated by its directions, made or fetched once."""
     if fast not in _models:
         _models[fast] = structural_model_of(fast)
     return _models[fast]

@@ -10,9 +10,12 @@ import pandas as pd
 import pytest
 
 from spindle_fem.errors import RecordingError
+from spindle_fem.inference import misdescription_columns
 from spindle_fem.inference.continued_run import ContinuedRun
 from spindle_fem.inference.cumulative_sums import CumulativeSums, level_for, run_length
+from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.innovations import InnovationFilter
+from spindle_fem.inference.misdescription_columns import PROVIDERS
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.watched_machine import WatchedMachine
@@ -182,7 +185,13 @@ def test_a_window_begins_with_the_last_reading_of_an_input(folder):
 
 
 # ---------------------------------------------------------------------------------------- model
-def test_pieces_of_a_run_are_the_run(fast, tmp_path):
+@pytest.mark.parametrize(
+    "providers",
+    [(heat_misdescriptions,), pytest.param(PROVIDERS, marks=pytest.mark.slow)],
+    ids=["heat", "all"],
+)
+def test_pieces_of_a_run_are_the_run(fast, tmp_path, monkeypatch, providers):
+    monkeypatch.setattr(misdescription_columns, "PROVIDERS", providers)
     times = np.arange(0.0, 7200.0, 60.0)
     frame = pd.DataFrame(
         {
@@ -291,7 +300,8 @@ def test_a_compressed_file_does_not_grow(tmp_path):
         next(follow_lines(tmp_path / "made.csv.gz", to_end=False, poll=0.0, tell=print))
 
 
-def test_after_a_gap_a_network_begins_again_and_geometry_waits(fast, folder, tmp_path):
+def test_after_a_gap_a_network_begins_again_and_geometry_waits(fast, folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(misdescription_columns, "PROVIDERS", (heat_misdescriptions,))
     frame = heated(8.0, seed=2)
     frame = frame[(frame.time < 4.0 * 3600.0) | (frame.time > 5.5 * 3600.0)]
     write_recording(tmp_path / "gap", frame, TEMPERATURES, INPUTS)
