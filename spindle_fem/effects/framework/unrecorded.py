@@ -101,6 +101,9 @@ class InIntervals:
         factors = [shape(f"factor_{n}", size, jitter, low=0.01) for n, size in enumerate(usual, 1)]
         if self._number == 1:
             factors = []
+        elif course == STEPS:
+            # As many free numbers as levels: the first stands to the common size as it is.
+            factors[0] = replace(factors[0], sigma=0.0)
         # A level that changes is another state of the machine, at once: its lag is that of the masses.
         lag = shape("lag", EDGE_WIDTH, 0.0, "s") if course == STEPS else _lag()
         self.parameters = (lag, *self._free_edges(intervals), *factors)
