@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from spindle_fem.inference.coarse_machine import refined
 from spindle_fem.inference.diagnosis import MOST_WORKERS, Diagnosis, diagnose_recordings
 from spindle_fem.inference.diagnosis_content import diagnosis_content, plain_data, unexplained_content
 from spindle_fem.inference.findings import predictions_at_stamps, states_of
@@ -109,6 +110,7 @@ def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
     opened = open_machine(
         asked.machine, tuple(asked.overrides), read, earlier, heldout=asked.heldout, progress=tell
     )
+    opened = refined(opened)
     with output_folder(asked.folder) as place:
         drawn = None
         reason = says_too_little(opened)
@@ -155,9 +157,9 @@ def _draw(place: Path, content: Mapping[str, Any]) -> Mapping[str, list[Any]]:
 
 def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, report: bool) -> dict[str, Any]:
     """Write predictions, states, the improved machine and the data of the report; the content so far."""
-    before, after = (
-        predictions_at_stamps(diagnosis.predictor, fit) for fit in (diagnosis.null, diagnosis.final)
-    )
+    before = predictions_at_stamps(diagnosis.unchanged, diagnosis.null)
+    plant = diagnosis.predictor if diagnosis.final.candidates else diagnosis.unchanged
+    after = predictions_at_stamps(plant, diagnosis.final)
     _write_predictions(diagnosis, place, "before", before)
     _write_predictions(diagnosis, place, "after", after)
     content = diagnosis_content(diagnosis, opened, before, after)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -19,6 +19,7 @@ from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Coordinate, Fit, Problem
 from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.input_sampling import left_over_noise
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
 from spindle_fem.inference.opened_machine import DiagnosedMachine
@@ -27,6 +28,7 @@ from spindle_fem.inference.prepared_problem import (
     Calibrated,
     calibrate,
     slow_error_of,
+    with_own_noise,
 )
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
@@ -51,6 +53,8 @@ class Diagnosis:
     ----------
     predictor : Predictor
         Machine on the diagnosed recordings, full basis.
+    unchanged : Predictor
+        The same for nothing missing: what its misdescriptions do without the set that was found.
     hypotheses : tuple of Hypothesis
         The most probable first.
     null : Fit
@@ -69,6 +73,7 @@ class Diagnosis:
     """
 
     predictor: Predictor
+    unchanged: Predictor
     view: MachineView
     calibrated: Calibrated
     hypotheses: tuple[Hypothesis, ...]
@@ -131,6 +136,10 @@ def diagnose_recordings(
     if earlier is not None:
         earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
     calibrated = calibrate(earlier, predictor)
+    if earlier is not None and machine.is_network:
+        belief = calibrated.belief
+        fitted = {c.name: c.at(u) for c, u in zip(belief.coordinates, belief.mean, strict=True)}
+        predictor = with_misdescriptions(predictor, directions, fitted)
     clock.lap("calibration")
     candidates = candidates_for(view)
     effects = catalogue()
@@ -148,23 +157,37 @@ def diagnose_recordings(
     found = run_search(search)
     clock.lap("search")
     progress("diagnosis: final fits")
-    best = rank(found)[0].best
+    coarseness = tuned.NETWORK_COARSENESS if machine.is_network else 1.0
+    best = rank(found, coarseness)[0].best
     slow = slow_error_of(problem, best.fit)
     trials = len({(c.effect, c.component) for c in candidates})
     empty = next(h for h in found if not h.fit.candidates)
-    wrong = wrong_direction(problem.belief, empty.fit, directions, trials)
+    wrong = wrong_direction(problem.belief, empty.fit, directions, trials, coarseness)
     if wrong is not None and wrong.log_gain > max(0.0, best.score - empty.score):
         belief = wrong.belief
         problem = Problem(small, belief, slow, small.observations)
         slow = slow_error_of(problem, problem.fit((), empty.fit.values))
     else:
         wrong, belief = None, calibrated.belief
+    unchanged = predictor
+    if machine.is_network:
+        unchanged = with_misdescriptions(predictor, directions, empty.fit.values)
     if directions:
+        # A set changes what directions do; calibration knows them by what they did without it.
         predictor = with_misdescriptions(predictor, directions, best.fit.values, best.fit.candidates)
     final = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
-    readings = _Readings(predictor, slow.sigma)
-    refitted = _refit(final, found, workers, overlapping, readings)
+    unseen = machine.unseen[: len(recordings)]
+    refitted = _refit(final, found, workers, overlapping, _Readings(final, final, unseen), coarseness)
+    # Nothing missing is the likelier of what directions do about its own run and about that of the set.
+    plain = Problem(unchanged, belief, slow, predictor.observations)
+    own = plain.fit((), empty.fit.values)
+    after = next(h.fit for h in refitted if not h.fit.candidates)
+    if after.misfit_with_prior < own.misfit_with_prior:
+        unchanged, plain, own = predictor, final, after
+    refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
+    readings = _Readings(final, plain, unseen)
+    refitted = with_own_noise(final, plain, readings.kept(refitted))
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
     judgement = judge(
@@ -173,6 +196,8 @@ def diagnose_recordings(
         calibrated=bool(calibration),
         overlapping=overlapping,
         apart=readings.apart,
+        left=readings.left,
+        coarseness=coarseness,
     )
     null = next(h.fit for h in refitted if not h.fit.candidates)
     judgement = with_wrong_definition(judgement, null, wrong)
@@ -187,6 +212,7 @@ def diagnose_recordings(
     clock.lap("location")
     return Diagnosis(
         predictor,
+        unchanged,
         view,
         calibrated,
         tuple(refitted),
@@ -226,12 +252,15 @@ class _Readings:
 
     Parameters
     ----------
-    slow : float, [K]
-        Slow error of a reading.
+    final, plain : Problem
+        With effects, and with nothing missing.
+    unseen : sequence of (n_sources,) ndarray
+        As :func:`left_over_noise` takes it.
     """
 
-    def __init__(self, predictor: Predictor, slow: float) -> None:
-        self._plant, self._slow = predictor, slow
+    def __init__(self, final: Problem, plain: Problem, unseen: Sequence[Array] = ()) -> None:
+        self._plant, self._unchanged = final.predictor, plain.predictor
+        self._slow, self._unseen = final.slow.sigma, unseen
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
 
     def apart(self, one: Fit, other: Fit) -> float:
@@ -242,15 +271,46 @@ class _Readings:
             largest = max(largest, float(np.sqrt(np.mean((first - second) ** 2))) / float(noise))
         return largest
 
+    def left(self, fit: Fit) -> float:
+        """Root mean square of what a fit leaves of single readings over their noise, all channels alike."""
+        plant = self._plant
+        return left_over_noise(plant, plant.observations, self._of(fit), fit.values, self._unseen)
+
+    def kept(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Sets without those that predict held-out readings worse than a set with some of their effects alone."""
+        error = {id(h): self._heldout(h.fit) for h in hypotheses}
+        return [
+            h
+            for h in hypotheses
+            if not any(
+                other.keys < h.keys and error[id(h)] > tuned.WORSE_HELDOUT * error[id(other)]
+                for other in hypotheses
+            )
+        ]
+
+    def _heldout(self, fit: Fit) -> float:
+        """Root mean square error of held-out readings over their noise."""
+        held = self._plant.heldout
+        told = self._told(fit)
+        errors = [
+            np.mean((item.at(told[item.recording][:, item.channel]) - item.values) ** 2) / item.bins.white**2
+            for item in held
+        ]
+        return float(np.sqrt(np.mean(errors))) if errors else 0.0
+
     def _of(self, fit: Fit) -> list[Array]:
+        told = self._told(fit)
+        return [item.at(told[item.recording][:, item.channel]) for item in self._plant.observations]
+
+    def _told(self, fit: Fit) -> list[Array]:
         if id(fit) not in self._known:
+            plant = self._plant if fit.candidates else self._unchanged
             told = [
-                self._plant.predict(number, fit.values, fit.candidates).temperature
+                plant.predict(number, fit.values, fit.candidates).temperature
                 for number in range(len(self._plant.recordings))
             ]
-            own = [item.at(told[item.recording][:, item.channel]) for item in self._plant.observations]
             # The fit is kept so that no other takes its identity.
-            self._known[id(fit)] = fit, own
+            self._known[id(fit)] = fit, told
         return self._known[id(fit)][1]
 
 
@@ -260,9 +320,10 @@ def _refit(
     workers: Workers,
     overlapping: Mapping[str, frozenset[str]],
     readings: _Readings,
+    coarseness: float,
 ) -> list[Hypothesis]:
     """The most probable hypotheses, what reads nearly as the first, and the empty one, on the whole basis."""
-    score = {id(h): value for h, value in zip(found, tempered(found), strict=True)}
+    score = {id(h): value for h, value in zip(found, tempered(found, coarseness), strict=True)}
     ranked = sorted(found, key=lambda h: -score[id(h)])
     best = score[id(ranked[0])]
     chosen = [
@@ -274,7 +335,8 @@ def _refit(
     members = ranked[0].keys
     smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
     chosen += [h for h in smaller if h not in chosen]
-    chosen += [h for h in ranked if not h.fit.candidates and h not in chosen]
+    for size in range(len(members)):
+        chosen += [h for h in ranked if len(h.fit.candidates) == size and h not in chosen][:1]
     first = ranked[0].fit
     rivals = [
         h

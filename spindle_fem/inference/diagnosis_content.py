@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,8 @@ def diagnosis_content(
         "machine": opened.name,
         "recordings": [recording.name for recording in predictor.recordings],
         "verdict": judgement.verdict,
-        "reason": judgement.reason,
+        "reason": " ".join(filter(None, (_too_coarse(opened), judgement.reason))),
+        "machine_too_coarse": None if opened.too_coarse is None else asdict(opened.too_coarse),
         "mismatch": {
             "detected": judgement.verdict != "consistent",
             "p_value": judgement.p_value,
@@ -96,6 +97,10 @@ def _told(diagnosis: Diagnosis) -> dict[str, float]:
     told = replace(final, candidates=tuple(diagnosis.told(item) for item in final.candidates))
     predicted = predictions_at_stamps(diagnosis.predictor, told)
     return {"heldout_states_told_rmse_K": rmse(diagnosis.predictor, predicted, heldout=True)}
+
+
+def _too_coarse(opened: DiagnosedMachine) -> str:
+    return "" if opened.too_coarse is None else opened.too_coarse.statement
 
 
 def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, float]:

@@ -17,10 +17,19 @@ class Hypothesis:
     ----------
     log_prior : float
         Logarithm of the prior of the set and of the choice of its intervals.
+    deviance : float or None
+        Minus twice the logarithm of likelihood and prior of the values, under the slow error that is most
+        probable here; None while all hypotheses share one slow error.
     """
 
     fit: Fit
     log_prior: float
+    deviance: float | None = None
+
+    @property
+    def misfit(self) -> float:
+        """What is compared between hypotheses: half its difference is a logarithm of likelihoods."""
+        return self.fit.misfit_with_prior if self.deviance is None else self.deviance
 
     @property
     def score(self) -> float:

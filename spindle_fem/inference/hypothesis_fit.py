@@ -290,7 +290,7 @@ class Problem:
             predicted = self.predict(candidates, coordinates, at, slopes=False, near=near)
             residual = self.data - self.whitened([p.temperature for p in predicted])
             pull = root @ (at - mean)
-            return float(np.sum(_huber(residual)) + pull @ pull), residual, predicted
+            return float(np.sum(huber(residual)) + pull @ pull), residual, predicted
 
         def slopes_at(at: Array, near: list[Prediction]) -> tuple[Array, list[Prediction]]:
             predicted = self.predict(candidates, coordinates, at, near=near)
@@ -362,7 +362,7 @@ class Problem:
             position,
             0.5 * (covariance + covariance.T),
             -0.5 * cost - 0.5 * log_det + log_root + cut_off,
-            float(np.sum(_huber(residual))),
+            float(np.sum(huber(residual))),
             cost,
             residual,
             self.slow,
@@ -370,7 +370,8 @@ class Problem:
         )
 
 
-def _huber(residual: Array) -> Array:
+def huber(residual: Array) -> Array:
+    """Square of a whitened residual, beyond ``OUTLIER_SIGMAS`` linear."""
     size = np.abs(residual)
     return np.where(size <= OUTLIER_SIGMAS, residual**2, 2.0 * OUTLIER_SIGMAS * size - OUTLIER_SIGMAS**2)
 

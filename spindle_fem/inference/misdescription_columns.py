@@ -17,13 +17,18 @@ from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.network_misdescriptions import network_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.structural_misdescriptions import structural_misdescriptions
 
 Array = NDArray[np.float64]
 Provider = Callable[[Predictor], Iterable[Misdescription]]
 
-PROVIDERS: tuple[Provider, ...] = (heat_misdescriptions, structural_misdescriptions)
+PROVIDERS: tuple[Provider, ...] = (
+    heat_misdescriptions,
+    structural_misdescriptions,
+    network_misdescriptions,
+)
 
 
 def misdescriptions_of(predictor: Predictor) -> tuple[Misdescription, ...]:

@@ -163,7 +163,7 @@ def where_of(diagnosis: Diagnosis) -> Where:
         if name in spots and name not in sensors
     }
     radius, axial = _centre(diagnosis, component)
-    when = significant_stretches(diagnosis.predictor, diagnosis.null)
+    when = significant_stretches(diagnosis.unchanged, diagnosis.null)
     several = len(diagnosis.predictor.recordings) > 1
     stamps = tuple(
         (

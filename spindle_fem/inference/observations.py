@@ -7,12 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from spindle_fem.inference.reading_noise import ChannelBins, channel_bins
 from spindle_fem.model.reduced.reduced_transient import grid_weights
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
+
+# Points of a row at which a prediction is averaged.
+ROW_POINTS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +34,8 @@ class Observation:
         it has a value at every stamp of the recording, which are averaged.
     part : (b,) ndarray or None
         Share of the step before it that has passed.
+    spread : (b, G + 1) csr_array or None
+        Averages over the rows of each bin, where a bin is long beside what the temperatures do.
     """
 
     recording: int
@@ -38,9 +44,13 @@ class Observation:
     values: Array
     right: NDArray[np.int64] | None = None
     part: Array | None = None
+    spread: csr_array | None = None
 
     def at(self, predicted: Array) -> Array:
         """Values at the bins, (b, ...), from values (G + 1, ...) on the grid or (N, ...) at the stamps."""
+        if self.spread is not None:
+            flat = self.spread @ predicted.reshape(len(predicted), -1)
+            return flat.reshape(-1, *predicted.shape[1:])
         if self.right is None:
             return self.bins.average(predicted)
         part = self.part.reshape(-1, *([1] * (predicted.ndim - 1)))
@@ -53,6 +63,7 @@ def observe(
     use: Sequence[NDArray[np.bool_] | None],
     grids: Sequence[Array | None],
     widths: Sequence[float | None],
+    rows: Sequence[float] | None = None,
 ) -> tuple[Observation, ...]:
     """Observations of every channel that has usable readings.
 
@@ -64,11 +75,31 @@ def observe(
         Grid of each recording's prediction; None where that has a value at every stamp.
     widths : sequence of float or None, [s]
         Width of the bins of each recording, as :func:`channel_bins` takes it.
+    rows : sequence of float, optional, [s]
+        Time over which each row of a recording is a mean; predictions are averaged as the readings were.
+        Without it a prediction at a bin's mean time stands for it.
     """
     found = []
     for number, (recording, mask, grid, width) in enumerate(zip(recordings, use, grids, widths, strict=True)):
         for bins in channel_bins(recording, mask, width=width):
             values = bins.average(recording.temperature[:, bins.channel])
             weights = () if grid is None else grid_weights(bins.times, grid)
-            found.append(Observation(number, bins.channel, bins, values, *weights))
+            spread = None if grid is None or rows is None else _spread(bins, recording.times, grid, rows[number])
+            found.append(Observation(number, bins.channel, bins, values, *weights, spread))
     return tuple(found)
+
+
+def _spread(bins: ChannelBins, times: Array, grid: Array, row: float) -> csr_array:
+    """Average of what is linear between grid points over the rows of each bin, (b, G + 1)."""
+    within = (np.arange(ROW_POINTS) + 0.5) / ROW_POINTS - 0.5 if row > 0.0 else np.zeros(1)
+    at = (times[bins.rows][:, None] + row * within).ravel()
+    owner = np.repeat(bins.owner, within.size)
+    right, part = grid_weights(at, grid)
+    share = 1.0 / (bins.number[owner] * within.size)
+    return csr_array(
+        (
+            np.concatenate(((1.0 - part) * share, part * share)),
+            (np.concatenate((owner, owner)), np.concatenate((right - 1, right))),
+        ),
+        shape=(len(bins.times), grid.size),
+    )

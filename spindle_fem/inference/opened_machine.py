@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.errors import RecordingError
 from spindle_fem.inference.heldout import heldout_stamps
+from spindle_fem.inference.input_sampling import unseen_power
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.machine.view.usual_sizes import common_quantities
 from spindle_fem.model.lumped.network_view import view_of_network
@@ -48,6 +50,10 @@ class DiagnosedMachine:
         As they are used: measured inputs smoothed, long ones of networks thinned.
     notes : tuple of str
         What was done to them.
+    unseen : tuple of (n_sources,) ndarray
+        Of the recordings, then the calibration: :func:`spindle_fem.inference.input_sampling.unseen_power`.
+    too_coarse : object or None
+        :class:`spindle_fem.inference.coarse_machine.TooCoarse`, where the machine's own calibration says so.
     """
 
     name: str
@@ -58,6 +64,8 @@ class DiagnosedMachine:
     recordings: tuple[Recording, ...]
     calibration: tuple[Recording, ...]
     notes: tuple[str, ...] = ()
+    unseen: tuple[np.ndarray, ...] = ()
+    too_coarse: Any = None
 
     @property
     def is_network(self) -> bool:
@@ -151,7 +159,19 @@ def _open_network(
         own,
         earlier,
         (*notes, *more, *averaged),
+        tuple(unseen_power(network, item) for item in (*smooth, *smooth_earlier)),
     )
+
+
+def with_network(machine: DiagnosedMachine, spec: NetworkMachineSpec) -> DiagnosedMachine:
+    """The same recordings on another written network."""
+    network = build_network(spec.network)
+    fast = fast_network(network, spec)
+    has = frozenset(f"{entry.effect} @ {entry.component}" for entry in spec.effects)
+    recordings = machine.recordings
+    view = _widest([view_of_network(network, item, has=has) for item in recordings])
+    effects = effects_on(spec.effects, fast, recordings[0])
+    return replace(machine, spec=spec, fast=fast, effects=effects, view=view)
 
 
 def _denoised(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:

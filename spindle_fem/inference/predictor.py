@@ -153,7 +153,9 @@ class Predictor:
             for r in self.recordings
         ]
         grids = [None if self.at_stamps else drive.grid for drive in self.drives]
-        return observe(self.recordings, masks, grids, widths)
+        thinned = [item.defects.thinned for item in self.recordings]
+        rows = [0.0 if item is None else item.step_s for item in thinned] if coarse else None
+        return observe(self.recordings, masks, grids, widths, rows)
 
     def with_model(self, fast: FastModel, same_within: float = 0.0) -> Predictor:
         """The same recordings on another reduction of the same machine."""

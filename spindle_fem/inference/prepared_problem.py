@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +12,12 @@ from numpy.typing import NDArray
 from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import coordinate_of
 from spindle_fem.inference.coordinate_names import DIRECTIONS, PROBE_PREFIX
-from spindle_fem.inference.hypothesis_fit import THETA_BOUND, Belief, Coordinate, Fit, Problem
+from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis_fit import THETA_BOUND, Belief, Coordinate, Fit, Problem, huber
 from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.reading_noise import SlowError, likely_slow_error
+from spindle_fem.inference.reading_noise import SlowError, likely_slow_error, slow_errors_of
 
 Array = NDArray[np.float64]
 
@@ -106,20 +110,49 @@ def expected_slow_error(predictor: Predictor) -> SlowError:
 
 def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
     """Most probable slow error of what a fit leaves."""
-    predictor = problem.predictor
-    residuals = problem.binned_residuals(fit)
+    return likely_slow_error(problem.binned_residuals(fit), **_slow_choices(problem.predictor))
+
+
+def with_own_noise(final: Problem, plain: Problem, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Each hypothesis with the slow error that is most probable under it.
+
+    How large the error is that nobody explains is as unknown as the parameters: held at what the best set
+    leaves it would make everything else look impossible.
+
+    Parameters
+    ----------
+    final, plain : Problem
+        With effects, and with nothing missing.
+    """
+    choices = _slow_choices(final.predictor)
+    fits = [item.fit for item in hypotheses]
+    for index, fit in enumerate(fits):
+        # Nothing missing is fitted anew: what the others explain it must take for error.
+        slow = plain.slow if fit.candidates else likely_slow_error(plain.binned_residuals(fit), **choices)
+        if slow != plain.slow:
+            own = Problem(plain.predictor, plain.belief, slow, plain.observations)
+            fits[index] = own.fit((), fit.values)
+    left = [(final if fit.candidates else plain).binned_residuals(fit) for fit in fits]
+    together = [(own[0][0], np.column_stack([values for _, values in own])) for own in zip(*left, strict=True)]
+    told = slow_errors_of(together, size=huber, **choices)
+    return [
+        replace(item, deviance=deviance + fit.misfit_with_prior - fit.misfit)
+        for item, fit, (_, deviance) in zip(hypotheses, fits, told, strict=True)
+    ]
+
+
+def _slow_choices(predictor: Predictor) -> dict[str, Any]:
+    """What the slow error is chosen from, as :func:`likely_slow_error` takes it."""
     if not predictor.is_network:
-        return likely_slow_error(
-            residuals, prior=EXPECTED_SLOW, sigmas=tuned.SLOW_SIGMAS, times=tuned.SLOW_TIMES
-        )
+        return {"prior": EXPECTED_SLOW, "sigmas": tuned.SLOW_SIGMAS, "times": tuned.SLOW_TIMES}
     unit, times = _network_scales(predictor)
-    return likely_slow_error(
-        residuals,
-        prior=expected_slow_error(predictor),
-        prior_width=1.5,
-        sigmas=[share * unit for share in tuned.NETWORK_SLOW_SIGMAS],
-        times=times,
-    )
+    return {
+        "prior": expected_slow_error(predictor),
+        "prior_width": 1.5,
+        "sigmas": [share * unit for share in tuned.NETWORK_SLOW_SIGMAS],
+        "times": times,
+        "by_channel": True,
+    }
 
 
 def _network_scales(predictor: Predictor) -> tuple[float, list[float]]:
@@ -157,6 +190,9 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
         problem = Problem(earlier, prior, slow, earlier.observations)
         fit = problem.fit((), None if fit is None else fit.values)
         slow = slow_error_of(problem, fit)
+        if earlier.is_network:
+            # Its numbers are guesses: what directions do is told about those that were fitted.
+            earlier = with_misdescriptions(earlier, earlier.misdescribed, fit.values)
     # Channels that only the diagnosed recordings have stay as they were known before.
     belief = known_before(predictor)
     place = {c.name: index for index, c in enumerate(fit.coordinates)}

@@ -8,7 +8,7 @@ averages, so that a reading repeated every second does not count as a new one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,10 +36,27 @@ class SlowError:
         One standard deviation.
     time : float, [s]
         Correlation time.
+    channels : tuple of (int, float, float)
+        Channels with a size and a time of their own, of which the others are means.
     """
 
     sigma: float = 0.035
     time: float = 1500.0
+    channels: tuple[tuple[int, float, float], ...] = ()
+
+    def of(self, channel: int) -> SlowError:
+        """That of one channel."""
+        for number, sigma, time in self.channels:
+            if number == channel:
+                return SlowError(sigma, time)
+        return self
+
+    @classmethod
+    def each(cls, channels: Mapping[int, SlowError]) -> SlowError:
+        """One for every channel."""
+        sigma = float(np.sqrt(np.mean([item.sigma**2 for item in channels.values()])))
+        time = float(np.exp(np.mean([np.log(item.time) for item in channels.values()])))
+        return cls(sigma, time, tuple((number, own.sigma, own.time) for number, own in channels.items()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +98,7 @@ class ChannelBins:
 
     def factor(self, slow: SlowError) -> Array:
         """Lower Cholesky factor of the covariance of the bin means, (b, b) [K]."""
+        slow = slow.of(self.channel)
         # Exact for readings at equal distances: what an average keeps of the slow error, ...
         half = 0.5 * self.spacing / slow.time
         kept = np.ones_like(half)
@@ -147,6 +165,7 @@ class Whitener:
 
     def __init__(self, bins: ChannelBins, slow: SlowError) -> None:
         self.factor: Array | None = None
+        slow = slow.of(bins.channel)
         if len(bins.times) <= MOST_DENSE:
             self.factor = bins.factor(slow)
             self.log_root_determinant = float(np.log(np.diag(self.factor)).sum())
@@ -188,6 +207,7 @@ def likely_slow_error(
     prior_width: float = 0.35,
     sigmas: Sequence[float] = (0.01, 0.02, 0.035, 0.05, 0.075, 0.11, 0.17, 0.25, 0.4, 0.65, 1.0, 1.6, 2.5),
     times: Sequence[float] = (600.0, 1200.0, 2400.0, 4800.0, 9600.0),
+    by_channel: bool = False,
 ) -> SlowError:
     """Most probable slow error of binned residuals.
 
@@ -200,17 +220,50 @@ def likely_slow_error(
         deviation ``prior_width``. Without it every listed value is as likely.
     sigmas, times : sequence of float, [K], [s]
         Values to choose from.
+    by_channel : bool
+        Whether every channel has its own.
     """
-    best, chosen = -np.inf, SlowError()
-    for sigma in sigmas:
-        for time in times:
-            slow = SlowError(sigma, time)
-            likelihood = 0.0
-            for bins, values in residuals:
-                whitener = Whitener(bins, slow)
-                likelihood -= whitener.log_root_determinant + 0.5 * float(np.sum(whitener(values) ** 2))
-            if prior is not None:
-                likelihood -= 0.5 * (np.log(sigma / prior.sigma) / prior_width) ** 2
-            if likelihood > best:
-                best, chosen = likelihood, slow
-    return chosen
+    several = [(bins, values[:, None]) for bins, values in residuals]
+    choices = {"prior": prior, "prior_width": prior_width, "sigmas": sigmas, "times": times}
+    return slow_errors_of(several, **choices, by_channel=by_channel)[0][0]
+
+
+def slow_errors_of(
+    residuals: Sequence[tuple[ChannelBins, Array]],
+    *,
+    prior: SlowError | None = None,
+    prior_width: float = 0.35,
+    sigmas: Sequence[float],
+    times: Sequence[float],
+    size: Callable[[Array], Array] = np.square,
+    by_channel: bool = False,
+) -> list[tuple[SlowError, float]]:
+    """Most probable slow error of each of several fits, and minus twice the logarithm of its likelihood.
+
+    Parameters
+    ----------
+    residuals : sequence of (ChannelBins, (b, m) ndarray)
+        Residuals of the bin means of m fits [K].
+    size : callable
+        What a whitened residual counts; its square by default.
+    Others as :func:`likely_slow_error` has them.
+    """
+    choices = [SlowError(sigma, time) for sigma in sigmas for time in times]
+    channels = sorted({bins.channel for bins, _ in residuals}) if by_channel else [0]
+    fits = residuals[0][1].shape[1]
+    found = np.zeros((len(choices), len(channels), fits))
+    for row, slow in zip(found, choices, strict=True):
+        for bins, values in residuals:
+            whitener = Whitener(bins, slow)
+            own = row[channels.index(bins.channel) if by_channel else 0]
+            own += 2.0 * whitener.log_root_determinant + size(whitener(values)).sum(axis=0)
+        if prior is not None:
+            row += (np.log(slow.sigma / prior.sigma) / prior_width) ** 2
+    best, least = found.argmin(axis=0), found.min(axis=0).sum(axis=0)
+    if by_channel:
+        told = [
+            SlowError.each({c: choices[best[i, fit]] for i, c in enumerate(channels)}) for fit in range(fits)
+        ]
+    else:
+        told = [choices[index] for index in best[0]]
+    return list(zip(told, least.tolist(), strict=True))

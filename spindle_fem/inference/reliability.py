@@ -29,19 +29,19 @@ def share_of_last(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float
         The empty one among them.
     """
     size = len(chosen.fit.candidates)
-    smaller = [h.fit.misfit_with_prior for h in hypotheses if len(h.fit.candidates) < size]
-    null = next(h.fit.misfit_with_prior for h in hypotheses if not h.fit.candidates)
-    gain = null - chosen.fit.misfit_with_prior
+    smaller = [h.misfit for h in hypotheses if len(h.fit.candidates) < size]
+    null = next(h.misfit for h in hypotheses if not h.fit.candidates)
+    gain = null - chosen.misfit
     if not smaller or gain <= 0.0:
         return 1.0
-    return float(np.clip((min(smaller) - chosen.fit.misfit_with_prior) / gain, 0.0, 1.0))
+    return float(np.clip((min(smaller) - chosen.misfit) / gain, 0.0, 1.0))
 
 
 def gain_of_more(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float:
     """What the best set with more effects makes the data likelier by (natural logarithm), at least 0."""
     size = len(chosen.fit.candidates)
-    larger = [h.fit.misfit_with_prior for h in hypotheses if len(h.fit.candidates) > size]
-    return max(0.0, 0.5 * (chosen.fit.misfit_with_prior - min(larger))) if larger else 0.0
+    larger = [h.misfit for h in hypotheses if len(h.fit.candidates) > size]
+    return max(0.0, 0.5 * (chosen.misfit - min(larger))) if larger else 0.0
 
 
 def features(probability: float, size: int, share: float, more: float) -> list[float]:

@@ -44,6 +44,15 @@ RESPONSE_SIGMA = 10.0
 # this share of what the temperatures move.
 NETWORK_SLOW_SIGMAS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 NETWORK_SHARE_OF_RISE = 0.01
+# What a roughly drawn network leaves open, one standard deviation each: share of a node's capacity that
+# follows with a lag; share by which conductances grow per kelvin (films of air, oil that thins); exponents.
+MASS_BESIDE, CONDUCTANCE_PER_K, EXPONENT_SIGMA = 0.12, 1.0e-3, 0.12
+# Share by which heat differs from its power of the input amid the input's range.
+HEAT_BEND = 0.1
+# A room that was not read swings by 1 to 3 K a day: daily amplitude [K] that wanders over days [s], and what
+# comes beside it [K] over hours [s].
+ROOM_DAILY, ROOM_DAYS = 0.8, 4.0 * 86400.0
+ROOM_SLOW, ROOM_HOURS = 0.4, 6.0 * 3600.0
 
 # ------------------------------------------------------------------------------------ basis of a search
 # Singular values below this share of the largest are left out.
@@ -123,6 +132,10 @@ NEAREST_REFITTED, NEAREST_WITHIN = 3, 1.3
 # 14 to 17, where the likelihood is flat from 1 to 3; by right sets on seeds 20, 22 and a third of 19: 164 of
 # 178 at 2, 162 at 3.)
 GAIN_DIVISOR, GAIN_DIVISOR_IN_A_SIZE = 2.0, 1.5
+# A network of a few nodes is a coarse picture: gains between sizes and over nothing count this many times less
+# there. (On seed 5 of validation.generate_networks consistent networks gain up to 75, by two effects, and
+# effects that leave three times the noise from 50 on.)
+NETWORK_COARSENESS = 3.0
 # An inexact law leaves a residual in proportion to its effect, which any further effect may fit a little:
 # gains beyond the first number grow logarithmically, never slower than the straight gain over the second.
 INEXACT_BEYOND, LARGEST_INEXACT_DIVISOR = 4000.0, 4.0
@@ -133,6 +146,8 @@ CHANCE_DIVISOR, CANDIDATES_A_TRIAL = 2.2, 64.0
 # Amplitudes from this share of their usual size up to it are as likely in every decade. What is less than
 # this many of its own standard deviations counts as that large: a small fitted size is no evidence.
 SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
+# A set whose error on held-out readings is this many times that of some of its effects alone is given up.
+WORSE_HELDOUT = 1.05
 # Probability from which the first set alone is named.
 DECIDED = 0.75
 # Sets of as many effects are named together where their readings differ by less than this share of the noise
@@ -145,6 +160,10 @@ LISTED = 0.02
 SIGNIFICANT, RULED_OUT, STILL_POSSIBLE = 0.01, 0.001, 0.5
 # Root of the misfit per datum after the best set above which something else must be there.
 UNEXPLAINED_MISFIT = 1.6
+# What a set may leave of the readings, in units of their noise, and still be named as what is missing.
+MOST_LEFT = 2.0
+# What the fit to its own calibration may leave over the noise before a written network is called too coarse.
+COARSE_LEFT = 2.0
 # Right sets leave a root misfit of 1 to a few hundredths. Beyond the first number the best set loses
 # probability to something outside the catalogue, over the second by as much again, the third at most.
 EXACT_MISFIT, OTHER_RANGE, LARGEST_OTHER = 1.04, 0.2, 0.5

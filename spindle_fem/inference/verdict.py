@@ -78,10 +78,13 @@ class Judgement:
     gain_of_more: float = 0.0
 
 
-def rank(hypotheses: Sequence[Hypothesis]) -> list[Ranked]:
-    """Probabilities of sets of effects at places, forms added up, the most probable first."""
+def rank(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[Ranked]:
+    """Probabilities of sets of effects at places, forms added up, the most probable first.
+
+    ``coarseness`` as :func:`tempered` has it.
+    """
     groups: dict[frozenset, list[tuple[float, Hypothesis]]] = {}
-    for item, score in zip(hypotheses, tempered(hypotheses), strict=True):
+    for item, score in zip(hypotheses, tempered(hypotheses, coarseness), strict=True):
         groups.setdefault(item.keys, []).append((score, item))
     highest = max(score for group in groups.values() for score, _ in group)
     weights = {
@@ -94,7 +97,7 @@ def rank(hypotheses: Sequence[Hypothesis]) -> list[Ranked]:
     return sorted(found, key=lambda item: -item.probability)
 
 
-def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
+def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[float]:
     """Logarithm of prior, complexity and likelihood over nothing missing, the last as far as it counts.
 
     Complexity (the determinants of Laplace's evidence) counts in full, with
@@ -104,9 +107,11 @@ def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
     ----------
     hypotheses : sequence of Hypothesis
         The empty one among them.
+    coarseness : float
+        How many times less a gain counts between sizes than on a machine that is drawn.
     """
     null = next(h for h in hypotheses if not h.fit.candidates)
-    gains = [0.5 * (null.fit.misfit_with_prior - h.fit.misfit_with_prior) for h in hypotheses]
+    gains = [0.5 * (null.misfit - h.misfit) for h in hypotheses]
     # Within a size; the best of it stands for the size beside others.
     scores = [
         float(
@@ -124,7 +129,7 @@ def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
         if size not in best or scores[index] > scores[best[size]]:
             best[size] = index
     less = {
-        size: counted(gains[index]) / tuned.GAIN_DIVISOR - gains[index] / tuned.GAIN_DIVISOR_IN_A_SIZE
+        size: counted(gains[index]) / (coarseness * tuned.GAIN_DIVISOR) - gains[index] / tuned.GAIN_DIVISOR_IN_A_SIZE
         for size, index in best.items()
     }
     return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]
@@ -157,7 +162,7 @@ def counted(gain: float) -> float:
     return float(tuned.INEXACT_BEYOND * np.log1p(inside / tuned.INEXACT_BEYOND) + beyond + min(gain, 0.0))
 
 
-def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
+def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness: float = 1.0) -> float:
     """Probability that some set of effects would improve a consistent recording as much.
 
     Wilks' theorem for each set with its free parameters; the lowest level is
@@ -172,17 +177,22 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
         The empty one among them.
     trials : int
         Candidates that were tried.
+    coarseness : float
+        As :func:`tempered` has it.
     """
     null = next(h for h in hypotheses if not h.fit.candidates)
     lowest = 0.0
+    likely = max((h.log_prior for h in hypotheses if len(h.fit.candidates) == 1), default=0.0)
     for item in hypotheses:
         freedom = len(item.fit.coordinates) - len(null.fit.coordinates)
-        gain = null.fit.misfit_with_prior - item.fit.misfit_with_prior
+        gain = null.misfit - item.misfit
         if freedom and gain > 0.0:
-            lowest = min(lowest, float(chi2.logsf(gain, freedom)))
+            # Pairs, and what is on in intervals, were chosen among so many more.
+            chosen_among = max(0.0, likely - item.log_prior)
+            lowest = min(lowest, float(chi2.logsf(gain, freedom)) + chosen_among)
     if lowest == 0.0:
         return 1.0
-    single = min(float(np.exp(lowest / tuned.CHANCE_DIVISOR)), 1.0 - 1e-16)
+    single = min(float(np.exp(lowest / (coarseness * tuned.CHANCE_DIVISOR))), 1.0 - 1e-16)
     return float(-np.expm1((1.0 + trials / tuned.CANDIDATES_A_TRIAL) * np.log1p(-single)))
 
 
@@ -220,6 +230,8 @@ def judge(
     calibrated: bool,
     overlapping: Mapping[str, frozenset[str]] | None = None,
     apart: Callable[[Fit, Fit], float] = lambda one, other: np.inf,
+    left: Callable[[Fit], float] = lambda fit: 1.0,
+    coarseness: float = 1.0,
 ) -> Judgement:
     """Conclude from fitted hypotheses.
 
@@ -235,9 +247,13 @@ def judge(
         Components that count as one for a decision (a bearing and its set), by component.
     apart : callable, optional
         How far the readings of two fits are apart, in units of the noise; far by default.
+    left : callable, optional
+        What a fit leaves of the readings over their noise; no more than the noise by default.
+    coarseness : float
+        As :func:`tempered` has it.
     """
-    ranked = rank(hypotheses)
-    p_value = detection_p_value(hypotheses, trials)
+    ranked = rank(hypotheses, coarseness)
+    p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:
@@ -245,8 +261,12 @@ def judge(
         ranked = _without(ranked, empty)
     chosen = ranked[0]
     if p_value > tuned.SIGNIFICANT or not chosen.fit.candidates or within_prior(chosen.fit, calibrated):
-        if np.sqrt(empty.fit.reduced_misfit) <= tuned.UNEXPLAINED_MISFIT or within_prior(
-            chosen.fit, calibrated
+        nothing_left = left(empty.fit)
+        much_left = (
+            np.sqrt(empty.fit.reduced_misfit) > tuned.UNEXPLAINED_MISFIT or nothing_left > tuned.MOST_LEFT
+        )
+        if not much_left or (
+            nothing_left <= tuned.MOST_LEFT and within_prior(chosen.fit, calibrated)
         ):
             return Judgement("consistent", p_value, empty, (), 0.0, "")
         # The residual is there, and no set of the catalogue makes it likelier.
@@ -255,13 +275,15 @@ def judge(
         return Judgement("unexplained", left_over, empty, (), 1.0, reason)
     misfit = float(np.sqrt(chosen.fit.reduced_misfit))
     inexact = float(np.clip((misfit - tuned.EXACT_MISFIT) / tuned.OTHER_RANGE, 0.0, tuned.LARGEST_OTHER))
+    rest = left(chosen.fit)
+    inexact = max(inexact, unexplained_share(rest))
     known_as_one = overlapping or {}
     near = [
         item
         for item in ranked[1:]
         if item.probability >= tuned.NEAR_PROBABILITY
         and may_stand_for(item.fit, chosen.fit, known_as_one)
-        and item.fit.misfit_with_prior < chosen.fit.misfit_with_prior + tuned.NEAR_MISFIT
+        and item.best.misfit < chosen.best.misfit + tuned.NEAR_MISFIT
         and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
     # Which bearing of a set it is does not matter for the decision; the best stands for all.
@@ -285,8 +307,16 @@ def judge(
         reason = NOTHING_REASON
     else:
         reason = NEAR_REASON if near else SEVERAL_REASON
+    verdict: Verdict = kind_of(chosen.fit.candidates) if decided else "ambiguous"
+    if rest > tuned.MOST_LEFT:
+        before = left(empty.fit)
+        verdict = "unexplained"
+        reason = (
+            f"the best set leaves {rest:.1f} times the noise of the readings, where {before:.1f} times was left "
+            f"without it: it explains {100.0 * (1.0 - (rest / before) ** 2):.0f} % of the mismatch"
+        )
     return Judgement(
-        kind_of(chosen.fit.candidates) if decided else "ambiguous",
+        verdict,
         p_value,
         Ranked(chosen.best, known * evidence),
         alternatives,
@@ -296,6 +326,16 @@ def judge(
         share,
         more,
     )
+
+
+def unexplained_share(rest: float) -> float:
+    """Probability of something else where a set leaves ``rest`` times the noise: odds of the square of the excess.
+
+    >>> [round(unexplained_share(rest), 2) for rest in (0.9, 1.3, 2.0, 4.0)]
+    [0.0, 0.08, 0.5, 0.9]
+    """
+    odds = max(0.0, rest - 1.0) ** 2
+    return odds / (1.0 + odds)
 
 
 def may_stand_for(fit: Fit, other: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:

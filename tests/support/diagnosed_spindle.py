@@ -116,6 +116,7 @@ class Case:
         tracks = [explain(item) for item in onset_answers(problem, null, patterns, 0)]
         return Diagnosis(
             predictor,
+            predictor,
             self.view,
             calibrated,
             hypotheses,

@@ -7,7 +7,7 @@ from scipy.optimize import lsq_linear
 from spindle_fem.inference.hypothesis_fit import (
     Coordinate,
     _bounded_step,
-    _huber,
+    huber,
 )
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener, likely_slow_error
 
@@ -48,9 +48,9 @@ def test_an_unbounded_step_is_newtons():
 
 
 def test_large_residuals_count_linearly():
-    assert _huber(np.array([-2.0, 3.0, 10.0])) == pytest.approx([4.0, 9.0, 51.0])
+    assert huber(np.array([-2.0, 3.0, 10.0])) == pytest.approx([4.0, 9.0, 51.0])
     step = 1e-6
-    slope = (_huber(np.array([3.0 + step])) - _huber(np.array([3.0 - step]))) / (2.0 * step)
+    slope = (huber(np.array([3.0 + step])) - huber(np.array([3.0 - step]))) / (2.0 * step)
     assert slope == pytest.approx([6.0], abs=1e-4)
 
 

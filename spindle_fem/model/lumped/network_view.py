@@ -69,6 +69,11 @@ def view_of_network(
             hot, cold = ends if ends[0] in heated or ends[1] not in heated else ends[::-1]
             walls[coefficient], fluids[coefficient] = names[hot], names[cold]
             joints[link] = (coefficient,)
+    # Air that moves more, or a room that is fuller, changes all films to it alike.
+    for other, links in surroundings.items():
+        if len(links) > 1:
+            largest = max(links, key=conductance.__getitem__).removeprefix("link.")
+            seats.append(Seat(largest, f"with all links to {other}", tuple(links)))
     nodes = {name: (name,) for name in network.node_names}
     inner, outer, speeds, reported = _sources(network, turning)
     speeds |= dict.fromkeys((*nodes, *films), turning)

@@ -1,0 +1,109 @@
+"""What a fit leaves beside the noise of readings, and what rarely written inputs leave open.
+
+A held input says nothing of what it did until its next row. What it did is taken for white noise of the
+variance that its own changes from row to row have, and the network answers it as a filter does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_continuous_lyapunov
+
+from spindle_fem.inference.observations import Observation
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.model.lumped.thermal_network import ThermalNetwork
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+
+def unseen_power(network: ThermalNetwork, recording: Recording) -> Array:
+    """Spectral density of each source's unseen heat for a gain of one, (n_sources,) in (input^exponent)² s."""
+    found = np.zeros(len(network.source_names))
+    for index, (name, exponent) in enumerate(
+        zip(network.source_input, network.source_exponent, strict=True)
+    ):
+        if name is None or name not in recording.input_names:
+            continue
+        column = recording.input_names.index(name)
+        written = np.isfinite(recording.inputs[:, column])
+        if recording.held[column] and written.sum() > 2:
+            heat = np.abs(recording.inputs[written, column]) ** exponent
+            apart = float(np.median(np.diff(recording.times[written])))
+            # Two rows of a process that forgets between them differ by twice its variance.
+            found[index] = 0.5 * float(np.mean(np.diff(heat) ** 2)) * apart
+    return found
+
+
+def sampling_errors(network: ThermalNetwork, power: Array) -> Array:
+    """Standard deviation of every node's temperature for unseen heat, (n_nodes,) K.
+
+    Parameters
+    ----------
+    power : (n_sources,) ndarray
+        :func:`unseen_power`.
+
+    Notes
+    -----
+    Stationary covariance P of ``C dT/dt = -G T + heat``: ``A P + P Aᵀ + B S Bᵀ = 0``.
+
+    Source: Gelb (1974), Applied Optimal Estimation, section 3.7.
+    """
+    n = network.n_nodes
+    matrix = np.zeros((n, n))
+    for first, second, value in zip(
+        network.link_first, network.link_second, network.link_conductance, strict=True
+    ):
+        for one, other in ((first, second), (second, first)):
+            if one < n:
+                matrix[one, one] += value
+                if other < n:
+                    matrix[one, other] -= value
+    heated = np.zeros(n)
+    np.add.at(heated, network.source_node, network.source_gain**2 * power)
+    # A network that nothing cools has no stationary state: the least leak gives it one.
+    leak = 1e-9 * np.trace(matrix) * np.eye(n)
+    state = -(matrix + leak) / network.capacity[:, None]
+    covariance = solve_continuous_lyapunov(state, -np.diag(heated / network.capacity**2))
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def left_over_noise(
+    predictor: Predictor,
+    observations: Sequence[Observation],
+    told: Sequence[Array],
+    factors: Mapping[str, float],
+    unseen: Sequence[Array] = (),
+) -> float:
+    """Root mean square of single readings less what is told, over their noise, all channels alike.
+
+    Parameters
+    ----------
+    told : sequence of (b,) ndarray, [K]
+        At the bins of every observation.
+    factors : mapping of str to float
+        Fitted factors of a network's parameters.
+    unseen : sequence of (n_sources,) ndarray
+        :func:`unseen_power` of every recording of a network; readings have the noise of sensors alone without.
+    """
+    beside = []
+    if predictor.is_network:
+        network = predictor.fast.inputs.moved(factors)
+        beside = [sampling_errors(network, power) for power in unseen]
+    ratios = []
+    for item, values in zip(observations, told, strict=True):
+        recording = predictor.recordings[item.recording]
+        thinned = recording.defects.thinned
+        each = 1.0 if thinned is None else thinned.rows / thinned.bins
+        noise = item.bins.white**2 * each
+        # What averaging took off the noise is put back.
+        averaged = noise * (1.0 - float(np.mean(1.0 / item.bins.number)) / each)
+        rest = float(np.mean((values - item.values) ** 2)) + averaged
+        if beside:
+            node = predictor.fast.inputs.channels.index(recording.probes[item.channel])
+            noise += float(beside[item.recording][node]) ** 2
+        ratios.append(rest / noise)
+    return float(np.sqrt(np.mean(ratios)))
