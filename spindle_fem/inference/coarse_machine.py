@@ -152,7 +152,9 @@ def _with_effects(machine: DiagnosedMachine, fit: Fit) -> DiagnosedMachine:
     )
     if not entries:
         return machine
-    return with_network(machine, machine.spec.model_copy(update={"effects": (*machine.spec.effects, *entries)}))
+    return with_network(
+        machine, machine.spec.model_copy(update={"effects": (*machine.spec.effects, *entries)})
+    )
 
 
 def _options(machine: DiagnosedMachine) -> Iterator[_Option]:

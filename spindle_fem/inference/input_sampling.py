@@ -23,9 +23,7 @@ Array = NDArray[np.float64]
 def unseen_power(network: ThermalNetwork, recording: Recording) -> Array:
     """Spectral density of each source's unseen heat for a gain of one, (n_sources,) in (input^exponent)² s."""
     found = np.zeros(len(network.source_names))
-    for index, (name, exponent) in enumerate(
-        zip(network.source_input, network.source_exponent, strict=True)
-    ):
+    for index, (name, exponent) in enumerate(zip(network.source_input, network.source_exponent, strict=True)):
         if name is None or name not in recording.input_names:
             continue
         column = recording.input_names.index(name)

@@ -225,9 +225,7 @@ def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
                 MassBeside(node, lag),
             )
     names = (*network.node_names, *network.boundary_names)
-    for link, first, second in zip(
-        network.link_names, network.link_first, network.link_second, strict=True
-    ):
+    for link, first, second in zip(network.link_names, network.link_first, network.link_second, strict=True):
         ends = tuple(names[end] for end in (first, second) if end < network.n_nodes)
         yield Misdescription(
             f"over_temperature.{link}",

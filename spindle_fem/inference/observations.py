@@ -84,7 +84,9 @@ def observe(
         for bins in channel_bins(recording, mask, width=width):
             values = bins.average(recording.temperature[:, bins.channel])
             weights = () if grid is None else grid_weights(bins.times, grid)
-            spread = None if grid is None or rows is None else _spread(bins, recording.times, grid, rows[number])
+            spread = (
+                None if grid is None or rows is None else _spread(bins, recording.times, grid, rows[number])
+            )
             found.append(Observation(number, bins.channel, bins, values, *weights, spread))
     return tuple(found)
 

@@ -133,7 +133,9 @@ def with_own_noise(final: Problem, plain: Problem, hypotheses: Sequence[Hypothes
             own = Problem(plain.predictor, plain.belief, slow, plain.observations)
             fits[index] = own.fit((), fit.values)
     left = [(final if fit.candidates else plain).binned_residuals(fit) for fit in fits]
-    together = [(own[0][0], np.column_stack([values for _, values in own])) for own in zip(*left, strict=True)]
+    together = [
+        (own[0][0], np.column_stack([values for _, values in own])) for own in zip(*left, strict=True)
+    ]
     told = slow_errors_of(together, size=huber, **choices)
     return [
         replace(item, deviance=deviance + fit.misfit_with_prior - fit.misfit)

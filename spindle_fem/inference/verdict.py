@@ -129,7 +129,8 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
         if size not in best or scores[index] > scores[best[size]]:
             best[size] = index
     less = {
-        size: counted(gains[index]) / (coarseness * tuned.GAIN_DIVISOR) - gains[index] / tuned.GAIN_DIVISOR_IN_A_SIZE
+        size: counted(gains[index]) / (coarseness * tuned.GAIN_DIVISOR)
+        - gains[index] / tuned.GAIN_DIVISOR_IN_A_SIZE
         for size, index in best.items()
     }
     return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]
@@ -265,9 +266,7 @@ def judge(
         much_left = (
             np.sqrt(empty.fit.reduced_misfit) > tuned.UNEXPLAINED_MISFIT or nothing_left > tuned.MOST_LEFT
         )
-        if not much_left or (
-            nothing_left <= tuned.MOST_LEFT and within_prior(chosen.fit, calibrated)
-        ):
+        if not much_left or (nothing_left <= tuned.MOST_LEFT and within_prior(chosen.fit, calibrated)):
             return Judgement("consistent", p_value, empty, (), 0.0, "")
         # The residual is there, and no set of the catalogue makes it likelier.
         left_over = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))

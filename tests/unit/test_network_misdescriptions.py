@@ -110,7 +110,9 @@ def told(blank, text):
 def test_a_mass_beside_is_a_second_node_that_takes_its_share(blank, predictor):
     share, lag = 0.02, 120.0
     split = MACHINE.replace('{value = "900 J/K", sigma_rel = 0.5}', f'"{900.0 * (1.0 - share)} J/K"')
-    beside = BEHIND.replace("600 J/K", f"{900.0 * share} J/K").replace("1.2 W/K", f"{900.0 * share / lag} W/K")
+    beside = BEHIND.replace("600 J/K", f"{900.0 * share} J/K").replace(
+        "1.2 W/K", f"{900.0 * share / lag} W/K"
+    )
     moved = (told(blank, split + beside) - predictor.predict(0, {}).temperature[:, 0]) / share
     column = column_of(predictor, MassBeside("plate", lag))
     np.testing.assert_allclose(column, moved, atol=0.05 * np.abs(moved).max())
