@@ -277,7 +277,7 @@ class _Readings:
         return left_over_noise(plant, plant.observations, self._of(fit), fit.values, self._unseen)
 
     def kept(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Sets without those that predict held-out readings worse than a set with some of their effects alone."""
+        """Sets without those that predict held-out readings worse than some of their effects alone."""
         error = {id(h): self._heldout(h.fit) for h in hypotheses}
         return [
             h

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def unseen_power(network: ThermalNetwork, recording: Recording) -> Array:
-    """Spectral density of each source's unseen heat for a gain of one, (n_sources,) in (input^exponent)² s."""
+    """Spectral density of every source's unseen heat at a gain of one, (n_sources,) (input^exponent)² s."""
     found = np.zeros(len(network.source_names))
     for index, (name, exponent) in enumerate(zip(network.source_input, network.source_exponent, strict=True)):
         if name is None or name not in recording.input_names:
@@ -85,7 +85,7 @@ def left_over_noise(
     factors : mapping of str to float
         Fitted factors of a network's parameters.
     unseen : sequence of (n_sources,) ndarray
-        :func:`unseen_power` of every recording of a network; readings have the noise of sensors alone without.
+        :func:`unseen_power` of every recording of a network; none: sensors alone are noisy.
     """
     beside = []
     if predictor.is_network:

@@ -1,4 +1,4 @@
-"""What a roughly drawn network leaves open: small masses, laws that are not quite constant, a room nobody read."""
+"""What a roughly drawn network leaves open: small masses, laws not quite constant, a room that nobody read."""
 
 from __future__ import annotations
 
@@ -263,8 +263,8 @@ def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             "clock of the recording",
             "s",
             spacing,
-            "time by which temperatures are stamped later than inputs: rows may be means stamped at their start, "
-            "inputs written more rarely than they change",
+            "time by which temperatures are stamped later than inputs: rows may be means stamped at their "
+            "start, inputs written more rarely than they change",
             clock_change,
             number,
         )

@@ -311,8 +311,8 @@ def judge(
         before = left(empty.fit)
         verdict = "unexplained"
         reason = (
-            f"the best set leaves {rest:.1f} times the noise of the readings, where {before:.1f} times was left "
-            f"without it: it explains {100.0 * (1.0 - (rest / before) ** 2):.0f} % of the mismatch"
+            f"the best set leaves {rest:.1f} times the noise of the readings, where {before:.1f} times was "
+            f"left without it: it explains {100.0 * (1.0 - (rest / before) ** 2):.0f} % of the mismatch"
         )
     return Judgement(
         verdict,
@@ -328,7 +328,7 @@ def judge(
 
 
 def unexplained_share(rest: float) -> float:
-    """Probability of something else where a set leaves ``rest`` times the noise: odds of the square of the excess.
+    """Probability of something else where a set leaves ``rest`` times the noise: its odds are the excess squared.
 
     >>> [round(unexplained_share(rest), 2) for rest in (0.9, 1.3, 2.0, 4.0)]
     [0.0, 0.08, 0.5, 0.9]
