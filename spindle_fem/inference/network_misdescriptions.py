@@ -1,4 +1,4 @@
-"""What a roughly drawn network leaves open: small masses, laws not quite constant, a room that nobody read."""
+"""What a roughly drawn network leaves open: small masses, laws not quite constant, a room not read."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ NEAREST_REFITTED, NEAREST_WITHIN = 3, 1.3
 # 178 at 2, 162 at 3.)
 GAIN_DIVISOR, GAIN_DIVISOR_IN_A_SIZE = 2.0, 1.5
 # A network of a few nodes is a coarse picture: gains between sizes and over nothing count this many times
-# less there. (On seed 5 of validation.generate_networks consistent networks gain up to 75, by two effects, and
+# less there. (On seed 5 of validation.generate_networks consistent networks gain up to 75, by two, and
 # effects that leave three times the noise from 50 on.)
 NETWORK_COARSENESS = 3.0
 # An inexact law leaves a residual in proportion to its effect, which any further effect may fit a little:

@@ -328,7 +328,7 @@ def judge(
 
 
 def unexplained_share(rest: float) -> float:
-    """Probability of something else where a set leaves ``rest`` times the noise: its odds are the excess squared.
+    """Probability of something else where ``rest`` times the noise is left: odds are the excess squared.
 
     >>> [round(unexplained_share(rest), 2) for rest in (0.9, 1.3, 2.0, 4.0)]
     [0.0, 0.08, 0.5, 0.9]
