@@ -206,6 +206,10 @@ def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
     if not predictor.is_network:
         return
     network, inputs = predictor.fast.network, predictor.fast.inputs
+    # A value that is given without uncertainty is meant as it stands.
+    open_to = {item.name for item in network.parameters if item.sigma_log > 0.0}
+    if not open_to:
+        return
     joined = np.zeros(network.n_nodes)
     for first, second, value in zip(
         network.link_first, network.link_second, network.link_conductance, strict=True
@@ -214,7 +218,7 @@ def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             if end < network.n_nodes:
                 joined[end] += value
     for node, capacity, conductance in zip(network.node_names, network.capacity, joined, strict=True):
-        for word, share in LAG_SHARES.items() if conductance > 0.0 else ():
+        for word, share in LAG_SHARES.items() if conductance > 0.0 and f"capacity.{node}" in open_to else ():
             lag = share * float(capacity / conductance)
             yield Misdescription(
                 f"mass_beside.{node}.{word}",
@@ -226,6 +230,8 @@ def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             )
     names = (*network.node_names, *network.boundary_names)
     for link, first, second in zip(network.link_names, network.link_first, network.link_second, strict=True):
+        if f"conductance.{link}" not in open_to:
+            continue
         ends = tuple(names[end] for end in (first, second) if end < network.n_nodes)
         yield Misdescription(
             f"over_temperature.{link}",
@@ -238,7 +244,7 @@ def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
     for source, name, exponent in zip(
         network.source_names, network.source_input, network.source_exponent, strict=True
     ):
-        if name is not None:
+        if name is not None and f"gain.{source}" in open_to:
             yield Misdescription(
                 f"exponent.{source}",
                 f"network.source.{source}.exponent",
@@ -272,7 +278,7 @@ def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
         modes = room_modes(times)
         for boundary, driven in zip(network.boundary_names, network.boundary_input, strict=True):
             films = tuple(film for film, other in inputs.boundary_of.items() if other == boundary)
-            if driven is None and films:
+            if driven is None and films and f"temperature.{boundary}" in open_to:
                 for order, (size, course) in enumerate(modes, 1):
                     yield Misdescription(
                         f"course.{boundary}.{order}",
