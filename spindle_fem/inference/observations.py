@@ -49,8 +49,8 @@ class Observation:
     def at(self, predicted: Array) -> Array:
         """Values at the bins, (b, ...), from values (G + 1, ...) on the grid or (N, ...) at the stamps."""
         if self.spread is not None:
-            flat = self.spread @ predicted.reshape(len(predicted), -1)
-            return flat.reshape(-1, *predicted.shape[1:])
+            flat = self.spread @ predicted.reshape(len(predicted), int(np.prod(predicted.shape[1:])))
+            return flat.reshape(len(flat), *predicted.shape[1:])
         if self.right is None:
             return self.bins.average(predicted)
         part = self.part.reshape(-1, *([1] * (predicted.ndim - 1)))
