@@ -88,7 +88,7 @@ def machine_bodies(spec: MachineSpec, *, size: float = ELEMENT_SIZE) -> MachineB
     for main, rotating in ((layout.shaft, True), (layout.housing, False)):
         if main is None:
             continue
-        own = [p for p in spec.part if p.rotating is rotating and not layout.is_spacer(p)]
+        own = [p for p in spec.part if p.rotating is rotating and (p is main or not layout.is_spacer(p))]
         regions = [
             [AnnularSegment(*s.z, 0.5 * s.inner_diameter, 0.5 * s.outer_diameter) for s in part.segment]
             for part in own
