@@ -15,7 +15,8 @@ import numpy as np
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.network_tables import LinkSpec, NetworkMachineSpec, NodeSpec
 from spindle_fem.effects.framework.effect import Candidate
-from spindle_fem.effects.registry import candidates_for, definition_entry
+from spindle_fem.effects.framework.outside_film_law import OutsideFilmEffect
+from spindle_fem.effects.registry import candidates_for, catalogue, definition_entry
 from spindle_fem.errors import SpindleFemError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.findings import candidate_values
@@ -36,7 +37,6 @@ LEAST_GAIN = 0.1
 # Capacity of a further node as a share of its neighbour's, conductances as a share of the usual one there,
 # and the standard deviations of their logarithms: nothing is known of them.
 SHARE, SPREAD = 0.3, 1.2
-LAWS = ("natural_convection", "radiation")
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +188,8 @@ def _options(machine: DiagnosedMachine) -> Iterator[_Option]:
                 yield _Option(f"a link from {pair[0]} to {pair[1]}", _grown(spec, None, link))
     present = {(entry.effect, entry.component) for entry in spec.effects}
     for candidate in candidates_for(machine.view):
-        if candidate.effect in LAWS and (candidate.effect, candidate.component) not in present:
+        grows = isinstance(catalogue()[candidate.effect], OutsideFilmEffect)
+        if grows and (candidate.effect, candidate.component) not in present:
             law = candidate.effect.replace("_", " ")
             yield _Option(f"{law} on {candidate.component}", spec, (candidate,))
 

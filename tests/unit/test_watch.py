@@ -230,7 +230,10 @@ def test_pieces_of_a_run_are_the_run(fast, tmp_path, monkeypatch, providers):
 def test_a_sound_machine_stays_and_a_changed_one_leaves(folder):
     how = Watching(calibrate=(folder / "sound",), heartbeat=1800.0, until_end=True)
     told = list(watch_recording(folder / "machine.toml", folder / "leaves", how))
-    assert {line["state"] for line in told if line["time"] < 5.0 * 3600.0} == {"as modelled"}
+    # the stated rate is that of "left"; a line that says "leaving" may take it back
+    sound = [line["state"] for line in told if line["time"] < 5.0 * 3600.0]
+    assert "left" not in sound
+    assert sound.count("leaving") <= 1 < sound.count("as modelled")
     left = next(line for line in told if line["state"] == "left")
     assert left["channel"] == "block"
     assert left["time"] < 5.7 * 3600.0
