@@ -34,6 +34,8 @@ ROUNDS, PLACES_SETTLED = 4, 2
 WORTH_ANOTHER = 2.0
 # Misfit beyond that of a course of levels from which one with a change less is not followed to its optimum.
 HOPELESS = 60.0
+# Changes of a course that are tried without, the least ones: each takes a fit.
+CHANGES_TRIED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +143,12 @@ def _simplest(search: Search, problem: Problem, fit: Fit, place: StepPlace, foun
         better = max((t for t in trials if t is not None), key=lambda t: t.score, default=None)
         if better is None or better.score <= best.score - least:
             return best
+        stretches = [
+            len(_course(*_spans(place.effect, item.fit), problem, place)[1]) for item in (better, best)
+        ]
+        if stretches[0] >= stretches[1]:
+            # levels that a fit parts again: leaving one out never ends
+            return best
         best = better
 
 
@@ -190,11 +198,15 @@ def _over_lowest(
 def _with_one_less(
     intervals: list[tuple[float, float]], levels: list[float], problem: Problem, place: StepPlace
 ) -> list[tuple[list[tuple[float, float]], list[float], float]]:
-    """Courses of levels without one of their changes, and their lowest: its neighbours have their mean."""
+    """Courses without one of their least changes, and their lowest level: its neighbours have their mean."""
     edges, sizes = _course(intervals, levels, problem, place)
+    lasts = np.maximum(np.diff(edges), 1e-3)
+    # energy of a change: what levelling it takes away
+    shorter = np.minimum(lasts[1:], lasts[:-1])
+    least = np.argsort(np.diff(sizes) ** 2 * shorter)[:CHANGES_TRIED]
     found = []
-    for inner in range(1, len(edges) - 1):
-        lengths = np.maximum(np.diff(edges)[inner - 1 : inner + 1], 1e-3)
+    for inner in sorted(int(index) + 1 for index in least):
+        lengths = lasts[inner - 1 : inner + 1]
         merged = float(np.average(sizes[inner - 1 : inner + 1], weights=lengths))
         found.append(
             _over_lowest(
