@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov
 
+from spindle_fem.inference import tuned
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
@@ -78,6 +79,9 @@ def left_over_noise(
 ) -> float:
     """Root mean square of single readings less what is told, over their noise, all channels alike.
 
+    Sensors of a machine with geometry also have the slow error that is expected of them before any fit; of
+    a network's, ``sigma`` is all that is known.
+
     Parameters
     ----------
     told : sequence of (b,) ndarray, [K]
@@ -100,6 +104,8 @@ def left_over_noise(
         # What averaging took off the noise is put back.
         averaged = noise * (1.0 - float(np.mean(1.0 / item.bins.number)) / each)
         rest = float(np.mean((values - item.values) ** 2)) + averaged
+        if not predictor.is_network:
+            noise += tuned.EXPECTED_SLOW_SIGMA**2
         if beside:
             node = predictor.fast.inputs.channels.index(recording.probes[item.channel])
             noise += float(beside[item.recording][node]) ** 2
