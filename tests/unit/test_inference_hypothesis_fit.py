@@ -18,8 +18,8 @@ from spindle_fem.inference.drive_steps import even_drive
 from spindle_fem.inference.hypothesis_fit import (
     Belief,
     Problem,
-    _huber,
     candidate_coordinates,
+    huber,
 )
 from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.predictor import Predictor
@@ -338,7 +338,7 @@ def test_an_amplitude_of_one_sign_counts_the_half_prior_twice(blank, candidates,
     misfits = []
     for value in values:
         read = problem.whitened([predictor.predict(0, {lag.amplitude: value}, (lag,)).temperature])
-        misfits.append(float(np.sum(_huber(problem.data - read))))
+        misfits.append(float(np.sum(huber(problem.data - read))))
     prior = 2.0 * np.exp(-0.5 * (values / coordinate.sigma) ** 2) / (np.sqrt(2.0 * np.pi) * coordinate.sigma)
     likelihood = np.exp(-0.5 * (np.array(misfits) - min(misfits)))
     exact = np.log(np.trapezoid(prior * likelihood, values)) - 0.5 * min(misfits)
