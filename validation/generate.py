@@ -4,9 +4,7 @@
 on, and ``DIR/answers/case_0001.json``. A case depends on the seed and its number alone.
 """
 
-import argparse
 import json
-import time as clock
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -19,6 +17,7 @@ from .identify import Study, machine_mimics, sensor_mimics
 from .recorder import draw_noise, record
 from .reduction import ReducedSpindle, load_reduced
 from .stepping import Path, draw_as_built, run
+from .study_writer import study_options, write_study
 
 UNSEEN_RATIO, UNSEEN_CHI2 = 0.3, 20.0
 CLEAR_RATIO, CLEAR_CHI2 = 1.0, 120.0
@@ -350,31 +349,13 @@ def plan_for(wanted: list[str], rng: np.random.Generator) -> Plan:
 
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(
-        prog="python -m validation.generate", description=__doc__.splitlines()[0]
-    )
-    parser.add_argument("--cases", type=int, default=200)
-    parser.add_argument("--first", type=int, default=1, help="number of the first case")
-    parser.add_argument("--seed", type=int, default=7)
-    parser.add_argument("-o", "--output", type=FilePath, required=True)
+    parser = study_options(__doc__, cases=200, seed=7)
     parser.add_argument("--cache", type=FilePath, default=None, help="folder of the reduced machine")
     parser.add_argument("--no-identifiability", action="store_true")
     given = parser.parse_args(arguments)
     model = load_reduced(given.cache)
-    given.output.mkdir(parents=True, exist_ok=True)
-    drawn = {"schema": "spindle-fem/concealed-study/1", "seed": given.seed, "cases": given.cases}
-    (given.output / "study.json").write_text(json.dumps(drawn, indent=1), encoding="utf-8")
-    for number in range(given.first, given.first + given.cases):
-        began = clock.perf_counter()
-        answer = make_case(model, given.output, given.seed, number, identify=not given.no_identifiability)
-        effects = ", ".join(e["effect"] for e in answer["effects"]) or "none"
-        known = answer["identifiability"]
-        seen = f"ratio {known['ratio']:.2f}" if known else ""
-        print(
-            f"{answer['case']} {effects:45s} {seen:12s} {'clear' if answer['clear'] else ''} "
-            f"{clock.perf_counter() - began:.1f} s",
-            flush=True,
-        )
+    identify = not given.no_identifiability
+    write_study(given, lambda number: make_case(model, given.output, given.seed, number, identify=identify))
 
 
 if __name__ == "__main__":

@@ -5,10 +5,8 @@ each case has its own ``machine.toml``. Every true machine has another outer dia
 tool, balls that conduct with speed, heat of another shape over speed; two to four probes are recorded.
 """
 
-import argparse
 import gzip
 import json
-import time as clock
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +24,7 @@ from .meridian.elements import assemble
 from .meridian.run import Act, Array, Plant, draw_as_built, every, run
 from .recorder import slow_error
 from .stepping import Drive
+from .study_writer import study_options, write_study
 
 MACHINES = (("uncooled", 1.0), ("uncooled", 1.6), ("uncooled", 0.7))
 TURNS = ("consistent", "single", "single", "pair", "single", "single")
@@ -291,26 +290,8 @@ def make_case(folder: Path, seed: int, number: int) -> dict[str, Any]:
 
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=24)
-    parser.add_argument("--first", type=int, default=1, help="number of the first case")
-    parser.add_argument("--seed", type=int, default=4)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    given = parser.parse_args(arguments)
-    given.output.mkdir(parents=True, exist_ok=True)
-    drawn = {"schema": "spindle-fem/concealed-study/1", "seed": given.seed, "cases": given.cases}
-    (given.output / "study.json").write_text(json.dumps(drawn | {"generator": "meridian"}), encoding="utf-8")
-    for number in range(given.first, given.first + given.cases):
-        began = clock.perf_counter()
-        answer = make_case(given.output, given.seed, number)
-        names = ", ".join(e["effect"] for e in answer["effects"]) or "nothing"
-        known = answer["identifiability"]
-        seen = f"ratio {known['ratio']:.2f}" if known else ""
-        print(
-            f"{answer['case']} {answer['machine']:20s} {names:40s} {seen:12s} structure "
-            f"{answer['noise']['structure_K']:.2f} K {clock.perf_counter() - began:.1f} s",
-            flush=True,
-        )
+    given = study_options(__doc__, cases=24, seed=4).parse_args(arguments)
+    write_study(given, lambda number: make_case(given.output, given.seed, number), generator="meridian")
 
 
 if __name__ == "__main__":

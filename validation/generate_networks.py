@@ -5,10 +5,8 @@
 drawn by family, solved by :mod:`validation.networks.truth`, and differ from their files in what files lack.
 """
 
-import argparse
 import itertools
 import json
-import time as clock
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +19,7 @@ from .networks.files import machine_text, write_run
 from .networks.known import Study, mimics_of, own_mimic
 from .networks.scene import Owner, Run, draw_owner, run_machine
 from .networks.truth import Array, Change
+from .study_writer import study_options, write_study
 
 # What is drawn: every fifth case consistent, a seventh pairs, the families in turn.
 CYCLE = 5
@@ -352,27 +351,8 @@ def _write(
 
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=100)
-    parser.add_argument("--first", type=int, default=1, help="number of the first case")
-    parser.add_argument("--seed", type=int, default=5)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    given = parser.parse_args(arguments)
-    given.output.mkdir(parents=True, exist_ok=True)
-    drawn = {"schema": "spindle-fem/concealed-study/1", "seed": given.seed, "cases": given.cases}
-    drawn |= {"generator": "networks"}
-    (given.output / "study.json").write_text(json.dumps(drawn, indent=1), encoding="utf-8")
-    for number in range(given.first, given.first + given.cases):
-        began = clock.perf_counter()
-        answer = make_case(given.output, given.seed, number)
-        known = answer["identifiability"]
-        own = known["own_simple_form"]
-        print(
-            f"{answer['case']} {answer['machine']:10s} {answer['family']:34s} ratio {known['ratio']:6.2f} "
-            f"own {own['ratio']:5.2f} noise {answer['noise']['total_K']:.2f} K "
-            f"{'clear' if answer['clear'] else '':6s}{clock.perf_counter() - began:.1f} s",
-            flush=True,
-        )
+    given = study_options(__doc__, cases=100, seed=5).parse_args(arguments)
+    write_study(given, lambda number: make_case(given.output, given.seed, number), generator="networks")
 
 
 if __name__ == "__main__":

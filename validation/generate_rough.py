@@ -5,9 +5,7 @@ on each, two to six channels, clocks apart. ``DIR/inputs`` and ``DIR/answers`` a
 leaves them; answers count structure into ``noise.total_K``, by which effects are judged.
 """
 
-import argparse
 import json
-import time as clock
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -24,6 +22,7 @@ from .recorder import Logger, Noise, record
 from .reduction import ReducedSpindle, load_reduced
 from .rough import GRID, AsMounted, deviating_machine, draw_channels, draw_mounting
 from .stepping import draw_as_built, run
+from .study_writer import study_options, write_study
 
 # What the cases conceal, in turn.
 TURNS = ("consistent", "single", "single", "pair", "consistent", "single", "triple", "sensor_beside")
@@ -192,12 +191,8 @@ def _attempt(
 
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=60)
-    parser.add_argument("--first", type=int, default=1, help="number of the first case")
-    parser.add_argument("--seed", type=int, default=3)
+    parser = study_options(__doc__, cases=60, seed=3)
     parser.add_argument("--shapes", type=int, default=6, help="machines of deviating shape in the pool")
-    parser.add_argument("-o", "--output", type=FilePath, required=True)
     parser.add_argument("--cache", type=FilePath, default=None, help="folder of the reduced machines")
     given = parser.parse_args(arguments)
     nominal = load_reduced(given.cache, **GRID)
@@ -205,21 +200,12 @@ def main(arguments: list[str] | None = None) -> None:
     for number in range(given.shapes):
         pool.append(deviating_machine(given.seed, number, given.cache))
         print(f"shape {number + 1} of {given.shapes}", flush=True)
-    given.output.mkdir(parents=True, exist_ok=True)
-    drawn = {"schema": "spindle-fem/concealed-study/1", "seed": given.seed, "cases": given.cases}
-    drawn |= {"generator": "rough", "shapes": given.shapes}
-    (given.output / "study.json").write_text(json.dumps(drawn, indent=1), encoding="utf-8")
-    for number in range(given.first, given.first + given.cases):
-        began = clock.perf_counter()
-        answer = make_case(given.output, nominal, pool, given.seed, number)
-        effects = ", ".join(e["effect"] for e in answer["effects"]) or "none"
-        known = answer["identifiability"]
-        seen = f"ratio {known['ratio']:.2f}" if known else ""
-        print(
-            f"{answer['case']} {answer['family']:16s} {len(answer['channels'])} channels {effects:45s} "
-            f"{seen:12s} noise {answer['noise']['total_K']:.2f} K {clock.perf_counter() - began:.1f} s",
-            flush=True,
-        )
+    write_study(
+        given,
+        lambda number: make_case(given.output, nominal, pool, given.seed, number),
+        generator="rough",
+        shapes=given.shapes,
+    )
 
 
 if __name__ == "__main__":
