@@ -65,10 +65,13 @@ book: $(READY)
 
 # What was concealed and what was found, from finished studies: PROOF names their folders, with answers and results.
 # REAL=folder: diagnoses of the real recordings (`python -m validation.open_examples` leaves them).
+# BOOK=folder: the book's work, for the paper's riddle and other programs (`python -m book --only riddle --only peers`).
 PROOF ?= runs/study_rough runs/study_meridian runs/study_networks
 REAL ?=
+BOOK ?=
 proof: $(READY)
-	$(BIN)/python -m validation.proof $(PROOF) -o reports/proof $(addprefix --real ,$(REAL)) --recordings $(RECORDINGS)
+	$(BIN)/python -m validation.proof $(PROOF) -o reports/proof $(addprefix --real ,$(REAL)) $(addprefix --book ,$(BOOK)) \
+	    --recordings $(RECORDINGS)
 
 clean:
 	rm -rf $(VENV) build dist runs .pytest_cache .ruff_cache .hypothesis

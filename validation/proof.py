@@ -14,6 +14,7 @@ from typing import Any
 
 import jinja2
 
+from . import riddle
 from .causes import OPEN, SPINDLE, read_causes, study_seed
 from .score import reliability
 from .score_families import percent, score_study, states_of, summary
@@ -151,9 +152,44 @@ def real_machines(results: Path | None, recordings: Path | None) -> list[dict[st
     return rounded(out)
 
 
+def riddles(book: Path | None) -> list[dict[str, Any]]:
+    """What was said of machines with the paper's two effects, from the folders that the book left."""
+    out = []
+    for folder in sorted(book.glob("riddle_*")) if book else ():
+        result = folder / "results" / riddle.NAME
+        held = riddle.held_against_answer(folder, result)
+        diagnosis = json.loads((result / "diagnosis.json").read_text(encoding="utf-8"))
+        out.append(
+            {
+                "machine": folder.name,
+                "right": held["score"]["exact"],
+                "verdict": diagnosis["verdict"],
+                "found": [f"{f['effect']}@{f['component']}" for f in diagnosis["findings"]],
+                "set_probability": diagnosis.get("set_probability"),
+                "noise_K": diagnosis["fit"]["noise_K"],
+                "speeds": [
+                    {"speed_rpm": before["speed_rpm"], "before_K": before["rms_K"], "after_K": after["rms_K"]}
+                    for before, after in zip(held["before"], held["after"], strict=True)
+                ],
+            }
+        )
+    return rounded(out)
+
+
+def other_programs(book: Path | None) -> dict[str, Any] | None:
+    """Temperatures of other programs on the same mesh, from the folder that the book left."""
+    table = book / "peers" / "peers.json" if book else None
+    if table is None or not table.exists():
+        return None
+    return rounded(json.loads(table.read_text(encoding="utf-8")))
+
+
 def build(
-    studies: list[tuple[Path, Path]], worked: str | None, real: tuple[Path | None, Path | None]
-) -> dict:
+    studies: list[tuple[Path, Path]],
+    worked: str | None = None,
+    real: tuple[Path | None, Path | None] = (None, None),
+    book: Path | None = None,
+) -> dict[str, Any]:
     """Everything that the page says, as one table of data."""
     told = {study.name: (study, results, read_study(study, results)) for study, results in studies}
     return {
@@ -161,6 +197,8 @@ def build(
         "interval_percent": 90,
         "studies": [data for _, _, data in told.values()],
         "worked": worked_case(told, worked),
+        "riddles": riddles(book),
+        "programs": other_programs(book),
         "real": real_machines(*real),
     }
 
@@ -217,9 +255,12 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--worked", default=None, help="STUDY/case_0001 to show from end to end")
     parser.add_argument("--real", type=Path, default=None, help="folder with diagnoses of real recordings")
     parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"))
+    parser.add_argument(
+        "--book", type=Path, default=None, help="work folder of the book, with its riddles and peers"
+    )
     given = parser.parse_args(arguments)
     studies = [(study, study / given.results) for study in given.study]
-    data = build(studies, given.worked, (given.real, given.recordings))
+    data = build(studies, given.worked, (given.real, given.recordings), given.book)
     given.output.mkdir(parents=True, exist_ok=True)
     from .proof_pictures import draw_all
 

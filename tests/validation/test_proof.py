@@ -62,7 +62,7 @@ def data(tmp_path_factory):
         (study / "answers" / f"{name}.json").write_text(json.dumps({**answer, "case": name}))
         (study / "results" / name).mkdir(parents=True)
         (study / "results" / name / "diagnosis.json").write_text(json.dumps(said))
-    return build([(study, study / "results")], None, (None, None))
+    return build([(study, study / "results")])
 
 
 def test_figures_follow_from_the_rows(data):
@@ -77,6 +77,23 @@ def test_page_follows_from_the_data(data):
     assert "50 % (" in page
     data["studies"][0]["seed"] = 123
     assert "seed 123" in render(data)
+
+
+def test_riddle_and_other_programs_are_told_where_the_book_has_them(data):
+    assert "riddle" not in render(data)
+    assert "Other programs" not in render(data)
+    found = {"machine": "riddle_1", "verdict": "missing_physics", "found": ["starvation@F1"], "right": True}
+    speeds = [{"speed_rpm": 2000.0, "before_K": 0.876, "after_K": 0.123}]
+    peer = {"name": "peer", "version": "9.8", "largest_K": 2.5e-7, "rms_K": None}
+    page = render(
+        data
+        | {
+            "riddles": [found | {"set_probability": 0.91, "noise_K": 0.1, "speeds": speeds}],
+            "programs": {"nodes": 10, "elements": 20, "low_degC": 15, "high_degC": 40, "programs": [peer]},
+        }
+    )
+    assert "| 2000 | 0.88 | 0.12 |" in page
+    assert "| peer | 9.8 | 2.5e-07 |  |" in page
 
 
 def test_words_of_the_page_hold_no_number():
