@@ -23,41 +23,21 @@ from spindle_fem.inference.told_apart import (
 )
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from tests.support.lumped_spindle import lumped_model
+from tests.support.written_texts import network_text
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "two bodies"
-initial = "ambient"
-[[network.node]]
-name = "a"
-capacity = "2000 J/K"
-[[network.node]]
-name = "b"
-capacity = "2000 J/K"
-[[network.boundary]]
-name = "ambient"
-temperature = "20 degC"
-[[network.link]]
-between = ["a", "b"]
-conductance = "{between}"
-[[network.link]]
-between = ["a", "ambient"]
-conductance = "2 W/K"
-[[network.link]]
-between = ["b", "ambient"]
-conductance = "2 W/K"
-[[network.source]]
-node = "a"
-input = "power"
-gain = "1 W/W"
-"""
+
+def machine_text(between):
+    nodes = {"a": "2000 J/K", "b": "2000 J/K"}
+    links = {"a|b": between, "a|ambient": "2 W/K", "b|ambient": "2 W/K"}
+    sources, rooms = [("a", "power", "1 W/W")], {"ambient": "20 degC"}
+    return network_text("two bodies", nodes, links, sources, rooms, initial="ambient")
 
 
 @pytest.fixture
 def machine(tmp_path):
     def write(between="1 W/K"):
         path = tmp_path / "machine.toml"
-        path.write_text(MACHINE.format(between=between), encoding="utf-8")
+        path.write_text(machine_text(between), encoding="utf-8")
         return path
 
     return write

@@ -26,24 +26,14 @@ from spindle_fem.recordings.manifest import load_manifest
 from spindle_fem.recordings.recording_window import RecordingWindow, piece_of
 from spindle_fem.studies.watch import Watching, watch_recording
 from tests.conftest import write_recording
+from tests.support.written_texts import network_text
 
-MACHINE = """
-schema = "spindle-fem/machine/1"
-name = "block"
-[[network.node]]
-name = "block"
-capacity = {value = "2000 J/K", sigma_rel = 0.2}
-[[network.boundary]]
-name = "ambient"
-temperature = "ambient"
-[[network.link]]
-between = ["block", "ambient"]
-conductance = {value = "2 W/K", sigma_rel = 0.2}
-[[network.source]]
-node = "block"
-input = "power"
-gain = {value = "1 W/W", sigma_rel = 0.1}
-"""
+MACHINE = network_text(
+    "block",
+    {"block": ("2000 J/K", 0.2)},
+    {"block|ambient": ("2 W/K", 0.2)},
+    [("block", "power", ("1 W/W", 0.1))],
+)
 TEMPERATURES, INPUTS = {"block": "block"}, {"power": "power", "room": "ambient"}
 
 
