@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import solve_banded, solve_triangular
 
 from spindle_fem.recordings.align import Recording
 
@@ -172,27 +172,28 @@ class Whitener:
             return
         kept = np.exp(-np.diff(bins.times, prepend=bins.times[0]) / slow.time)
         white = bins.white**2 / bins.number
-        self._kept, self._gain, self._scale = kept, np.empty_like(kept), np.empty_like(kept)
+        gain, self._scale = np.empty_like(kept), np.empty_like(kept)
         variance = slow.sigma**2
         for step, (share, own) in enumerate(zip(kept.tolist(), white.tolist(), strict=True)):
             variance = share**2 * variance + slow.sigma**2 * (1.0 - share**2)
             total = variance + own
-            self._gain[step], self._scale[step] = variance / total, np.sqrt(total)
+            gain[step], self._scale[step] = variance / total, np.sqrt(total)
             variance *= own / total
+        # What is expected of a bin: kept of what was before, corrected by its gain. One row a bin.
+        self._corrected = (kept[1:] * gain[:-1])[:, None]
+        self._expecting = np.ones((2, len(kept)))
+        self._expecting[1, :-1] = -kept[1:] * (1.0 - gain[:-1])
         self.log_root_determinant = float(np.log(self._scale).sum())
 
     def __call__(self, values: Array) -> Array:
         """Whitened values (b, ...)."""
         if self.factor is not None:
             return whiten(self.factor, values)
-        found = np.empty_like(values, dtype=float)
-        state = np.zeros(values.shape[1:])
-        for step in range(len(values)):
-            state = self._kept[step] * state
-            difference = values[step] - state
-            found[step] = difference / self._scale[step]
-            state = state + self._gain[step] * difference
-        return found
+        flat = values.reshape(len(values), -1)
+        expected = np.zeros(flat.shape)
+        expected[1:] = self._corrected * flat[:-1]
+        expected = solve_banded((1, 0), self._expecting, expected, overwrite_b=True, check_finite=False)
+        return ((flat - expected) / self._scale[:, None]).reshape(values.shape)
 
 
 def whiten(factor: Array, values: Array) -> Array:
