@@ -186,7 +186,7 @@ def diagnose_recordings(
     if after.misfit_with_prior < own.misfit_with_prior:
         unchanged, plain, own = predictor, final, after
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
-    readings = _Readings(final, plain, unseen)
+    readings = _Readings(final, plain, unseen, lambda fit: told_states(search, final, fit))
     refitted = with_own_noise(final, plain, readings.kept(refitted))
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
@@ -197,6 +197,7 @@ def diagnose_recordings(
         overlapping=overlapping,
         apart=readings.apart,
         left=readings.left,
+        beyond=readings.beyond,
         coarseness=coarseness,
     )
     null = next(h.fit for h in refitted if not h.fit.candidates)
@@ -224,7 +225,7 @@ def diagnose_recordings(
         tried,
         clock.laps,
         wrong,
-        told_states(search, final, judgement.chosen.fit),
+        readings.states(judgement.chosen.fit),
     )
 
 
@@ -256,12 +257,22 @@ class _Readings:
         With effects, and with nothing missing.
     unseen : sequence of (n_sources,) ndarray
         As :func:`left_over_noise` takes it.
+    follow : callable
+        Hidden states of a fit as all readings tell them, as :func:`told_states` gives them.
     """
 
-    def __init__(self, final: Problem, plain: Problem, unseen: Sequence[Array] = ()) -> None:
+    def __init__(
+        self,
+        final: Problem,
+        plain: Problem,
+        unseen: Sequence[Array] = (),
+        follow: Callable[[Fit], Mapping[str, Told]] = lambda fit: {},
+    ) -> None:
         self._plant, self._unchanged = final.predictor, plain.predictor
         self._slow, self._unseen = final.slow.sigma, unseen
+        self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
+        self._states: dict[int, tuple[Fit, Mapping[str, Told]]] = {}
 
     def apart(self, one: Fit, other: Fit) -> float:
         """Root mean square of the difference over the noise, in the channel where it is largest."""
@@ -275,6 +286,26 @@ class _Readings:
         """Root mean square of what a fit leaves of single readings over their noise, all channels alike."""
         plant = self._plant
         return left_over_noise(plant, plant.observations, self._of(fit), fit.values, self._unseen)
+
+    def beyond(self, fit: Fit) -> float:
+        """Likewise of held-out readings; what switches is on there as all readings tell it."""
+        plant, states = self._plant, self.states(fit)
+        if not plant.heldout:
+            return 1.0
+        told = self._told(fit)
+        if states:
+            own = tuple(
+                states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates
+            )
+            told = [plant.predict(n, fit.values, own).temperature for n in range(len(plant.recordings))]
+        at = [item.at(told[item.recording][:, item.channel]) for item in plant.heldout]
+        return left_over_noise(plant, plant.heldout, at, fit.values, self._unseen)
+
+    def states(self, fit: Fit) -> Mapping[str, Told]:
+        """Hidden states of a fit."""
+        if id(fit) not in self._states:
+            self._states[id(fit)] = fit, self._follow(fit)
+        return self._states[id(fit)][1]
 
     def kept(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Sets without those that predict held-out readings worse than some of their effects alone."""

@@ -232,6 +232,7 @@ def judge(
     overlapping: Mapping[str, frozenset[str]] | None = None,
     apart: Callable[[Fit, Fit], float] = lambda one, other: np.inf,
     left: Callable[[Fit], float] = lambda fit: 1.0,
+    beyond: Callable[[Fit], float] = lambda fit: 1.0,
     coarseness: float = 1.0,
 ) -> Judgement:
     """Conclude from fitted hypotheses.
@@ -250,6 +251,8 @@ def judge(
         How far the readings of two fits are apart, in units of the noise; far by default.
     left : callable, optional
         What a fit leaves of the readings over their noise; no more than the noise by default.
+    beyond : callable, optional
+        Likewise of readings that no fit has seen: a set that does not predict them is not the whole truth.
     coarseness : float
         As :func:`tempered` has it.
     """
@@ -275,7 +278,7 @@ def judge(
     misfit = float(np.sqrt(chosen.fit.reduced_misfit))
     inexact = float(np.clip((misfit - tuned.EXACT_MISFIT) / tuned.OTHER_RANGE, 0.0, tuned.LARGEST_OTHER))
     rest = left(chosen.fit)
-    inexact = max(inexact, unexplained_share(rest))
+    inexact = max(inexact, unexplained_share(max(rest, beyond(chosen.fit))))
     known_as_one = overlapping or {}
     near = [
         item

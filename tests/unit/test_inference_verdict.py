@@ -199,6 +199,14 @@ def test_the_p_value_is_that_of_the_most_significant_set_not_of_the_largest_gain
     assert detection_p_value([null, pair], 50) > detection_p_value([null, better], 50)
 
 
+def test_a_set_that_does_not_predict_what_was_held_out_is_stated_no_higher_than_that_permits():
+    sets = hypothesis(PRELOAD, misfit=400.0), hypothesis(misfit=2000.0)
+    well, badly = verdict(*sets, beyond=lambda fit: 1.1), verdict(*sets, beyond=lambda fit: 4.0)
+    assert well.chosen.probability > 0.9 > 0.11 > badly.chosen.probability
+    assert badly.other == pytest.approx(1.0 - badly.chosen.probability)
+    assert badly.verdict == "missing_physics"
+
+
 def test_what_nothing_could_do_by_chance_has_no_probability_left():
     assert detection_p_value([hypothesis(misfit=9e3), hypothesis(PRELOAD, misfit=400.0)], 50) == 0.0
 
