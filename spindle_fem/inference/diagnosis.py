@@ -294,9 +294,7 @@ class _Readings:
             return 1.0
         told = self._told(fit)
         if states:
-            own = tuple(
-                states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates
-            )
+            own = tuple(states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates)
             told = [plant.predict(n, fit.values, own).temperature for n in range(len(plant.recordings))]
         at = [item.at(told[item.recording][:, item.channel]) for item in plant.heldout]
         return left_over_noise(plant, plant.heldout, at, fit.values, self._unseen)
