@@ -120,13 +120,14 @@ def _fitted(
     use = [~heldout_stamps(item)[0] for item in machine.calibration]
     predictor = Predictor(machine.fast, machine.calibration, use, machine.effects)
     predictor = with_misdescriptions(predictor, misdescriptions_of(predictor))
-    belief, slow, fit = known_before(predictor), expected_slow_error(predictor), None
-    for _ in range(2 if given is None else 1):
-        problem = Problem(predictor, belief, slow if given is None else given, predictor.observations)
-        fit = problem.fit(candidates, None if fit is None else fit.values, iterations=STEPS)
-        slow = slow_error_of(problem, fit)
+    slow = expected_slow_error(predictor) if given is None else given
+    problem = Problem(predictor, known_before(predictor), slow, predictor.observations)
+    fit = problem.fit(candidates, iterations=STEPS)
+    if given is None:
         predictor = with_misdescriptions(predictor, predictor.misdescribed, fit.values, candidates)
-    predictor = problem.predictor
+        slow = slow_error_of(problem, fit)
+        problem = Problem(predictor, problem.belief, slow, predictor.observations)
+        fit = problem.fit(candidates, fit.values, iterations=STEPS)
     told = [
         predictor.predict(number, fit.values, candidates).temperature
         for number in range(len(machine.calibration))
