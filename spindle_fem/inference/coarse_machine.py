@@ -27,7 +27,6 @@ from spindle_fem.inference.misdescription_columns import misdescriptions_of, wit
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_network
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import expected_slow_error, known_before, slow_error_of
-from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.units import Uncertain
 
 # Additions at most, and steps of the fit of each option.
@@ -93,37 +92,38 @@ def refined(machine: DiagnosedMachine) -> DiagnosedMachine:
         return machine
     additions: list[Addition] = []
     while len(additions) < MOST_ADDITIONS:
-        best: tuple[float, DiagnosedMachine, _Option] | None = None
+        best: tuple[float, DiagnosedMachine, _Option, Fit] | None = None
         for option in _options(machine):
             try:
                 opened = with_network(machine, option.spec)
-                fit, _, after = _fitted(opened, option.candidates, own.slow)
+                fit, _, after = _fitted(opened, option.candidates, own)
             except SpindleFemError:
                 # It cannot be simulated: no help.
                 continue
             if best is None or after < best[0]:
-                best = after, _with_effects(opened, fit), option
+                best = after, _with_effects(opened, fit), option, fit
         if best is None or best[0] > (1.0 - LEAST_GAIN) * before:
             break
         additions.append(Addition(best[2].statement, before, best[0]))
-        before, machine = best[0], best[1]
+        before, machine, _, own = best
     return replace(machine, too_coarse=TooCoarse(left, tuple(additions)))
 
 
 def _fitted(
-    machine: DiagnosedMachine, candidates: tuple[Candidate, ...] = (), given: SlowError | None = None
+    machine: DiagnosedMachine, candidates: tuple[Candidate, ...] = (), known: Fit | None = None
 ) -> tuple[Fit, float, float]:
     """Fit to most of the calibration's time; what that leaves over the noise there, and on the rest.
 
-    ``given`` is a slow error that is known; found in two rounds when None.
+    ``known`` is the fit of the machine that this one extends, which says how large the slow error is and where
+    to begin: an extension at its usual size is far from what it is compared with. In two rounds when None.
     """
     use = [~heldout_stamps(item)[0] for item in machine.calibration]
     predictor = Predictor(machine.fast, machine.calibration, use, machine.effects)
     predictor = with_misdescriptions(predictor, misdescriptions_of(predictor))
-    slow = expected_slow_error(predictor) if given is None else given
+    slow = expected_slow_error(predictor) if known is None else known.slow
     problem = Problem(predictor, known_before(predictor), slow, predictor.observations)
-    fit = problem.fit(candidates, iterations=STEPS)
-    if given is None:
+    fit = problem.fit(candidates, None if known is None else known.values, iterations=STEPS)
+    if known is None:
         predictor = with_misdescriptions(predictor, predictor.misdescribed, fit.values, candidates)
         slow = slow_error_of(problem, fit)
         problem = Problem(predictor, problem.belief, slow, predictor.observations)
