@@ -114,8 +114,8 @@ def _fitted(
 ) -> tuple[Fit, float, float]:
     """Fit to most of the calibration's time; what that leaves over the noise there, and on the rest.
 
-    ``known`` is the fit of the machine that this one extends, which says how large the slow error is and where
-    to begin: an extension at its usual size is far from what it is compared with. In two rounds when None.
+    ``known`` is the fit of the machine that this one extends: its slow error holds, and the fit
+    begins from its values. In two rounds when None.
     """
     use = [~heldout_stamps(item)[0] for item in machine.calibration]
     predictor = Predictor(machine.fast, machine.calibration, use, machine.effects)
