@@ -9,7 +9,7 @@ from spindle_fem.machine.geometry.part_shapes import AnnularSegment
 from spindle_fem.model.elastic.elastic_body import ElasticBody, Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL, RADIAL, SIDEWAYS, BodyOutputs
 from spindle_fem.model.elastic.meridian_mesh import MeridianMesh
-from spindle_fem.model.elastic.seat_contact import solve_seats
+from spindle_fem.physics.bearings.seat_contact import solve_seats
 from spindle_fem.physics.elasticity.elastic_material import ElasticMaterial
 
 STEEL = ElasticMaterial(206e9, 0.3, 12e-6, 7850.0)

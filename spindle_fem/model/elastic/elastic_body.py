@@ -100,13 +100,8 @@ class ElasticBody:
 
     def stiffness_matrix(self) -> sparse.csr_matrix:
         """Of every unknown, none held, [N/m]."""
-        shape = self.basis.dx.shape
-        constants = {
-            name: np.broadcast_to(values, (*values.shape[:-2], *shape))
-            for name, values in self.coefficients.items()
-            if name in ("normal", "shear")
-        }
-        return forms.stiffness.assemble(self.basis, harmonic=self.harmonic, **constants)
+        normal, shear = (self.coefficients[name][..., 0] for name in ("normal", "shear"))
+        return forms.stiffness_matrix(self.basis, self.harmonic, normal, shear)
 
     def solve(self, load: Array) -> Array:
         """Displacement (n,) under a load (n,) in balance [N]."""

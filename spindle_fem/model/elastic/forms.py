@@ -17,7 +17,9 @@ import math
 from typing import Any
 
 import numpy as np
-from skfem import BilinearForm, LinearForm
+from numpy.typing import NDArray
+from scipy import sparse
+from skfem import Basis, BilinearForm, LinearForm
 
 
 def strains(u: Any, r: Any, harmonic: int) -> tuple[Any, ...]:
@@ -36,18 +38,32 @@ def turn(harmonic: int) -> float:
     return math.pi if harmonic else 2.0 * math.pi
 
 
-@BilinearForm
-def stiffness(u: Any, v: Any, w: Any) -> Any:
+def stiffness_matrix(
+    basis: Basis, harmonic: int, normal: NDArray[np.float64], shear: NDArray[np.float64]
+) -> sparse.csr_matrix:
     """``∫ ε(u)ᵀ D ε(v) dV``, [N/m] on nodes.
 
-    ``w`` carries ``harmonic`` and, on each element, ``normal`` (3, 3, ...) and ``shear`` (3, ...).
+    The strains of every shape function are worked out once, not once a pair.
+
+    Parameters
+    ----------
+    normal : (3, 3, n_elements) ndarray, [Pa]
+    shear : (3, n_elements) ndarray, [Pa]
     """
-    r, harmonic = w.x[1], w.harmonic
-    of_u, of_v = strains(u, r, harmonic), strains(v, r, harmonic)
-    normal, shear = np.asarray(w.normal), np.asarray(w.shear)
-    energy = sum(of_v[i] * sum(normal[i, j] * of_u[j] for j in range(3)) for i in range(3))
-    energy = energy + sum(modulus * a * b for modulus, a, b in zip(shear, of_u[3:], of_v[3:], strict=False))
-    return turn(harmonic) * r * energy
+    r = basis.default_parameters()["x"][1]
+    of = np.stack([np.stack(strains(own[0], r, harmonic)) for own in basis.basis])
+    count = of.shape[1]
+    law = np.zeros((count, count, normal.shape[-1]))
+    law[:3, :3] = normal
+    diagonal = np.arange(3, count)
+    law[diagonal, diagonal] = shear[: count - 3]
+    weight = turn(harmonic) * r * basis.dx
+    stress = np.einsum("ste,itep,ep->isep", law, of, weight, optimize=True)
+    local = np.einsum("isep,jsep->ije", stress, of, optimize=True)
+    places = basis.element_dofs
+    rows = np.broadcast_to(places[:, None], local.shape).ravel()
+    columns = np.broadcast_to(places[None], local.shape).ravel()
+    return sparse.coo_matrix((local.ravel(), (rows, columns)), shape=(basis.N, basis.N)).tocsr()
 
 
 @BilinearForm

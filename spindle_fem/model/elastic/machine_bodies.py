@@ -113,18 +113,20 @@ def machine_bodies(spec: MachineSpec, *, size: float = ELEMENT_SIZE) -> MachineB
 
 
 def _seats(spec: MachineSpec) -> tuple[Seat, ...]:
+    """Inner and outer seat of every bearing in turn; none where shaft or housing is missing."""
     layout = Layout(spec, set())
     found = []
     for group, bearing in spec.bearings:
         kind = spec.bearing_types[group.bearing_type]
         z = tuple(bearing.z)
+        if layout.shaft is None or layout.housing is None:
+            continue
         for ring, carrier, seat, raceway in (
             ("inner", layout.shaft, kind.bore_diameter, kind.inner_ring_outer_diameter),
             ("outer", layout.housing, kind.outer_diameter, kind.outer_ring_inner_diameter),
         ):
-            if carrier is not None:
-                faces = (Face(z, (0.5 * seat, 0.5 * seat)), Face(z, (0.5 * raceway, 0.5 * raceway)))
-                found.append(Seat(bearing.name, f"{bearing.name}.{ring}_ring", carrier.name, *faces))
+            faces = (Face(z, (0.5 * seat, 0.5 * seat)), Face(z, (0.5 * raceway, 0.5 * raceway)))
+            found.append(Seat(bearing.name, f"{bearing.name}.{ring}_ring", carrier.name, *faces))
     return tuple(found)
 
 

@@ -7,22 +7,24 @@ temperatures and one small contact problem over all seats.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.solid_tables import Fit
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.elastic_body import Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL, RADIAL, SIDEWAYS, BodyOutputs
 from spindle_fem.model.elastic.machine_bodies import MachineBodies, Seat, machine_bodies
 from spindle_fem.model.elastic.meridian_field import MeridianField
-from spindle_fem.model.elastic.seat_contact import solve_seats
 from spindle_fem.physics.bearings.mounting import ROOM_TEMPERATURE
+from spindle_fem.physics.bearings.seat_contact import SeatBodies
 
 Array = NDArray[np.float64]
 Side = Literal["shaft", "housing"]
@@ -61,7 +63,7 @@ class Growth:
         machine has no shaft, no flange or no bearing.
     nose_radial : (up, across) or None, [m]
         Shift of the nose's middle, where the housing bends; None without a second set of bearings.
-        Across is to the left of who looks along the axis from the nose, where θ = 90°.
+        Across is where θ = 90°: to the right of who looks along the axis from the nose.
     nose_tilt : (up, across) or None, [rad]
         Turn of the axis: its shift for each metre towards the drive end.
     """
@@ -85,6 +87,13 @@ class _Ring:
         """Areas of seat and raceway, signed: pressure pushes the outside inwards."""
         outwards = 1.0 if self.seat.is_inner else -1.0
         return np.array([outwards * self.seat.face.area, -outwards * self.seat.raceway.area])
+
+
+def _clearance(fit: Fit | None, seat: Seat) -> float:
+    """Radial clearance of a ring on its seat as assembled, m; a set without a fit just touches."""
+    if fit is None:
+        return 0.0
+    return 0.5 * (-fit.inner_interference if seat.is_inner else fit.outer_clearance)
 
 
 def _flange_back(layout: Layout) -> Face:
@@ -119,9 +128,12 @@ class GrowthModel:
             name: self._carrier(name) for name in (self.bodies.shaft, self.bodies.housing) if name
         }
         self.bending = self._bending()
-        self._fits = {bearing.name: group.fit for group, bearing in spec.bearings}
         sets = spec.bearing_set
-        self.assembly_temperature = sets[0].assembly_temperature if sets else ROOM_TEMPERATURE
+        groups = {bearing.name: group for group, bearing in spec.bearings}
+        self.bearings = tuple(dict.fromkeys(ring.seat.bearing for ring in self.rings))
+        self._assembled_at = np.array([groups[name].assembly_temperature for name in self.bearings])
+        held = [group for group in sets if group.carries_thrust] or list(sets)
+        self.assembly_temperature = held[0].assembly_temperature if held else ROOM_TEMPERATURE
         self.assembly_forces = {
             bearing.name: (force, force)
             for group in sets
@@ -129,6 +141,16 @@ class GrowthModel:
             for share in [group.preload / sum(b.takes_thrust == bearing.takes_thrust for b in group.bearing)]
             for force in [share / math.tan(spec.bearing_types[group.bearing_type].contact_angle)]
         }
+        self._clearance = np.array([_clearance(groups[ring.seat.bearing].fit, ring.seat) for ring in self.rings])
+        self.seats = self._seat_bodies()
+        seat_rows = np.stack([self._seat_row(ring) for ring in self.rings])
+        inwards = self._inwards[:, None]
+        rows = np.stack([ring.rows for ring in self.rings])
+        self.seat_rows = seat_rows
+        self.thermal_rows = np.concatenate(
+            [(inwards * (seat_rows - rows[:, 0])).reshape(-1, 2, self._size), rows[:, 1].reshape(-1, 2, self._size)],
+            axis=1,
+        )
 
     def _rows(self, outputs: BodyOutputs, body: str) -> Array:
         field = MeridianField(self._mesh, self._order, self.bodies.parts[body], outputs.body.section)
@@ -200,6 +222,62 @@ class GrowthModel:
         held = max(sets[0].bearing, key=lambda bearing: bearing.z[1]).name
         return next((s.face for s in self.bodies.seats if (s.bearing, s.carrier) == (held, carrier)), None)
 
+    # ------------------------------------------------------------------ seats
+    @property
+    def _inwards(self) -> Array:
+        """Which way a gap opens by its seat's shift outwards: -1 on the shaft, +1 in the housing."""
+        return np.array([-1.0 if ring.seat.is_inner else 1.0 for ring in self.rings])
+
+    def _seat_row(self, ring: _Ring) -> Array:
+        outputs, rows = self.carriers[ring.seat.carrier]
+        return rows[outputs.names.index(ring.seat.ring)]
+
+    def _seat_bodies(self) -> SeatBodies:
+        """How all seats yield, in the order of the rings: inner and outer of each bearing."""
+        count, inwards = len(self.rings), self._inwards
+        bearing = np.arange(count) // 2
+        areas = np.array([ring.seat.face.area for ring in self.rings])
+        self._by_seats = np.zeros((count, count))
+        spin = self._spin_of_seats = np.zeros(count)
+        for name, (outputs, rows) in self.carriers.items():
+            own = [i for i, ring in enumerate(self.rings) if ring.seat.carrier == name]
+            yields = outputs.compliance(np.append(areas[own], np.zeros(len(rows) - len(own))))
+            self._by_seats[np.ix_(own, own)] = yields[: len(own), : len(own)] * inwards[own][None, :]
+            if name == self.bodies.shaft:
+                spin[own] = outputs.by_spin[: len(own)]
+        own = np.array([ring.outputs.compliance(ring.areas) for ring in self.rings])
+        by_load = own[:, :, 1] / np.array([ring.seat.raceway.area for ring in self.rings])[:, None]
+        turning = np.where(inwards < 0.0, 1.0, 0.0)
+        rings_spin = turning[:, None] * np.array([ring.outputs.by_spin for ring in self.rings])
+        by_force, by_pressure = np.zeros((count, count // 2)), np.zeros((count // 2, count))
+        by_force[np.arange(count), bearing] = -inwards * by_load[:, 0]
+        by_pressure[bearing, np.arange(count)] = -inwards * own[:, 1, 0]
+        return SeatBodies(
+            self._clearance,
+            inwards[:, None] * self._by_seats - np.diag(inwards * own[:, 0, 0]),
+            by_force,
+            areas,
+            by_pressure,
+            (inwards * by_load[:, 1]).reshape(-1, 2),
+            inwards * (spin - rings_spin[:, 0]),
+            rings_spin[::2, 1],
+            np.array([ring.seat.raceway.r[0] for ring in self.rings]).reshape(-1, 2),
+        )
+
+    def shifts(self, temperature: Array) -> dict[str, Array]:
+        """What temperature alone does to each bearing, (4,) m, as ``SeatBodies.law`` takes it."""
+        rises = self.thermal_rows @ temperature - self._unit_shifts * self._assembled_at[:, None]
+        return dict(zip(self.bearings, rises, strict=True))
+
+    @cached_property
+    def _unit_shifts(self) -> Array:
+        """Shifts (k, 4) of a kelvin everywhere, m/K."""
+        return self.thermal_rows.sum(axis=2)
+
+    def of_set(self, names: Sequence[str]) -> SeatBodies:
+        """Seats of a set; what the seats of other sets press on the same bodies is left out."""
+        return self.seats.of([self.bearings.index(name) for name in names])
+
     # ------------------------------------------------------------------ a state
     def at(self, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Growth:
         """Growth at a temperature field (n_unknowns,) [K], a speed [rad/s] and radial ball forces.
@@ -209,61 +287,35 @@ class GrowthModel:
         forces : mapping of str to (inner, outer), [N]
             Sum of the radial ball loads on both raceways of each bearing.
         """
+        seat_shifts = self.seat_rows @ temperature - self.seat_rows.sum(axis=1) * np.repeat(self._assembled_at, 2)
+        now = self._state(np.stack(list(self.shifts(temperature).values())), seat_shifts, speed, forces)
+        assembled = self._state(np.zeros((len(self.bearings), 4)), 0.0 * seat_shifts, 0.0, self.assembly_forces)
         found: dict[tuple[str, Side], SeatState] = {}
-        for name in self.carriers:
-            now = self._seats(name, temperature, speed, forces)
-            cold = np.full(self._size, self.assembly_temperature)
-            assembled = self._seats(name, cold, 0.0, self.assembly_forces)
-            for ring, (pressure, gap, seat, raceway), before in zip(
-                self._rings_of(name), now.T, assembled.T, strict=True
-            ):
-                side: Side = "shaft" if ring.seat.is_inner else "housing"
-                found[ring.seat.bearing, side] = SeatState(
-                    float(pressure), float(gap), float(seat - before[2]), float(raceway - before[3])
-                )
+        for ring, (pressure, gap, seat, raceway), before in zip(self.rings, now.T, assembled.T, strict=True):
+            side: Side = "shaft" if ring.seat.is_inner else "housing"
+            found[ring.seat.bearing, side] = SeatState(
+                float(pressure), float(gap), float(seat - before[2]), float(raceway - before[3])
+            )
         bent = self.bending @ (temperature - self.assembly_temperature)
         radial, tilt = (tuple(pair) for pair in bent.reshape(2, 2).tolist()) if len(bent) else (None, None)
         return Growth(found, self._nose(temperature), radial, tilt)
 
-    def _rings_of(self, carrier: str) -> list[_Ring]:
-        return [ring for ring in self.rings if ring.seat.carrier == carrier]
-
-    def _seats(
-        self, carrier: str, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]
+    def _state(
+        self, thermal: Array, seat: Array, speed: float, forces: Mapping[str, tuple[float, float]]
     ) -> Array:
-        """Pressure, gap, seat and raceway shift (4, n) of every ring on a body, from no pressure or load."""
-        outputs, rows = self.carriers[carrier]
-        rings = self._rings_of(carrier)
-        rise = temperature - self.assembly_temperature
-        turning = speed**2 if carrier == self.bodies.shaft else 0.0
-        count = len(rings)
-        areas = np.array([ring.seat.face.area for ring in rings])
-        inwards = -1.0 if carrier == self.bodies.shaft else 1.0
-        seat = (rows @ rise + turning * outputs.by_spin)[:count]
-        by_seats = inwards * outputs.compliance(np.append(areas, np.zeros(len(rows) - count)))[:count, :count]
-        free, by_pressure = [], []
-        for ring in rings:
-            compliance = ring.outputs.compliance(ring.areas)
-            force = forces[ring.seat.bearing][0 if ring.seat.is_inner else 1]
-            load = force / ring.seat.raceway.area
-            free.append(ring.rows @ rise + turning * ring.outputs.by_spin + compliance[:, 1] * load)
-            by_pressure.append(compliance[:, 0])
-        free, by_pressure = np.array(free), np.array(by_pressure)
-        clearance = np.array([self._clearance(ring.seat) for ring in rings])
-        # the seat less the ring around the gap: outwards for the housing, inwards for the shaft
-        opening = inwards * (seat - free[:, 0]) + clearance
-        yielding = inwards * by_seats - np.diag(inwards * by_pressure[:, 0])
-        pressure, gap = solve_seats(opening, yielding, areas)
-        return np.array(
-            [pressure, gap, seat + by_seats @ pressure, free[:, 1] + by_pressure[:, 1] * pressure]
+        """Pressure, gap, seat and raceway shift (4, n) of every ring, from no pressure or load."""
+        both = np.array([forces[name] for name in self.bearings])
+        bodies = self.seats
+        law = bodies.law(thermal, speed, both[:, 1] - both[:, 0])
+        pressure, gap = law.seats(both[:, 0])
+        outwards = -self._inwards
+        spin = np.where(outwards > 0.0, np.repeat(bodies.spin_growth, 2), 0.0)
+        raceway = (
+            thermal[:, 2:].ravel()
+            + spin * speed**2
+            + outwards * (bodies.by_pressure.sum(axis=0) * pressure - (bodies.by_load * both).ravel())
         )
-
-    def _clearance(self, seat: Seat) -> float:
-        """Radial clearance of a ring on its seat as assembled, m; a set without a fit just touches."""
-        fit = self._fits[seat.bearing]
-        if fit is None:
-            return 0.0
-        return 0.5 * (-fit.inner_interference if seat.is_inner else fit.outer_clearance)
+        return np.array([pressure, gap, seat + self._spin_of_seats * speed**2 + self._by_seats @ pressure, raceway])
 
     def _nose(self, temperature: Array) -> float | None:
         if any("forward" not in outputs.names for outputs, _ in self.carriers.values()):

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.hertz import INNER, OUTER, contact_polynomials
 from spindle_fem.physics.bearings.rings import RingCompliance, RingLaw
+from spindle_fem.physics.bearings.seat_contact import CoupledRings, SeatedLaw
 
 FloatArray = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ class BallSystem:
     smoothing : float, [m]
         Width over which contact sets in; above 0 only on the way to a
         solution, where a free ball would leave the Newton matrix singular.
-    rings : RingCompliance or None
+    rings : RingCompliance, CoupledRings or None
         Displacements that are raceway growths, held by rings that give way;
         None: rigid rings.
     """
@@ -65,7 +66,7 @@ class BallSystem:
     radial_map: FloatArray
     polynomials: FloatArray
     smoothing: float = 0.0
-    rings: RingCompliance | None = None
+    rings: RingCompliance | CoupledRings | None = None
 
     @property
     def number(self) -> int:
@@ -164,16 +165,17 @@ def build_ball_rows(
 
 
 def join_rows(
-    rows: list[dict[str, FloatArray]], displacements: list[int], laws: Sequence[RingLaw | None] = ()
+    rows: list[dict[str, FloatArray]], displacements: list[int], laws: Sequence[RingLaw | None] | SeatedLaw = ()
 ) -> BallSystem:
     """One system of several bearings' rows that keeps the displacements named by index.
 
     Every bearing with a ring law gets one displacement more, the growth of its
-    inner raceway over the outer one, counted from ``start``.
+    inner raceway over the outer one, counted from ``start``; a :class:`SeatedLaw` is one for all of them.
     """
     joined = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
     axial_map, radial_map = joined["axial_map"][:, displacements], joined["radial_map"][:, displacements]
-    seated = [index for index, law in enumerate(laws) if law is not None]
+    coupled = isinstance(laws, SeatedLaw)
+    seated = list(range(len(rows))) if coupled else [i for i, law in enumerate(laws) if law is not None]
     rings = None
     if seated:
         bearing = np.repeat(np.arange(len(rows)), [len(row["weight"]) for row in rows])
@@ -181,7 +183,10 @@ def join_rows(
         columns = axial_map.shape[1] + np.arange(len(seated))
         axial_map = np.hstack([axial_map, np.zeros_like(growth)])
         radial_map = np.hstack([radial_map, growth])
-        rings = RingCompliance.of([laws[index] for index in seated], columns)
+        if coupled:
+            rings = CoupledRings(columns, (laws,))
+        else:
+            rings = RingCompliance.of([laws[index] for index in seated], columns)
     joined |= {"axial_map": np.ascontiguousarray(axial_map), "radial_map": np.ascontiguousarray(radial_map)}
     return BallSystem(**joined, rings=rings)
 
@@ -409,5 +414,5 @@ def _tangent(
     tangent = np.einsum("n,nia,nij,njb->ab", system.weight, maps, stiffness, maps)
     if system.rings is not None:
         columns = system.rings.columns
-        tangent[columns, columns] += system.rings.force(displacement)[1]
+        tangent[np.ix_(columns, columns)] += system.rings.force(displacement)[1]
     return tangent, solved_residual, solved_distance

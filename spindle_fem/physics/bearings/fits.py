@@ -21,9 +21,15 @@ from spindle_fem.errors import GeometryError, SpecError
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_DENSITY, BearingGeometry
 from spindle_fem.physics.bearings.hertz import contact_polynomials
 from spindle_fem.physics.bearings.rings import STEEL, Annulus, RingLaw, SeatMaterial
+from spindle_fem.physics.bearings.seat_contact import SeatBodies
 
 # An interference beyond this share of the diameter yields the ring (Harris: about 1e-3 at most)
 _LARGEST_FIT = 2.0e-3
+# rad; where the contact angle of a mounted bearing is looked for
+_ANGLES = (1.0e-3, 0.5 * math.pi - 1.0e-6)
+# m; seats that yield together have settled
+_GROWTH_TOLERANCE = 1.0e-13
+_MOST_ROUNDS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,28 +336,91 @@ def mounted_state(geometry: BearingGeometry, fits: RingFits, axial_force: float)
         A force that is not above 0.
     GeometryError
     """
+    _require_force(axial_force)
+    law = seated_rings(geometry, fits).law(FitTemperatures())
+    angle = float(
+        brentq(
+            lambda angle: _excess(geometry, axial_force, angle)
+            - law.growth(axial_force / math.tan(angle)),
+            *_ANGLES,
+            xtol=1e-15,
+            rtol=1e-14,
+        )
+    )
+    return _mounted(geometry, axial_force, angle)
+
+
+@lru_cache(maxsize=64)
+def mounted_states(
+    geometries: tuple[BearingGeometry, ...], seats: SeatBodies, axial_forces: tuple[float, ...]
+) -> tuple[MountedState, ...]:
+    """Every bearing of a set on bodies that carry their seats together.
+
+    Each bearing's angle is found under the growth that all ball forces leave, in turn until they agree.
+
+    Parameters
+    ----------
+    axial_forces : tuple of float, [N]
+
+    Raises
+    ------
+    SpecError
+        As :func:`mounted_state`.
+    """
+    for force in axial_forces:
+        _require_force(force)
+    law = seats.law()
+    growth = np.zeros(len(geometries))
+    for _ in range(_MOST_ROUNDS):
+        angles = [
+            float(
+                brentq(
+                    lambda angle, g=geometry, f=force, up=grown: _excess(g, f, angle) - up,
+                    *_ANGLES,
+                    xtol=1e-15,
+                    rtol=1e-14,
+                )
+            )
+            for geometry, force, grown in zip(geometries, axial_forces, growth.tolist(), strict=True)
+        ]
+        before, growth = growth, law.growth(np.array(axial_forces) / np.tan(angles))
+        if np.abs(growth - before).max() < _GROWTH_TOLERANCE:
+            break
+    return tuple(
+        _mounted(geometry, force, angle)
+        for geometry, force, angle in zip(geometries, axial_forces, angles, strict=True)
+    )
+
+
+def _require_force(axial_force: float) -> None:
     if not axial_force > 0.0:
         raise SpecError(
             "axial force", f"it is {axial_force:g} N.", "A mounted bearing needs a force above 0."
         )
-    law = seated_rings(geometry, fits).law(FitTemperatures())
-    distance, free = geometry.curvature_centre_distance, geometry.contact_angle
 
-    def at(angle: float) -> tuple[float, float]:
-        load = axial_force / (geometry.ball_count * math.sin(angle))
-        return load, distance + (load / _normal_constant(geometry, math.cos(angle))) ** (2.0 / 3.0)
 
-    def excess(angle: float) -> float:
-        length = at(angle)[1]
-        return (
-            length * math.cos(angle) - distance * math.cos(free) - law.growth(axial_force / math.tan(angle))
-        )
+def _lengths(geometry: BearingGeometry, axial_force: float, angle: float) -> tuple[float, float]:
+    """Ball load (N) and distance of the groove centres (m) at a contact angle."""
+    load = axial_force / (geometry.ball_count * math.sin(angle))
+    stretch = (load / _normal_constant(geometry, math.cos(angle))) ** (2.0 / 3.0)
+    return load, geometry.curvature_centre_distance + stretch
 
-    angle = float(brentq(excess, 1.0e-3, 0.5 * math.pi - 1.0e-6, xtol=1e-15, rtol=1e-14))
-    load, length = at(angle)
-    radial = axial_force / math.tan(angle)
+
+def _excess(geometry: BearingGeometry, axial_force: float, angle: float) -> float:
+    """Raceway growth that a contact angle under an axial force asks for, m."""
+    radial = geometry.curvature_centre_distance * math.cos(geometry.contact_angle)
+    return _lengths(geometry, axial_force, angle)[1] * math.cos(angle) - radial
+
+
+def _mounted(geometry: BearingGeometry, axial_force: float, angle: float) -> MountedState:
+    load, length = _lengths(geometry, axial_force, angle)
+    free = geometry.curvature_centre_distance * math.sin(geometry.contact_angle)
     return MountedState(
-        length * math.sin(angle) - distance * math.sin(free), angle, load, radial, law.growth(radial)
+        length * math.sin(angle) - free,
+        angle,
+        load,
+        axial_force / math.tan(angle),
+        _excess(geometry, axial_force, angle),
     )
 
 
@@ -370,5 +439,6 @@ __all__ = [
     "SeatedRings",
     "fit_faults",
     "mounted_state",
+    "mounted_states",
     "seated_rings",
 ]

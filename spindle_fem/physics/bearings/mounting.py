@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import SpecError
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_EXPANSION, BearingGeometry
-from spindle_fem.physics.bearings.fits import RingFits, mounted_state, seated_rings
+from spindle_fem.physics.bearings.fits import RingFits, mounted_state, mounted_states, seated_rings
 from spindle_fem.physics.bearings.preload import require_force, tandem_approach
 from spindle_fem.physics.bearings.rough_surface import SurfaceRoughness, roughness_from_rms
+from spindle_fem.physics.bearings.seat_contact import SeatBodies
 
 FloatArray = NDArray[np.float64]
 ROOM_TEMPERATURE = 293.15
@@ -64,6 +65,8 @@ class BearingSet:
         Rq.
     roughness : SurfaceRoughness or None
         Composite moments from measured profiles; None: assumed from both Rq.
+    seats : SeatBodies or None
+        Elastic bodies that carry the rings, in place of the cylinders of each bearing's ``fits``.
 
     Raises
     ------
@@ -80,6 +83,7 @@ class BearingSet:
     raceway_roughness: float = 0.05e-6
     ball_roughness: float = 0.01e-6
     roughness: SurfaceRoughness | None = None
+    seats: SeatBodies | None = None
 
     def __post_init__(self) -> None:
         if not self.bearings:
@@ -110,7 +114,8 @@ class BearingSet:
 
     def with_rigid_rings(self) -> BearingSet:
         """The same set on rings that keep their size: the contact angle is that of the mounted bearing."""
-        return replace(self, bearings=tuple(replace(bearing, fits=None) for bearing in self.bearings))
+        bearings = tuple(replace(bearing, fits=None) for bearing in self.bearings)
+        return replace(self, bearings=bearings, seats=None)
 
     def assembly_approaches(self) -> FloatArray:
         """Axial approach of each bearing after assembly, (n_bearings,), m.
@@ -127,9 +132,14 @@ class BearingSet:
             for index in group:
                 bearing = self.bearings[index]
                 approach[index] = together
-                if bearing.fits is not None:
+                if bearing.fits is not None and self.seats is None:
                     share = self.preload / len(group)
                     approach[index] = mounted_state(bearing.geometry, bearing.fits, share).approach
+        if self.seats is not None:
+            sides = [bearing.orientation for bearing in self.bearings]
+            shares = tuple(self.preload / sides.count(side) for side in sides)
+            geometries = tuple(bearing.geometry for bearing in self.bearings)
+            approach[:] = [state.approach for state in mounted_states(geometries, self.seats, shares)]
         return approach
 
 
@@ -166,12 +176,15 @@ class SetTemperatures:
         Between the bearings.
     assembly : float
         At which the preload was set.
+    shifts : (n_bearings, 4) ndarray or None, [m]
+        What temperature alone does where elastic bodies carry the rings, as ``SeatBodies.law`` takes it.
     """
 
     bearings: tuple[BearingTemperatures, ...]
     shaft: float
     housing: float
     assembly: float = ROOM_TEMPERATURE
+    shifts: FloatArray | None = None
 
 
 def uniform_temperatures(number: int, temperature: float) -> SetTemperatures:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -137,8 +138,17 @@ class RingCompliance:
         return cls(columns, np.array([law.level for law in laws]), np.array([law.compliance for law in laws]))
 
     def force(self, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Radial force of every law (N) and its fall with the displacement (N/m), each (k,)."""
+        """Radial force of every law (N) and its fall with the growths, (k,) and (k, k) N/m."""
         forces = (self.level - displacement[self.columns][:, None]) / self.compliance
         active = np.argmax(forces, axis=1)
         rows = np.arange(len(active))
-        return forces[rows, active], 1.0 / self.compliance[rows, active]
+        return forces[rows, active], np.diag(1.0 / self.compliance[rows, active])
+
+    @classmethod
+    def joined(cls, parts: Sequence[tuple[int, RingCompliance]]) -> RingCompliance:
+        """Of systems side by side, each with the number of its first displacement."""
+        return cls(
+            np.concatenate([first + part.columns for first, part in parts]),
+            np.concatenate([part.level for _, part in parts]),
+            np.concatenate([part.compliance for _, part in parts]),
+        )

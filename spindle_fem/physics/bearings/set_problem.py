@@ -11,9 +11,10 @@ import scipy.linalg
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from spindle_fem.errors import NoEquilibriumError
+from spindle_fem.errors import NoEquilibriumError, SpecError
 from spindle_fem.physics.bearings.ball_system import BallSystem, build_ball_rows, join_rows
-from spindle_fem.physics.bearings.fits import FitTemperatures, mounted_state, seated_rings
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.fits import FitTemperatures, mounted_state, mounted_states, seated_rings
 from spindle_fem.physics.bearings.hertz import mean_load_constant
 from spindle_fem.physics.bearings.mounting import (
     BearingSet,
@@ -25,7 +26,8 @@ from spindle_fem.physics.bearings.mounting import (
 )
 from spindle_fem.physics.bearings.preload import tandem_approach
 from spindle_fem.physics.bearings.race_control import static_evaluation
-from spindle_fem.physics.bearings.rings import RingCompliance, RingLaw
+from spindle_fem.physics.bearings.rings import RingLaw
+from spindle_fem.physics.bearings.seat_contact import SeatedLaw
 
 FloatArray = NDArray[np.float64]
 
@@ -56,7 +58,8 @@ def build_problem(
     middle = float(np.mean([bearing.axial_position for bearing in bearing_set.bearings]))
     shaft_rise = temperatures.shaft - temperatures.assembly
     housing_rise = temperatures.housing - temperatures.assembly
-    rows, laws, growths = [], [], []
+    elastic, growths = _elastic_law(bearing_set, temperatures, speed, external)
+    rows, laws = [], []
     for bearing, heat, approach in zip(bearing_set.bearings, temperatures.bearings, approaches, strict=True):
         geometry, sign = bearing.geometry, bearing.orientation
         position = bearing.axial_position - middle
@@ -70,24 +73,28 @@ def build_problem(
         single = external.is_axial
         count = geometry.ball_count
         azimuth = np.zeros(1) if single else 2.0 * np.pi * np.arange(count) / count
-        law, growth = _ring_law(bearing_set, bearing, heat, temperatures, speed, external)
-        laws.append(law)
-        if law is not None:
-            growths.append(growth)
+        if elastic is None:
+            law, growth = _ring_law(bearing_set, bearing, heat, temperatures, speed, external)
+            laws.append(law)
+            if law is not None:
+                growths.append(growth)
         rows.append(
             build_ball_rows(
                 geometry, azimuth, float(count) if single else 1.0,
                 ring_rise=(heat.inner_ring - temperatures.assembly, heat.outer_ring - temperatures.assembly),
                 ball_rise=heat.ball - temperatures.assembly,
                 radial_growth=rotation_growth(geometry, speed, bearing_set.shaft_bore_diameter)
-                if law is None else 0.0,
+                if elastic is None and law is None else 0.0,
                 axial_offset=approach + thermal,
                 place=(sign, position),
             )
             | {"azimuth": azimuth}
         )  # fmt: skip
     columns = [0] if external.is_axial else [0, 1, 2, 3, 4]
-    system = join_rows([{k: v for k, v in row.items() if k != "azimuth"} for row in rows], columns, laws)
+    system = join_rows(
+        [{k: v for k, v in row.items() if k != "azimuth"} for row in rows], columns,
+        laws if elastic is None else elastic,
+    )  # fmt: skip
     load = np.array([external.thrust, external.radial, 0.0, external.moment, 0.0])[columns]
     load = np.append(load, np.zeros(len(growths)))
     spring = bearing_set.preload_kind == "spring" and bearing_set.has_counter_bearings
@@ -102,6 +109,45 @@ def build_problem(
     return SetProblem(
         bearing_set, rows, system, load, spring, _ball_load(bearing_set, external), np.array(growths)
     )
+
+
+def _share(bearing_set: BearingSet, bearing: MountedBearing, external: ExternalLoad) -> float:
+    """Axial force of a bearing at assembly, N; that of the thrust in a set without preload."""
+    beside = sum(1 for other in bearing_set.bearings if other.orientation == bearing.orientation)
+    return (bearing_set.preload or abs(external.thrust)) / beside
+
+
+def _centrifugal(geometry: BearingGeometry, speed: float) -> float:
+    """Force of all balls on the outer ring, N; they orbit as in pure rolling."""
+    orbital = 0.5 * speed * (1.0 - geometry.diameter_ratio * math.cos(geometry.contact_angle))
+    return 0.5 * geometry.ball_count * geometry.ball_mass * geometry.pitch_diameter * orbital**2
+
+
+def _elastic_law(
+    bearing_set: BearingSet, temperatures: SetTemperatures, speed: float, external: ExternalLoad
+) -> tuple[SeatedLaw | None, list[float]]:
+    """How elastic bodies carry the rings of a set, and the growths to look for first (m)."""
+    seats = bearing_set.seats
+    if seats is None:
+        return None, []
+    thermal = temperatures.shifts
+    if thermal is None:
+        raise SpecError(
+            "temperatures.shifts", "elastic bodies carry the rings.", "Give what temperature does to them."
+        )
+    # the balls' rows have the raceways of rings that grow by their own temperature
+    own = [
+        bearing.geometry.thermal_expansion
+        * np.array([heat.inner_ring - temperatures.assembly, heat.outer_ring - temperatures.assembly])
+        for bearing, heat in zip(bearing_set.bearings, temperatures.bearings, strict=True)
+    ]
+    thermal = thermal - np.pad(np.array(own) * seats.raceway_radius, ((0, 0), (2, 0)))
+    beyond = np.array([_centrifugal(bearing.geometry, speed) for bearing in bearing_set.bearings])
+    law = seats.law(thermal, speed, beyond)
+    shares = tuple(_share(bearing_set, bearing, external) for bearing in bearing_set.bearings)
+    geometries = tuple(bearing.geometry for bearing in bearing_set.bearings)
+    radial = [state.radial_force for state in mounted_states(geometries, seats, shares)]
+    return law, law.growth(np.array(radial)).tolist()
 
 
 def _ring_law(
@@ -127,12 +173,8 @@ def _ring_law(
         )
     )
     geometry = bearing.geometry
-    # the outer ring carries the balls' own centrifugal force too; they orbit as in pure rolling
-    orbital = 0.5 * speed * (1.0 - geometry.diameter_ratio * math.cos(geometry.contact_angle))
-    centrifugal = 0.5 * geometry.ball_count * geometry.ball_mass * geometry.pitch_diameter * orbital**2
-    law = seated_rings(geometry, bearing.fits).law(rise, speed, centrifugal)
-    beside = sum(1 for other in bearing_set.bearings if other.orientation == bearing.orientation)
-    force = (bearing_set.preload or abs(external.thrust)) / beside
+    law = seated_rings(geometry, bearing.fits).law(rise, speed, _centrifugal(geometry, speed))
+    force = _share(bearing_set, bearing, external)
     radial = mounted_state(geometry, bearing.fits, force).radial_force if force > 0.0 else 0.0
     return law, law.growth(radial)
 
@@ -164,11 +206,7 @@ def side_by_side(problems: Sequence[SetProblem]) -> BallSystem:
     rings = None
     seated = [(first, s.rings) for first, s in zip(firsts, systems, strict=True) if s.rings is not None]
     if seated:
-        rings = RingCompliance(
-            np.concatenate([first + part.columns for first, part in seated]),
-            np.concatenate([part.level for _, part in seated]),
-            np.concatenate([part.compliance for _, part in seated]),
-        )
+        rings = type(seated[0][1]).joined(seated)
     return BallSystem(**arrays, **maps, rings=rings)
 
 

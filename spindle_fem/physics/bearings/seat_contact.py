@@ -1,0 +1,204 @@
+"""Which rings are tight on their seats, how hard they press, and where a gap opens: all seats at once.
+
+Seats of one body yield together. With gap g and pressure p at every seat, g = g0 + M p, g ≥ 0, p ≥ 0 and
+g p = 0: the bodies apart would leave gaps g0 (negative: they overlap), M is their compliance. That is
+the minimum of a convex energy, found by non-negative least squares.
+
+Source: Johnson, Contact Mechanics (1985), section 5.4, for the complementary form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.optimize import nnls
+
+Array = NDArray[np.float64]
+
+
+def solve_seats(gap: Array, compliance: Array, areas: Array) -> tuple[Array, Array]:
+    """Pressures [Pa] and gaps [m] of seats, both (n,) and neither negative.
+
+    Parameters
+    ----------
+    gap : (n,) ndarray, [m]
+        Without any pressure; negative where the bodies would overlap.
+    compliance : (n, n) ndarray, [m/Pa]
+        Opening of each gap by a pressure in each seat.
+    areas : (n,) ndarray, [m²]
+
+    >>> compliance = np.array([[2e-12, 0.5e-12], [0.5e-12, 2e-12]])
+    >>> p, g = solve_seats(np.array([-4e-6, 2e-6]), compliance, np.ones(2))
+    >>> (p / 1e6).round(6), (g * 1e6).round(6)
+    (array([2., 0.]), array([0., 3.]))
+    """
+    # Work of the pressures on the gaps is symmetric: area times compliance.
+    energy = areas[:, None] * compliance
+    lower = np.linalg.cholesky(0.5 * (energy + energy.T))
+    pressure, _ = nnls(lower.T, np.linalg.solve(lower, -areas * gap))
+    opening = gap + compliance @ pressure
+    return pressure, np.where(pressure > 0.0, 0.0, np.maximum(opening, 0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeatedLaw:
+    """Rings of k bearings on their n seats at one state of temperature and speed, over the ball forces.
+
+    Gaps are ``opening + yielding p + by_force F`` and raceway growths (inner less outer)
+    ``growth + by_pressure p - by_load F``, with p the seat pressures and F the radial ball force of each
+    bearing on its inner ring.
+
+    Attributes
+    ----------
+    opening : (n,) ndarray, [m]
+    yielding : (n, n) ndarray, [m/Pa]
+    by_force : (n, k) ndarray, [m/N]
+    areas : (n,) ndarray, [m²]
+        Of the seats.
+    free_growth : (k,) ndarray, [m]
+    by_pressure : (k, n) ndarray, [m/Pa]
+    by_load : (k,) ndarray, [m/N]
+    """
+
+    opening: Array
+    yielding: Array
+    by_force: Array
+    areas: Array
+    free_growth: Array
+    by_pressure: Array
+    by_load: Array
+
+    def seats(self, force: Array) -> tuple[Array, Array]:
+        """Pressures [Pa] and gaps [m] of the seats (n,) under ball forces (k,) [N]."""
+        return solve_seats(self.opening + self.by_force @ force, self.yielding, self.areas)
+
+    def growth(self, force: Array) -> Array:
+        """Raceway growth (k,) [m] under ball forces (k,) [N]."""
+        return self.free_growth + self.by_pressure @ self.seats(force)[0] - self.by_load * force
+
+    def force(self, growth: Array) -> tuple[Array, Array]:
+        """Ball forces (k,) [N] that leave raceway growths (k,) [m], and how they fall with these, (k, k) N/m.
+
+        Negative: the rings would have to be pulled.
+        """
+        held = self.by_force / self.by_load
+        yielding = self.yielding + held @ self.by_pressure
+        pressure, _ = solve_seats(
+            self.opening + held @ (self.free_growth - growth), yielding, self.areas
+        )
+        force = (self.free_growth + self.by_pressure @ pressure - growth) / self.by_load
+        fall = np.diag(1.0 / self.by_load)
+        tight = np.flatnonzero(pressure > 0.0)
+        if len(tight):
+            more = np.linalg.solve(yielding[np.ix_(tight, tight)], held[tight])
+            fall -= (self.by_pressure[:, tight] / self.by_load[:, None]) @ more
+        return force, fall
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeatBodies:
+    """How the seats of k bearings yield, whatever the state: two seats a bearing, inner ring first.
+
+    Attributes
+    ----------
+    clearance : (2k,) ndarray, [m]
+        Radial, as assembled; negative: interference.
+    yielding, by_force, areas, by_pressure
+        As of :class:`SeatedLaw`.
+    by_load : (k, 2) ndarray, [m/N]
+        How far a newton of radial ball force moves the inner raceway inwards and the outer one outwards.
+    spin_opening : (2k,) ndarray, [m s²]
+    spin_growth : (k,) ndarray, [m s²]
+        At 1 rad/s.
+    raceway_radius : (k, 2) ndarray, [m]
+        Inner, outer.
+    """
+
+    clearance: Array
+    yielding: Array
+    by_force: Array
+    areas: Array
+    by_pressure: Array
+    by_load: Array
+    spin_opening: Array
+    spin_growth: Array
+    raceway_radius: Array
+
+    def of(self, bearings: Sequence[int]) -> SeatBodies:
+        """Those of some bearings, as if no others pressed on the same bodies."""
+        own = np.asarray(bearings)
+        seats = (2 * own[:, None] + np.arange(2)).ravel()
+        return SeatBodies(
+            self.clearance[seats],
+            self.yielding[np.ix_(seats, seats)],
+            self.by_force[np.ix_(seats, own)],
+            self.areas[seats],
+            self.by_pressure[np.ix_(own, seats)],
+            self.by_load[own],
+            self.spin_opening[seats],
+            self.spin_growth[own],
+            self.raceway_radius[own],
+        )
+
+    def law(
+        self, thermal: Array | None = None, speed: float = 0.0, centrifugal: Array | float = 0.0
+    ) -> SeatedLaw:
+        """The law at a state.
+
+        Parameters
+        ----------
+        thermal : (k, 4) ndarray, optional, [m]
+            By temperature alone: opening of the inner and of the outer seat, outward shift of the inner
+            and of the outer raceway. Zero by default.
+        speed : float, [rad/s]
+        centrifugal : (k,) ndarray or float, [N]
+            Radial force on the outer raceways beyond that on the inner ones.
+        """
+        thermal = np.zeros((len(self.by_load), 4)) if thermal is None else thermal
+        beyond = np.broadcast_to(centrifugal, len(self.by_load))
+        on_outer = self.by_force * beyond * (np.arange(len(self.areas)) % 2)[:, None]
+        return SeatedLaw(
+            self.clearance + thermal[:, :2].ravel() + self.spin_opening * speed**2 + on_outer.sum(axis=1),
+            self.yielding,
+            self.by_force,
+            self.areas,
+            thermal[:, 2]
+            - thermal[:, 3]
+            + self.spin_growth * speed**2
+            - self.by_load[:, 1] * beyond,
+            self.by_pressure,
+            self.by_load.sum(axis=1),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledRings:
+    """Laws of sets as restoring forces on displacements of a ball system.
+
+    Attributes
+    ----------
+    columns : (k,) int64 ndarray
+        Displacements that are raceway growths, inner less outer.
+    laws : tuple of SeatedLaw
+        One a set, in the order of the columns.
+    """
+
+    columns: NDArray[np.int64]
+    laws: tuple[SeatedLaw, ...]
+
+    def force(self, displacement: Array) -> tuple[Array, Array]:
+        """Radial force of every law (N) and its fall with the growths, (k,) and (k, k) N/m."""
+        growths = displacement[self.columns]
+        ends = np.cumsum([len(law.by_load) for law in self.laws])
+        found = [law.force(g) for law, g in zip(self.laws, np.split(growths, ends[:-1]), strict=True)]
+        return np.concatenate([force for force, _ in found]), block_diag(*(fall for _, fall in found))
+
+    @classmethod
+    def joined(cls, parts: Sequence[tuple[int, CoupledRings]]) -> CoupledRings:
+        """Of systems side by side, each with the number of its first displacement."""
+        columns = np.concatenate([first + part.columns for first, part in parts])
+        return cls(columns, tuple(law for _, part in parts for law in part.laws))
