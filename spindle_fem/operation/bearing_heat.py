@@ -30,6 +30,7 @@ from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.bearings.rings import SeatMaterial
+from spindle_fem.physics.bearings.seat_contact import SeatBodies
 from spindle_fem.validity import CodedWarning
 
 _ORIENTATION = {"towards_rear": 1, "towards_nose": -1}
@@ -40,7 +41,8 @@ class BearingTemperatures:
     """Mean temperatures around one bearing, K.
 
     ``shaft`` and ``housing`` are those of the seats on the other side of the
-    joints.
+    joints. ``shifts`` (4,) [m] is what temperature does to seats and raceways where elastic bodies carry
+    the rings, as ``SeatBodies.law`` takes it.
     """
 
     inner: float
@@ -48,6 +50,12 @@ class BearingTemperatures:
     ball: float
     shaft: float
     housing: float
+    shifts: NDArray[np.float64] | None = None
+
+    @property
+    def kelvins(self) -> tuple[float, ...]:
+        """The temperatures alone."""
+        return self.inner, self.outer, self.ball, self.shaft, self.housing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,12 +82,18 @@ HeatModel = Callable[
 ]
 
 
-def heat_model_of(spec: MachineSpec) -> HeatModel:
-    """The heat model that a definition asks for."""
+def heat_model_of(spec: MachineSpec, seats: Mapping[str, SeatBodies] | None = None) -> HeatModel:
+    """The heat model that a definition asks for.
+
+    Parameters
+    ----------
+    seats : mapping of bearing set to SeatBodies, optional
+        Elastic bodies that carry rings with fits; thick-walled cylinders without.
+    """
     if not spec.bearing_set:
         return lambda point, temperatures: ({}, ())
     if spec.heat.model != "table":
-        return BearingMechanics(spec)
+        return BearingMechanics(spec, seats)
     needs_contacts = any(group.ball_row.kind == "contact" for group in spec.bearing_set)
     mechanics = BearingMechanics(spec) if needs_contacts else None
 
@@ -159,7 +173,7 @@ class BearingMechanics:
     mechanics are used.
     """
 
-    def __init__(self, spec: MachineSpec) -> None:
+    def __init__(self, spec: MachineSpec, seats: Mapping[str, SeatBodies] | None = None) -> None:
         self.spec = spec
         grease = spec.grease
         self.lubricant = Lubricant(
@@ -178,7 +192,11 @@ class BearingMechanics:
             palmgren_f0=spec.heat.palmgren_f0,
             skf_friction_ehl=spec.heat.skf_mu_ehl,
         )
-        self.sets = {group.name: _bearing_set(spec, group) for group in spec.bearing_set}
+        elastic = seats or {}
+        self.sets = {
+            group.name: replace(_bearing_set(spec, group), seats=elastic.get(group.name))
+            for group in spec.bearing_set
+        }
 
     def states(
         self,
@@ -291,6 +309,7 @@ class BearingMechanics:
             shaft=float(np.mean([item.shaft for item in around])),
             housing=float(np.mean([item.housing for item in around])),
             assembly=assembly,
+            shifts=np.stack([item.shifts for item in around]) if around[0].shifts is not None else None,
         )
 
     @staticmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +42,14 @@ class FieldState:
     lumped : mapping of lumped-node name to float, [K]
     joints : mapping of joint to (float, float), [K]
         Mean of the first and of the second part's side.
+    shifts : mapping of bearing to (4,) ndarray, [m]
+        What temperature does to seats and raceways of rings that elastic bodies carry.
     """
 
     facets: Mapping[str, NDArray[np.float64]]
     joints: Mapping[str, tuple[float, float]]
     lumped: Mapping[str, float]
+    shifts: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 class LoadsBuilder:
@@ -105,7 +108,9 @@ class LoadsBuilder:
             ball = float(np.mean(balls)) if balls else 0.5 * (inner + outer)
             shaft = self._seat(f"{bearing.name}.inner_ring", state, default=inner)
             housing = self._seat(f"{bearing.name}.outer_ring", state, default=outer)
-            found[bearing.name] = BearingTemperatures(inner, outer, ball, shaft, housing)
+            found[bearing.name] = BearingTemperatures(
+                inner, outer, ball, shaft, housing, state.shifts.get(bearing.name)
+            )
         return found
 
     def _seat(self, ring: str, state: FieldState, default: float) -> float:

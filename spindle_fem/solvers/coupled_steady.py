@@ -17,9 +17,8 @@ from spindle_fem.operation.loads import NO_CHANGE, LoadChange, Loads
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.fixed_point import REFUSED, Iteration, fixed_point
 from spindle_fem.solvers.preload_runaway import (
-    PreloadGuard,
-    highest_stable_speed,
     no_equilibrium,
+    speed_limit,
 )
 from spindle_fem.solvers.prepared_machine import PreparedMachine, without_expansion
 
@@ -121,11 +120,6 @@ class _Operation:
         self.loads: Loads | None = None
         self.coolant: CoolantState | None = None
         self.change = self.heat_before = np.inf
-        self.guard: PreloadGuard | None = None
-        if self.follows_preload:
-            cold = np.full(machine.operators.n_unknowns, point.ambient_temperature)
-            loads, _ = machine.builder.at(point, machine.field_state(cold, {}))
-            self.guard = PreloadGuard.of(loads.bearing_heat)
 
     def padded(self, field: NDArray[np.float64] | None) -> NDArray[np.float64]:
         """State of a field, ambient by default, with lumped nodes at ambient temperature."""
@@ -159,14 +153,11 @@ class _Operation:
         return _joined(self.solution)
 
     def _require_bounded(self) -> None:
-        """Refuse temperatures and preloads that run away."""
+        """Refuse temperatures that run away."""
         hottest = float(self.solution.temperature.max())
         if not np.isfinite(hottest) or hottest > RUNAWAY_TEMPERATURE:
             heat = f"{self.loads.total_heat:.0f} W would heat it over {hottest - 273.15:.0f} °C."
             raise _no_steady_state(self.machine, self.point, heat)
-        reason = "" if self.guard is None else self.guard.reason(self.loads.bearing_heat)
-        if reason:
-            raise _no_steady_state(self.machine, self.point, reason)
 
     def settled(self, state: NDArray[np.float64], found: NDArray[np.float64]) -> bool:
         """Whether field, heat and coolant agree."""
@@ -206,5 +197,12 @@ def _linear_tolerance(change: float) -> float:
 
 def _no_steady_state(machine: PreparedMachine, point: OperatingPoint, reason: str) -> NoSteadyStateError:
     """The error of a runaway, with the speed up to which the machine has an equilibrium."""
-    limit = highest_stable_speed(machine, point) if follows_preload(machine.spec) else None
+    if not follows_preload(machine.spec):
+        return no_equilibrium(machine.spec.name, point, reason)
+    branch = speed_limit(machine, point, point.speed)
+    if branch.end == "end":
+        return no_equilibrium(machine.spec.name, point, reason)
+    limit = branch.limit
+    if branch.end == "fold":
+        reason = f"heat and preload feed each other beyond the fold. {reason}"
     return no_equilibrium(machine.spec.name, point, reason, limit)

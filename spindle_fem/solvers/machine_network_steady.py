@@ -245,8 +245,7 @@ class _PreloadOperation(_Operation):
 
 
 def _vector(around: Mapping[str, BearingTemperatures]) -> Array:
-    rows = [[getattr(item, key) for key in BearingTemperatures.__slots__] for item in around.values()]
-    return np.array(rows, dtype=float).ravel()
+    return np.array([item.kelvins for item in around.values()], dtype=float).ravel()
 
 
 def _named(values: Array, like: Mapping[str, BearingTemperatures]) -> dict[str, BearingTemperatures]:

@@ -14,30 +14,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import (
-    ConvergenceError,
-    NoEquilibriumError,
-    NoSteadyStateError,
-    OutOfValidityError,
-)
+from spindle_fem.errors import NoSteadyStateError
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.operation.bearing_heat import (
     BearingTemperatures,
-    HeatModel,
-    at_assembly_size,
-    heat_model_of,
 )
 from spindle_fem.operation.heat_shares import heat_shares
-from spindle_fem.operation.loads import BearingHeat
+from spindle_fem.operation.loads import BearingHeat, Loads
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.fixed_point import Iteration, fixed_point
 from spindle_fem.solvers.prepared_machine import PreparedMachine
+from spindle_fem.solvers.solution_branch import Branch, follow_branch
 
 # A preload this many times that of assembly ends a bearing, whatever the loop then does.
 LARGEST_PRELOAD_RATIO = 5.0
-HEAT_TOLERANCE = 1.0e-3
-# The linear response has no film or oil loop to upset, so it may step further than the full one.
-RESPONSE = Iteration(relaxation=0.6, mixing_below=0.0)
+# Of the end of a search: where a branch of equilibria begins.
+SLOWEST = 0.05
 SPEED_TOLERANCE = 0.01
 MAXIMUM_RESPONSES = 6
 
@@ -100,19 +91,24 @@ def highest_settling_speed(highest: float, settles: Callable[[float], bool]) -> 
 
 
 class HeatResponse:
-    """Bearing temperatures as a linear function of the heat of each bearing.
+    """Bearing temperatures and shifts as a linear function of the heat of each bearing.
 
-    Films, oil and contact conductances stay as they are at the operating
-    point, so one solve a bearing describes the machine for all heats.
+    Films, oil and contact conductances stay as they are in given loads, so one solve a bearing describes
+    the machine for all heats near them.
+
+    Parameters
+    ----------
+    loads : Loads, optional
+        Those at ambient temperature by default.
     """
 
-    def __init__(self, machine: PreparedMachine, point: OperatingPoint) -> None:
+    def __init__(self, machine: PreparedMachine, point: OperatingPoint, loads: Loads | None = None) -> None:
         self.machine = machine
         self.point = point
-        self.without_expansion = heat_model_of(at_assembly_size(machine.spec))
         self.names = [bearing.name for _, bearing in machine.spec.bearings]
-        unknowns = np.full(machine.operators.n_unknowns, point.ambient_temperature)
-        loads, _ = machine.builder.at(point, machine.field_state(unknowns, {}))
+        if loads is None:
+            unknowns = np.full(machine.operators.n_unknowns, point.ambient_temperature)
+            loads, _ = machine.builder.at(point, machine.field_state(unknowns, {}))
         solution = None
         columns = []
         for active in (None, *self.names):
@@ -142,65 +138,53 @@ class HeatResponse:
         """Temperatures at given heats (n_bearings,) in W."""
         values = self.unheated + self.per_watt @ heat
         return {
-            name: BearingTemperatures(*row) for name, row in zip(self.names, values.tolist(), strict=True)
+            name: BearingTemperatures(*row[:5].tolist(), row[5:] if row.size > 5 else None)
+            for name, row in zip(self.names, values, strict=True)
         }
 
-    def settles(self, speed: float) -> bool:
-        """Whether heat and temperature reach a fixed point from that without expansion."""
-        point = replace(self.point, speed=speed)
+    def branch(self, end: float) -> Branch:
+        """Heats of the bearings (W) over the speed (rad/s), from slow running to ``end`` or a fold before.
+
+        Raises
+        ------
+        SpindleFemError
+            No equilibrium even at the slowest speed.
+        """
         model = self.machine.builder.heat_model
-        cold = self.temperatures(np.zeros(len(self.names)))
-        try:
-            guard = PreloadGuard.of(model(point, cold)[0])
-            heat = self._fixed_point(point, self.without_expansion, np.zeros(len(self.names)))
-            self._fixed_point(point, model, heat, guard)
-        except (ConvergenceError, NoEquilibriumError, NoSteadyStateError, OutOfValidityError):
-            return False
-        return True
 
-    def _fixed_point(
-        self,
-        point: OperatingPoint,
-        model: HeatModel,
-        heat: NDArray[np.float64],
-        guard: PreloadGuard | None = None,
-    ) -> NDArray[np.float64]:
-        """Heat of every bearing (n_bearings,) [W] that makes the temperatures that make it."""
-
-        def respond(given: NDArray[np.float64]) -> NDArray[np.float64]:
-            found, _ = model(point, self.temperatures(given))
-            reason = "" if guard is None else guard.reason(found)
-            if reason:
-                raise no_equilibrium(self.machine.spec.name, point, reason)
+        def respond(heat: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
+            found, _ = model(replace(self.point, speed=speed), self.temperatures(heat))
             return np.array([found[name].total for name in self.names])
 
-        def settled(given: NDArray[np.float64], wanted: NDArray[np.float64]) -> bool:
-            return np.abs(wanted - given).max() <= HEAT_TOLERANCE * wanted.max()
+        start = SLOWEST * end
+        slow = respond(np.zeros(len(self.names)), start)
+        return follow_branch(respond, slow, start, end)
 
-        return fixed_point(respond, settled, heat, RESPONSE, self.machine.spec.name)[0]
 
+def speed_limit(machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads | None = None) -> Branch:
+    """The branch of equilibria from slow running to a speed ``end`` (rad/s), or to its fold before.
 
-def highest_stable_speed(machine: PreparedMachine, point: OperatingPoint) -> float:
-    """Speed up to which the machine has a thermal equilibrium, rad/s; below that of ``point``.
-
-    Films depend on speed, so the response is taken again at the speed found
-    until both agree.
+    Parameters
+    ----------
+    loads : Loads, optional
+        Films and contacts of a solved state at ``point``; without them those at ambient temperature,
+        taken again at the fold's speed until that stays.
     """
-    limit = point.speed
+    branch = HeatResponse(machine, point, loads).branch(end)
+    if loads is not None:
+        return branch
     for _ in range(MAXIMUM_RESPONSES):
-        response = HeatResponse(machine, replace(point, speed=limit))
-        found = highest_settling_speed(point.speed, response.settles)
-        settled = abs(found - limit) <= 2.0 * SPEED_TOLERANCE * point.speed
-        limit = found
-        if settled or limit == 0.0:
+        before, at = branch.limit, replace(point, speed=branch.limit)
+        branch = HeatResponse(machine, at).branch(end)
+        if abs(branch.limit - before) <= SPEED_TOLERANCE * end:
             break
-    return limit
+    return branch
 
 
 def _as_array(found: dict[str, BearingTemperatures], names: list[str]) -> NDArray[np.float64]:
     return np.array(
         [
-            (found[name].inner, found[name].outer, found[name].ball, found[name].shaft, found[name].housing)
+            np.append(found[name].kelvins, () if found[name].shifts is None else found[name].shifts)
             for name in names
         ]
     )

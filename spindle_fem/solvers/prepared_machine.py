@@ -13,10 +13,11 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.model.mesh.kernels.compile import compile_kernels
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
-from spindle_fem.operation.bearing_heat import at_assembly_size, heat_model_of
+from spindle_fem.operation.bearing_heat import at_assembly_size, follows_preload, heat_model_of
 from spindle_fem.operation.coefficients import joint_conductances
 from spindle_fem.operation.loads import Loads
 from spindle_fem.operation.machine_loads import FieldState, LoadsBuilder
@@ -27,7 +28,10 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class PreparedMachine:
-    """A machine with mesh, operators and sorted loads, ready to be solved at any operating point."""
+    """A machine with mesh, operators and sorted loads, ready to be solved at any operating point.
+
+    ``growth`` is there where preload follows the fits.
+    """
 
     spec: MachineSpec
     mesh: TaggedMesh
@@ -37,6 +41,7 @@ class PreparedMachine:
     conductivity: Mapping[str, float]
     volumetric_capacity: Mapping[str, float]
     geometry_notes: tuple[str, ...] = ()
+    growth: GrowthModel | None = None
     timings: Mapping[str, float] = field(default_factory=dict)
 
     def field_state(self, unknowns: NDArray[np.float64], lumped: Mapping[str, float]) -> FieldState:
@@ -56,7 +61,8 @@ class PreparedMachine:
             for joint in self.operators.joint_rows
             if not joint.endswith(":face")
         }
-        return FieldState(facets, sides, lumped)
+        shifts = {} if self.growth is None else self.growth.shifts(unknowns)
+        return FieldState(facets, sides, lumped, shifts)
 
     def problem(self, loads: Loads) -> ConductionProblem:
         """Conduction problem of given loads."""
@@ -129,11 +135,20 @@ def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOpera
     facet_area = {surface: operators.facet_areas(surface) for surface in mesh.surfaces}
     materials = {part: spec.part_material(part) for part in mesh.part_names}
     capacity_factor = spec.heat_capacity_factor.value
+    growth = seats = None
+    if follows_preload(spec) and any(group.fit for group in spec.bearing_set):
+        growth = GrowthModel(spec, mesh, operators.order)
+        seats = {
+            group.name: growth.of_set([bearing.name for bearing in group.bearing])
+            for group in spec.bearing_set
+            if group.fit is not None
+        }
     return PreparedMachine(
         spec=spec,
         mesh=mesh,
         operators=operators,
-        builder=LoadsBuilder(spec, mesh, facet_area, heat_model_of(spec)),
+        builder=LoadsBuilder(spec, mesh, facet_area, heat_model_of(spec, seats)),
+        growth=growth,
         joint_conductance=joint_conductances(spec, mesh.joints),
         conductivity={part: material.thermal_conductivity for part, material in materials.items()},
         volumetric_capacity={

@@ -1,0 +1,184 @@
+"""A branch of fixed points followed in a parameter, to the fold where it turns back.
+
+Fixed points x = G(x, p) of positive quantities are followed by pseudo-arclength continuation in
+(ln x, p / p_end): the parameter may turn while the arc goes on, so that the fold is a regular point.
+
+Source: Keller (1977), in Applications of Bifurcation Theory, Academic Press, 359-384;
+Broyden (1965), Math. Comp. 19, 577-593.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.errors import SpindleFemError
+
+Array = NDArray[np.float64]
+Respond = Callable[[Array, float], Array]
+# Largest residual of ln x at a point of the branch.
+TOLERANCE = 1.0e-6
+DIFFERENCE = 1.0e-4
+FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.1, 0.4, 1.0e-3
+MOST_CORRECTIONS = 8
+MOST_POINTS = 200
+# The parameter at the fold, relative to the end of the search.
+FOLD_TOLERANCE = 1.0e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """Where a branch went.
+
+    Attributes
+    ----------
+    parameter : (n,) ndarray
+        Of every point, in their order.
+    states : (n, k) ndarray
+    end : {"fold", "end", "refused"}
+        Whether it turned back, reached the end, or came where there is no response.
+    limit : float
+        Largest parameter reached.
+    reason : str
+        Why there was no response.
+    """
+
+    parameter: Array
+    states: Array
+    end: Literal["fold", "end", "refused"]
+    limit: float
+    reason: str = ""
+
+
+def follow_branch(respond: Respond, state: Array, start: float, end: float) -> Branch:
+    """Follow fixed points from a parameter towards a larger one.
+
+    Parameters
+    ----------
+    respond : callable
+        G(x (k,), p) -> (k,), positive; a ``SpindleFemError`` says that there is no response.
+    state : (k,) ndarray
+        Near the fixed point at ``start``.
+
+    Raises
+    ------
+    SpindleFemError
+        No fixed point at ``start``.
+
+    >>> # x = 1 + p x² turns at p = 1/4
+    >>> branch = follow_branch(lambda x, p: 1.0 + p * x**2, np.array([1.0]), 0.01, 1.0)
+    >>> branch.end, round(branch.limit, 4)
+    ('fold', 0.25)
+    """
+    return _Walk(respond, end).go(np.append(np.log(state), start / end))
+
+
+class _NoPointError(Exception):
+    """The correction did not reach the branch."""
+
+
+class _Walk:
+    def __init__(self, respond: Respond, end: float) -> None:
+        self.respond, self.end = respond, end
+        self.jacobian = np.empty((0, 0))
+
+    def residual(self, point: Array) -> Array:
+        """ln x - ln G, (k,)."""
+        found = self.respond(np.exp(point[:-1]), float(point[-1]) * self.end)
+        return point[:-1] - np.log(found)
+
+    def differentiate(self, point: Array, residual: Array) -> None:
+        """Take the derivatives (k, k + 1) anew."""
+        moved = point + DIFFERENCE * np.eye(len(point))
+        self.jacobian = np.stack([self.residual(row) - residual for row in moved], axis=1) / DIFFERENCE
+
+    def correct(self, guess: Array, across: Array) -> tuple[Array, int]:
+        """The point of the branch in the plane through a guess, and how many corrections it took."""
+        point, residual = guess, self.residual(guess)
+        for count in range(MOST_CORRECTIONS):
+            if np.abs(residual).max() < TOLERANCE:
+                return point, count
+            if count == MOST_CORRECTIONS // 2:
+                self.differentiate(point, residual)
+            step = np.linalg.solve(
+                np.vstack([self.jacobian, across]), -np.append(residual, across @ (point - guess))
+            )
+            point = point + step
+            after = self.residual(point)
+            change = after - residual - self.jacobian @ step
+            self.jacobian = self.jacobian + np.outer(change, step) / (step @ step)
+            residual = after
+        raise _NoPointError
+
+    def tangent(self, along: Array) -> Array:
+        """Unit direction of the branch, on the side of ``along``."""
+        last = np.zeros(len(along))
+        last[-1] = 1.0
+        direction = np.linalg.solve(np.vstack([self.jacobian, along]), last)
+        return direction / np.linalg.norm(direction)
+
+    def go(self, guess: Array) -> Branch:
+        upwards = np.zeros(len(guess))
+        upwards[-1] = 1.0
+        self.differentiate(guess, self.residual(guess))
+        try:
+            point, _ = self.correct(guess, upwards)
+        except _NoPointError:
+            raise SpindleFemError(
+                "fixed point", f"none found at {guess[-1] * self.end:g}.", "Start nearer to it."
+            ) from None
+        points, tangent, step, reason = [point], self.tangent(upwards), FIRST_STEP, "steps without end"
+        while step > SHORTEST_STEP and len(points) < MOST_POINTS:
+            if points[-1][-1] + step * tangent[-1] > 1.0 and tangent[-1] > 0.0:
+                try:
+                    last, _ = self.correct(points[-1] + (1.0 - points[-1][-1]) / tangent[-1] * tangent, upwards)
+                    return self.branch([*points, last], "end", 1.0)
+                except (_NoPointError, SpindleFemError):
+                    step *= 0.5
+                    continue
+            try:
+                point, count = self.correct(points[-1] + step * tangent, tangent)
+            except (_NoPointError, SpindleFemError) as error:
+                reason, step = str(error), 0.5 * step
+                continue
+            points.append(point)
+            if point[-1] < points[-2][-1]:
+                return self.branch(points, "fold", self.fold(points))
+            tangent = self.tangent(points[-1] - points[-2])
+            step = min(LONGEST_STEP, step * (1.5 if count <= 3 else 0.7))
+        return self.branch(points, "refused", max(point[-1] for point in points), reason)
+
+    def fold(self, points: list[Array]) -> float:
+        """Largest parameter of the parabola through the last points, with one more on it until it stays."""
+        near = points[-3:] if len(points) > 2 else [*points, points[-1]]
+        best = max(point[-1] for point in near)
+        for _ in range(MOST_CORRECTIONS):
+            along = near[-1] - near[0]
+            along = along / np.linalg.norm(along)
+            places = np.array([along @ (point - near[0]) for point in near])
+            square, slope, _ = np.polyfit(places, [point[-1] for point in near], 2)
+            if not square < 0.0:
+                break
+            place = float(np.clip(-0.5 * slope / square, places[0], places[-1]))
+            share = np.array([np.interp(place, places, column) for column in np.array(near).T])
+            try:
+                top, _ = self.correct(share + (place - along @ (share - near[0])) * along, along)
+            except (_NoPointError, SpindleFemError):
+                break
+            before, best = best, max(best, top[-1])
+            near = sorted([*near, top], key=lambda point: float(along @ (point - near[0])))
+            peak = int(np.clip(max(range(4), key=lambda i: near[i][-1]), 1, 2))
+            near = near[peak - 1 : peak + 2]
+            if abs(best - before) < FOLD_TOLERANCE:
+                break
+        return float(best)
+
+    def branch(
+        self, points: list[Array], end: Literal["fold", "end", "refused"], limit: float, reason: str = ""
+    ) -> Branch:
+        rows = np.array(points)
+        return Branch(rows[:, -1] * self.end, np.exp(rows[:, :-1]), end, limit * self.end, reason)
