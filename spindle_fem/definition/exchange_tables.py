@@ -17,6 +17,7 @@ from spindle_fem.definition.field_types import (
     Place,
     PositiveLength,
     PositiveNumber,
+    Pressure,
     SpecModel,
     Temperature,
     UncertainFilm,
@@ -112,6 +113,21 @@ class Coolant(SpecModel):
     """Whether the pressure loss heats the oil."""
 
 
+class SeatSurface(SpecModel):
+    """Rough surfaces of ring and seat, for the law ``tight_seat``.
+
+    With `heat.thermal_preload` the joint conducts as its fit presses or opens: by the law at
+    the fit's pressure and gap over the law as assembled, where `conductance` holds.
+    """
+
+    roughness: PositiveLength = 1.0e-6
+    """Combined rms of both surfaces."""
+    slope: PositiveNumber = 0.1
+    """Combined rms of the profiles' slopes."""
+    microhardness: Pressure = 3.0e9
+    """Of the softer surface."""
+
+
 class JointGroup(SpecModel):
     """Contact faces that share one conductance (one factor when uncertain).
 
@@ -127,6 +143,8 @@ class JointGroup(SpecModel):
     """Heat-transfer coefficient of the joint, ``"perfect"``, or a law with its quantities."""
     contacts: Annotated[tuple[str, ...], Field(min_length=1)]
     """Names, with `*` for any text."""
+    seat: SeatSurface | None = None
+    """Given for seats of rings whose fit changes what they conduct."""
 
 
 class FaceSelector(SpecModel):

@@ -7,6 +7,7 @@ function of that form, entered in :func:`heat_model_of`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -82,18 +83,12 @@ HeatModel = Callable[
 ]
 
 
-def heat_model_of(spec: MachineSpec, seats: Mapping[str, SeatBodies] | None = None) -> HeatModel:
-    """The heat model that a definition asks for.
-
-    Parameters
-    ----------
-    seats : mapping of bearing set to SeatBodies, optional
-        Elastic bodies that carry rings with fits; thick-walled cylinders without.
-    """
+def heat_model_of(spec: MachineSpec) -> HeatModel:
+    """The heat model that a definition asks for."""
     if not spec.bearing_set:
         return lambda point, temperatures: ({}, ())
     if spec.heat.model != "table":
-        return BearingMechanics(spec, seats)
+        return BearingMechanics(spec)
     needs_contacts = any(group.ball_row.kind == "contact" for group in spec.bearing_set)
     mechanics = BearingMechanics(spec) if needs_contacts else None
 
@@ -171,6 +166,11 @@ class BearingMechanics:
 
     The heat level is the definition's; with ``heat.model = "table"`` only the
     mechanics are used.
+
+    Parameters
+    ----------
+    seats : mapping of bearing set to SeatBodies, optional
+        Elastic bodies that carry rings with fits; thick-walled cylinders without.
     """
 
     def __init__(self, spec: MachineSpec, seats: Mapping[str, SeatBodies] | None = None) -> None:
@@ -334,6 +334,7 @@ class BearingMechanics:
         factors = {bearing.name: group.heat_factor.value for group, bearing in self.spec.bearings}
         groups = {bearing.name: group for group, bearing in self.spec.bearings}
         heat, warnings = {}, []
+        seats = self._seats(point, temperatures, states) if self.spec.heat.thermal_preload else {}
         for name, state in states.items():
             path = self._ball_path(groups[name], state)
             balls = state.balls
@@ -349,9 +350,51 @@ class BearingMechanics:
                 film_thickness_ratio=float(np.min(balls.film_thickness_ratio)),
                 conductance_inner=path.inner,
                 conductance_outer=path.outer,
+                contact_pressure=float(np.max(balls.pressure)),
+                **seats.get(name, {}),
             )
             warnings += state.warnings
         return heat, tuple(warnings)
+
+    def _seats(
+        self,
+        point: OperatingPoint,
+        temperatures: Mapping[str, BearingTemperatures],
+        states: Mapping[str, BearingState],
+    ) -> dict[str, dict[str, tuple[float, float]]]:
+        """Pressures and gaps of the seats of every bearing that elastic bodies carry."""
+        found = {}
+        for group in self.spec.bearing_set:
+            seats = self.sets[group.name].seats
+            if seats is None:
+                continue
+            own = [states[bearing.name] for bearing in group.bearing]
+            inner, outer = (
+                np.array([state.axial_force / math.tan(getattr(state, angle)) for state in own])
+                for angle in ("contact_angle_inner", "contact_angle_outer")
+            )
+            thermal = np.stack([temperatures[state.name].shifts for state in own])
+            pressure, gap = seats.law(thermal, point.speed, outer - inner).seats(inner)
+            for index, state in enumerate(own):
+                pair = slice(2 * index, 2 * index + 2)
+                found[state.name] = {
+                    "seat_pressure": tuple(pressure[pair].tolist()),
+                    "seat_gap": tuple(gap[pair].tolist()),
+                }
+        return found
+
+    def assembled_seats(self) -> dict[str, tuple[tuple[float, float], ...]]:
+        """Pressure (Pa) and gap (m) of every bearing's inner and outer seat as assembled."""
+        found = {}
+        for mounted in self.sets.values():
+            if mounted.seats is None:
+                continue
+            radial = np.array([state.radial_force for state in mounted.mounted_states()])
+            pressure, gap = mounted.seats.law().seats(radial)
+            for index, bearing in enumerate(mounted.bearings):
+                pair = slice(2 * index, 2 * index + 2)
+                found[bearing.name] = tuple(zip(pressure[pair].tolist(), gap[pair].tolist(), strict=True))
+        return found
 
 
 def _control(options: HeatOptions) -> str:

@@ -50,7 +50,9 @@ class BearingHeat:
     Angles in rad; ``preload`` in N is the axial force at this state without the
     external load, ``axial_load`` with it; film in m; ``nan`` where a heat model does not give them.
     ``conductance_inner`` and ``conductance_outer`` (W/K) join the balls to
-    each raceway and are ``nan`` where the model has no contacts.
+    each raceway and are ``nan`` where the model has no contacts. ``contact_pressure`` (Pa) is the largest
+    between ball and raceway; ``seat_pressure`` (Pa) and ``seat_gap`` (m, radial) are those of the inner
+    and the outer ring, None where no elastic bodies carry them.
     """
 
     total: float
@@ -63,6 +65,9 @@ class BearingHeat:
     film_thickness_ratio: float = float("nan")
     conductance_inner: float = float("nan")
     conductance_outer: float = float("nan")
+    contact_pressure: float = float("nan")
+    seat_pressure: tuple[float, float] | None = None
+    seat_gap: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from spindle_fem.operation.gap_bands import GapBands, angle_of, build_gap_bands
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads, LumpedLoad
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.seat_joints import SeatJoints
 from spindle_fem.validity import CodedWarning, fold_warnings
 
 GAP_BAND_WIDTH = 0.02
@@ -64,8 +65,10 @@ class LoadsBuilder:
         mesh: TaggedMesh,
         facet_area: Mapping[str, NDArray[np.float64]],
         heat_model: HeatModel,
+        seat_joints: SeatJoints | None = None,
     ) -> None:
         self.spec = spec
+        self.seat_joints = seat_joints
         self.mesh = mesh
         self.heat_model = heat_model
         self.n_sectors = 1 if spec.mesh.circumferential_averaging else SECTORS_WITHOUT_AVERAGING
@@ -149,6 +152,10 @@ class LoadsBuilder:
         heats, heat_warnings = self.heat_model(point, self.bearing_temperatures(state))
         heats = {name: _scaled(heat, change.friction.get(name, 1.0)) for name, heat in heats.items()}
         warnings += heat_warnings
+        fits = {} if self.seat_joints is None else self.seat_joints.factors(heats)
+        if fits:
+            joined = {name: value * change.factor(name) for name, value in fits.items()}
+            change = replace(change, coefficients={**change.coefficients, **joined})
         surface_heat: dict[str, float] = {}
         heat_to: dict[str, dict[str, float]] = {}
         lumped: list[LumpedLoad] = []

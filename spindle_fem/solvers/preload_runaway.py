@@ -161,7 +161,9 @@ class HeatResponse:
         return follow_branch(respond, slow, start, end)
 
 
-def speed_limit(machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads | None = None) -> Branch:
+def speed_limit(
+    machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads | None = None
+) -> Branch:
     """The branch of equilibria from slow running to a speed ``end`` (rad/s), or to its fold before.
 
     Parameters

@@ -17,10 +17,16 @@ from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.model.mesh.kernels.compile import compile_kernels
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
-from spindle_fem.operation.bearing_heat import at_assembly_size, follows_preload, heat_model_of
+from spindle_fem.operation.bearing_heat import (
+    BearingMechanics,
+    at_assembly_size,
+    follows_preload,
+    heat_model_of,
+)
 from spindle_fem.operation.coefficients import joint_conductances
 from spindle_fem.operation.loads import Loads
 from spindle_fem.operation.machine_loads import FieldState, LoadsBuilder
+from spindle_fem.operation.seat_joints import SeatJoints
 from spindle_fem.parallel import beside
 
 Progress = Callable[[str], None]
@@ -135,7 +141,8 @@ def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOpera
     facet_area = {surface: operators.facet_areas(surface) for surface in mesh.surfaces}
     materials = {part: spec.part_material(part) for part in mesh.part_names}
     capacity_factor = spec.heat_capacity_factor.value
-    growth = seats = None
+    growth = seat_joints = None
+    heat_model = heat_model_of(spec)
     if follows_preload(spec) and any(group.fit for group in spec.bearing_set):
         growth = GrowthModel(spec, mesh, operators.order)
         seats = {
@@ -143,11 +150,13 @@ def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOpera
             for group in spec.bearing_set
             if group.fit is not None
         }
+        heat_model = BearingMechanics(spec, seats)
+        seat_joints = SeatJoints(spec, mesh.joints, heat_model.assembled_seats())
     return PreparedMachine(
         spec=spec,
         mesh=mesh,
         operators=operators,
-        builder=LoadsBuilder(spec, mesh, facet_area, heat_model_of(spec, seats)),
+        builder=LoadsBuilder(spec, mesh, facet_area, heat_model, seat_joints),
         growth=growth,
         joint_conductance=joint_conductances(spec, mesh.joints),
         conductivity={part: material.thermal_conductivity for part, material in materials.items()},

@@ -135,7 +135,9 @@ class _Walk:
         while step > SHORTEST_STEP and len(points) < MOST_POINTS:
             if points[-1][-1] + step * tangent[-1] > 1.0 and tangent[-1] > 0.0:
                 try:
-                    last, _ = self.correct(points[-1] + (1.0 - points[-1][-1]) / tangent[-1] * tangent, upwards)
+                    last, _ = self.correct(
+                        points[-1] + (1.0 - points[-1][-1]) / tangent[-1] * tangent, upwards
+                    )
                     return self.branch([*points, last], "end", 1.0)
                 except (_NoPointError, SpindleFemError):
                     step *= 0.5

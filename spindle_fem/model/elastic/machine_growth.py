@@ -141,14 +141,19 @@ class GrowthModel:
             for share in [group.preload / sum(b.takes_thrust == bearing.takes_thrust for b in group.bearing)]
             for force in [share / math.tan(spec.bearing_types[group.bearing_type].contact_angle)]
         }
-        self._clearance = np.array([_clearance(groups[ring.seat.bearing].fit, ring.seat) for ring in self.rings])
+        self._clearance = np.array(
+            [_clearance(groups[ring.seat.bearing].fit, ring.seat) for ring in self.rings]
+        )
         self.seats = self._seat_bodies()
         seat_rows = np.stack([self._seat_row(ring) for ring in self.rings])
         inwards = self._inwards[:, None]
         rows = np.stack([ring.rows for ring in self.rings])
         self.seat_rows = seat_rows
         self.thermal_rows = np.concatenate(
-            [(inwards * (seat_rows - rows[:, 0])).reshape(-1, 2, self._size), rows[:, 1].reshape(-1, 2, self._size)],
+            [
+                (inwards * (seat_rows - rows[:, 0])).reshape(-1, 2, self._size),
+                rows[:, 1].reshape(-1, 2, self._size),
+            ],
             axis=1,
         )
 
@@ -287,9 +292,13 @@ class GrowthModel:
         forces : mapping of str to (inner, outer), [N]
             Sum of the radial ball loads on both raceways of each bearing.
         """
-        seat_shifts = self.seat_rows @ temperature - self.seat_rows.sum(axis=1) * np.repeat(self._assembled_at, 2)
+        seat_shifts = self.seat_rows @ temperature - self.seat_rows.sum(axis=1) * np.repeat(
+            self._assembled_at, 2
+        )
         now = self._state(np.stack(list(self.shifts(temperature).values())), seat_shifts, speed, forces)
-        assembled = self._state(np.zeros((len(self.bearings), 4)), 0.0 * seat_shifts, 0.0, self.assembly_forces)
+        assembled = self._state(
+            np.zeros((len(self.bearings), 4)), 0.0 * seat_shifts, 0.0, self.assembly_forces
+        )
         found: dict[tuple[str, Side], SeatState] = {}
         for ring, (pressure, gap, seat, raceway), before in zip(self.rings, now.T, assembled.T, strict=True):
             side: Side = "shaft" if ring.seat.is_inner else "housing"
@@ -315,7 +324,9 @@ class GrowthModel:
             + spin * speed**2
             + outwards * (bodies.by_pressure.sum(axis=0) * pressure - (bodies.by_load * both).ravel())
         )
-        return np.array([pressure, gap, seat + self._spin_of_seats * speed**2 + self._by_seats @ pressure, raceway])
+        return np.array(
+            [pressure, gap, seat + self._spin_of_seats * speed**2 + self._by_seats @ pressure, raceway]
+        )
 
     def _nose(self, temperature: Array) -> float | None:
         if any("forward" not in outputs.names for outputs, _ in self.carriers.values()):

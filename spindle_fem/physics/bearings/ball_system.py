@@ -165,7 +165,9 @@ def build_ball_rows(
 
 
 def join_rows(
-    rows: list[dict[str, FloatArray]], displacements: list[int], laws: Sequence[RingLaw | None] | SeatedLaw = ()
+    rows: list[dict[str, FloatArray]],
+    displacements: list[int],
+    laws: Sequence[RingLaw | None] | SeatedLaw = (),
 ) -> BallSystem:
     """One system of several bearings' rows that keeps the displacements named by index.
 

@@ -340,8 +340,7 @@ def mounted_state(geometry: BearingGeometry, fits: RingFits, axial_force: float)
     law = seated_rings(geometry, fits).law(FitTemperatures())
     angle = float(
         brentq(
-            lambda angle: _excess(geometry, axial_force, angle)
-            - law.growth(axial_force / math.tan(angle)),
+            lambda angle: _excess(geometry, axial_force, angle) - law.growth(axial_force / math.tan(angle)),
             *_ANGLES,
             xtol=1e-15,
             rtol=1e-14,

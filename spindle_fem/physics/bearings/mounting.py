@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import SpecError
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_EXPANSION, BearingGeometry
-from spindle_fem.physics.bearings.fits import RingFits, mounted_state, mounted_states, seated_rings
+from spindle_fem.physics.bearings.fits import (
+    MountedState,
+    RingFits,
+    mounted_state,
+    mounted_states,
+    seated_rings,
+)
 from spindle_fem.physics.bearings.preload import require_force, tandem_approach
 from spindle_fem.physics.bearings.rough_surface import SurfaceRoughness, roughness_from_rms
 from spindle_fem.physics.bearings.seat_contact import SeatBodies
@@ -136,11 +142,14 @@ class BearingSet:
                     share = self.preload / len(group)
                     approach[index] = mounted_state(bearing.geometry, bearing.fits, share).approach
         if self.seats is not None:
-            sides = [bearing.orientation for bearing in self.bearings]
-            shares = tuple(self.preload / sides.count(side) for side in sides)
-            geometries = tuple(bearing.geometry for bearing in self.bearings)
-            approach[:] = [state.approach for state in mounted_states(geometries, self.seats, shares)]
+            approach[:] = [state.approach for state in self.mounted_states()]
         return approach
+
+    def mounted_states(self) -> tuple[MountedState, ...]:
+        """Every bearing as assembled with preload on elastic seats."""
+        sides = [bearing.orientation for bearing in self.bearings]
+        shares = tuple(self.preload / sides.count(side) for side in sides)
+        return mounted_states(tuple(bearing.geometry for bearing in self.bearings), self.seats, shares)
 
 
 @dataclass(frozen=True, slots=True)

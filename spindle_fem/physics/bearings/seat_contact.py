@@ -87,9 +87,7 @@ class SeatedLaw:
         """
         held = self.by_force / self.by_load
         yielding = self.yielding + held @ self.by_pressure
-        pressure, _ = solve_seats(
-            self.opening + held @ (self.free_growth - growth), yielding, self.areas
-        )
+        pressure, _ = solve_seats(self.opening + held @ (self.free_growth - growth), yielding, self.areas)
         force = (self.free_growth + self.by_pressure @ pressure - growth) / self.by_load
         fall = np.diag(1.0 / self.by_load)
         tight = np.flatnonzero(pressure > 0.0)
@@ -166,10 +164,7 @@ class SeatBodies:
             self.yielding,
             self.by_force,
             self.areas,
-            thermal[:, 2]
-            - thermal[:, 3]
-            + self.spin_growth * speed**2
-            - self.by_load[:, 1] * beyond,
+            thermal[:, 2] - thermal[:, 3] + self.spin_growth * speed**2 - self.by_load[:, 1] * beyond,
             self.by_pressure,
             self.by_load.sum(axis=1),
         )
