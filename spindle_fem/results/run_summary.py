@@ -7,7 +7,7 @@ import math
 import platform
 from typing import TYPE_CHECKING, Any
 
-from spindle_fem.results.thermal_result import BearingResult, CoolantResult, ThermalResult
+from spindle_fem.results.thermal_result import BearingResult, CoolantResult, Equilibrium, ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def package_versions() -> dict[str, str]:
 
 def build_summary(result: ThermalResult, wall_time_s: float, peak_rss_MB: float) -> dict[str, Any]:
     """Dictionary written as ``summary.json``; ``nan`` becomes ``None``."""
+    growth = result.growth
     maximum_mm = [round(float(value) * 1e3, 3) for value in result.temperature_maximum_at]
     return _without_nan(
         {
@@ -73,7 +74,8 @@ def build_summary(result: ThermalResult, wall_time_s: float, peak_rss_MB: float)
                 "max_degC": result.temperature_maximum - ZERO_CELSIUS_K,
                 "max_at_mm": maximum_mm,
             },
-            **({} if result.growth is None else _growth(result.growth)),
+            **({} if growth is None else _growth(growth)),
+            **({} if result.equilibrium is None else {"equilibrium": _equilibrium(result.equilibrium)}),
             "joints": {name: {"heat_W": value} for name, value in result.heat_flows.items()},
             "iterations": dict(result.iterations),
             "checks": [
@@ -107,6 +109,7 @@ def _bearing(bearing: BearingResult) -> dict[str, Any]:
         "preload_N": bearing.preload,
         "film_um": bearing.film_thickness * 1e6,
         "lambda": bearing.film_thickness_ratio,
+        "contact_pressure_GPa": bearing.contact_pressure * 1e-9,
     }
 
 
@@ -161,6 +164,19 @@ def _growth(growth: Growth) -> dict[str, Any]:
             "seats": seats,
         },
         "fits": fits,
+    }
+
+
+def _equilibrium(found: Equilibrium) -> dict[str, Any]:
+    def rpm(speed: float | None) -> float | None:
+        return None if speed is None else speed * 30.0 / math.pi
+
+    return {
+        "followed": found.followed,
+        "preload_ratio": dict(found.preload_ratio),
+        "fold_speed_rpm": rpm(found.fold_speed),
+        "searched_to_rpm": rpm(found.searched_to),
+        "limits": list(found.limits),
     }
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
+
 if TYPE_CHECKING:
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
-    from spindle_fem.model.elastic.machine_growth import Growth
     from spindle_fem.validity import CodedWarning
 
 
@@ -21,7 +24,7 @@ class BearingResult:
     """State of one bearing at the solution; temperatures in K.
 
     ``contact_angle_*`` in rad, ``film_thickness`` (central, thinner contact)
-    in m; ``nan`` where the heat model does not give them.
+    in m; ``contact_pressure`` (largest) in Pa; ``nan`` where the heat model does not give them.
     """
 
     heat: float
@@ -35,6 +38,7 @@ class BearingResult:
     preload: float
     film_thickness: float
     film_thickness_ratio: float
+    contact_pressure: float = float("nan")
 
     @property
     def ring_difference(self) -> float:
@@ -113,6 +117,32 @@ class Check:
 
 
 @dataclass(frozen=True, slots=True)
+class Equilibrium:
+    """How far a running machine is from where its preload runs away.
+
+    Attributes
+    ----------
+    followed : bool
+        Whether expansion changed the preload and with it the heat.
+    preload_ratio : mapping of bearing to float
+        Running over assembled.
+    fold_speed : float or None, [rad/s]
+        Where equilibria end because heat and preload feed each other; None where that was not looked for
+        or lies beyond ``searched_to``.
+    searched_to : float or None, [rad/s]
+        Speed up to which equilibria were followed.
+    limits : tuple of str
+        What a bearing does not bear for long at this state, or above this speed, in words.
+    """
+
+    followed: bool
+    preload_ratio: Mapping[str, float]
+    fold_speed: float | None
+    searched_to: float | None
+    limits: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class ThermalResult:
     """A solved machine.
 
@@ -135,8 +165,10 @@ class ThermalResult:
         More entries of the summary.
     heat_study : mapping or None
         Heat over speed at this run's temperatures, where it was asked for.
-    growth : Growth or None
-        Shape against the assembled state, where it was asked for.
+    growth_model : GrowthModel or None
+        Where the solution made one already.
+    equilibrium : Equilibrium or None
+        Of a machine with preloaded bearings, where it was asked for.
     """
 
     spec: MachineSpec
@@ -164,7 +196,25 @@ class ThermalResult:
     timings: Mapping[str, float]
     extra: Mapping[str, Any] = field(default_factory=dict)
     heat_study: Mapping[str, Any] | None = None
-    growth: Growth | None = None
+    growth_model: GrowthModel | None = None
+    equilibrium: Equilibrium | None = None
+
+    @cached_property
+    def growth(self) -> Growth | None:
+        """What temperatures, fits and ball loads do to the machine's shape; None without bearings.
+
+        Worked out when first asked for. Ball loads are those of the preload that was found; of the
+        assembled one where the heat model gives none.
+        """
+        if not self.bearings:
+            return None
+        model = self.growth_model or GrowthModel(self.spec, self.mesh, self.order)
+        forces = dict(model.assembly_forces)
+        for name, bearing in self.bearings.items():
+            if math.isfinite(bearing.preload):
+                angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
+                forces[name] = tuple(bearing.preload / math.tan(angle) for angle in angles)
+        return model.at(self.temperature[: self.n_unknowns], self.speed, forces)
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
         """The same result with the seconds of each stage."""

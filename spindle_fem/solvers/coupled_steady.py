@@ -17,8 +17,8 @@ from spindle_fem.operation.loads import NO_CHANGE, LoadChange, Loads
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.fixed_point import REFUSED, Iteration, fixed_point
 from spindle_fem.solvers.preload_runaway import (
+    equilibria_below,
     no_equilibrium,
-    speed_limit,
 )
 from spindle_fem.solvers.prepared_machine import PreparedMachine, without_expansion
 
@@ -199,7 +199,7 @@ def _no_steady_state(machine: PreparedMachine, point: OperatingPoint, reason: st
     """The error of a runaway, with the speed up to which the machine has an equilibrium."""
     if not follows_preload(machine.spec):
         return no_equilibrium(machine.spec.name, point, reason)
-    branch = speed_limit(machine, point, point.speed)
+    branch = equilibria_below(machine, point)
     if branch.end == "end":
         return no_equilibrium(machine.spec.name, point, reason)
     limit = branch.limit

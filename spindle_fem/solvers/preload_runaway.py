@@ -8,7 +8,7 @@ temperature.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -142,6 +142,11 @@ class HeatResponse:
             for name, row in zip(self.names, values, strict=True)
         }
 
+    def heat(self, heat: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
+        """Heats (n_bearings,) [W] that the temperatures of given heats make at a speed (rad/s)."""
+        found, _ = self.machine.builder.heat_model(replace(self.point, speed=speed), self.temperatures(heat))
+        return np.array([found[name].total for name in self.names])
+
     def branch(self, end: float) -> Branch:
         """Heats of the bearings (W) over the speed (rad/s), from slow running to ``end`` or a fold before.
 
@@ -150,37 +155,44 @@ class HeatResponse:
         SpindleFemError
             No equilibrium even at the slowest speed.
         """
-        model = self.machine.builder.heat_model
-
-        def respond(heat: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
-            found, _ = model(replace(self.point, speed=speed), self.temperatures(heat))
-            return np.array([found[name].total for name in self.names])
-
         start = SLOWEST * end
-        slow = respond(np.zeros(len(self.names)), start)
-        return follow_branch(respond, slow, start, end)
+        slow = self.heat(np.zeros(len(self.names)), start)
+        return follow_branch(self.heat, slow, start, end)
 
 
-def speed_limit(
-    machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads | None = None
+def equilibria_below(machine: PreparedMachine, point: OperatingPoint) -> Branch:
+    """The branch of equilibria from slow running to a point's speed, or to its fold before.
+
+    Films and contacts are those at ambient temperature, taken again at the speed reached until that stays.
+
+    Raises
+    ------
+    SpindleFemError
+        No equilibrium even at the slowest speed.
+    """
+    limit = point.speed
+    for _ in range(MAXIMUM_RESPONSES):
+        branch = HeatResponse(machine, replace(point, speed=limit)).branch(point.speed)
+        before, limit = limit, branch.limit
+        if abs(limit - before) <= SPEED_TOLERANCE * point.speed:
+            break
+    return branch
+
+
+def equilibria_above(
+    machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads, heat: Sequence[float]
 ) -> Branch:
-    """The branch of equilibria from slow running to a speed ``end`` (rad/s), or to its fold before.
+    """The branch of equilibria from a solved state to a higher speed ``end`` (rad/s), or to its fold before.
 
     Parameters
     ----------
-    loads : Loads, optional
-        Films and contacts of a solved state at ``point``; without them those at ambient temperature,
-        taken again at the fold's speed until that stays.
+    loads : Loads
+        Of the solved state: films and contacts stay as they are there.
+    heat : sequence of float, [W]
+        Of its bearings.
     """
-    branch = HeatResponse(machine, point, loads).branch(end)
-    if loads is not None:
-        return branch
-    for _ in range(MAXIMUM_RESPONSES):
-        before, at = branch.limit, replace(point, speed=branch.limit)
-        branch = HeatResponse(machine, at).branch(end)
-        if abs(branch.limit - before) <= SPEED_TOLERANCE * end:
-            break
-    return branch
+    response = HeatResponse(machine, point, loads)
+    return follow_branch(response.heat, np.asarray(heat, dtype=float), point.speed, end)
 
 
 def _as_array(found: dict[str, BearingTemperatures], names: list[str]) -> NDArray[np.float64]:

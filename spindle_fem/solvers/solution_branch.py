@@ -87,7 +87,7 @@ class _Walk:
         self.jacobian = np.empty((0, 0))
 
     def residual(self, point: Array) -> Array:
-        """ln x - ln G, (k,)."""
+        """What is left of ln x = ln G, (k,)."""
         found = self.respond(np.exp(point[:-1]), float(point[-1]) * self.end)
         return point[:-1] - np.log(found)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,6 @@ import numpy as np
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
-from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -32,6 +30,7 @@ from spindle_fem.solvers.coupled_steady import (
 from spindle_fem.solvers.prepared_machine import Clock, PreparedMachine, Progress, prepare_machine
 from spindle_fem.studies import run_checks as checks
 from spindle_fem.studies.heat_study import heat_study
+from spindle_fem.studies.machine_equilibrium import equilibrium_of
 from spindle_fem.validity import CodedWarning
 
 
@@ -62,13 +61,23 @@ def solve(
     GeometryError, MeshQualityError, NoSteadyStateError, ConvergenceError, EnergyBalanceError
     """
     spec = machine if isinstance(machine, MachineSpec) else load_machine(machine)
-    return with_growth(solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress))
+    return solve_prepared(prepare_machine(spec, progress=progress), point, progress=progress)
 
 
 def solve_prepared(
-    machine: PreparedMachine, point: OperatingPoint | None = None, *, progress: Progress = lambda stage: None
+    machine: PreparedMachine,
+    point: OperatingPoint | None = None,
+    *,
+    progress: Progress = lambda stage: None,
+    find_fold: bool = False,
 ) -> ThermalResult:
-    """Steady temperatures of a prepared machine; see :func:`solve`."""
+    """Steady temperatures of a prepared machine; see :func:`solve`.
+
+    Parameters
+    ----------
+    find_fold : bool
+        Whether to look for the speed at which a preload that is followed runs away.
+    """
     clock = Clock(progress)
     clock.begin("solve")
     point = point or OperatingPoint.of(machine.spec)
@@ -83,6 +92,8 @@ def solve_prepared(
     coupled = solve_coupled(machine, point, beyond=beyond)
     clock.begin("evaluate")
     result = _build_result(machine, point, coupled)
+    equilibrium = equilibrium_of(machine, point, coupled, result.bearings, search=find_fold)
+    result = replace(result, growth_model=machine.growth, equilibrium=equilibrium)
     clock.end()
     return result.with_timings({**machine.timings, **clock.timings})
 
@@ -172,6 +183,7 @@ def _bearings(
             preload=heat.preload,
             film_thickness=heat.film_thickness,
             film_thickness_ratio=heat.film_thickness_ratio,
+            contact_pressure=heat.contact_pressure,
         )
     return found
 
@@ -290,24 +302,6 @@ def with_heat_study(result: ThermalResult) -> ThermalResult:
         for name, bearing in result.bearings.items()
     }
     return replace(result, heat_study=heat_study(spec, temperatures=temperatures))
-
-
-def with_growth(result: ThermalResult) -> ThermalResult:
-    """The same result with what its temperatures, fits and ball loads do to the machine's shape.
-
-    Ball loads are those of the preload that was found; of the assembled one where the heat model gives none.
-    Left as it is where the machine has no bearings.
-    """
-    if not result.bearings:
-        return result
-    model = GrowthModel(result.spec, result.mesh, result.order)
-    forces = dict(model.assembly_forces)
-    for name, bearing in result.bearings.items():
-        if np.isfinite(bearing.preload):
-            angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
-            forces[name] = tuple(bearing.preload / math.tan(angle) for angle in angles)
-    grown = model.at(result.temperature[: result.n_unknowns], result.speed, forces)
-    return replace(result, growth=grown)
 
 
 def estimate_refinement(result: ThermalResult, spec: MachineSpec, ratio: float = 1.5) -> ThermalResult:

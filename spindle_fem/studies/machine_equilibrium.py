@@ -1,0 +1,80 @@
+"""How far a running machine is from the end of its equilibria, and what its bearings do not bear for long."""
+
+from __future__ import annotations
+
+import math
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.operation.bearing_heat import follows_preload
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.results.thermal_result import BearingResult, Equilibrium
+from spindle_fem.solvers.coupled_steady import CoupledState
+from spindle_fem.solvers.preload_runaway import equilibria_above
+from spindle_fem.solvers.prepared_machine import PreparedMachine
+
+# Pa; contact pressure below which bearing steel does not tire (ISO 281:2007, 9.3.3.1).
+FATIGUE_PRESSURE = 1.5e9
+# Of the running speed: how far above it equilibria are followed.
+SEARCHED_RANGE = 1.5
+
+
+def equilibrium_of(
+    machine: PreparedMachine,
+    point: OperatingPoint,
+    coupled: CoupledState,
+    bearings: dict[str, BearingResult],
+    *,
+    search: bool,
+) -> Equilibrium | None:
+    """Preload, fold and limits of a solved state; None without preloaded bearings.
+
+    Parameters
+    ----------
+    search : bool
+        Whether to look for the fold, up to half as fast again, with films and contacts of this state.
+    """
+    spec = machine.spec
+    assembled = assembled_preloads(spec)
+    if not assembled or not all(math.isfinite(bearings[name].preload) for name in assembled):
+        return None
+    fold = searched = None
+    limits = _limits(spec, coupled, bearings)
+    if search and follows_preload(spec) and point.speed > 0.0:
+        heats = [coupled.loads.bearing_heat[bearing.name].total for _, bearing in spec.bearings]
+        branch = equilibria_above(machine, point, SEARCHED_RANGE * point.speed, coupled.loads, heats)
+        searched = branch.limit
+        if branch.end == "fold":
+            fold = branch.limit
+        elif branch.end == "refused":
+            limits.append(
+                f"From {branch.limit * 30.0 / math.pi:.0f} rpm on there is no state: {branch.reason}"
+            )
+    ratios = {name: bearings[name].preload / force for name, force in assembled.items()}
+    return Equilibrium(follows_preload(spec), ratios, fold, searched, tuple(limits))
+
+
+def assembled_preloads(spec: MachineSpec) -> dict[str, float]:
+    """Axial force of every bearing of a preloaded set at assembly, N: those that face one way share it."""
+    return {
+        bearing.name: group.preload / sum(b.takes_thrust == bearing.takes_thrust for b in group.bearing)
+        for group in spec.bearing_set
+        if group.preload > 0.0
+        for bearing in group.bearing
+    }
+
+
+def _limits(spec: MachineSpec, coupled: CoupledState, bearings: dict[str, BearingResult]) -> list[str]:
+    found = []
+    for name, heat in coupled.loads.bearing_heat.items():
+        if heat.contact_pressure > FATIGUE_PRESSURE:
+            found.append(
+                f"{name}: contact pressure {heat.contact_pressure / 1e9:.2f} GPa, above the "
+                f"{FATIGUE_PRESSURE / 1e9:g} GPa that bearing steel bears without tiring."
+            )
+        if heat.seat_pressure is not None and heat.seat_pressure[0] == 0.0:
+            found.append(f"{name}: the inner ring has lost its interference on the shaft.")
+        hottest = max(bearings[name].temperature_inner, bearings[name].temperature_outer)
+        if spec.grease is not None and hottest > spec.grease.temperature_limit:
+            limit = spec.grease.temperature_limit - 273.15
+            found.append(f"{name}: grease at {hottest - 273.15:.1f} °C, above its {limit:.1f} °C.")
+    return found
