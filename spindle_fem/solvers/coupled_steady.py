@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import NoSteadyStateError
+from spindle_fem.errors import NoSteadyStateError, SpindleFemError
 from spindle_fem.model.mesh.linear_solvers import RELATIVE_TOLERANCE
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady
 from spindle_fem.operation.bearing_heat import follows_preload
@@ -17,7 +17,8 @@ from spindle_fem.operation.loads import NO_CHANGE, LoadChange, Loads
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.fixed_point import REFUSED, Iteration, fixed_point
 from spindle_fem.solvers.preload_runaway import (
-    equilibria_below,
+    HeatResponse,
+    equilibria_above,
     no_equilibrium,
 )
 from spindle_fem.solvers.prepared_machine import PreparedMachine, without_expansion
@@ -33,6 +34,11 @@ ANDERSON_DEPTH = 6
 RUNAWAY_TEMPERATURE = 600.0
 MIXING_BELOW = 0.5
 MAXIMUM_RETREATS = 10
+# Of the speed asked for: where films are taken first when the fold is looked for below it.
+SLOW_RUNNING = 0.3
+# Of the speed that a search reached: where films and contacts are taken anew for the next.
+FOLD_APPROACHES = (0.9, 0.97, 0.97)
+FOLD_TOLERANCE = 0.01
 # A linear residual this small against the last change of the field costs no extra iteration of the loop.
 LINEAR_PER_KELVIN = 1.0e-4
 LOOSEST_LINEAR_TOLERANCE = 1.0e-3
@@ -83,6 +89,20 @@ def solve_coupled(
 
     Source: Walker & Ni (2011), SIAM J. Numer. Anal. 49, 1715-1735 (mixing).
     """
+    try:
+        return _settle(machine, point, start, beyond)
+    except NoSteadyStateError as error:
+        if not follows_preload(machine.spec):
+            raise
+        raise _beyond_the_fold(machine, point, error, beyond) from error
+
+
+def _settle(
+    machine: PreparedMachine,
+    point: OperatingPoint,
+    start: NDArray[np.float64] | None,
+    beyond: Beyond | None,
+) -> CoupledState:
     operation = _Operation(machine, point, beyond)
     far = operation.follows_preload or beyond is not None
     state = operation.padded(start)
@@ -102,7 +122,7 @@ def solve_coupled(
         _, steps = fixed_point(operation.respond, operation.settled, state, iteration, machine.spec.name)
     except REFUSED as error:
         if operation.follows_preload and (operation.solution is not None or start is None):
-            raise _no_steady_state(machine, point, str(error)) from error
+            raise no_equilibrium(machine.spec.name, point, str(error)) from error
         raise
     return CoupledState(operation.solution, operation.loads, operation.coolant, steps, operation.change)
 
@@ -157,7 +177,7 @@ class _Operation:
         hottest = float(self.solution.temperature.max())
         if not np.isfinite(hottest) or hottest > RUNAWAY_TEMPERATURE:
             heat = f"{self.loads.total_heat:.0f} W would heat it over {hottest - 273.15:.0f} °C."
-            raise _no_steady_state(self.machine, self.point, heat)
+            raise no_equilibrium(self.machine.spec.name, self.point, heat)
 
     def settled(self, state: NDArray[np.float64], found: NDArray[np.float64]) -> bool:
         """Whether field, heat and coolant agree."""
@@ -195,14 +215,32 @@ def _linear_tolerance(change: float) -> float:
     return float(np.clip(LINEAR_PER_KELVIN * change, RELATIVE_TOLERANCE, LOOSEST_LINEAR_TOLERANCE))
 
 
-def _no_steady_state(machine: PreparedMachine, point: OperatingPoint, reason: str) -> NoSteadyStateError:
-    """The error of a runaway, with the speed up to which the machine has an equilibrium."""
-    if not follows_preload(machine.spec):
-        return no_equilibrium(machine.spec.name, point, reason)
-    branch = equilibria_below(machine, point)
+def _beyond_the_fold(
+    machine: PreparedMachine, point: OperatingPoint, error: NoSteadyStateError, beyond: Beyond | None
+) -> NoSteadyStateError:
+    """The error of a runaway, with the speed up to which the machine has an equilibrium.
+
+    Equilibria are followed with films and contacts at ambient temperature first, then with those of
+    states solved just below the speed that was reached, until that stays.
+    """
+    try:
+        slow = replace(point, speed=SLOW_RUNNING * point.speed)
+        branch = HeatResponse(machine, slow).branch(point.speed)
+        for approach in FOLD_APPROACHES:
+            below = replace(point, speed=approach * branch.limit)
+            state = _settle(machine, below, None, beyond)
+            heats = [state.loads.bearing_heat[bearing.name].total for _, bearing in machine.spec.bearings]
+            before, branch = branch.limit, equilibria_above(machine, below, point.speed, state.loads, heats)
+            if abs(branch.limit - before) < FOLD_TOLERANCE * before:
+                break
+    except SpindleFemError:
+        return error
     if branch.end == "end":
-        return no_equilibrium(machine.spec.name, point, reason)
-    limit = branch.limit
-    if branch.end == "fold":
-        reason = f"heat and preload feed each other beyond the fold. {reason}"
-    return no_equilibrium(machine.spec.name, point, reason, limit)
+        return error
+    rpm = branch.limit * 30.0 / np.pi
+    what = (
+        f"Heat and preload feed each other: equilibria end in a fold at {rpm:.0f} rpm."
+        if branch.end == "fold"
+        else f"A thermal equilibrium exists up to about {rpm:.0f} rpm: {branch.reason}"
+    )
+    return NoSteadyStateError(error.where, error.what, f"{what} {error.how_to_fix}")

@@ -30,7 +30,6 @@ LARGEST_PRELOAD_RATIO = 5.0
 # Of the end of a search: where a branch of equilibria begins.
 SLOWEST = 0.05
 SPEED_TOLERANCE = 0.01
-MAXIMUM_RESPONSES = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,21 +61,9 @@ class PreloadGuard:
         )
 
 
-def no_equilibrium(
-    name: str, point: OperatingPoint, reason: str, limit: float | None = None
-) -> NoSteadyStateError:
-    """The error of a machine whose heat and temperature do not settle.
-
-    Parameters
-    ----------
-    name : str
-        Of the machine.
-    limit : float, optional, [rad/s]
-        Speed up to which they do.
-    """
+def no_equilibrium(name: str, point: OperatingPoint, reason: str) -> NoSteadyStateError:
+    """The error of a machine, by name, whose heat and temperature do not settle."""
     advice = "Lower the speed or the preload, or cool more."
-    if limit is not None:
-        advice = f"A thermal equilibrium exists up to about {limit * 30.0 / np.pi:.0f} rpm. {advice}"
     rpm = point.speed * 30.0 / np.pi
     return NoSteadyStateError(name, f"no thermal equilibrium at {rpm:.0f} rpm: {reason}", advice)
 
@@ -158,25 +145,6 @@ class HeatResponse:
         start = SLOWEST * end
         slow = self.heat(np.zeros(len(self.names)), start)
         return follow_branch(self.heat, slow, start, end)
-
-
-def equilibria_below(machine: PreparedMachine, point: OperatingPoint) -> Branch:
-    """The branch of equilibria from slow running to a point's speed, or to its fold before.
-
-    Films and contacts are those at ambient temperature, taken again at the speed reached until that stays.
-
-    Raises
-    ------
-    SpindleFemError
-        No equilibrium even at the slowest speed.
-    """
-    limit = point.speed
-    for _ in range(MAXIMUM_RESPONSES):
-        branch = HeatResponse(machine, replace(point, speed=limit)).branch(point.speed)
-        before, limit = limit, branch.limit
-        if abs(limit - before) <= SPEED_TOLERANCE * point.speed:
-            break
-    return branch
 
 
 def equilibria_above(

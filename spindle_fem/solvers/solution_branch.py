@@ -23,9 +23,11 @@ Respond = Callable[[Array, float], Array]
 # Largest residual of ln x at a point of the branch.
 TOLERANCE = 1.0e-6
 DIFFERENCE = 1.0e-4
-FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.1, 0.4, 1.0e-3
+FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.3, 1.0, 1.0e-3
 MOST_CORRECTIONS = 8
 MOST_POINTS = 200
+# A point that took so many corrections has its derivatives taken anew.
+REFRESHED_FROM = 4
 # The parameter at the fold, relative to the end of the search.
 FOLD_TOLERANCE = 1.0e-4
 
@@ -150,6 +152,8 @@ class _Walk:
             points.append(point)
             if point[-1] < points[-2][-1]:
                 return self.branch(points, "fold", self.fold(points))
+            if count >= REFRESHED_FROM:
+                self.differentiate(point, self.residual(point))
             tangent = self.tangent(points[-1] - points[-2])
             step = min(LONGEST_STEP, step * (1.5 if count <= 3 else 0.7))
         return self.branch(points, "refused", max(point[-1] for point in points), reason)
