@@ -8,11 +8,12 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from spindle_fem.definition.bearing_seats import seat_faults
+from spindle_fem.definition.displacement_faults import displacement_faults
 from spindle_fem.definition.machine_spec import BearingType, MachineSpec, Probe
 from spindle_fem.definition.schema import names_of
 from spindle_fem.errors import SpecError, SpindleFemError, UnknownSurfaceError, did_you_mean
 
-_LISTS = ("part", "bearing_set", "joint", "surface", "film", "gap", "factor", "probe")
+_LISTS = ("part", "bearing_set", "joint", "surface", "film", "gap", "factor", "probe", "displacement_sensor")
 _TOLERANCE = 1.0e-9
 
 
@@ -121,6 +122,7 @@ def find_faults(spec: MachineSpec, declared: Declared | None = None) -> list[Spi
         *_surfaces(spec, declared),
         *_factors(spec, declared),
         *_probes(spec, declared),
+        *displacement_faults(spec),
         *_mesh(spec, declared),
     ]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.exchange_tables import (
@@ -194,6 +194,36 @@ class Probe(SpecModel):
         return self
 
 
+class SensorSpot(SpecModel):
+    """A spot on the outside of the turning body."""
+
+    z: Length
+    """Along the axis."""
+    radius: Radius
+    """From the axis."""
+    angle: Angle = 0.0
+    """Around the axis; 0 is up."""
+
+
+class DisplacementSensor(SpecModel):
+    """What a displacement sensor on the machine's mount reads of the shaft.
+
+    Its reading is how far the shaft has moved since assembly, by temperature and rotation.
+    """
+
+    name: Name
+    """Results and recordings use it."""
+    at: Annotated[
+        Annotated[Name, Tag("name")] | Annotated[SensorSpot, Tag("spot")],
+        Discriminator(lambda given: "name" if isinstance(given, str) else "spot"),
+    ]
+    """What it looks at: a surface of the shaft, or a spot on it."""
+    direction: Literal["axial", "radial"]
+    """Axial readings grow away from the mount, radial ones outwards."""
+    mount: Name = "flange"
+    """What it is fixed to: the segment of the housing that is its flange."""
+
+
 class MeshSettings(SpecModel):
     """How the machine is meshed and interpolated."""
 
@@ -256,6 +286,8 @@ class MachineSpec(SpecModel):
     """Uncertain factors that several coefficients share."""
     probe: tuple[Probe, ...] = ()
     """Where temperatures are read."""
+    displacement_sensor: tuple[DisplacementSensor, ...] = ()
+    """Where growth is read."""
     mesh: MeshSettings = MeshSettings()
     """Fineness of the mesh."""
     effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
@@ -306,6 +338,7 @@ __all__ = [
     "Channel",
     "ConstantFilm",
     "Coolant",
+    "DisplacementSensor",
     "EffectEntry",
     "FaceSelector",
     "Film",
@@ -323,6 +356,7 @@ __all__ = [
     "Ports",
     "Probe",
     "RotatingFilm",
+    "SensorSpot",
     "SetBearing",
     "SharedFactor",
     "Surface",

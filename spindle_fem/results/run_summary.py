@@ -75,6 +75,7 @@ def build_summary(result: ThermalResult, wall_time_s: float, peak_rss_MB: float)
                 "max_at_mm": maximum_mm,
             },
             **({} if growth is None else _growth(growth)),
+            "displacements": {name: 1e6 * value for name, value in result.displacements.items()},
             **({} if result.equilibrium is None else {"equilibrium": _equilibrium(result.equilibrium)}),
             "joints": {name: {"heat_W": value} for name, value in result.heat_flows.items()},
             "iterations": dict(result.iterations),

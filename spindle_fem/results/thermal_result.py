@@ -208,13 +208,24 @@ class ThermalResult:
         """
         if not self.bearings:
             return None
-        model = self.growth_model or GrowthModel(self.spec, self.mesh, self.order)
+        model = self._elastic
         forces = dict(model.assembly_forces)
         for name, bearing in self.bearings.items():
             if math.isfinite(bearing.preload):
                 angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
                 forces[name] = tuple(bearing.preload / math.tan(angle) for angle in angles)
         return model.at(self.temperature[: self.n_unknowns], self.speed, forces)
+
+    @cached_property
+    def displacements(self) -> dict[str, float]:
+        """Reading of every displacement sensor since assembly, m."""
+        if not self.spec.displacement_sensor:
+            return {}
+        return self._elastic.displacements(self.temperature[: self.n_unknowns], self.speed)
+
+    @cached_property
+    def _elastic(self) -> GrowthModel:
+        return self.growth_model or GrowthModel(self.spec, self.mesh, self.order)
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
         """The same result with the seconds of each stage."""

@@ -34,6 +34,13 @@ def in_millimetres(nanometres: int) -> str:
     return f"{nanometres * 1e-6:g} mm"
 
 
+def revolved_area(z: tuple[float, float], r: tuple[float, float]) -> float:
+    """Area of a cylinder (equal radii) or a plane of revolution between two places, m²."""
+    if r[0] == r[1]:
+        return 2.0 * np.pi * r[0] * (z[1] - z[0])
+    return np.pi * (r[1] ** 2 - r[0] ** 2)
+
+
 @dataclass(frozen=True, slots=True)
 class MeridianEdge:
     """A face of revolution as a line in the meridian plane.
@@ -74,9 +81,7 @@ class MeridianEdge:
     @property
     def area(self) -> float:
         """Area of the face of revolution without channel and ports, m²."""
-        if self.is_cylinder:
-            return 2.0 * np.pi * self.r[0] * (self.z[1] - self.z[0])
-        return np.pi * (self.r[1] ** 2 - self.r[0] ** 2)
+        return revolved_area(self.z, self.r)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from skfem import Basis, ElementQuad1, ElementQuad2, ElementVector, FacetBasis
 
 from spindle_fem.errors import GeometryError
+from spindle_fem.machine.geometry.faces import revolved_area
 from spindle_fem.model.elastic import forms
 from spindle_fem.model.elastic.meridian_mesh import MeridianMesh
 from spindle_fem.physics.elasticity.elastic_material import Stiffness
@@ -44,9 +45,7 @@ class Face:
     @property
     def area(self) -> float:
         """m²."""
-        if self.r[0] == self.r[1]:
-            return 2.0 * np.pi * self.r[0] * (self.z[1] - self.z[0])
-        return np.pi * (self.r[1] ** 2 - self.r[0] ** 2)
+        return revolved_area(self.z, self.r)
 
 
 @dataclass(frozen=True)
@@ -143,6 +142,13 @@ class ElasticBody:
         basis = FacetBasis(self.section.mesh, self.basis.elem, facets=boundary, intorder=QUADRATURE_DEGREE)
         load = forms.mean_shift.assemble(basis, direction=tuple(direction), lever=int(lever))
         return load * 2.0 * np.pi / face.area
+
+    def spot_shift(self, z: float, r: float, direction: Sequence[float]) -> Array:
+        """Output: displacement along (z, r) of the boundary's element side nearest to a spot."""
+        points = self.section.mesh.p[:, self.section.mesh.facets[:, self.section.mesh.boundary_facets()]]
+        nearest = np.argmin(np.hypot(*(points.mean(axis=1) - np.array([[z], [r]]))))
+        low, high = points[:, :, nearest].min(axis=1), points[:, :, nearest].max(axis=1)
+        return self.mean_shift(Face(*zip(low.tolist(), high.tolist(), strict=True)), direction)
 
     def expansion_load(self) -> sparse.csr_array:
         """Load (n_unknowns, n_corners) of a kelvin at each corner of the section's cells, N/K."""

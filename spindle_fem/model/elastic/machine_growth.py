@@ -19,6 +19,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.solid_tables import Fit
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.model.elastic.displacement_sensors import SensorSight, sensor_sights
 from spindle_fem.model.elastic.elastic_body import Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL, RADIAL, SIDEWAYS, BodyOutputs
 from spindle_fem.model.elastic.machine_bodies import MachineBodies, Seat, machine_bodies
@@ -123,6 +124,7 @@ class GrowthModel:
         self.bodies = machine_bodies(spec) if bodies is None else bodies
         self._mesh, self._order = mesh, order
         self._size = mesh.n_corners if order == 1 else len(mesh.points)
+        self.sights = sensor_sights(spec, mesh)
         self.rings = [self._ring(seat) for seat in self.bodies.seats]
         self.carriers = {
             name: self._carrier(name) for name in (self.bodies.shaft, self.bodies.housing) if name
@@ -177,6 +179,8 @@ class GrowthModel:
         forward = self._forward(name)
         if forward is not None:
             outputs["forward"] = forward
+        for sight in self.sights:
+            outputs[sight.key] = self._seen(name, sight)
         solved = BodyOutputs.of(body, outputs)
         return solved, self._rows(solved, name)
 
@@ -193,6 +197,41 @@ class GrowthModel:
             radii = (0.5 * first.inner_diameter, 0.5 * first.outer_diameter)
             return at_bearing - body.mean_shift(Face((first.z[0],) * 2, radii), AXIAL)
         return body.mean_shift(_flange_back(layout), AXIAL) - at_bearing
+
+    def _seen(self, name: str, sight: SensorSight) -> Array:
+        """What a body adds to the reading of a sensor on the flange: the shaft, or the housing below it."""
+        body, held = self.bodies.bodies[name], self._holding_seat(name)
+        if not sight.axial:
+            spot = body.spot_shift(sight.z, sight.r, RADIAL) if name == self.bodies.shaft else None
+            return np.zeros(body.basis.N) if spot is None else spot
+        at_bearing = body.mean_shift(held, AXIAL)
+        if name == self.bodies.shaft:
+            return sight.axial * (body.spot_shift(sight.z, sight.r, AXIAL) - at_bearing)
+        back = body.mean_shift(_flange_back(Layout(self.spec, set())), AXIAL)
+        return sight.axial * (at_bearing - back)
+
+    def displacements(self, temperature: Array, speed: float) -> dict[str, float]:
+        """Reading of every displacement sensor since assembly, m, at a field [K] and a speed [rad/s]."""
+        rise = temperature - self.assembly_temperature
+        return {
+            sight.name: float(row @ rise + spin * speed**2)
+            for sight, row, spin in zip(self.sights, *self.sensor_rows, strict=True)
+        }
+
+    @cached_property
+    def sensor_rows(self) -> tuple[Array, Array]:
+        """Reading of every sensor by a kelvin of each unknown (n, n_unknowns), and at 1 rad/s (n,), m s²."""
+        nose = min(segment.z[0] for segment in Layout(self.spec, set()).shaft.segment)
+        rows, spins = np.zeros((len(self.sights), self._size)), np.zeros(len(self.sights))
+        for index, sight in enumerate(self.sights):
+            for name, (outputs, weights) in self.carriers.items():
+                place = outputs.names.index(sight.key)
+                rows[index] += weights[place]
+                if name == self.bodies.shaft:
+                    spins[index] = outputs.by_spin[place]
+            if len(self.bending):
+                rows[index] += sight.of_axis(nose) @ self.bending
+        return rows, spins
 
     def _bending(self) -> Array:
         """Rows (4, n_unknowns): nose up, across; tilt up, across. Empty where they cannot be told."""
