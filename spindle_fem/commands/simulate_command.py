@@ -14,7 +14,13 @@ from scipy.stats import norm
 
 from spindle_fem.inference.calibration import LEVEL, Calibration
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.compare import ALL, Comparison, simulation_summary, write_simulated
+from spindle_fem.recordings.compare import (
+    ALL,
+    Comparison,
+    displacement_errors,
+    simulation_summary,
+    write_simulated,
+)
 from spindle_fem.report.read_against_predicted import draw_channels
 from spindle_fem.report.simulation_report import write_simulation_report
 from spindle_fem.results.output_folder import output_folder, replace_text
@@ -81,7 +87,7 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
         The content of ``simulation.json``.
     """
     recording, comparison = simulation.recording, simulation.comparison
-    write_simulated(folder / "simulated.csv", recording, simulation.predicted)
+    write_simulated(folder / "simulated.csv", recording, simulation.predicted, simulation.displacements)
     figures = draw_channels(folder / "figures", recording, simulation.predicted, simulation.half_width)
     _write_error_table(folder / "error_table.csv", comparison)
     summary = simulation_summary(comparison)
@@ -91,6 +97,8 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
         read = np.isfinite(comparison.residual[:, index])
         entry["inside_90_percent_interval"] = float(np.mean(inside[read, index]))
         entry["interval_half_width_K"] = float(np.mean(simulation.half_width[:, index]))
+    if recording.displacement_names and simulation.displacements.size:
+        summary["displacements"] = displacement_errors(recording, simulation.displacements)
     summary |= {
         "recording": recording.name,
         "notes": list(simulation.notes),

@@ -53,7 +53,7 @@ class ThermalModel:
     places : (n_p, n) matrix
         Mean over each place; its transpose is the load of 1 W spread over it.
     probe_names : tuple of str
-        Point probes.
+        Point probes, then displacement sensors, which read micrometres.
     probes : (n_q, n) matrix
     one : (n,) ndarray
         The uniform field of 1 K: with it heat is conserved exactly.

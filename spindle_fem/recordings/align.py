@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,10 @@ class Recording:
         SI base units.
     segments : (S, 2) int64 ndarray
         Start and stop of the stretches between long gaps.
+    displacement_names, displacement_sensors : tuple of str
+        Columns, and the sensor of the machine of each.
+    displacements : (N, d) float64 ndarray, [m]
+        From each one's first reading; NaN where missing.
     """
 
     name: str
@@ -93,6 +98,9 @@ class Recording:
     covariate_units: tuple[str, ...]
     segments: NDArray[np.int64]
     defects: DefectReport
+    displacement_names: tuple[str, ...] = ()
+    displacement_sensors: tuple[str, ...] = ()
+    displacements: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -197,7 +205,7 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
     """
     grid = _Grid(table.seconds)
     units = conversions(manifest)
-    by_role: dict[str, list[Channel]] = {"temperature": [], "input": [], "covariate": []}
+    by_role: dict[str, list[Channel]] = defaultdict(list)
     for channel in manifest.channel:
         by_role[channel.role].append(channel)
     times = grid.times
@@ -249,6 +257,9 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
         covariate_units=tuple(units[c.column].unit for c in by_role["covariate"]),
         segments=segments,
         defects=report,
+        displacement_names=tuple(c.column for c in by_role["displacement"]),
+        displacement_sensors=tuple(str(c.probe) for c in by_role["displacement"]),
+        displacements=_stack([_from_first(aligned[c.column]) for c in by_role["displacement"]], times),
     )
     for array in (recording.times, recording.temperature, recording.flags, recording.inputs, recording.sigma):
         array.setflags(write=False)
@@ -302,6 +313,12 @@ def _channel_defects(
         noise=noise,
         sigma_declared=channel.sigma,
     )
+
+
+def _from_first(values: Array) -> Array:
+    """Values less the first of them that is there."""
+    known = np.flatnonzero(np.isfinite(values))
+    return values - values[known[0]] if len(known) else values
 
 
 def _stack(columns: list[Array], times: Array) -> Array:

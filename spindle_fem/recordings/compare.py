@@ -122,6 +122,20 @@ def _error_row(channel: str, condition: str, values: NDArray[np.float64], noise:
     )
 
 
+def displacement_errors(recording: Recording, predicted: NDArray[np.float64]) -> list[dict[str, Any]]:
+    """Errors of displacements (N, d) [m] by channel, as ``simulation.json`` has them."""
+    residual = 1e6 * (predicted - recording.displacements)
+    return [
+        {
+            "channel": name,
+            "rmse_um": float(np.sqrt(np.nanmean(column**2))),
+            "max_um": float(np.nanmax(np.abs(column))),
+        }
+        for name, column in zip(recording.displacement_names, residual.T, strict=True)
+        if np.isfinite(column).any()
+    ]
+
+
 def simulation_summary(comparison: Comparison) -> dict[str, Any]:
     """Content of ``simulation.json``: errors by channel, and by channel and condition."""
     overall = [row.to_json() for row in comparison.rows if row.condition == ALL]
@@ -132,9 +146,21 @@ def simulation_summary(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def write_simulated(path: Path, recording: Recording, predicted: NDArray[np.float64]) -> None:
-    """Write ``simulated.csv``: ``time_s`` and one column in °C for each temperature channel."""
+def write_simulated(
+    path: Path,
+    recording: Recording,
+    predicted: NDArray[np.float64],
+    displacements: NDArray[np.float64] | None = None,
+) -> None:
+    """Write ``simulated.csv``: ``time_s``, temperatures in °C, displacements in µm, a column for each channel.
+
+    Parameters
+    ----------
+    displacements : (N, d) ndarray, optional, [m]
+    """
     frame = pd.DataFrame(predicted - ZERO_CELSIUS_K, columns=list(recording.temperature_names))
+    if displacements is not None and displacements.size:
+        frame[list(recording.displacement_names)] = 1e6 * displacements
     times = recording.times
     if np.all(times == np.round(times)):
         frame.insert(0, "time_s", times.astype(np.int64))

@@ -44,7 +44,7 @@ class Channel(_ManifestModel):
     """One column and what it means."""
 
     column: str
-    role: Literal["temperature", "input", "covariate"]
+    role: Literal["temperature", "displacement", "input", "covariate"]
     unit: str | None = None
     probe: str | None = None
     sigma: float | None = None
@@ -228,11 +228,13 @@ def manifest_faults(manifest: Manifest) -> list[SpindleFemError]:
 def _role_faults(channel: Channel, where: str) -> list[SpindleFemError]:
     needed: dict[str, tuple[str, ...]] = {
         "temperature": ("probe", "unit"),
+        "displacement": ("probe", "unit"),
         "input": ("drives", "unit"),
         "covariate": (),
     }
     allowed: dict[str, tuple[str, ...]] = {
         "temperature": ("probe", "unit", "sigma"),
+        "displacement": ("probe", "unit", "sigma"),
         "input": ("drives", "unit", "hold", "sigma"),
         "covariate": ("unit", "sigma"),
     }
@@ -251,10 +253,16 @@ def _role_faults(channel: Channel, where: str) -> list[SpindleFemError]:
                 )
             )
     if channel.sigma is not None and not 0.0 < channel.sigma < float("inf"):
-        faults.append(SpecError(f"{where}.sigma", f"is {channel.sigma:g}.", "Allowed: above 0, in K."))
+        faults.append(
+            SpecError(
+                f"{where}.sigma",
+                f"is {channel.sigma:g}.",
+                "Allowed: above 0, in K or, of a displacement, its unit.",
+            )
+        )
     if channel.unit is None:
         return faults
-    expected: str | None = "K" if role == "temperature" else None
+    expected: str | None = {"temperature": "K", "displacement": "m"}.get(role)
     if role == "input" and channel.drives is not None:
         expected = "W" if channel.drives.startswith("heat.") else DRIVES_UNITS.get(channel.drives)
     return faults + _unit_faults(channel.unit, f"{where}.unit", expected)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,8 @@ class Simulation:
         these as the calibration left them or as their priors say.
     machine_text : str or None
         Definition with the calibrated values.
+    displacements : (N, d) ndarray, [m]
+        Of the recording's displacement channels, from where each has its first reading.
     model : mapping
         Size and checked error of the reduced model; empty for a network.
     """
@@ -58,6 +60,7 @@ class Simulation:
     machine_text: str | None
     notes: tuple[str, ...]
     model: Mapping[str, Any]
+    displacements: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 def simulate_recordings(
@@ -141,7 +144,28 @@ def _simulate_geometry(
             "checked_error_K": dict(fast.model.errors),
             "mesh_preset": spec.mesh.preset,
         },
+        _displacements(predictor, factors),
     )
+
+
+def _displacements(predictor: Predictor, factors: Mapping[str, float]) -> Array:
+    """What the displacement channels of the one recording should read, (N, d) [m] from each first reading."""
+    recording = predictor.recordings[0]
+    if not recording.displacement_names:
+        return recording.displacements
+    read = 1e6 * recording.displacements
+    seen = replace(
+        recording,
+        temperature_names=recording.displacement_names,
+        probes=recording.displacement_sensors,
+        temperature=read,
+        flags=np.isnan(read).astype(np.uint8),
+        sigma=np.ones(read.shape[1]),
+    )
+    growing = Predictor(predictor.fast, [seen], effects=predictor.effects, at_stamps=True)
+    found = 1e-6 * growing.predict(0, factors, (), ()).temperature
+    first = np.argmax(np.isfinite(read), axis=0)
+    return found - found[first, np.arange(len(first))]
 
 
 def _outside_range(predictor: Predictor, parameters: Mapping[str, float]) -> tuple[str, ...]:

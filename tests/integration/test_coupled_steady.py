@@ -2,18 +2,19 @@
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
 
+from spindle_fem.definition.exchange_tables import SeatSurface
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import CheckFailedError, FaultsError, NoSteadyStateError
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.coupled_steady import LINEAR_RESIDUAL_LIMIT, solve_coupled
-from spindle_fem.solvers.preload_runaway import HeatResponse, highest_stable_speed
-from spindle_fem.solvers.prepared_machine import prepare_machine
+from spindle_fem.solvers.prepared_machine import machine_on_mesh, prepare_machine
 from spindle_fem.studies.run_checks import require_checks
 from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
 
@@ -164,28 +165,60 @@ def test_grease_beyond_its_limit_fails_the_run(recorded):
         require_checks(result.checks, "recorded")
 
 
-def test_heat_response_tells_stable_from_runaway(reference):
-    spec = reference.spec
-    following = prepare_machine(
-        spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": True})})
+@pytest.fixture(scope="module")
+def following():
+    return prepare_machine(
+        load_machine(
+            "wu_tan_2016", ["mesh.preset=coarse", "heat.thermal_preload=true", "operation.speed=600rpm"]
+        )
     )
-    response = HeatResponse(following, OperatingPoint.of(spec))
-    assert response.settles(200.0 * RPM)
-    assert not response.settles(3000.0 * RPM)
+
+
+@pytest.fixture(scope="module")
+def followed_result(following):
+    return solve_prepared(following, find_fold=True)
+
+
+def test_a_followed_preload_grows_and_its_fold_lies_above_the_running_speed(followed_result):
+    equilibrium = followed_result.equilibrium
+    assert equilibrium.followed
+    assert equilibrium.preload_ratio["F3"] > 2.0
+    assert 600.0 * RPM < equilibrium.fold_speed < 900.0 * RPM
+    assert all(check.passed for check in followed_result.checks)
+
+
+def test_fits_of_the_state_are_those_that_the_growth_shows(followed_result, following):
+    """The heat model and the growth after the run solve the same contact problem."""
+    point = OperatingPoint.of(following.spec)
+    heats = solve_coupled(following, point).loads.bearing_heat
+    for (bearing, side), state in followed_result.growth.seats.items():
+        pressure = heats[bearing].seat_pressure[("shaft", "housing").index(side)]
+        assert pressure == pytest.approx(state.pressure, rel=1e-3, abs=1e3)
+
+
+def test_seats_that_follow_their_fits_conduct_better_where_the_rings_press(following, followed_result):
+    spec = following.spec
+    joints = tuple(
+        joint.model_copy(update={"seat": SeatSurface()}) if "ring_seats" in joint.name else joint
+        for joint in spec.joint
+    )
+    changed = machine_on_mesh(spec.model_copy(update={"joint": joints}), following.mesh, following.operators)
+    state = solve_coupled(changed, OperatingPoint.of(spec))
+    factors = state.loads.change.coefficients
+    assert factors["joint.F3.outer_ring|housing"] > 1.5
+    assert not any(name.endswith(":face") for name in factors)
+    assert state.loads.bearing_heat["F3"].preload < followed_result.bearings["F3"].preload
 
 
 @pytest.mark.slow
-def test_rigid_preload_runs_away_and_says_up_to_which_speed_it_does_not():
-    spec = load_machine("wu_tan_2016", ["mesh.preset=coarse", "heat.thermal_preload=true"])
-    machine = prepare_machine(spec)
-    with pytest.raises(NoSteadyStateError, match=r"no thermal equilibrium at 3000 rpm.*up to about \d+ rpm"):
-        solve_coupled(machine, OperatingPoint.of(spec))
-    limit = highest_stable_speed(machine, OperatingPoint.of(spec))
-    slower = dataclasses.replace(OperatingPoint.of(spec), speed=0.9 * limit)
-    state = solve_coupled(machine, slower)
-    cold = solve_coupled(prepare_machine(load_machine("wu_tan_2016", ["mesh.preset=coarse"])), slower)
-    assert state.loads.bearing_heat["F2"].preload > cold.loads.bearing_heat["F2"].preload
-    assert HeatResponse(machine, slower).settles(slower.speed)
+def test_rigid_preload_runs_away_and_says_where_equilibria_end(following):
+    point = OperatingPoint.of(following.spec)
+    with pytest.raises(NoSteadyStateError, match=r"no thermal equilibrium at 3000 rpm.*fold at \d+ rpm") as told:
+        solve_coupled(following, dataclasses.replace(point, speed=3000.0 * RPM))
+    fold = float(re.search(r"fold at (\d+) rpm", str(told.value))[1]) * RPM
+    slower = dataclasses.replace(point, speed=0.98 * fold)
+    state = solve_coupled(following, slower)
+    assert state.loads.bearing_heat["F2"].preload > 2000.0
 
 
 def test_spring_preload_keeps_its_force_when_the_rings_grow():

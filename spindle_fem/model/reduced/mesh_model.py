@@ -16,6 +16,7 @@ from scipy import sparse
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import SpecError
+from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.equations import ThermalSystem
 from spindle_fem.model.mesh.evaluate import probe_matrix
 from spindle_fem.model.thermal_model import ThermalModel
@@ -62,6 +63,10 @@ class MeshModel(ThermalModel):
         )
 
 
+# Readings of displacement sensors are in micrometres, as large in number as those in kelvins.
+MICROMETRES = 1.0e6
+
+
 def build_mesh_model(machine: PreparedMachine) -> MeshModel:
     """Split a prepared machine into its unit operators.
 
@@ -87,7 +92,13 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
     storage = _storage(machine, names, size)
     places = dict(named_places(machine, names, size))
     points = [probe for probe in spec.probe if probe.kind == "point"]
-    rows = probe_matrix(operators, probe_positions(points), [p.part for p in points])
+    rows = _widened(probe_matrix(operators, probe_positions(points), [p.part for p in points]), size)
+    gradients = _widened(probe_slopes(operators, points), size)
+    sensors = [sensor.name for sensor in spec.displacement_sensor]
+    if sensors:
+        growth = GrowthModel(spec, operators.mesh, operators.order).sensor_rows[0]
+        rows = sparse.vstack([rows, _widened(sparse.csr_array(MICROMETRES * growth), size)], format="csr")
+        gradients = sparse.vstack([gradients, sparse.csr_array((2 * len(sensors), size))], format="csr")
     channel = {} if machine.builder.cells is None else _channel(machine, size)
     return MeshModel(
         coefficient_names=tuple(coefficients),
@@ -98,10 +109,10 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
         storage=tuple(storage.values()),
         place_names=tuple(places),
         places=sparse.vstack([sparse.csr_array(row[None, :]) for row in places.values()], format="csr"),
-        probe_names=tuple(p.name for p in points),
-        probes=_widened(rows, size),
+        probe_names=(*(p.name for p in points), *sensors),
+        probes=rows,
         one=np.ones(size),
-        probe_gradients=_widened(probe_slopes(operators, points), size),
+        probe_gradients=gradients,
         contacts=tuple(machine.mesh.joints),
         gap_radii=gap_radii_of(spec, operators),
         n_unknowns=operators.n_unknowns,

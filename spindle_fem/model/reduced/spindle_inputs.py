@@ -64,7 +64,7 @@ class SpindleInputs:
         self.spec, self.extra_terms = spec, tuple(extra_terms)
         self.table = build_coefficient_table(spec, model.contacts, model.gap_radii)
         self.bearings = tuple(bearing.name for _, bearing in spec.bearings)
-        self.channels = tuple(probe.name for probe in spec.probe)
+        self.channels = tuple(item.name for item in (*spec.probe, *spec.displacement_sensor))
         self.heat_places = tuple(f"{name}.{side}" for name in self.bearings for side in SIDES)
         self.fixed_fluids = tuple(
             dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")

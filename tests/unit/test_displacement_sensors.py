@@ -1,0 +1,110 @@
+"""Displacement sensors: what they may look at, and what they read of a machine that is evenly warm."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spindle_fem.definition.load import load_machine
+from spindle_fem.errors import BadInputError, SpecError
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.machine.meshing.build_mesh import build_mesh
+from spindle_fem.model.elastic.machine_growth import GrowthModel
+
+MACHINE = """schema = "spindle-fem/machine/1"
+base = "wu_tan_2016"
+name = "sensors"
+"""
+AXIAL = {"name": "S1", "at": "shaft.nose_end", "direction": "axial"}
+TOP = {"name": "S2", "at": {"z": "10 mm", "radius": "90 mm"}, "direction": "radial"}
+
+
+def text(value) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f'{key} = "{item}"' for key, item in value.items()) + "}"
+    return f'"{value}"'
+
+
+def machine(tmp_path, *sensors: dict, more: str = "", overrides: tuple[str, ...] = ()):
+    tables = [
+        "\n[[displacement_sensor]]\n" + "\n".join(f"{key} = {text(value)}" for key, value in sensor.items())
+        for sensor in sensors
+    ]
+    path = tmp_path / "sensors.toml"
+    path.write_text(MACHINE + more + "\n".join(tables) + "\n")
+    return load_machine(path, ["mesh.preset=coarse", *overrides])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"at": "shaft.nose_ent"}, 'S1.at: "shaft.nose_ent" is no surface of a turning part.*nose_end'),
+        ({"at": "housing.outside"}, "no surface of a turning part"),
+        ({"at": {"z": "10 mm", "radius": "91 mm"}}, "nothing that turns has a face at z 10 mm, radius 91 mm"),
+        ({"at": {"z": "10 mm", "radius": "90 mm", "angel": "1 deg"}}, 'angel: unknown key. Did you mean "angle"'),
+        ({"direction": "sideways"}, "Allowed: axial, radial"),
+        ({"mount": "flangge"}, 'mount: "flangge" is no segment of a standing part. Did you mean "flange"'),
+    ],
+)
+def test_a_sensor_on_nothing_is_refused(tmp_path, change: dict, message: str) -> None:
+    with pytest.raises(BadInputError, match=message):
+        machine(tmp_path, AXIAL | change)
+
+
+def test_a_material_without_expansion_is_refused(tmp_path) -> None:
+    with pytest.raises(BadInputError, match=r"materials.cast_iron.thermal_expansion: it is 0"):
+        machine(tmp_path, AXIAL, overrides=("materials.cast_iron.thermal_expansion=0 1/K",))
+
+
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory):
+    """A machine with sensors, all of one material, on a coarse mesh."""
+    bottom = TOP | {"name": "S3", "at": TOP["at"] | {"angle": "180 deg"}}
+    tip = {"name": "S4", "at": {"z": "0 mm", "radius": "60 mm"}, "direction": "axial"}
+    spec = machine(tmp_path_factory.mktemp("sensors"), AXIAL, TOP, bottom, tip)
+    steel = {key: m.model_copy(update={"thermal_expansion": 12e-6}) for key, m in spec.materials.items()}
+    spec = spec.model_copy(update={"materials": steel})
+    mesh = build_mesh(build_assembly(spec), preset="coarse")
+    return spec, mesh, GrowthModel(spec, mesh, 1)
+
+
+def test_an_even_rise_moves_every_spot_by_its_distance(grown) -> None:
+    """The flange's back is at z 65 mm; the channel's lands and every ring expand alike."""
+    spec, mesh, model = grown
+    flange = next(s for p in spec.part for s in p.segment if s.name == "flange")
+    rise = np.full(mesh.n_corners, model.assembly_temperature + 10.0)
+    read = model.displacements(rise, 0.0)
+    assert read["S1"] == pytest.approx(12e-5 * flange.z[1], rel=1e-3)
+    assert read["S4"] == pytest.approx(12e-5 * flange.z[1], rel=1e-3)
+    assert read["S2"] == pytest.approx(12e-5 * 0.090, rel=1e-3)
+    assert read["S3"] == pytest.approx(read["S2"], rel=1e-6)
+
+
+def test_a_bent_housing_lifts_one_side_and_lowers_the_other(grown) -> None:
+    """T grows upwards: readings at top and bottom differ by twice the lift of the axis."""
+    _, mesh, model = grown
+    warm_above = model.assembly_temperature + 10.0 * mesh.points[: mesh.n_corners, 1]
+    read = model.displacements(warm_above, 0.0)
+    growth = model.at(warm_above, 0.0, model.assembly_forces)
+    lift = growth.nose_radial[0] + 0.010 * growth.nose_tilt[0]
+    assert read["S2"] - read["S3"] == pytest.approx(2.0 * lift, rel=1e-6)
+    assert abs(lift) > 1e-9
+    # the tip above the axis goes against the way that it tilts
+    assert read["S4"] - read["S1"] == pytest.approx(0.060 * growth.nose_tilt[0], abs=2e-9)
+
+
+def test_fast_running_stretches_the_nose(grown) -> None:
+    """About as a free disc of 180 mm with a bore of 60 mm (Timoshenko & Goodier, section 32)."""
+    spec, mesh, model = grown
+    cold = np.full(mesh.n_corners, model.assembly_temperature)
+    steel = spec.part_material("shaft")
+    disc = 0.7 * 0.09**2 + 3.3 * 0.03**2
+    expected = steel.density * 314.0**2 * 0.09 / (4.0 * steel.young_modulus) * disc
+    assert model.displacements(cold, 314.0)["S2"] == pytest.approx(expected, rel=0.1)
+
+
+def test_a_mount_that_is_no_flange_is_refused(grown, tmp_path) -> None:
+    other = next(s.name for s in machine(tmp_path).part[1].segment if s.name != "flange")
+    spec = machine(tmp_path, AXIAL | {"mount": other})
+    with pytest.raises(SpecError, match="is not the flange of the housing"):
+        GrowthModel(spec, grown[1], 1)
