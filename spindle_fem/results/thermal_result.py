@@ -24,7 +24,8 @@ class BearingResult:
     """State of one bearing at the solution; temperatures in K.
 
     ``contact_angle_*`` in rad, ``film_thickness`` (central, thinner contact)
-    in m; ``contact_pressure`` (largest) in Pa; ``nan`` where the heat model does not give them.
+    in m; ``contact_pressure`` (largest) in Pa; ``preload`` is the axial force without
+    external load, ``axial_load`` with it; ``nan`` where the heat model does not give them.
     """
 
     heat: float
@@ -39,6 +40,7 @@ class BearingResult:
     film_thickness: float
     film_thickness_ratio: float
     contact_pressure: float = float("nan")
+    axial_load: float = float("nan")
 
     @property
     def ring_difference(self) -> float:
@@ -203,17 +205,17 @@ class ThermalResult:
     def growth(self) -> Growth | None:
         """What temperatures, fits and ball loads do to the machine's shape; None without bearings.
 
-        Worked out when first asked for. Ball loads are those of the preload that was found; of the
-        assembled one where the heat model gives none.
+        Worked out when first asked for. Ball loads are those that were found; those of the
+        assembled preload where the heat model gives none.
         """
         if not self.bearings:
             return None
         model = self._elastic
         forces = dict(model.assembly_forces)
         for name, bearing in self.bearings.items():
-            if math.isfinite(bearing.preload):
+            if math.isfinite(bearing.axial_load):
                 angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
-                forces[name] = tuple(bearing.preload / math.tan(angle) for angle in angles)
+                forces[name] = tuple(bearing.axial_load / math.tan(angle) for angle in angles)
         return model.at(self.temperature[: self.n_unknowns], self.speed, forces)
 
     @cached_property

@@ -184,6 +184,7 @@ def _bearings(
             film_thickness=heat.film_thickness,
             film_thickness_ratio=heat.film_thickness_ratio,
             contact_pressure=heat.contact_pressure,
+            axial_load=heat.axial_load,
         )
     return found
 
