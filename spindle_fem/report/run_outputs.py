@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+    from spindle_fem.model.elastic.deformed_shape import BodyShape
     from spindle_fem.report.block_page import Illustration
     from spindle_fem.report.drawn_surfaces import SegmentSet
     from spindle_fem.results.thermal_result import ThermalResult
@@ -74,7 +75,8 @@ class OutputHelpers:
         figures.mkdir(exist_ok=True)
         for old in figures.glob("*.png"):
             old.unlink()
-        plain = replace(result, heat_study=None)
+        # what growth is worked out with is large, and not for other processes
+        plain = replace(result, heat_study=None, growth_model=None)
         self._begun = folder
         self._waiting["pictures"] = self._pictures.ask("write", plain, figures)
         self._waiting["data"] = self._charts.ask("write_data", plain, folder)
@@ -87,6 +89,10 @@ class OutputHelpers:
     def draw_over_speed(self, study: Mapping[str, Any]) -> None:
         """Write the charts over speed of the result begun."""
         self._waiting["over speed"] = self._charts.ask("write_over_speed", dict(study))
+
+    def draw_growth(self, shapes: Mapping[str, BodyShape]) -> None:
+        """Write the picture of the deformed machine of the result begun."""
+        self._waiting["growth"] = self._charts.ask("write_growth", dict(shapes))
 
     def wait(self) -> dict[str, float]:
         """Wait for all that was begun; seconds of each part."""
@@ -142,6 +148,7 @@ def write_outputs(
         with clock.step("fields"):
             if result.heat_study is not None:
                 helpers.draw_over_speed(result.heat_study)
+            helpers.draw_growth(result.shapes)
             write_fields(result, folder / "fields.vtu")
     finally:  # also after an error nothing must go on writing here
         with clock.step("pictures"):
@@ -265,6 +272,14 @@ class _ChartWorker:
         self._write_all(
             {f"{OVER_SPEED}{name}": (lambda draw=draw: draw(study)) for name, draw in CHARTS.items()}
         )
+        return time.perf_counter() - began
+
+    def write_growth(self, shapes: Mapping[str, BodyShape]) -> float:
+        """Write the picture of the deformed machine; seconds."""
+        from spindle_fem.report.growth_chart import deformed_machine
+
+        began = time.perf_counter()
+        self._write_all({"deformed_machine": lambda: deformed_machine(shapes)})
         return time.perf_counter() - began
 
     def write_report(self, summary: dict[str, Any], pictures: Mapping[str, Illustration]) -> None:

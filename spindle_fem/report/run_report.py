@@ -59,6 +59,7 @@ CAPTIONS = {
     "coolant": "Oil along the channel: temperatures, and the film coefficient with its low and high value.",
     "channel_walls": "Walls of the channel, seen without the housing.",
     "heat_balance": "Where the heat comes from and where it goes.",
+    "deformed_machine": "The machine as it has grown since assembly, exaggerated as its title says.",
     "mesh": "The mesh, opened along the vertical plane; colours are parts.",
 }
 
@@ -71,8 +72,8 @@ _ANSWERS = (
     ),
     Text(
         Markup(
-            "It does not answer how the machine warms up (that is <code>spindle-fem simulate</code>), how "
-            "the parts deform, or how long grease and bearings last."
+            "It does not answer how the machine warms up (that is <code>spindle-fem simulate</code>) "
+            "or how long grease and bearings last."
         )
     ),
 )
@@ -149,7 +150,13 @@ def render_run_report(
         sections.append(Section("over_speed", "Bearings over speed", [_OVER_SPEED_TEXT, *over_speed]))
     if "growth" in summary:
         nose = tables.nose_table(summary)
-        shown = [tables.growth_table(summary), *([nose] if nose.rows else [])]
+        read = tables.displacement_table(summary)
+        shown = [
+            *_drawn(illustrations, "deformed_machine"),
+            tables.growth_table(summary),
+            *(table for table in (nose, read) if table.rows),
+            *_equilibrium(summary),
+        ]
         sections.append(Section("growth", "Growth and fits", shown))
     coolant = summary.get("coolant")
     if coolant:
@@ -166,6 +173,23 @@ def render_run_report(
         Section("versions", "Versions and provenance", _versions(summary, dataset)),
     ]
     return render_document("Thermal run", dataset.attrs["title"], sections, _subtitle(definition))
+
+
+def _equilibrium(summary: Mapping[str, Any]) -> list[Any]:
+    """How far the machine runs from the end of its equilibria."""
+    found = summary.get("equilibrium")
+    if found is None:
+        return []
+    name = max(found["preload_ratio"], key=found["preload_ratio"].get)
+    said = (
+        f"The preload of {name} is {found['preload_ratio'][name]:.2f} times that of assembly, the most of all; "
+        f"expansion is {'' if found['followed'] else 'not '}followed."
+    )
+    if found["fold_speed_rpm"] is not None:
+        said += f" Heat and preload feed each other without end above {found['fold_speed_rpm']:.0f} rpm."
+    elif found["searched_to_rpm"] is not None:
+        said += f" Up to {found['searched_to_rpm']:.0f} rpm they do not run away."
+    return [Text(said), *([Bullets(found["limits"])] if found["limits"] else [])]
 
 
 def _drawn(illustrations: Mapping[str, Illustration | None], *names: str) -> list[Illustration]:

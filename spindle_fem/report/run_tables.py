@@ -246,6 +246,13 @@ def growth_table(summary: Mapping[str, Any]) -> Table:
     return Table(columns, rows_of(rows), caption)
 
 
+def displacement_table(summary: Mapping[str, Any]) -> Table:
+    """What displacement sensors read."""
+    fields = (words("sensor", itemgetter(0)), fixed("displacement / µm", itemgetter(1), 2))
+    caption = "What the displacement sensors read since assembly."
+    return table_of(fields, summary.get("displacements", {}).items(), caption)
+
+
 def nose_table(summary: Mapping[str, Any]) -> Table:
     """How the nose has moved from the frame that the flange is bolted to."""
     growth = summary["growth"]

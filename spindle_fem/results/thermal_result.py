@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.model.elastic.deformed_shape import BodyShape, deformed_shapes
 from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
 
 if TYPE_CHECKING:
@@ -211,12 +212,25 @@ class ThermalResult:
         if not self.bearings:
             return None
         model = self._elastic
-        forces = dict(model.assembly_forces)
+        return model.at(self.temperature[: self.n_unknowns], self.speed, self._ball_forces)
+
+    @cached_property
+    def shapes(self) -> dict[str, BodyShape]:
+        """The elastic bodies before and after, by name; empty without bearings."""
+        if not self.bearings:
+            return {}
+        field = self.temperature[: self.n_unknowns]
+        return deformed_shapes(self._elastic, field, self.speed, self._ball_forces)
+
+    @property
+    def _ball_forces(self) -> dict[str, tuple[float, float]]:
+        """Radial ball force on both raceways of every bearing, N."""
+        forces = dict(self._elastic.assembly_forces)
         for name, bearing in self.bearings.items():
             if math.isfinite(bearing.axial_load):
                 angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
                 forces[name] = tuple(bearing.axial_load / math.tan(angle) for angle in angles)
-        return model.at(self.temperature[: self.n_unknowns], self.speed, forces)
+        return forces
 
     @cached_property
     def displacements(self) -> dict[str, float]:

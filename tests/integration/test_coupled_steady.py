@@ -213,7 +213,9 @@ def test_seats_that_follow_their_fits_conduct_better_where_the_rings_press(follo
 @pytest.mark.slow
 def test_rigid_preload_runs_away_and_says_where_equilibria_end(following):
     point = OperatingPoint.of(following.spec)
-    with pytest.raises(NoSteadyStateError, match=r"no thermal equilibrium at 3000 rpm.*fold at \d+ rpm") as told:
+    with pytest.raises(
+        NoSteadyStateError, match=r"no thermal equilibrium at 3000 rpm.*fold at \d+ rpm"
+    ) as told:
         solve_coupled(following, dataclasses.replace(point, speed=3000.0 * RPM))
     fold = float(re.search(r"fold at (\d+) rpm", str(told.value))[1]) * RPM
     slower = dataclasses.replace(point, speed=0.98 * fold)

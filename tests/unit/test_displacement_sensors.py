@@ -41,7 +41,10 @@ def machine(tmp_path, *sensors: dict, more: str = "", overrides: tuple[str, ...]
         ({"at": "shaft.nose_ent"}, 'S1.at: "shaft.nose_ent" is no surface of a turning part.*nose_end'),
         ({"at": "housing.outside"}, "no surface of a turning part"),
         ({"at": {"z": "10 mm", "radius": "91 mm"}}, "nothing that turns has a face at z 10 mm, radius 91 mm"),
-        ({"at": {"z": "10 mm", "radius": "90 mm", "angel": "1 deg"}}, 'angel: unknown key. Did you mean "angle"'),
+        (
+            {"at": {"z": "10 mm", "radius": "90 mm", "angel": "1 deg"}},
+            'angel: unknown key. Did you mean "angle"',
+        ),
         ({"direction": "sideways"}, "Allowed: axial, radial"),
         ({"mount": "flangge"}, 'mount: "flangge" is no segment of a standing part. Did you mean "flange"'),
     ],

@@ -97,7 +97,7 @@ def _clearance(fit: Fit | None, seat: Seat) -> float:
     return 0.5 * (-fit.inner_interference if seat.is_inner else fit.outer_clearance)
 
 
-def _flange_back(layout: Layout) -> Face:
+def flange_back(layout: Layout) -> Face:
     """The plane behind the flange that is bolted to the frame."""
     flange = next(s for s in layout.housing.segment if s.name == layout.flange)
     below = max(s.outer_diameter for s in layout.housing.segment if s is not flange)
@@ -125,6 +125,7 @@ class GrowthModel:
         self._mesh, self._order = mesh, order
         self._size = mesh.n_corners if order == 1 else len(mesh.points)
         self.sights = sensor_sights(spec, mesh)
+        self.fields: dict[str, MeridianField] = {}
         self.rings = [self._ring(seat) for seat in self.bodies.seats]
         self.carriers = {
             name: self._carrier(name) for name in (self.bodies.shaft, self.bodies.housing) if name
@@ -161,6 +162,7 @@ class GrowthModel:
 
     def _rows(self, outputs: BodyOutputs, body: str) -> Array:
         field = MeridianField(self._mesh, self._order, self.bodies.parts[body], outputs.body.section)
+        self.fields[body] = field
         return field.rows(outputs.by_temperature())
 
     def _ring(self, seat: Seat) -> _Ring:
@@ -187,7 +189,7 @@ class GrowthModel:
     def _forward(self, name: str) -> Array | None:
         """How far the shaft carries the nose forward of its bearing, or the housing that of its flange."""
         layout, body = Layout(self.spec, set()), self.bodies.bodies[name]
-        held = self._holding_seat(name)
+        held = self.holding_seat(name)
         ends = layout.flange_ends()
         if held is None or ends is None or not self.bodies.shaft:
             return None
@@ -196,18 +198,18 @@ class GrowthModel:
             first = min(layout.shaft.segment, key=lambda s: s.z[0])
             radii = (0.5 * first.inner_diameter, 0.5 * first.outer_diameter)
             return at_bearing - body.mean_shift(Face((first.z[0],) * 2, radii), AXIAL)
-        return body.mean_shift(_flange_back(layout), AXIAL) - at_bearing
+        return body.mean_shift(flange_back(layout), AXIAL) - at_bearing
 
     def _seen(self, name: str, sight: SensorSight) -> Array:
         """What a body adds to the reading of a sensor on the flange: the shaft, or the housing below it."""
-        body, held = self.bodies.bodies[name], self._holding_seat(name)
+        body, held = self.bodies.bodies[name], self.holding_seat(name)
         if not sight.axial:
             spot = body.spot_shift(sight.z, sight.r, RADIAL) if name == self.bodies.shaft else None
             return np.zeros(body.basis.N) if spot is None else spot
         at_bearing = body.mean_shift(held, AXIAL)
         if name == self.bodies.shaft:
             return sight.axial * (body.spot_shift(sight.z, sight.r, AXIAL) - at_bearing)
-        back = body.mean_shift(_flange_back(Layout(self.spec, set())), AXIAL)
+        back = body.mean_shift(flange_back(Layout(self.spec, set())), AXIAL)
         return sight.axial * (at_bearing - back)
 
     def displacements(self, temperature: Array, speed: float) -> dict[str, float]:
@@ -240,7 +242,7 @@ class GrowthModel:
             return np.zeros((0, self._size))
         straight = self.bodies.bodies[self.bodies.housing]
         body = replace(straight, harmonic=1)
-        back = _flange_back(layout)
+        back = flange_back(layout)
         square = 0.5 * (back.r[0] ** 2 + back.r[1] ** 2)
         mount = body.mean_shift(back, SIDEWAYS)
         turn = -body.mean_shift(back, (1.0, 0.0, 0.0), lever=True) / square
@@ -258,7 +260,7 @@ class GrowthModel:
         up, across = (field.rows(outputs.by_temperature(), around) for around in ("up", "across"))
         return np.stack((up, across), axis=1).reshape(4, -1)
 
-    def _holding_seat(self, carrier: str) -> Face | None:
+    def holding_seat(self, carrier: str) -> Face | None:
         """Seat of the bearing that holds the shaft in place: the last of the set that carries thrust."""
         sets = [group for group in self.spec.bearing_set if group.carries_thrust] or self.spec.bearing_set
         if not sets:
@@ -347,6 +349,21 @@ class GrowthModel:
         bent = self.bending @ (temperature - self.assembly_temperature)
         radial, tilt = (tuple(pair) for pair in bent.reshape(2, 2).tolist()) if len(bent) else (None, None)
         return Growth(found, self._nose(temperature), radial, tilt)
+
+    def pressures(self, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Array:
+        """Pressures on the seat and on the raceway of every ring, (2, n) Pa; arguments as of :meth:`at`."""
+        thermal = np.stack(list(self.shifts(temperature).values()))
+        return self._pressures(thermal, speed, forces)
+
+    def assembled_pressures(self) -> Array:
+        """The same as assembled."""
+        return self._pressures(np.zeros((len(self.bearings), 4)), 0.0, self.assembly_forces)
+
+    def _pressures(self, thermal: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Array:
+        both = np.array([forces[name] for name in self.bearings])
+        law = self.seats.law(thermal, speed, both[:, 1] - both[:, 0])
+        area = np.array([ring.seat.raceway.area for ring in self.rings])
+        return np.array([law.seats(both[:, 0])[0], both.ravel() / area])
 
     def _state(
         self, thermal: Array, seat: Array, speed: float, forces: Mapping[str, tuple[float, float]]

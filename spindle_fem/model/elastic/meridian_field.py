@@ -76,6 +76,11 @@ class MeridianField:
             points = points - weights * (shape @ factor.solve(shape.T @ points))
         return (self._mesh_values.T @ points).T
 
+    def corner_values(self, temperature: Array) -> Array:
+        """The fitted mean over the angle at the corners of the section's cells, (n_corners,) K."""
+        shape, factor, _, _ = self._fit
+        return factor.solve(shape.T @ (self._weights * (self._mesh_values @ temperature)))
+
     @cached_property
     def _points(self) -> tuple[Array, Array, Array]:
         places, weights = get_quadrature(RefTet, POINT_DEGREE)

@@ -1,0 +1,101 @@
+"""The deformed bodies of a machine in the meridian plane, for pictures: the mean round the axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.model.elastic.elastic_body import ElasticBody
+from spindle_fem.model.elastic.growth_outputs import AXIAL
+from spindle_fem.model.elastic.machine_growth import GrowthModel, flange_back
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class BodyShape:
+    """One body before and after.
+
+    Attributes
+    ----------
+    points : (n, 2) ndarray, [m]
+        z and r of the corners as assembled.
+    cells : (m, 4) int64 ndarray
+    sides : (k, 2) int64 ndarray
+        Ends of the outline's pieces.
+    shift : (n, 2) ndarray, [m]
+        Along z and r since assembly.
+    """
+
+    points: Array
+    cells: NDArray[np.int64]
+    sides: NDArray[np.int64]
+    shift: Array
+
+
+def deformed_shapes(
+    model: GrowthModel, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]
+) -> dict[str, BodyShape]:
+    """Every body of a machine at a state, against the assembled one; the flange's back stays in its place.
+
+    Parameters as of :meth:`GrowthModel.at`. Bending is left out.
+    """
+    pressing = model.pressures(temperature, speed, forces) - model.assembled_pressures()
+    found: dict[str, Array] = {}
+    held: dict[str, float] = {}
+    for name, (outputs, _) in reversed(model.carriers.items()):
+        own = [i for i, ring in enumerate(model.rings) if ring.seat.carrier == name]
+        inwards = -1.0 if name == model.bodies.shaft else 1.0
+        push = np.array([inwards * model.rings[i].seat.face.area * pressing[0, i] for i in own])
+        shift = _thermal(model, name, temperature) + outputs.solutions[:, : len(own)] @ push
+        if name == model.bodies.shaft:
+            shift = shift + outputs.body.solve(outputs.body.spin_load()) * speed**2
+        seat = model.holding_seat(name)
+        at_seat = None if seat is None else outputs.body.mean_shift(seat, AXIAL) @ shift
+        layout = Layout(model.spec, set())
+        place = 0.0
+        if name == model.bodies.housing and layout.flange_ends() is not None:
+            place = -float(outputs.body.mean_shift(flange_back(layout), AXIAL) @ shift)
+        elif at_seat is not None:
+            place = held.get("seat", 0.0) - float(at_seat)
+        if at_seat is not None:
+            held["seat"] = float(at_seat) + place
+        found[name] = _moved(outputs.body, shift, place)
+    for index, ring in enumerate(model.rings):
+        body = ring.outputs.body
+        shift = _thermal(model, ring.seat.ring, temperature) + ring.outputs.solutions @ (
+            ring.areas * pressing[:, index]
+        )
+        if ring.seat.is_inner:
+            shift = shift + body.solve(body.spin_load()) * speed**2
+        carrier = model.bodies.bodies[ring.seat.carrier]
+        under = carrier.mean_shift(ring.seat.face, AXIAL) @ found[ring.seat.carrier]
+        own = body.mean_shift(ring.seat.face, AXIAL)
+        found[ring.seat.ring] = _moved(body, shift, float(under - own @ shift))
+    return {name: _shape(model.bodies.bodies[name], shift) for name, shift in found.items()}
+
+
+def _thermal(model: GrowthModel, name: str, temperature: Array) -> Array:
+    body = model.bodies.bodies[name]
+    rise = model.fields[name].corner_values(temperature - model.assembly_temperature)
+    return body.solve(body.expansion_load() @ rise)
+
+
+def _moved(body: ElasticBody, shift: Array, distance: float) -> Array:
+    """A displacement with the whole body moved along the axis."""
+    shift = shift.copy()
+    basis = body.basis
+    for dofs in (basis.nodal_dofs, basis.facet_dofs, basis.interior_dofs):
+        shift[dofs[0]] += distance
+    return shift
+
+
+def _shape(body: ElasticBody, shift: Array) -> BodyShape:
+    mesh = body.section.mesh
+    return BodyShape(
+        mesh.p.T, mesh.t.T, mesh.facets[:, mesh.boundary_facets()].T, shift[body.basis.nodal_dofs[:2]].T
+    )
