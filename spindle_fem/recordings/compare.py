@@ -152,7 +152,7 @@ def write_simulated(
     predicted: NDArray[np.float64],
     displacements: NDArray[np.float64] | None = None,
 ) -> None:
-    """Write ``simulated.csv``: ``time_s``, temperatures in °C, displacements in µm, a column for each channel.
+    """Write ``simulated.csv``: ``time_s``, temperatures in °C, displacements in µm, one column a channel.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from spindle_fem.report.drawn_surfaces import SegmentSet
     from spindle_fem.results.thermal_result import ThermalResult
 
-_SHADED = ("meridian_temperature",)  # a palette would show as bands
+_SHADED = ("meridian_temperature", "deformed_machine")  # a palette would show as bands
 _MESH_COLOURS = 192
 _CHART_COLOURS = 256
 

@@ -182,7 +182,7 @@ def _equilibrium(summary: Mapping[str, Any]) -> list[Any]:
         return []
     name = max(found["preload_ratio"], key=found["preload_ratio"].get)
     said = (
-        f"The preload of {name} is {found['preload_ratio'][name]:.2f} times that of assembly, the most of all; "
+        f"The preload of {name} is {found['preload_ratio'][name]:.2f} times that of assembly (the most); "
         f"expansion is {'' if found['followed'] else 'not '}followed."
     )
     if found["fold_speed_rpm"] is not None:

@@ -28,8 +28,8 @@ MOST_CORRECTIONS = 8
 MOST_POINTS = 200
 # A point that took so many corrections has its derivatives taken anew.
 REFRESHED_FROM = 4
-# The parameter at the fold, relative to the end of the search.
-FOLD_TOLERANCE = 1.0e-4
+# Relative, of the parameter at the fold.
+FOLD_TOLERANCE = 2.0e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +179,7 @@ class _Walk:
             near = sorted([*near, top], key=lambda point: float(along @ (point - near[0])))
             peak = int(np.clip(max(range(4), key=lambda i: near[i][-1]), 1, 2))
             near = near[peak - 1 : peak + 2]
-            if abs(best - before) < FOLD_TOLERANCE:
+            if abs(best - before) < FOLD_TOLERANCE * best:
                 break
         return float(best)
 

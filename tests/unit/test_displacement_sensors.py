@@ -9,6 +9,7 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError, SpecError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.meshing.build_mesh import build_mesh
+from spindle_fem.model.elastic.deformed_shape import deformed_shapes
 from spindle_fem.model.elastic.machine_growth import GrowthModel
 
 MACHINE = """schema = "spindle-fem/machine/1"
@@ -104,6 +105,18 @@ def test_fast_running_stretches_the_nose(grown) -> None:
     disc = 0.7 * 0.09**2 + 3.3 * 0.03**2
     expected = steel.density * 314.0**2 * 0.09 / (4.0 * steel.young_modulus) * disc
     assert model.displacements(cold, 314.0)["S2"] == pytest.approx(expected, rel=0.1)
+
+
+def test_bodies_that_are_evenly_warm_keep_their_proportions(grown) -> None:
+    """Every body moves away from the flange's back and from the axis by α ΔT times its distance."""
+    spec, mesh, model = grown
+    flange = next(s for p in spec.part for s in p.segment if s.name == "flange")
+    rise = np.full(mesh.n_corners, model.assembly_temperature + 10.0)
+    shapes = deformed_shapes(model, rise, 0.0, model.assembly_forces)
+    assert {"shaft", "housing", "F1.inner_ring", "R2.outer_ring"} <= set(shapes)
+    for shape in shapes.values():
+        expected = 12e-5 * (shape.points - [flange.z[1], 0.0])
+        np.testing.assert_allclose(shape.shift, expected, atol=2e-8)
 
 
 def test_a_mount_that_is_no_flange_is_refused(grown, tmp_path) -> None:

@@ -82,7 +82,7 @@ FAULTS = [
     ('probe = "SP01"\n', "", r"channel\[1\].probe: is missing"),
     ('drives = "speed"\n', "", r"channel\[2\].drives: is missing"),
     ('"covariate"', '"covariate"\ndrives = "thrust"', r"channel\[3\].drives: 'thrust' has no meaning"),
-    ('role = "covariate"', 'role = "status"', "Allowed: temperature, input, covariate"),
+    ('role = "covariate"', 'role = "status"', "Allowed: temperature, displacement, input, covariate"),
     ('hold = "previous"', 'hold = "last"', "Allowed: previous, linear"),
     ("sigma = 0.1", "sigma = -0.1", r"channel\[1\].sigma: is -0.1. Allowed: above 0"),
     ("sigma = 0.1", "sigm = 0.1", 'unknown key. Did you mean "sigma"'),
