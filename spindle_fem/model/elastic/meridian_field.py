@@ -24,7 +24,8 @@ from skfem.refdom import RefTet
 
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.elastic.meridian_mesh import MeridianMesh
-from spindle_fem.model.mesh.element_integrals import evaluate_shape, tetrahedron_element
+from spindle_fem.model.mesh.element_integrals import evaluate_shape
+from spindle_fem.model.mesh.skfem_mesh import tetrahedron_element
 
 Array = NDArray[np.float64]
 # Points of an element; round the axis there are many elements to a cell.

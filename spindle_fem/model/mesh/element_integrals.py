@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from skfem import ElementTetP1, ElementTetP2, ElementTriP1, ElementTriP2
+from skfem import ElementTriP1, ElementTriP2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
 
@@ -26,6 +26,7 @@ from spindle_fem.model.mesh.skfem_mesh import (
     FACET_QUADRATURE_DEGREE,
     SkfemMesh,
     load_into_skfem,
+    tetrahedron_element,
 )
 from spindle_fem.model.mesh.threads import row_blocks, run_blocks, unsigned
 
@@ -56,11 +57,6 @@ def evaluate_shape(element: object, places: NDArray[np.float64]) -> tuple[NDArra
     values = np.stack([np.broadcast_to(value, places.shape[1]) for value, _ in pairs], axis=1)
     gradients = np.stack([np.asarray(gradient).T for _, gradient in pairs], axis=1)
     return values, gradients
-
-
-def tetrahedron_element(order: int) -> ElementTetP1 | ElementTetP2:
-    """scikit-fem's tetrahedron of order 1 or 2."""
-    return ElementTetP1() if order == 1 else ElementTetP2()
 
 
 @cache

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.spatial import KDTree
-from skfem import ElementTetP1, ElementTetP2
 
 from spindle_fem.errors import GeometryError, SpecError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.element_integrals import evaluate_shape
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, prolongation_from_corners
+from spindle_fem.model.mesh.skfem_mesh import tetrahedron_element
 
 CANDIDATES = 48
 NEWTON_STEPS = 30
@@ -141,7 +141,7 @@ def _invert_mapping(nodes: NDArray[np.float64], targets: NDArray[np.float64]) ->
 
 def quadratic_shape(places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Values (n, 10) and gradients (n, 10, 3) of the quadratic tetrahedron at places (n, 3)."""
-    return evaluate_shape(ElementTetP2(), places.T)
+    return evaluate_shape(tetrahedron_element(2), places.T)
 
 
 def probe_matrix(operators: ThermalOperators, points: ArrayLike, parts: Sequence[str]) -> sparse.csr_array:
@@ -159,7 +159,7 @@ def probe_matrix(operators: ThermalOperators, points: ArrayLike, parts: Sequence
         A point outside its part.
     """
     location = locate_points(operators.mesh, points, parts)
-    element = ElementTetP1() if operators.order == 1 else ElementTetP2()
+    element = tetrahedron_element(operators.order)
     values, _ = evaluate_shape(element, location.place.T)
     columns = operators.mesh.tetrahedra[location.element, : values.shape[1]]
     rows = np.repeat(np.arange(len(values)), values.shape[1])

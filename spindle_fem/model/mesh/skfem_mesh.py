@@ -23,6 +23,11 @@ FACET_QUADRATURE_DEGREE = 6
 PLACE_TOLERANCE, PLACE_ROUNDING = 1.0e-12, 1.0e-9
 
 
+def tetrahedron_element(order: int) -> ElementTetP1 | ElementTetP2:
+    """scikit-fem's tetrahedron of order 1 or 2."""
+    return ElementTetP1() if order == 1 else ElementTetP2()
+
+
 class CurvedMapping(MappingIsoparametric):
     """scikit-fem's mapping of curved elements; its inverse accepts what rounding leaves in thin ones."""
 
@@ -131,7 +136,7 @@ def load_into_skfem(mesh: TaggedMesh, order: int) -> SkfemMesh:
     points[number] = mesh.points
     tetrahedra = number[mesh.tetrahedra]
     loaded = MeshTet2(np.ascontiguousarray(points.T), np.ascontiguousarray(tetrahedra.T))
-    element = ElementTetP1() if order == 1 else ElementTetP2()
+    element = tetrahedron_element(order)
     basis = Basis(loaded, element, intorder=ELEMENT_QUADRATURE_DEGREE)
     local_nodes = 4 if order == 1 else 10
     unknown_of_dof = np.empty(basis.N, dtype=np.int64)
