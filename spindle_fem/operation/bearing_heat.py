@@ -58,6 +58,11 @@ class BearingTemperatures:
         """The temperatures alone."""
         return self.inner, self.outer, self.ball, self.shaft, self.housing
 
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """Temperatures in K, then shifts in µm where there are any: all that heat follows, alike in size."""
+        return np.append(self.kelvins, () if self.shifts is None else 1.0e6 * self.shifts)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilmCurves:

@@ -15,7 +15,7 @@ import bisect
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,7 @@ class HeatInMemory:
         self, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
     ) -> tuple[Mapping[str, BearingHeat], tuple]:
         """Heat of every bearing; see :mod:`spindle_fem.operation.bearing_heat`."""
-        values = np.array([astuple(item) for item in temperatures.values()])
+        values = np.array([item.state for item in temperatures.values()])
         if self._last is not None:
             last_point, last_values, answer = self._last
             if point == last_point and np.abs(values - last_values).max(initial=0.0) <= self.tolerance:

@@ -125,7 +125,7 @@ class HeatResponse:
         """Temperatures at given heats (n_bearings,) in W."""
         values = self.unheated + self.per_watt @ heat
         return {
-            name: BearingTemperatures(*row[:5].tolist(), row[5:] if row.size > 5 else None)
+            name: BearingTemperatures(*row[:5].tolist(), 1.0e-6 * row[5:] if row.size > 5 else None)
             for name, row in zip(self.names, values, strict=True)
         }
 
@@ -164,9 +164,4 @@ def equilibria_above(
 
 
 def _as_array(found: dict[str, BearingTemperatures], names: list[str]) -> NDArray[np.float64]:
-    return np.array(
-        [
-            np.append(found[name].kelvins, () if found[name].shifts is None else found[name].shifts)
-            for name in names
-        ]
-    )
+    return np.array([found[name].state for name in names])
