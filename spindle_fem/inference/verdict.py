@@ -252,7 +252,8 @@ def judge(
     left : callable, optional
         What a fit leaves of the readings over their noise; no more than the noise by default.
     beyond : callable, optional
-        Likewise of readings that no fit has seen: a set that does not predict them is not the whole truth.
+        Likewise of readings that no fit has seen: a set that leaves more there than where it
+        was fitted is not the whole truth.
     coarseness : float
         As :func:`tempered` has it.
     """
@@ -278,7 +279,8 @@ def judge(
     misfit = float(np.sqrt(chosen.fit.reduced_misfit))
     inexact = float(np.clip((misfit - tuned.EXACT_MISFIT) / tuned.OTHER_RANGE, 0.0, tuned.LARGEST_OTHER))
     rest = left(chosen.fit)
-    inexact = max(inexact, unexplained_share(max(rest, beyond(chosen.fit))))
+    # Held-out readings count by what is left of them beyond what is left of those that were fitted.
+    inexact = max(inexact, unexplained_share(rest), unexplained_share(beyond(chosen.fit) / max(1.0, rest)))
     known_as_one = overlapping or {}
     near = [
         item

@@ -205,6 +205,9 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_stated_no_higher_than_
     assert well.chosen.probability > 0.9 > 0.11 > badly.chosen.probability
     assert badly.other == pytest.approx(1.0 - badly.chosen.probability)
     assert badly.verdict == "missing_physics"
+    # as much as in what was fitted: no more than that says
+    evenly, fitted = ({"left": lambda fit: 1.9, "beyond": lambda fit, r=r: r} for r in (1.9, 1.0))
+    assert verdict(*sets, **evenly).chosen.probability == verdict(*sets, **fitted).chosen.probability
 
 
 def test_what_nothing_could_do_by_chance_has_no_probability_left():
