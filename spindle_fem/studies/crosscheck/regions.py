@@ -155,9 +155,9 @@ def _integrate(prepared, machine, elements, points, weight, n_shape):
     nodes = mesh.points[mesh.tetrahedra[elements]]
     geometry, gradient = quadratic_shape(points)
     shape = geometry if n_shape == 10 else evaluate_shape(_linear(), points.T)[0]
-    jacobian = np.einsum("enx,qnk->eqxk", nodes, gradient)
-    measure = np.abs(np.linalg.det(jacobian)) * weight
-    places = np.einsum("qn,enx->eqx", geometry, nodes)
+    along = np.moveaxis(np.tensordot(nodes, gradient, axes=(1, 1)), 1, -1)
+    measure = np.abs(np.sum(np.cross(along[:, :, 0], along[:, :, 1]) * along[:, :, 2], axis=-1)) * weight
+    places = geometry @ nodes
     part = np.repeat(mesh.part_of_element[elements], len(points))
     owner = machine.partition.node_of_cell[
         cells_at(machine.cells, mesh.part_names, part, places.reshape(-1, 3))
