@@ -228,6 +228,7 @@ outputs = ["temperature.max_degC"]
 
 
 @pytest.mark.usefixtures("unpictured")
+@pytest.mark.slow
 def test_search_repeats_itself_and_carries_the_band(tmp_path):
     path = study_file(tmp_path, SEARCH)
     summary = sweep_machine(MACHINE, path, tmp_path / "one", QUICK)

@@ -26,6 +26,7 @@ outputs = ["temperature.max_degC", "coolant.outlet_degC"]
 """
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_no_row_and_changes_no_digit(tmp_path, monkeypatch):
     path = tmp_path / "study.toml"
     path.write_text(STUDY, encoding="utf-8")

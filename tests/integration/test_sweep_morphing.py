@@ -179,6 +179,7 @@ def test_rows_tell_which_mesh_they_were_solved_on(rows):
     assert len({row["geometry"] for row in rows}) == 3
 
 
+@pytest.mark.slow
 def test_rows_depend_on_neither_workers_nor_company(rows, tmp_path):
     """In two processes; and, as a study that goes on does it, the last of them after another one."""
     assert solved(study(tmp_path, (5.4, 5, 6.9)), jobs=2) == rows

@@ -184,6 +184,7 @@ def test_a_design_outside_the_range_gets_no_answer(by_table, tmp_path):
     assert answer_tasks(model, tables, far.tasks, far.question) == []
 
 
+@pytest.mark.slow
 def test_heat_and_films_that_follow_the_temperature(tmp_path):
     """The reference spindle: friction, ball contacts and oil at their own temperature, wetted ports."""
     prepared = prepare_study(
@@ -199,6 +200,7 @@ def test_heat_and_films_that_follow_the_temperature(tmp_path):
 
 
 @pytest.mark.usefixtures("unpictured")
+@pytest.mark.slow
 def test_a_sweep_is_the_same_however_it_runs_and_resumes(tmp_path):
     outputs = ("temperature.max_degC", "probes.SP02")
     path = study_file(tmp_path, outputs=outputs, size=34)

@@ -99,6 +99,7 @@ def test_network_follows_the_preload_to_its_fixed_point():
     assert state.imbalance_relative < 1e-10
 
 
+@pytest.mark.slow
 def test_network_says_from_which_speed_on_the_preload_runs_away(monkeypatch):
     spec = load_machine("wu_tan_2016", ("heat.thermal_preload=true",))
     network, point = build_machine_network(spec), OperatingPoint.of(spec)
