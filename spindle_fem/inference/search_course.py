@@ -67,8 +67,12 @@ def run_search(search: Search) -> list[Hypothesis]:
 
 
 def _what_changes(search: Search, null: Fit) -> None:
-    """Add what changed its level at unknown moments, and what switches."""
-    if not search.is_explained(search.ranked()[0]):
+    """Add what changed its level at unknown moments, and what switches.
+
+    What fits well with heat in intervals may fit better with a cooling that changed at the same moments.
+    """
+    best = search.ranked()[0]
+    if not search.is_explained(best) or any(search.in_intervals(c) for c in best.fit.candidates):
         search.progress("diagnosis: changes and states that switch")
         add_steps(search, null)
         add_states(search, null)
