@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov
 
 from spindle_fem.inference import tuned
+from spindle_fem.inference.hypothesis_fit import huber
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
@@ -77,7 +78,7 @@ def left_over_noise(
     factors: Mapping[str, float],
     unseen: Sequence[Array] = (),
 ) -> float:
-    """Root mean square of single readings less what is told, over their noise, all channels alike.
+    """Robust root mean square of single readings less what is told, over their noise, all channels alike.
 
     Sensors of a machine with geometry also have the slow error that is expected of them before any fit; of
     a network's, ``sigma`` is all that is known.
@@ -103,11 +104,11 @@ def left_over_noise(
         noise = item.bins.white**2 * each
         # What averaging took off the noise is put back.
         averaged = noise * (1.0 - float(np.mean(1.0 / item.bins.number)) / each)
-        rest = float(np.mean((values - item.values) ** 2)) + averaged
         if not predictor.is_network:
             noise += tuned.EXPECTED_SLOW_SIGMA**2
         if beside:
             node = predictor.fast.inputs.channels.index(recording.probes[item.channel])
             noise += float(beside[item.recording][node]) ** 2
-        ratios.append(rest / noise)
+        # Few readings far off, as about the edge of an interval, count as they do in a fit.
+        ratios.append(np.mean(huber((values - item.values) / np.sqrt(noise))) + averaged / noise)
     return float(np.sqrt(np.mean(ratios)))
