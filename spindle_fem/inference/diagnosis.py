@@ -28,6 +28,7 @@ from spindle_fem.inference.prepared_problem import (
     Calibrated,
     calibrate,
     slow_error_of,
+    with_inexact_laws,
     with_own_noise,
 )
 from spindle_fem.inference.search_basis import searched_predictor
@@ -152,6 +153,7 @@ def diagnose_recordings(
         predictor = with_misdescriptions(predictor, directions, values)
         small = small.misdescribed_like(predictor)
         problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
+    problem = with_inexact_laws(problem, problem.fit())
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)
     found = run_search(search)

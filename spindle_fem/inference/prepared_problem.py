@@ -113,6 +113,34 @@ def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
     return likely_slow_error(problem.binned_residuals(fit), **_slow_choices(problem.predictor))
 
 
+def with_inexact_laws(problem: Problem, fit: Fit) -> Problem:
+    """The problem with the slow error that laws of what is missing will leave beside that of the machine.
+
+    What is added follows nature to a share only: where a fit without it leaves much, the best set leaves more
+    than the machine did by itself.
+    """
+    left: dict[int, list[Array]] = {}
+    for bins, values in problem.binned_residuals(fit):
+        left.setdefault(bins.channel, []).append(values)
+    return replace(
+        problem,
+        slow=SlowError.each(
+            {
+                channel: replace(
+                    problem.slow.of(channel),
+                    sigma=float(
+                        np.hypot(
+                            problem.slow.of(channel).sigma,
+                            tuned.LAW_INEXACT * np.sqrt(np.mean(np.concatenate(values) ** 2)),
+                        )
+                    ),
+                )
+                for channel, values in left.items()
+            }
+        ),
+    )
+
+
 def with_own_noise(final: Problem, plain: Problem, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Each hypothesis with the slow error that is most probable under it.
 

@@ -40,6 +40,8 @@ CLOCK_SIGMA = 30.0
 CONDUCTIVITY_SIGMA = 0.05
 # Time by which a sensor in its hole, or in the stream, answers later than what it touches, s.
 RESPONSE_SIGMA = 10.0
+# Share by which laws of the catalogue miss what they explain: a slow error in proportion, while searching.
+LAW_INEXACT = 0.03
 # A network of a few nodes is a coarse picture: its slow error as multiples of the larger of the noise and
 # this share of what the temperatures move.
 NETWORK_SLOW_SIGMAS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
