@@ -382,7 +382,13 @@ def _refit(
         for distance, _, h in nearest[: tuned.NEAREST_REFITTED]
         if distance < tuned.NEAREST_WITHIN * tuned.NEAR_READINGS
     ]
-    orders = [FitOrder(h.fit.candidates, h.fit.values, iterations=12) for h in chosen]
+    # What stays far behind the first set need not be followed to its optimum.
+    begun = problem.fit(first.candidates, first.values, iterations=0).misfit_with_prior
+    behind = begun + 2.0 * tuned.HOPELESS_SCORE
+    orders = [
+        FitOrder(h.fit.candidates, h.fit.values, iterations=12, hopeless=behind if h.keys else np.inf)
+        for h in chosen
+    ]
     # A set that could be simulated on the search's basis may run away on the whole one, and is dropped then.
     fitted = [
         Hypothesis(fit, item.log_prior)

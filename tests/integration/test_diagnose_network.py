@@ -11,6 +11,7 @@ from spindle_fem.commands.diagnose_command import diagnose, diagnose_without_rep
 from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.effects.registry import candidates_for
 from spindle_fem.errors import BadInputError, ConvergenceError
+from spindle_fem.inference import misdescription_columns
 from spindle_fem.inference import worker_processes as abreast
 from spindle_fem.inference.candidate_response import variants_of
 from spindle_fem.inference.hypothesis_fit import Problem
@@ -212,14 +213,18 @@ def test_what_is_held_out_does_not_touch_the_findings(machine, heated, tmp_path)
     assert again["fit"]["after"]["heldout_rmse_K"] > 1.5
 
 
-def test_the_improved_machine_simulates_what_the_diagnosis_predicts(heated, tmp_path):
+def test_the_improved_machine_simulates_what_the_diagnosis_predicts(machine, heated, tmp_path, monkeypatch):
     """Read back by another command; temperatures at the start are then those of the first readings."""
-    run, out, content = heated
+    # A definition has no keys for all that directions may be: without them both say the same.
+    monkeypatch.setattr(misdescription_columns, "PROVIDERS", ())
+    run, _, _ = heated
+    out = tmp_path / "out"
+    content = diagnose_without_report(machine, [run], out)
     simulated = simulate_machine(out / "improved_machine.toml", run, tmp_path / "simulated")
     before = {row["channel"]: row["rmse_K"] for row in content["mismatch"]["channels"]}
     after = {row["channel"]: row["rmse_K"] for row in content["fit"]["channels_after"]}
     for row in simulated["channels"]:
-        assert row["rmse_K"] == pytest.approx(after[row["channel"]], abs=LEFT_TO_DIRECTIONS)
+        assert row["rmse_K"] == pytest.approx(after[row["channel"]], abs=0.02)
     assert max(after.values()) < 0.13 < max(before.values())
     predicted, again = (
         pd.read_csv(path) for path in (out / "after.csv", tmp_path / "simulated" / "simulated.csv")
@@ -227,7 +232,7 @@ def test_the_improved_machine_simulates_what_the_diagnosis_predicts(heated, tmp_
     assert list(predicted.columns) == list(again.columns) == ["time_s", "Tw", "Tl", "Tb"]
     late = predicted["time_s"] > 1800.0
     for name in ("Tw", "Tl", "Tb"):
-        assert (predicted[name] - again[name])[late].abs().max() < 0.2 + 2.0 * LEFT_TO_DIRECTIONS
+        assert (predicted[name] - again[name])[late].abs().max() < 0.2
 
 
 def test_fits_abreast_are_those_of_one_process(machine, tmp_path):
