@@ -43,3 +43,17 @@ def seat_faults(spec: MachineSpec, group: BearingSet, kind: BearingType) -> Iter
                     f"has a face of {diameter * 1e3:g} mm there.",
                     "Allowed: rings on a rotating and a standing part; or leave the fit out.",
                 )
+
+
+def followed_joint_faults(spec: MachineSpec) -> Iterator[SpindleFemError]:
+    """Joints that are to conduct as fits press, but have no fit or nothing to change."""
+    for joint in spec.joint:
+        if joint.seat is None:
+            continue
+        where = f"joint.{joint.name}.seat"
+        if joint.conductance == "perfect":
+            yield SpecError(where, 'its conductance is "perfect".', "Give the conductance as assembled.")
+        if not any(group.fit is not None for group in spec.bearing_set):
+            yield SpecError(
+                where, "no bearing set has a fit.", "Give bearing_set.fit, or leave the seat out."
+            )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
-from spindle_fem.definition.bearing_seats import seat_faults
+from spindle_fem.definition.bearing_seats import followed_joint_faults, seat_faults
 from spindle_fem.definition.displacement_faults import displacement_faults
 from spindle_fem.definition.machine_spec import BearingType, MachineSpec, Probe
 from spindle_fem.definition.schema import names_of
@@ -119,6 +119,7 @@ def find_faults(spec: MachineSpec, declared: Declared | None = None) -> list[Spi
         *_cooling(spec, declared),
         *_heat(spec, declared),
         *_joints(spec, declared),
+        *followed_joint_faults(spec),
         *_surfaces(spec, declared),
         *_factors(spec, declared),
         *_probes(spec, declared),

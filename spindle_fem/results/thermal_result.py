@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.model.elastic.deformed_shape import BodyShape, deformed_shapes
+from spindle_fem.model.elastic.machine_bodies import carries_rings
 from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
 
 if TYPE_CHECKING:
@@ -204,20 +205,20 @@ class ThermalResult:
 
     @cached_property
     def growth(self) -> Growth | None:
-        """What temperatures, fits and ball loads do to the machine's shape; None without bearings.
+        """What temperatures, fits and ball loads do to the machine's shape; None without bearings on bodies.
 
         Worked out when first asked for. Ball loads are those that were found; those of the
         assembled preload where the heat model gives none.
         """
-        if not self.bearings:
+        if not carries_rings(self.spec):
             return None
         model = self._elastic
         return model.at(self.temperature[: self.n_unknowns], self.speed, self._ball_forces)
 
     @cached_property
     def shapes(self) -> dict[str, BodyShape]:
-        """The elastic bodies before and after, by name; empty without bearings."""
-        if not self.bearings:
+        """The elastic bodies before and after, by name; empty without bearings on bodies."""
+        if not carries_rings(self.spec):
             return {}
         field = self.temperature[: self.n_unknowns]
         return deformed_shapes(self._elastic, field, self.speed, self._ball_forces)

@@ -229,8 +229,7 @@ def _beyond_the_fold(
         for approach in FOLD_APPROACHES:
             below = replace(point, speed=approach * branch.limit)
             state = _settle(machine, below, None, beyond)
-            heats = [state.loads.bearing_heat[bearing.name].total for _, bearing in machine.spec.bearings]
-            before, branch = branch.limit, equilibria_above(machine, below, point.speed, state.loads, heats)
+            before, branch = branch.limit, equilibria_above(machine, below, point.speed, state.loads)
             if abs(branch.limit - before) < FOLD_TOLERANCE * before:
                 break
     except SpindleFemError:

@@ -8,7 +8,7 @@ temperature.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.operation.bearing_heat import (
     BearingTemperatures,
 )
+from spindle_fem.operation.coefficients import ball_conductances
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat, Loads
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -78,10 +79,11 @@ def highest_settling_speed(highest: float, settles: Callable[[float], bool]) -> 
 
 
 class HeatResponse:
-    """Bearing temperatures and shifts as a linear function of the heat of each bearing.
+    """Bearing temperatures and shifts as a linear function of what enters rings and balls of each bearing.
 
-    Films, oil and contact conductances stay as they are in given loads, so one solve a bearing describes
-    the machine for all heats near them.
+    Films, oil and joints stay as they are in given loads, so one solve for each ring and ball row
+    describes the machine near them. What the balls conduct is followed: a change of it moves heat
+    between balls and rings.
 
     Parameters
     ----------
@@ -96,20 +98,21 @@ class HeatResponse:
         if loads is None:
             unknowns = np.full(machine.operators.n_unknowns, point.ambient_temperature)
             loads, _ = machine.builder.at(point, machine.field_state(unknowns, {}))
+        self._groups = {bearing.name: group for group, bearing in machine.spec.bearings}
+        self._base = self._conductances(loads.bearing_heat)
+        shares = heat_shares(machine.spec.heat)
+        self._shares = np.array([shares["inner"], shares["outer"], shares["balls"]])
         solution = None
         columns = []
-        for active in (None, *self.names):
+        for active in (None, *((name, body) for name in self.names for body in ("inner", "outer", "balls"))):
             heat = dict.fromkeys(loads.surface_heat, 0.0)
-            shares = heat_shares(machine.spec.heat)
-            if active:
-                heat |= {
-                    f"{active}.inner_raceway": shares["inner"],
-                    f"{active}.outer_raceway": shares["outer"],
-                }
-            balls = machine.builder.ball_nodes(active) if active else ()
+            balls: tuple[str, ...] = ()
+            if active is not None and active[1] == "balls":
+                balls = machine.builder.ball_nodes(active[0])
+            elif active is not None:
+                heat[f"{active[0]}.{active[1]}_raceway"] = 1.0
             lumped = tuple(
-                replace(node, heat=shares["balls"] / len(balls) if node.name in balls else 0.0)
-                for node in loads.lumped
+                replace(node, heat=1.0 / len(balls) if node.name in balls else 0.0) for node in loads.lumped
             )
             problem = machine.problem(replace(loads, surface_heat=heat, lumped=lumped))
             solution = solve_steady(
@@ -121,21 +124,49 @@ class HeatResponse:
         self.unheated = columns[0]
         self.per_watt = np.stack([column - columns[0] for column in columns[1:]], axis=-1)
 
-    def temperatures(self, heat: NDArray[np.float64]) -> dict[str, BearingTemperatures]:
-        """Temperatures at given heats (n_bearings,) in W."""
-        values = self.unheated + self.per_watt @ heat
+    def _conductances(self, heats: Mapping[str, BearingHeat]) -> NDArray[np.float64]:
+        """From the balls to the inner and the outer raceway, (n_bearings, 2) W/K."""
+        return np.array([ball_conductances(self._groups[name], heats[name]) for name in self.names])
+
+    def temperatures(
+        self, heat: NDArray[np.float64], conductance: NDArray[np.float64]
+    ) -> dict[str, BearingTemperatures]:
+        """Temperatures at heats (n_bearings,) [W] and conductances of the balls (n_bearings, 2) [W/K]."""
+        entering = (heat[:, None] * self._shares).ravel()
+        values = self.unheated + self.per_watt @ entering
+        more = (conductance - self._base).ravel()
+        # ball less raceway of every contact, by what enters; a flow leaves the balls and enters the raceway
+        count = len(self.names)
+        flows = np.zeros((3 * count, 2 * count))
+        for contact in range(2 * count):
+            flows[3 * (contact // 2) + contact % 2, contact] = 1.0
+            flows[3 * (contact // 2) + 2, contact] = -1.0
+        drop = (self.per_watt[:, 2:3] - self.per_watt[:, :2]).reshape(2 * count, -1)
+        driving = (values[:, 2:3] - values[:, :2]).ravel()
+        flow = np.linalg.solve(np.eye(2 * count) - more[:, None] * (drop @ flows), more * driving)
+        values = values + self.per_watt @ (flows @ flow)
         return {
             name: BearingTemperatures(*row[:5].tolist(), 1.0e-6 * row[5:] if row.size > 5 else None)
             for name, row in zip(self.names, values, strict=True)
         }
 
-    def heat(self, heat: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
-        """Heats (n_bearings,) [W] that the temperatures of given heats make at a speed (rad/s)."""
-        found, _ = self.machine.builder.heat_model(replace(self.point, speed=speed), self.temperatures(heat))
-        return np.array([found[name].total for name in self.names])
+    def state(self, heats: Mapping[str, BearingHeat]) -> NDArray[np.float64]:
+        """Heats and conductances of the balls, as one state (3 n_bearings,)."""
+        return np.append([heats[name].total for name in self.names], self._conductances(heats))
+
+    def respond(self, state: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
+        """The state that the temperatures of a state make at a speed (rad/s)."""
+        count = len(self.names)
+        around = self.temperatures(state[:count], state[count:].reshape(count, 2))
+        found, _ = self.machine.builder.heat_model(replace(self.point, speed=speed), around)
+        return self.state(found)
+
+    def follow(self, state: NDArray[np.float64], start: float, end: float) -> Branch:
+        """The branch from a state at a speed ``start`` (rad/s)."""
+        return follow_branch(self.respond, state, start, end, weak=2 * len(self.names))
 
     def branch(self, end: float) -> Branch:
-        """Heats of the bearings (W) over the speed (rad/s), from slow running to ``end`` or a fold before.
+        """States of the bearings over the speed (rad/s), from slow running to ``end`` or a fold before.
 
         Raises
         ------
@@ -143,24 +174,20 @@ class HeatResponse:
             No equilibrium even at the slowest speed.
         """
         start = SLOWEST * end
-        slow = self.heat(np.zeros(len(self.names)), start)
-        return follow_branch(self.heat, slow, start, end)
+        cold = np.append(np.zeros(len(self.names)), self._base)
+        return self.follow(self.respond(cold, start), start, end)
 
 
-def equilibria_above(
-    machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads, heat: Sequence[float]
-) -> Branch:
+def equilibria_above(machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads) -> Branch:
     """The branch of equilibria from a solved state to a higher speed ``end`` (rad/s), or to its fold before.
 
     Parameters
     ----------
     loads : Loads
-        Of the solved state: films and contacts stay as they are there.
-    heat : sequence of float, [W]
-        Of its bearings.
+        Of the solved state: films, oil and joints stay as they are there.
     """
     response = HeatResponse(machine, point, loads)
-    return follow_branch(response.heat, np.asarray(heat, dtype=float), point.speed, end)
+    return response.follow(response.state(loads.bearing_heat), point.speed, end)
 
 
 def _as_array(found: dict[str, BearingTemperatures], names: list[str]) -> NDArray[np.float64]:

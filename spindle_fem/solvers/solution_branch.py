@@ -56,7 +56,7 @@ class Branch:
     reason: str = ""
 
 
-def follow_branch(respond: Respond, state: Array, start: float, end: float) -> Branch:
+def follow_branch(respond: Respond, state: Array, start: float, end: float, *, weak: int = 0) -> Branch:
     """Follow fixed points from a parameter towards a larger one.
 
     Parameters
@@ -65,6 +65,9 @@ def follow_branch(respond: Respond, state: Array, start: float, end: float) -> B
         G(x (k,), p) -> (k,), positive; a ``SpindleFemError`` says that there is no response.
     state : (k,) ndarray
         Near the fixed point at ``start``.
+    weak : int
+        So many of the last quantities move the response little: no differences are taken in them, their
+        derivatives are learned on the way.
 
     Raises
     ------
@@ -76,7 +79,7 @@ def follow_branch(respond: Respond, state: Array, start: float, end: float) -> B
     >>> branch.end, round(branch.limit, 4)
     ('fold', 0.25)
     """
-    return _Walk(respond, end).go(np.append(np.log(state), start / end))
+    return _Walk(respond, end, weak).go(np.append(np.log(state), start / end))
 
 
 class _NoPointError(Exception):
@@ -84,9 +87,9 @@ class _NoPointError(Exception):
 
 
 class _Walk:
-    def __init__(self, respond: Respond, end: float) -> None:
-        self.respond, self.end = respond, end
-        self.jacobian = np.empty((0, 0))
+    def __init__(self, respond: Respond, end: float, weak: int) -> None:
+        self.respond, self.end, self.weak = respond, end, weak
+        self.jacobian: Array | None = None
 
     def residual(self, point: Array) -> Array:
         """What is left of ln x = ln G, (k,)."""
@@ -95,8 +98,13 @@ class _Walk:
 
     def differentiate(self, point: Array, residual: Array) -> None:
         """Take the derivatives (k, k + 1) anew."""
-        moved = point + DIFFERENCE * np.eye(len(point))
-        self.jacobian = np.stack([self.residual(row) - residual for row in moved], axis=1) / DIFFERENCE
+        size = len(residual)
+        if self.jacobian is None:
+            self.jacobian = np.eye(size, size + 1)
+        for column in (*range(size - self.weak), size):
+            moved = point.copy()
+            moved[column] += DIFFERENCE
+            self.jacobian[:, column] = (self.residual(moved) - residual) / DIFFERENCE
 
     def correct(self, guess: Array, across: Array) -> tuple[Array, int]:
         """The point of the branch in the plane through a guess, and how many corrections it took."""
@@ -160,7 +168,14 @@ class _Walk:
 
     def fold(self, points: list[Array]) -> float:
         """Largest parameter of the parabola through the last points, with one more on it until it stays."""
-        near = points[-3:] if len(points) > 2 else [*points, points[-1]]
+        near = points[-3:]
+        if len(near) == 2:
+            along = near[1] - near[0]
+            try:
+                middle, _ = self.correct(0.5 * (near[0] + near[1]), along / np.linalg.norm(along))
+            except (_NoPointError, SpindleFemError):
+                return float(near[0][-1])
+            near.insert(1, middle)
         best = max(point[-1] for point in near)
         for _ in range(MOST_CORRECTIONS):
             along = near[-1] - near[0]

@@ -40,8 +40,7 @@ def equilibrium_of(
     fold = searched = None
     limits = _limits(spec, coupled, bearings)
     if search and follows_preload(spec) and point.speed > 0.0:
-        heats = [coupled.loads.bearing_heat[bearing.name].total for _, bearing in spec.bearings]
-        branch = equilibria_above(machine, point, SEARCHED_RANGE * point.speed, coupled.loads, heats)
+        branch = equilibria_above(machine, point, SEARCHED_RANGE * point.speed, coupled.loads)
         searched = branch.limit
         if branch.end == "fold":
             fold = branch.limit

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from spindle_fem.definition.bearing_seats import seat_diameter
+from spindle_fem.definition.bearing_seats import followed_joint_faults, seat_diameter
+from spindle_fem.definition.exchange_tables import SeatSurface
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
@@ -81,9 +82,23 @@ def test_wetted_share_sets_the_way_of_heat_through_the_grease() -> None:
             "bearing_set.front.fit: the inner ring of F1 sits on no part: none has a face of 140 mm there.",
         ),
         (["materials.cast_iron.thermal_expansion=12 K"], "thermal_expansion"),
+        (
+            [
+                "joint.inner_ring_seats.seat.slope=0.1",
+                *(f"bearing_set.{s}.fit=none" for s in ("front", "rear")),
+            ],
+            "joint.inner_ring_seats.seat: no bearing set has a fit.",
+        ),
     ],
 )
 def test_bad_fits_are_refused(settings: list[str], message: str) -> None:
     with pytest.raises(BadInputError) as caught:
         load_machine("wu_tan_2016", settings)
     assert message in str(caught.value)
+
+
+def test_a_perfect_joint_cannot_follow_its_fit() -> None:
+    spec = load_machine("wu_tan_2016")
+    perfect = spec.joint[0].model_copy(update={"conductance": "perfect", "seat": SeatSurface()})
+    (fault,) = followed_joint_faults(spec.model_copy(update={"joint": (perfect,)}))
+    assert 'its conductance is "perfect"' in str(fault)

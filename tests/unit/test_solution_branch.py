@@ -29,12 +29,34 @@ def test_ignition_in_two_coupled_quantities() -> None:
     assert branch.limit == pytest.approx(np.exp(-1.0), rel=1e-4)
 
 
+def test_a_quantity_that_moves_little_needs_no_differences() -> None:
+    """The same fold, with a second quantity that follows the first and acts back a little."""
+
+    def respond(x: np.ndarray, p: float) -> np.ndarray:
+        return np.array([1.0 + p * x[0] ** 2 * x[1] ** 0.1, x[0] ** 0.2])
+
+    found = []
+    for weak in (0, 1):
+        branch = follow_branch(respond, np.array([1.0, 1.0]), 0.01, 1.0, weak=weak)
+        assert branch.end == "fold"
+        found.append(branch.limit)
+    assert found[1] == pytest.approx(found[0], rel=1e-4)
+
+
 def test_a_branch_without_fold_reaches_its_end() -> None:
     branch = follow_branch(lambda x, p: (1.0 + p) / (1.0 + x), np.array([0.6]), 0.1, 3.0)
     assert branch.end == "end"
     assert branch.limit == pytest.approx(3.0)
     x = branch.states[-1, 0]
     assert x * (1.0 + x) == pytest.approx(4.0, rel=1e-5)
+
+
+def test_a_fold_just_ahead_of_the_start_is_found() -> None:
+    start = 0.2499
+    lower = (1.0 - np.sqrt(1.0 - 4.0 * start)) / (2.0 * start)
+    branch = follow_branch(lambda x, p: 1.0 + p * x**2, np.array([lower]), start, 0.5)
+    assert branch.end == "fold"
+    assert branch.limit == pytest.approx(0.25, rel=1e-4)
 
 
 def test_a_refusal_is_no_fold() -> None:

@@ -74,6 +74,12 @@ def elastic_material(material: Material) -> ElasticMaterial:
     )
 
 
+def carries_rings(spec: MachineSpec) -> bool:
+    """Whether a machine has bearings, a turning part and a standing one."""
+    layout = Layout(spec, set())
+    return bool(spec.bearings) and layout.shaft is not None and layout.housing is not None
+
+
 def machine_bodies(spec: MachineSpec, *, size: float = ELEMENT_SIZE) -> MachineBodies:
     """Bodies of a machine definition, evenly stretched round the axis.
 
@@ -116,11 +122,9 @@ def _seats(spec: MachineSpec) -> tuple[Seat, ...]:
     """Inner and outer seat of every bearing in turn; none where shaft or housing is missing."""
     layout = Layout(spec, set())
     found = []
-    for group, bearing in spec.bearings:
+    for group, bearing in spec.bearings if carries_rings(spec) else ():
         kind = spec.bearing_types[group.bearing_type]
         z = tuple(bearing.z)
-        if layout.shaft is None or layout.housing is None:
-            continue
         for ring, carrier, seat, raceway in (
             ("inner", layout.shaft, kind.bore_diameter, kind.inner_ring_outer_diameter),
             ("outer", layout.housing, kind.outer_diameter, kind.outer_ring_inner_diameter),
