@@ -61,6 +61,12 @@ class LinearAnswer:
     begins: NDArray[np.bool_]
     outputs: Array
 
+    @property
+    def largest(self) -> float:
+        """Size that settles what it acts on within a step: more of it says no more, and would overshoot."""
+        settled = float(np.trace(self.loss, axis1=1, axis2=2).max())
+        return 1.0 / settled if settled > 0.0 else np.inf
+
 
 @dataclass(frozen=True, slots=True)
 class Readings:
@@ -227,6 +233,7 @@ def find_course(
     """
     found: Course | None = None
     for _ in range(effort[1]):
+        size = min(size, answer.largest)
         on, probability, evidence, likelihood = readings.courses(answer, chain, size, effort[0])
         if not on.any():
             return found
@@ -450,6 +457,9 @@ def _follow(
             for i in range(after):
                 spare[k, i] = past[h, i]
             spare[k, t % after] = next_on[c]
+        if kept_courses == 0:
+            # no course has a likelihood that is a number
+            return np.zeros(steps, np.bool_), probability, -np.inf, -np.inf
         whole = 0.0
         for k in range(kept_courses):
             c = selected[k]

@@ -113,3 +113,16 @@ def test_changes_are_found_and_no_more():
     np.testing.assert_allclose(levels, [3.0, 1.0], atol=0.2)
     noise = 0.3 * generator.standard_normal(len(times))
     assert find_changes(answers.T @ answers / 0.09, answers.T @ noise / 0.09, 3.0) is None
+
+
+def test_a_conductance_never_takes_more_in_a_step_than_there_is():
+    generator = np.random.default_rng(4)
+    answer = one_mass(conductance=True)
+    on = truth(generator, np.ones(STEPS))
+    filter_ = ReadingFilter(readings(answer, on, 40.0, generator))
+    assert answer.largest == pytest.approx(CAPACITY / STEP, rel=0.05)
+    assert one_mass().largest == np.inf
+    found = find_course(answer, filter_, Chain.usual(np.zeros(STEPS, dtype=int)), 1e6, 1e6)
+    assert found is None or np.isfinite(found.size + found.log_evidence)
+    course = filter_.courses(answer, Chain.usual(np.zeros(STEPS, dtype=int)), 1e6, 24)
+    assert not course[0].any()
