@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.model.mesh.kernels import OPTIONS
 from spindle_fem.operation.effect_terms import Quantities
 
 Array = NDArray[np.float64]
@@ -134,51 +136,88 @@ class Linearised:
             Likewise after each step.
         """
         answers, lines = self.answers, self.lines
-        n_sensed, size = answers.sense.shape
-        steps, _, number = forcing.shape
-        n_added, n_states = lines.end.value.shape[1], lines.end.n_states
-        start_by_sensed, start_by_state = lines.begin.by_sensed, lines.begin.by_state
-        memory_by_sensed, memory_by_state = lines.memory.by_sensed, lines.memory.by_state
+        steps, number = forcing.shape[0], forcing.shape[2]
         by_sensed, by_state = self._end_lines(number)
         # A single column is solved for as it comes.
         solved = self._answered is not None
-        states = np.zeros((steps + 1, size, number))
-        sensed = np.zeros((steps + 1, n_sensed, number))
-        added_start, added_end = np.zeros((2, steps, n_added, number))
-        own = self._solve @ end if solved and end is not None else end
-        right = np.empty((n_added, number))
-        now, base = np.zeros((size + n_added, number)), np.empty((size + n_sensed, number))
-        memory = np.zeros((n_states, number))
-        for step, group in enumerate(answers.group_of_step.tolist()):
-            if step in answers.given:
-                states[step] = start[answers.given[step]]
-                np.dot(answers.sense, states[step], out=sensed[step])
-            added = added_start[step]
-            np.dot(start_by_sensed[step], sensed[step], out=added)
-            if n_states:
-                added += start_by_state[step] @ memory
-            if begin is not None:
-                added += begin[step]
-            if step + 1 in answers.given:
-                # A gap: nothing is known of it, and what comes after it is given.
-                added_end[step] = added
-                continue
-            if n_states:
-                memory = memory_by_sensed[step] @ sensed[step] + memory_by_state[step] @ memory
-                if remembered is not None:
-                    memory += remembered[step]
-            now[:size], now[size:] = states[step], added
-            np.dot(answers.follows[group], now, out=base)
-            base += forcing[step]
-            added = added_end[step]
-            total = added if solved else right
-            np.dot(by_sensed[step], base[size:], out=total)
-            if n_states:
-                total += by_state[step] @ memory
-            if own is not None:
-                total += own[step]
-            if not solved:
-                np.dot(self._solve[step], total, out=added)
-            base += np.dot(answers.replies[group], added)
-            states[step + 1], sensed[step + 1] = base[:size], base[size:]
-        return Followed(states, sensed, added_start, added_end)
+        if solved and end is not None:
+            end = self._solve @ end
+        given = np.full(steps + 1, -1, dtype=np.int64)
+        for point, row in answers.given.items():
+            given[point] = row
+        none = np.zeros((0, 0, number))
+        return Followed(
+            *_follow(
+                answers.group_of_step,
+                given,
+                *(
+                    np.ascontiguousarray(item, dtype=np.float64)
+                    for item in (
+                        start,
+                        np.stack(answers.follows),
+                        np.stack(answers.replies),
+                        answers.sense,
+                        lines.begin.by_sensed,
+                        lines.begin.by_state,
+                        lines.memory.by_sensed,
+                        lines.memory.by_state,
+                        by_sensed,
+                        by_state,
+                        np.zeros((0, 0, 0)) if solved else self._solve,
+                        forcing,
+                        none if begin is None else begin,
+                        none if end is None else end,
+                        none if remembered is None else remembered,
+                    )
+                ),
+            )
+        )
+
+
+@njit(**OPTIONS)
+def _follow(
+    group, given, start, follows, replies, sense, start_by_sensed, start_by_state, memory_by_sensed,
+    memory_by_state, by_sensed, by_state, solve, forcing, begin, end, remembered,
+):  # fmt: skip
+    """March columns of changes; see :meth:`Linearised.follow`. Arrays without rows are left out."""
+    steps, _, number = forcing.shape
+    n_sensed, size = sense.shape
+    n_added, n_states = by_sensed.shape[1], memory_by_sensed.shape[1]
+    states, sensed = np.zeros((steps + 1, size, number)), np.zeros((steps + 1, n_sensed, number))
+    added_start, added_end = np.zeros((steps, n_added, number)), np.zeros((steps, n_added, number))
+    now, base = np.zeros((size + n_added, number)), np.zeros((size + n_sensed, number))
+    memory = np.zeros((n_states, number))
+    for step in range(steps):
+        if given[step] >= 0:
+            states[step] = start[given[step]]
+            sensed[step] = np.dot(sense, states[step])
+        added = np.dot(start_by_sensed[step], sensed[step])
+        if n_states > 0:
+            added += np.dot(start_by_state[step], memory)
+        if len(begin) > 0:
+            added += begin[step]
+        added_start[step] = added
+        if given[step + 1] >= 0:
+            # A gap: nothing is known of it, and what comes after it is given.
+            added_end[step] = added
+            continue
+        if n_states > 0:
+            memory = np.dot(memory_by_sensed[step], sensed[step]) + np.dot(memory_by_state[step], memory)
+            if len(remembered) > 0:
+                memory += remembered[step]
+        now[:size] = states[step]
+        now[size:] = added
+        np.dot(follows[group[step]], now, base)
+        base += forcing[step]
+        total = np.dot(by_sensed[step], base[size:])
+        if n_states > 0:
+            total += np.dot(by_state[step], memory)
+        if len(end) > 0:
+            total += end[step]
+        if len(solve) > 0:
+            total = np.dot(solve[step], total)
+        added_end[step] = total
+        base += np.dot(replies[group[step]], total)
+        states[step + 1] = base[:size]
+        sensed[step + 1] = base[size:]
+    return states, sensed, added_start, added_end
