@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import NoSteadyStateError, SpindleFemError
+from spindle_fem.errors import ConvergenceError, NoSteadyStateError, SpindleFemError
 from spindle_fem.model.mesh.linear_solvers import RELATIVE_TOLERANCE
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady
 from spindle_fem.operation.bearing_heat import follows_preload
@@ -28,6 +29,8 @@ FIELD_TOLERANCE = 1.0e-8
 HEAT_TOLERANCE = 1.0e-7
 COOLANT_TOLERANCE = 2.0e-9
 MAXIMUM_ITERATIONS = 100
+# Near the fold of the reference spindle 17 are enough.
+QUICK_ITERATIONS = 25
 RELAXATION = 0.3
 ANDERSON_DEPTH = 6
 # Greases and seals are gone long before; a field beyond this is running away.
@@ -103,12 +106,17 @@ def _settle(
     start: NDArray[np.float64] | None,
     beyond: Beyond | None,
 ) -> CoupledState:
+    first = None
+    if follows_preload(machine.spec) and start is None:
+        # Cold grease makes heat that would carry the loop past the fixed point.
+        first = solve_coupled(without_expansion(machine), point, beyond=beyond)
+        if beyond is None:
+            # Quick where there is an equilibrium; what fails here may still be crept up to.
+            quick = Iteration(RELAXATION, np.inf, ANDERSON_DEPTH, QUICK_ITERATIONS)
+            with contextlib.suppress(ConvergenceError, NoSteadyStateError, *REFUSED):
+                return _iterate(_Operation(machine, point, beyond), None, first, quick)
     operation = _Operation(machine, point, beyond)
     far = operation.follows_preload or beyond is not None
-    state = operation.padded(start)
-    if operation.follows_preload and start is None:
-        # Cold grease makes heat that would carry the loop past the fixed point.
-        state = operation.begin(solve_coupled(without_expansion(machine), point, beyond=beyond))
     iteration = Iteration(
         relaxation=RELAXATION,
         # Far from the fixed point, heat that grows with temperature must be followed as the machine warms.
@@ -119,11 +127,23 @@ def _settle(
         retreats=0 if operation.follows_preload else MAXIMUM_RETREATS,
     )
     try:
-        _, steps = fixed_point(operation.respond, operation.settled, state, iteration, machine.spec.name)
+        return _iterate(operation, start, first, iteration)
     except REFUSED as error:
         if operation.follows_preload and (operation.solution is not None or start is None):
             raise no_equilibrium(machine.spec.name, point, str(error)) from error
         raise
+
+
+def _iterate(
+    operation: _Operation,
+    start: NDArray[np.float64] | None,
+    first: CoupledState | None,
+    iteration: Iteration,
+) -> CoupledState:
+    """The fixed point of an operation, from a field or from a solved state of the machine."""
+    state = operation.padded(start) if first is None else operation.begin(first)
+    name = operation.machine.spec.name
+    _, steps = fixed_point(operation.respond, operation.settled, state, iteration, name)
     return CoupledState(operation.solution, operation.loads, operation.coolant, steps, operation.change)
 
 
