@@ -72,7 +72,7 @@ class TrialPredictor(Predictor):
         self.__dict__.update(copy.copy(predictor.__dict__))
         self.drives = (replace(drive, times=drive.grid),)
         # What its directions do is another thing in another operation.
-        self.misdescribed = ()
+        self.misdescribed, self._stacked = (), {}
         self.recordings, self.columns = predictor.recordings[:1], predictor.columns[:1]
         self.observations, self.heldout = (), ()
 

@@ -131,6 +131,7 @@ class Predictor:
         self._slopes: dict[tuple[str, int], Array] = {}
         self.misdescribed: tuple[Misdescription, ...] = ()
         self._columns: dict[tuple[int, str], Array] = {}
+        self._stacked: dict[int, tuple[list[str], Array]] = {}
         self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
         self.observations = self._observe(self.use)
         self.heldout = self._observe([~mask for mask in self.use])
@@ -181,7 +182,7 @@ class Predictor:
             Change of every channel for each unit of a direction; none where it does nothing.
         """
         found = copy.copy(self)
-        found.misdescribed, found._columns = tuple(directions), dict(columns)
+        found.misdescribed, found._columns, found._stacked = tuple(directions), dict(columns), {}
         return found
 
     def column_of(self, number: int, coordinate: str) -> Array | None:
@@ -366,17 +367,8 @@ class Predictor:
         initial = self.start(number, values, of_run)
         if self.at_stamps:
             parameters, terms = self._physics(number, values, acting)
-            run, found = (
-                None,
-                simulate_fast(
-                    self.fast,
-                    self.drives[number],
-                    initial,
-                    parameters=parameters,
-                    derivatives=of_run,
-                    terms=terms,
-                ),
-            )
+            run, own = None, {"parameters": parameters, "derivatives": of_run, "terms": terms}
+            found = simulate_fast(self.fast, self.drives[number], initial, **own)
         else:
             run = self.transient(number, values, acting, of_run, None if near is None else near.run)
             found = run.solve(initial, None if near is None else near.states)
@@ -414,13 +406,12 @@ class Predictor:
         self, number: int, told: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
         """What happened in gaps of the recording, and how the machine differs, to first order, in place."""
-        for item in self.misdescribed:
-            name, slope = item.coordinate, self._columns.get((number, item.coordinate))
-            if slope is None:
-                continue
-            told.temperature[:] += values.get(name, 0.0) * slope
-            if name in derivatives:
-                told.sensitivity[:, :, derivatives.index(name)] += slope
+        known, slopes = self._directions_of(number)
+        if known:
+            told.temperature[:] += slopes @ [values.get(name, 0.0) for name in known]
+            asked = [k for k, name in enumerate(known) if name in derivatives]
+            places = [derivatives.index(known[k]) for k in asked]
+            told.sensitivity[:, :, places] += slopes[:, :, asked]
         for kind in (JUMP_PREFIX, GAP_PREFIX):
             prefix = f"{kind}{number}."
             for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
@@ -428,6 +419,14 @@ class Predictor:
                 told.temperature[:] += values.get(name, 0.0) * slope
                 if name in derivatives:
                     told.sensitivity[:, :, derivatives.index(name)] += slope
+
+    def _directions_of(self, number: int) -> tuple[list[str], Array]:
+        """Coordinates of directions that do something in a recording, and what they do, (G + 1, c, k) K."""
+        if number not in self._stacked:
+            known = [i.coordinate for i in self.misdescribed if (number, i.coordinate) in self._columns]
+            own = [self._columns[number, name] for name in known]
+            self._stacked[number] = known, np.stack(own, axis=2) if own else np.zeros((0, 0, 0))
+        return self._stacked[number]
 
     def _slopes_of(self, kind: str, number: int) -> Array:
         """Change of the channels (G + 1, c, n): K for each second that an input changed earlier, or K."""

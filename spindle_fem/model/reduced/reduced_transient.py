@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.errors import SpecError
+from spindle_fem.model.mesh.kernels import OPTIONS
 from spindle_fem.model.reduced.added_heat import AddedHeat
 from spindle_fem.model.reduced.drive import Drive, with_walls
 from spindle_fem.model.reduced.exponential_step import ExactPropagator
@@ -222,15 +224,15 @@ class TransientRun:
             response[rows] = load_response(self.propagators[key], self.start[rows], self.end[rows], loads)
         if self.dynamic is not None:
             return self._with_terms(start, response).march(near)
-        states = np.empty((steps + 1, size))
-        given = start.rows()
-        advance = [self.propagators[key].advance for key in self.groups]
-        for step, group in enumerate(self.group_of_step.tolist()):
-            if step in given:
-                states[step] = start.states[given[step]]
-            np.dot(advance[group], states[step], out=states[step + 1])
-            states[step + 1] += response[step]
-        return states, None
+        return self._carried(response[:, :, None], start.states[:, :, None])[:, :, 0], None
+
+    def _carried(self, forcing: Array, start: Array) -> Array:
+        """Columns (G + 1, r, p) from those that are given (S, r, p), with what every step adds (G, r, p)."""
+        given = np.full(len(forcing) + 1, -1, dtype=np.int64)
+        given[list(self._given)] = np.arange(len(self._given))
+        advance = np.stack([self.propagators[key].advance for key in self.groups])
+        columns = (np.ascontiguousarray(item) for item in (forcing, start))
+        return _carry(self.group_of_step, given, advance, *columns)
 
     def _with_terms(self, start: Start, response: Array) -> TermMarch:
         """The run with its terms, ready to be marched."""
@@ -330,20 +332,11 @@ class TransientRun:
         -------
         (G + 1, r, p) ndarray
         """
-        number = forcing.shape[2]
-        found = np.zeros((len(forcing) + 1, forcing.shape[1], number))
-        given = {point: 0.0 if start is None else start[row] for row, point in enumerate(self._given)}
+        if start is None:
+            start = np.zeros((len(self._given), *forcing.shape[1:]))
         if tracks is not None:
-            if start is None:
-                start = np.zeros((len(self._given), *forcing.shape[1:]))
             return tracks.follow(forcing, start, explicit=explicit)
-        advance = [self.propagators[key].advance for key in self.groups]
-        for step, group in enumerate(self.group_of_step.tolist()):
-            if step in given:
-                found[step] = given[step]
-            np.dot(advance[group], found[step], out=found[step + 1])
-            found[step + 1] += forcing[step]
-        return found
+        return self._carried(forcing, start)
 
     # ----------------------------------------------------------------- outputs
     def _outputs(self, states: Array, sensitivities: Array | None, tracks: Tracks | None) -> FastTransient:
@@ -416,3 +409,15 @@ def grid_weights(times: Array, grid: Array) -> tuple[NDArray[np.int64], Array]:
     """Grid point after each time, and the share of the step before it that has passed."""
     right = np.clip(np.searchsorted(grid, times - 1e-7), 1, grid.size - 1)
     return right, np.clip((times - grid[right - 1]) / (grid[right] - grid[right - 1]), 0.0, 1.0)
+
+
+@njit(**OPTIONS)
+def _carry(group, given, advance, forcing, start):
+    """March columns through linear steps; see :meth:`TransientRun._carried`."""
+    steps, size, number = forcing.shape
+    found = np.zeros((steps + 1, size, number))
+    for step in range(steps):
+        if given[step] >= 0:
+            found[step] = start[given[step]]
+        found[step + 1] = np.dot(advance[group[step]], found[step]) + forcing[step]
+    return found
