@@ -20,7 +20,7 @@ reference: run
 	mkdir -p reports/reference_run/figures
 	cp $(RESULT)/report.html $(RESULT)/summary.json $(RESULT)/machine.toml reports/reference_run/
 	cp $(addprefix $(RESULT)/figures/,machine_definition.png temperature_cut.png channel_walls.png \
-	    bearings_front.png heat_balance.png over_speed_heat_terms.png) reports/reference_run/figures/
+	    bearings_front.png heat_balance.png over_speed_heat_terms.png deformed_machine.png) reports/reference_run/figures/
 
 test: $(READY) lint
 	$(BIN)/python -m pytest -q
