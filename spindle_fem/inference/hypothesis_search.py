@@ -270,12 +270,15 @@ class Search:
 
     def _within_gaps(self, intervals: Sequence[tuple[float, float]], recording: int) -> bool:
         """Whether any interval lies in gaps by more than ``tuned.MOST_IN_GAPS`` of it."""
-        gaps = self.problem.predictor.gap_intervals(recording)
         return any(
-            sum(max(0.0, min(end, stop) - max(start, begin)) for begin, stop in gaps)
-            > tuned.MOST_IN_GAPS * (end - start)
+            self._hidden_time((start, end), recording) > tuned.MOST_IN_GAPS * (end - start)
             for start, end in intervals
         )
+
+    def _hidden_time(self, span: tuple[float, float], recording: int) -> float:
+        """How much of an interval lies in gaps, s."""
+        gaps = self.problem.predictor.gap_intervals(recording)
+        return sum(max(0.0, min(span[1], stop) - max(span[0], begin)) for begin, stop in gaps)
 
     def _hopeless(self, size: int) -> float:
         """Misfit beyond which a set of some size does not matter."""
@@ -289,7 +292,13 @@ class Search:
         return max(tuned.HOPELESS_SCORE, (1.0 - tuned.FAIR_SHARE) * gain)
 
     def keep(self, hypothesis: Hypothesis) -> None:
-        """Add a fitted hypothesis to what was found."""
+        """Add a fitted hypothesis to what was found, unless it is on when nobody could have seen it."""
+        values = hypothesis.fit.values
+        for candidate in filter(self.in_intervals, hypothesis.fit.candidates):
+            on = self.effects[candidate.effect].intervals(candidate, values)
+            hidden = sum(self._hidden_time(span, candidate.recording or 0) for span in on)
+            if hidden > tuned.MOST_IN_GAPS * sum(end - start for start, end in on):
+                return
         self.found[identity(hypothesis.fit.candidates)] = hypothesis
 
     def log_prior(self, candidates: Sequence[Candidate]) -> float:

@@ -123,9 +123,9 @@ class Predictor:
             unseen_jumps(item, drive) if left_open else ()
             for item, drive in zip(self.recordings, self.drives, strict=True)
         ]
-        self._gaps = [gap_pieces(item) if left_open else () for item in self.recordings]
+        self._gaps = [() if at_stamps else gap_pieces(item) for item in self.recordings]
         self._hidden = [
-            hidden_in(recording, gaps, [group.name for group in fast.spec.bearing_set]) if gaps else ()
+            hidden_in(recording, gaps, [group.name for group in fast.spec.bearing_set]) if left_open else ()
             for recording, gaps in zip(self.recordings, self._gaps, strict=True)
         ]
         self._slopes: dict[tuple[str, int], Array] = {}
