@@ -57,7 +57,7 @@ def require_probabilities(content):
     assert 0.0 <= total <= 1.0 + 1e-9
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_machine_within_its_priors_is_consistent(machine, tmp_path, seed):
     content = diagnose_without_report(machine, [record(tmp_path / "run", seed)], tmp_path / "out")
     assert content["verdict"] == "consistent"
@@ -83,6 +83,7 @@ def test_a_link_beyond_what_the_calibration_told_is_a_parameter(machine, tmp_pat
     require_probabilities(content)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_reads_high_is_the_sensor(machine, tmp_path):
     def high(times, told):
         return told + np.array([0.0, 0.0, 3.0])
