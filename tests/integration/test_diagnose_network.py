@@ -57,7 +57,9 @@ def require_probabilities(content):
     assert 0.0 <= total <= 1.0 + 1e-9
 
 
-@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.slow), 2])
+@pytest.mark.parametrize(
+    "seed", [pytest.param(0, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.slow), 2]
+)
 def test_a_machine_within_its_priors_is_consistent(machine, tmp_path, seed):
     content = diagnose_without_report(machine, [record(tmp_path / "run", seed)], tmp_path / "out")
     assert content["verdict"] == "consistent"
