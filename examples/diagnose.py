@@ -36,10 +36,11 @@ data.to_csv(folder / "data.csv", index=False)
 shutil.copy(Path(__file__).with_name("pump_recording.toml"), folder / "recording.toml")
 
 machine = Path(__file__).with_name("pump.toml")
-answer = spindle_fem.diagnose_without_report(machine, [folder / "recording.toml"], folder / "answer")
+answer = spindle_fem.diagnose(machine, folder / "recording.toml", folder / "answer")
 before, after = (answer["fit"][when]["heldout_rmse_K"] for when in ("before", "after"))
 print(f"{answer['verdict']}: error on readings that the fit did not see {before:.2f} K, then {after:.2f} K")
 for finding in answer["findings"]:
     print(f"{finding['probability']:.2f}  {finding['statement']}")
+answer.plot_before_after().savefig(folder / "before_after.png")
 assert answer["verdict"] == "missing_physics"
 assert answer["findings"][0]["component"] == "casing"

@@ -1,4 +1,4 @@
-"""A machine with every fault of its tables, its geometry or network and its effects found at once."""
+"""What commands are given: recordings, and machines with the faults of tables, geometry, effects at once."""
 
 from __future__ import annotations
 
@@ -15,6 +15,14 @@ if TYPE_CHECKING:
     from spindle_fem.definition.effect_entries import EffectEntry
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.definition.network_tables import NetworkMachineSpec
+    from spindle_fem.recordings.align import Recording
+
+
+def recording_of(recording: str | Path | Recording) -> Recording:
+    """A recording as it is, or read from its folder or manifest."""
+    from spindle_fem.recordings.align import read_recording
+
+    return read_recording(recording) if isinstance(recording, (str, Path)) else recording
 
 
 def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:

@@ -11,7 +11,7 @@ from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.report.crosscheck_charts import write_crosscheck_figures
 from spindle_fem.report.crosscheck_report import write_crosscheck_report
 from spindle_fem.results.output_folder import output_folder, replace_text
-from spindle_fem.studies.crosscheck.crosscheck_study import crosscheck
+from spindle_fem.studies.crosscheck.crosscheck_study import Crosscheck, crosscheck
 from spindle_fem.studies.crosscheck.network_files import export_network
 
 
@@ -20,6 +20,7 @@ def crosscheck_machine(
     folder: str | Path,
     overrides: Iterable[str] = (),
     progress: Callable[[str], None] | None = None,
+    keep: Callable[[Crosscheck], None] = lambda found: None,
 ) -> dict[str, Any]:
     """Build the paper's network of a machine, solve it beside the elements, and say why they differ.
 
@@ -37,6 +38,8 @@ def crosscheck_machine(
         ``path=value`` texts.
     progress : callable, optional
         Told each stage by name as it begins.
+    keep : callable, optional
+        Given what was found.
 
     Returns
     -------
@@ -52,6 +55,7 @@ def crosscheck_machine(
     spec = load_machine(machine, overrides)
     with output_folder(folder) as place:
         found = crosscheck(spec, tell)
+        keep(found)
         content = found.content
         content["matched"]["files"] = export_network(found.matched, place, found.points, found.heat_model)
         tell("pictures and report")

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from spindle_fem.commands.checked_machine import recording_of
 from spindle_fem.inference.coarse_machine import refined
 from spindle_fem.inference.diagnosis import MOST_WORKERS, Diagnosis, diagnose_recordings
 from spindle_fem.inference.diagnosis_content import diagnosis_content, plain_data, unexplained_content
@@ -24,7 +25,7 @@ from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.parallel import thread_count
-from spindle_fem.recordings.align import read_recording
+from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.results.output_folder import output_folder, replace_text
 
@@ -37,9 +38,9 @@ class _Asked:
     """What :func:`diagnose` is asked."""
 
     machine: str | Path
-    recordings: Iterable[str | Path]
+    recordings: Iterable[str | Path | Recording]
     folder: str | Path
-    calibrate: Iterable[str | Path] = ()
+    calibrate: Iterable[str | Path | Recording] = ()
     overrides: Iterable[str] = ()
     heldout: str = "blocks"
     full_model: str = AUTO
@@ -48,9 +49,9 @@ class _Asked:
 
 def diagnose(
     machine: str | Path,
-    recordings: Iterable[str | Path],
+    recordings: Iterable[str | Path | Recording],
     folder: str | Path,
-    calibrate: Iterable[str | Path] = (),
+    calibrate: Iterable[str | Path | Recording] = (),
     overrides: Iterable[str] = (),
     *,
     heldout: str = "blocks",
@@ -63,14 +64,14 @@ def diagnose(
     ----------
     machine : str or Path
         A definition or the name of one that ships; with geometry or a ``[network]``.
-    recordings : iterable of str or Path
+    recordings : iterable of str, Path or Recording
         To be explained; what is found acts in all of them.
     folder : str or Path
         Gets ``diagnosis.json``, ``improved_machine.toml``, ``states.csv``,
         ``before.csv`` and ``after.csv`` (predictions), the same of the full
         model as ``before_full_model.csv`` and ``after_full_model.csv``,
         ``diagnosis.nc``, ``figures/*.png`` and ``report.html``.
-    calibrate : iterable of str or Path
+    calibrate : iterable of str, Path or Recording
         Recordings of the same machine with nothing missing.
     overrides : iterable of str
         ``path=value`` texts.
@@ -94,7 +95,11 @@ def diagnose(
 
 
 def diagnose_without_report(
-    machine: str | Path, recordings: Iterable[str | Path], folder: str | Path, *others: Any, **choices: Any
+    machine: str | Path,
+    recordings: Iterable[str | Path | Recording],
+    folder: str | Path,
+    *others: Any,
+    **choices: Any,
 ) -> dict[str, Any]:
     """As :func:`diagnose`, which has the same parameters, without ``diagnosis.nc``, figures and report."""
     return _diagnose(_Asked(machine, recordings, folder, *others, **choices), report=False)
@@ -105,8 +110,8 @@ def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
     require_choice(asked.full_model)
     tell = asked.progress or (lambda stage: None)
     tell("reading")
-    read = [read_recording(path) for path in asked.recordings]
-    earlier = [read_recording(path) for path in asked.calibrate]
+    read = [recording_of(item) for item in asked.recordings]
+    earlier = [recording_of(item) for item in asked.calibrate]
     opened = open_machine(
         asked.machine, tuple(asked.overrides), read, earlier, heldout=asked.heldout, progress=tell
     )

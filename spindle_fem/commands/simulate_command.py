@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from spindle_fem.commands.checked_machine import recording_of
 from spindle_fem.inference.calibration import LEVEL, Calibration
-from spindle_fem.recordings.align import read_recording
+from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import (
     ALL,
     Comparison,
@@ -32,11 +33,12 @@ Progress = Callable[[str], None]
 
 def simulate_machine(
     machine: str | Path,
-    recording: str | Path,
+    recording: str | Path | Recording,
     folder: str | Path,
-    calibrate: Iterable[str | Path] = (),
+    calibrate: Iterable[str | Path | Recording] = (),
     overrides: Iterable[str] = (),
     progress: Progress | None = None,
+    keep: Callable[[Simulation], None] = lambda simulation: None,
 ) -> dict[str, Any]:
     """Predict every temperature channel of a recording and write what came of it.
 
@@ -45,18 +47,20 @@ def simulate_machine(
     machine : str or Path
         A definition file or the name of a machine that ships; with geometry
         or a ``[network]``.
-    recording : str or Path
-        Folder or manifest.
+    recording : str, Path or Recording
+        Folder or manifest, or what was read from it.
     folder : str or Path
         Gets ``simulated.csv``, ``simulation.json``, ``error_table.csv``,
         ``figures/residual_<channel>.png``, ``report.html`` and, when
         calibrated, ``calibrated_machine.toml``.
-    calibrate : iterable of str or Path
+    calibrate : iterable of str, Path or Recording
         Recordings that may move the uncertain parameters first.
     overrides : iterable of str
         ``path=value`` texts.
     progress : callable, optional
         Told each stage by name as it begins.
+    keep : callable, optional
+        Given what was simulated.
 
     Returns
     -------
@@ -70,10 +74,11 @@ def simulate_machine(
     started = time.perf_counter()
     tell = progress or (lambda stage: None)
     tell("reading")
-    read = read_recording(recording)
-    others = [read_recording(path) for path in calibrate]
+    read = recording_of(recording)
+    others = [recording_of(item) for item in calibrate]
     with output_folder(folder) as place:
         simulation = simulate_recordings(machine, read, others, overrides=tuple(overrides), progress=tell)
+        keep(simulation)
         tell("writing")
         return write_simulation(simulation, place, started=started)
 

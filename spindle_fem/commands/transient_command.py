@@ -14,7 +14,7 @@ from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.model.reduced.defined_effects import physics_of
 from spindle_fem.report.transient_report import write_transient_report
 from spindle_fem.results.output_folder import output_folder, replace_text
-from spindle_fem.solvers.prepared_machine import prepare_machine
+from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
 from spindle_fem.studies.transient_study import StudyResult, load_study, run_study
 from spindle_fem.studies.transient_summary import summarise
@@ -29,6 +29,7 @@ def run_transient_study(
     overrides: Iterable[str] = (),
     restart: str | Path | None = None,
     progress: Callable[[str], None] = lambda stage: None,
+    keep: Callable[[PreparedMachine, StudyResult], None] = lambda machine, result: None,
 ) -> dict[str, Any]:
     """Run a transient study by the full model and write what came of it.
 
@@ -47,6 +48,8 @@ def run_transient_study(
         ``state.npz`` of an earlier run on the same mesh, to go on from.
     progress : callable, optional
         Told each stage by name as it begins.
+    keep : callable, optional
+        Given the machine and the study as it ran.
 
     Returns
     -------
@@ -60,6 +63,7 @@ def run_transient_study(
         prepared = prepare_machine(spec, progress=progress)
         physics = physics_of(prepared)
         result = run_study(prepared, asked, start=start, memory=memory, physics=physics, progress=progress)
+        keep(prepared, result)
         summary = summarise(prepared, result)
         _write_table(result, place / "transient.csv")
         save_state(place / "state.npz", result.state, result.memory)

@@ -181,22 +181,34 @@ def draw_channels(folder: Path, recording: Recording, predicted: Array, half_wid
         Of the interval that should hold nine readings in ten.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    nothing = np.zeros(recording.times.size, dtype=bool)
     written = []
-    for column, name in enumerate(recording.temperature_names):
-        read = np.where(recording.usable[:, column], recording.temperature[:, column], np.nan)
-        course = Course(
+    for course in simulated_courses(recording, predicted, half_width):
+        figure = simulated_figure([course], f"{recording.name}: {course.name}")
+        written.append(save_png(figure, folder / f"residual_{_safe(course.name)}.png", colours=128))
+    return written
+
+
+def simulated_courses(recording: Recording, predicted: Array, half_width: Array) -> list[Course]:
+    """Courses of all temperature channels of a recording; parameters as of :func:`draw_channels`."""
+    nothing = np.zeros(recording.times.size, dtype=bool)
+    readings = np.where(recording.usable, recording.temperature, np.nan) - ZERO_CELSIUS_K
+    return [
+        Course(
             name,
             recording.times,
-            read - ZERO_CELSIUS_K,
+            readings[:, column],
             {"predicted": predicted[:, column] - ZERO_CELSIUS_K},
             half_width[:, column],
             nothing,
         )
-        notes = "Temperature above, residual (read − predicted, means over short times) beneath."
-        figure = courses_figure([course], f"{recording.name}: {name}", notes, "90 % interval of a reading")
-        written.append(save_png(figure, folder / f"residual_{_safe(name)}.png", colours=128))
-    return written
+        for column, name in enumerate(recording.temperature_names)
+    ]
+
+
+def simulated_figure(courses: list[Course], title: str) -> Figure:
+    """Channels of a simulated recording."""
+    notes = "Temperature above, residual (read − predicted, means over short times) beneath."
+    return courses_figure(courses, title, notes, "90 % interval of a reading")
 
 
 def _safe(name: str) -> str:

@@ -76,9 +76,7 @@ def write_sweep_report(
     results : mapping of design to ThermalResult, optional
         Fields of the best designs; without them their picture stays as it is.
     """
-    solved = [row for row in rows if row["status"] == "ok"]
-    parameters = [scale_of_column(item["path"], item["unit"], rows) for item in summary["parameters"]]
-    outputs = [scale_of_column(item["path"], item["unit"], rows) for item in summary["outputs"]]
+    solved, parameters, outputs = drawn_columns(summary, rows)
     films = film_study(spec)
     figures = draw_figures(summary, solved, parameters, outputs, films)
     place = folder / FIGURE_FOLDER
@@ -114,6 +112,16 @@ def rebuild_sweep_report(folder: str | Path) -> Path:
     summary = read_content(folder / SUMMARY_FILE, SWEEP_SCHEMA, "sweep")
     machine = read_toml(folder / MACHINE_FILE)
     return write_sweep_report(folder, summary, read_results(folder), validate(machine, MACHINE_FILE))
+
+
+def drawn_columns(
+    summary: Mapping[str, Any], rows: Sequence[Row]
+) -> tuple[list[Row], list[Scale], list[Scale]]:
+    """Rows that were solved, and the scales of the parameters and of the outputs."""
+    solved = [row for row in rows if row["status"] == "ok"]
+    parameters = [scale_of_column(item["path"], item["unit"], rows) for item in summary["parameters"]]
+    outputs = [scale_of_column(item["path"], item["unit"], rows) for item in summary["outputs"]]
+    return solved, parameters, outputs
 
 
 def draw_figures(

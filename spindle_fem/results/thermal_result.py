@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from spindle_fem.model.elastic.deformed_shape import BodyShape, deformed_shapes
 from spindle_fem.model.elastic.machine_bodies import carries_rings
 from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
+from spindle_fem.results.presented import Presented
+from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     from spindle_fem.definition.machine_spec import MachineSpec
@@ -146,8 +148,8 @@ class Equilibrium:
     limits: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class ThermalResult:
+@dataclass(frozen=True, repr=False)
+class ThermalResult(Presented):
     """A solved machine.
 
     Attributes
@@ -243,6 +245,21 @@ class ThermalResult:
     @cached_property
     def _elastic(self) -> GrowthModel:
         return self.growth_model or GrowthModel(self.spec, self.mesh, self.order)
+
+    def _headline(self) -> str:
+        """The machine and its warmest place."""
+        warmest = self.temperature_maximum - ZERO_CELSIUS_K
+        return f"{self.spec.name} at {30.0 / math.pi * self.speed:.0f} rpm, warmest {warmest:.1f} °C"
+
+    def _rows(self) -> dict[str, str]:
+        """Probes, heat of the bearings, coolant, balance."""
+        rows = {name: f"{value - ZERO_CELSIUS_K:.2f} °C" for name, value in self.probes.items()}
+        for name, bearing in self.bearings.items():
+            rows[name] = f"{bearing.heat:.1f} W, inner − outer ring {bearing.ring_difference:+.1f} K"
+        if self.coolant is not None:
+            rows["coolant"] = f"{self.coolant.heat:.0f} W"
+        rows["heat in"] = f"{self.energy.heat_in:.1f} W, imbalance {self.energy.imbalance_relative:.0e}"
+        return rows
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
         """The same result with the seconds of each stage."""

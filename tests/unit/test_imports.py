@@ -46,6 +46,7 @@ FLOORS = (
     "studies",
     "report",
     "commands",
+    "library",
     "cli",
     "__main__",
 )
