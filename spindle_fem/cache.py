@@ -18,12 +18,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.registry import source_from_outside
+
 CACHE_VARIABLE = "SPINDLE_FEM_CACHE"
 _PACKAGE = Path(__file__).parent
 # Imports at the start of a line or inside a function, on one line or in parentheses.
 _IMPORT = re.compile(
     rf"^\s*(?:from|import) ({_PACKAGE.name}(?:\.\w+)*)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE
 )
+_IS_REGISTRY = "registry(__name__)"
 
 
 def cache_directory() -> Path:
@@ -39,12 +42,12 @@ def cache_directory() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "spindle-fem" / "meshes"
 
 
-@cache
 def source_digest(*modules: str) -> str:
     """Hash of the source of modules and of everything of this package that they import.
 
     Part of a cache key, so that what an older version of the code made is
-    never taken for what this version would make.
+    never taken for what this version would make; things of registries that
+    come from outside the package count as it does.
 
     Parameters
     ----------
@@ -56,11 +59,22 @@ def source_digest(*modules: str) -> str:
     FileNotFoundError
         There is no such module.
     """
-    found = hashlib.sha256()
+    digest, registries = _package_digest(modules)
+    outside = "".join(map(source_from_outside, registries))
+    return hashlib.sha256((digest + outside).encode()).hexdigest() if outside else digest
+
+
+@cache
+def _package_digest(modules: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    """Hash of modules and what they import, and the packages among them that are registries."""
+    found, registries = hashlib.sha256(), []
     for name, path in sorted(_with_imports(modules).items()):
+        content = path.read_bytes()
         found.update(name.encode())
-        found.update(path.read_bytes())
-    return found.hexdigest()
+        found.update(content)
+        if path.name == "__init__.py" and _IS_REGISTRY in content.decode():
+            registries.append(name)
+    return found.hexdigest(), tuple(registries)
 
 
 def _with_imports(modules: Sequence[str]) -> dict[str, Path]:
@@ -76,7 +90,7 @@ def _with_imports(modules: Sequence[str]) -> dict[str, Path]:
             raise FileNotFoundError(f"there is no module {name}")
         found[name] = path
         text = path.read_text(encoding="utf-8")
-        if path.name == "__init__.py" and "registry(__name__)" in text:
+        if path.name == "__init__.py" and _IS_REGISTRY in text:
             # Its files are imported by name when they are asked for.
             waiting += [f"{name}.{file.stem}" for file in path.parent.glob("*.py") if file != path]
         for package, listed in _IMPORT.findall(text):

@@ -1,4 +1,4 @@
-"""Every effect: those of the catalogue's files, found by walking it, and those that a program adds."""
+"""Every effect: those of the catalogue's files, found by walking it, those of programs and other packages."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffe
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.registry import ADDED, entry_points, load_entry_point
 from spindle_fem.units import to_si
 
 Owner = TypeVar("Owner", Term, Reading)
@@ -26,7 +27,7 @@ Owner = TypeVar("Owner", Term, Reading)
 STANDING_REYNOLDS = (100.0, 1000.0)
 
 
-_added: dict[str, Effect] = {}
+GROUP = "effects"
 
 
 @cache
@@ -43,8 +44,14 @@ def _shipped() -> Mapping[str, Effect]:
     return MappingProxyType(effects)
 
 
+@cache
+def _installed() -> Mapping[str, Effect]:
+    """Effects of other packages, announced by entry points of the group ``spindle_fem.effects``."""
+    return {name: load_entry_point(entry)() for name, entry in entry_points(GROUP).items()}
+
+
 def _found() -> Mapping[str, Effect]:
-    return {**_shipped(), **_added}
+    return {**_installed(), **ADDED.get(GROUP, {}), **_shipped()}
 
 
 def register_effect(kind: type[Effect]) -> type[Effect]:
@@ -55,9 +62,9 @@ def register_effect(kind: type[Effect]) -> type[Effect]:
     SpecError
         There is an effect of this name.
     """
-    if kind.name in _found():
+    if kind.name in _shipped() or kind.name in ADDED.get(GROUP, {}):
         raise SpecError("effects", f'there is a "{kind.name}" already.', "Give yours another name.")
-    _added[kind.name] = kind()
+    ADDED.setdefault(GROUP, {})[kind.name] = kind()
     return kind
 
 

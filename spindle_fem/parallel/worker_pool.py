@@ -16,6 +16,7 @@ from typing import Any, Generic, TypeVar
 
 from spindle_fem.errors import BadInputError, WorkerDiedError
 from spindle_fem.parallel.worker_threads import MORE_ROOM, ONE_THREAD, Job, worker_count
+from spindle_fem.registry import ADDED
 
 # Worker processes end when idle for so long, s.
 IDLE_S = 300
@@ -58,8 +59,20 @@ def _dumps(content: Any) -> bytes:
     return bytes(dumps(content))
 
 
-def _run_sent(job: bytes) -> Any:
+def _sent(job: Job) -> partial:
+    """A job for another process, as it is now, with what this program added to the registries."""
+    return partial(_run_sent, _dumps(ADDED), _dumps(job))
+
+
+def _run_sent(added: bytes, job: bytes) -> Any:
+    _add(added)
     return pickle.loads(job)()
+
+
+@lru_cache(maxsize=1)
+def _add(added: bytes) -> None:
+    for group, things in pickle.loads(added).items():
+        ADDED.setdefault(group, {}).update(things)
 
 
 def _nothing() -> None:
@@ -160,10 +173,10 @@ class WorkerPool:
 
         names, executor = _names(jobs, names), _executor(self._number - 1)
         # Sent as they are now, by this thread: what they hold goes on changing while others wait.
-        waiting = deque((place, _dumps(job)) for place, job in enumerate(jobs))
+        waiting = deque((place, _sent(job)) for place, job in enumerate(jobs))
         found: list[Any] = [None] * len(jobs)
 
-        def work_off(do: Callable[[int, bytes], Any]) -> None:
+        def work_off(do: Callable[[int, partial], Any]) -> None:
             while waiting:
                 try:
                     place, sent = waiting.popleft()
@@ -171,8 +184,8 @@ class WorkerPool:
                     return  # another thread was quicker
                 found[place] = do(place, sent)
 
-        def there(place: int, sent: bytes) -> Any:
-            return _answer_of(executor.submit(_run_sent, sent), names[place])
+        def there(place: int, sent: partial) -> Any:
+            return _answer_of(executor.submit(sent), names[place])
 
         # Each other thread only waits for one worker.
         with ThreadPoolExecutor(min(self._number, len(jobs)) - 1) as threads, threadpool_limits(1):
@@ -221,7 +234,7 @@ def _name_of(job: Job) -> str:
 
 
 def _submit(executor: Any, job: Job) -> Any:
-    return executor.submit(_run_sent, _dumps(job))
+    return executor.submit(_sent(job))
 
 
 def _answer_of(future: Any, name: str) -> Any:
@@ -256,7 +269,7 @@ def _on_cluster(jobs: Sequence[Job], names: Sequence[str], address: str) -> Iter
         from distributed.scheduler import KilledWorker
 
         # A job that dies with its worker goes to another one; Dask gives up after some.
-        places = {client.submit(job, pure=False): place for place, job in enumerate(jobs)}
+        places = {client.submit(_sent(job), pure=False): place for place, job in enumerate(jobs)}
         for future in as_completed(list(places)):
             place = places.pop(future)
             try:

@@ -22,6 +22,7 @@ from spindle_fem.effects.registry import (
 )
 from spindle_fem.errors import SpecError, UnitError
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.registry import ADDED
 from tests.support.effect_machines import (
     INTERVALS,
     KINDS,
@@ -103,7 +104,7 @@ def test_the_page_of_effects_is_up_to_date():
 
 
 def test_a_program_adds_an_effect_of_its_own(monkeypatch):
-    monkeypatch.setattr(registry, "_added", {})
+    monkeypatch.setitem(ADDED, registry.GROUP, {})
     own = type("Own", (type(effect_of("windage")),), {"name": "own"})
     assert registry.register_effect(own) is own
     assert type(effect_of("own")) is own

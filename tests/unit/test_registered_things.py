@@ -25,7 +25,7 @@ from spindle_fem.physics.surroundings.air_gaps import AirGap
 from spindle_fem.physics.surroundings.gap_laws import GAP_LAWS
 from spindle_fem.physics.surroundings.rotating_films import ROTATING_FILMS
 from spindle_fem.physics.surroundings.rotating_surfaces import rotating_film
-from spindle_fem.registry import Registry, registry
+from spindle_fem.registry import ADDED, Registry, registry
 
 REGISTRIES = sorted({things.package for things in options().values()})
 NAMED = [(package, name) for package in REGISTRIES for name in registry(package)]
@@ -157,7 +157,7 @@ def test_every_heat_model_takes_every_kind_of_bearing(kind, level):
 
 
 def test_a_program_adds_its_own(monkeypatch):
-    monkeypatch.setattr(COOLANTS, "_things", dict(COOLANTS._things))
+    monkeypatch.setitem(ADDED, "coolants", {})
     oil = COOLANTS.add("own_oil", COOLANTS["iso_vg_32"])
     assert COOLANTS["own_oil"] is oil
     table = {"fluid": "own_oil", "inlet_temperature": "20 degC", "flow": "20 L/min"}
@@ -166,7 +166,8 @@ def test_a_program_adds_its_own(monkeypatch):
         COOLANTS.add("own_oil", object())
 
 
-def test_a_function_of_a_program_takes_its_own_name():
+def test_a_function_of_a_program_takes_its_own_name(monkeypatch):
+    monkeypatch.setitem(ADDED, "gap_laws", {})
     things = Registry("spindle_fem.physics.surroundings.gap_laws")
 
     @things.register
