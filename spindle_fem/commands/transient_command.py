@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from spindle_fem.definition.load import load_machine, write_machine
+from spindle_fem.model.mesh.evaluate import temperature_at_nodes
+from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.model.reduced.defined_effects import physics_of
 from spindle_fem.report.transient_report import write_transient_report
+from spindle_fem.results.field_series import FieldSeries
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
-from spindle_fem.studies.transient_study import StudyResult, load_study, run_study
+from spindle_fem.studies.transient_study import StudyResult, TransientStudy, load_study, run_study
 from spindle_fem.studies.transient_summary import summarise
 from spindle_fem.units import ZERO_CELSIUS_K
+
+FIELDS = "fields.vtkhdf"
 
 
 def run_transient_study(
@@ -39,7 +45,8 @@ def run_transient_study(
         File with ``schema = "spindle-fem/transient/1"``.
     folder : str or Path
         Gets ``transient.csv``, ``transient.json``, ``state.npz``,
-        ``machine.toml``, ``figures/*.png`` and ``report.html``.
+        ``machine.toml``, ``figures/*.png`` and ``report.html``; of a study with
+        ``fields_every`` also ``fields.vtkhdf``.
     machine : str or Path, optional
         In place of the study's own.
     overrides : iterable of str
@@ -62,7 +69,16 @@ def run_transient_study(
     with output_folder(folder) as place:
         prepared = prepare_machine(spec, progress=progress)
         physics = physics_of(prepared)
-        result = run_study(prepared, asked, start=start, memory=memory, physics=physics, progress=progress)
+        with _fields(place / FIELDS, prepared, asked) as add_field:
+            result = run_study(
+                prepared,
+                asked,
+                start=start,
+                memory=memory,
+                physics=physics,
+                progress=progress,
+                keep=add_field,
+            )
         keep(prepared, result)
         summary = summarise(prepared, result)
         _write_table(result, place / "transient.csv")
@@ -71,6 +87,19 @@ def run_transient_study(
         replace_text(place / "transient.json", json.dumps(summary, indent=1) + "\n")
         write_transient_report(summary, result, place)
         return summary
+
+
+@contextlib.contextmanager
+def _fields(
+    path: Path, machine: PreparedMachine, study: TransientStudy
+) -> Iterator[Callable[[ThermalState], None]]:
+    """Keeper of the fields that a study asks for."""
+    path.unlink(missing_ok=True)
+    if study.fields_every is None:
+        yield lambda state: None
+        return
+    with FieldSeries(path, machine.mesh) as series:
+        yield lambda state: series.add(state.time, temperature_at_nodes(machine.operators, state.temperature))
 
 
 def _write_table(result: StudyResult, path: Path) -> None:

@@ -39,6 +39,7 @@ _OWN = frozenset(
         "results.parquet",
         "study.toml",
         "transient.json",
+        "fields.vtkhdf",
         "reduced_network.toml",
         "state_space.npz",
         "state_space.json",

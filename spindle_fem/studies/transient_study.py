@@ -112,6 +112,8 @@ class TransientStudy(SpecModel):
     """Everything at ambient temperature, or settled at the definition's own operating point."""
     sample_every: Duration = 60.0
     """Time between readings."""
+    fields_every: Duration | None = None
+    """Time between fields that are kept for ParaView, with those where phases begin and end."""
     error: PositiveDifference = 0.05
     """Largest estimated error of one time step at any node."""
     until: Until | None = None
@@ -248,6 +250,7 @@ def run_study(
     memory: Array | None = None,
     physics: Physics = NO_PHYSICS,
     progress: Callable[[str], None] = lambda text: None,
+    keep: Callable[[ThermalState], None] = lambda state: None,
 ) -> StudyResult:
     """Run every phase of a study, one after the other.
 
@@ -259,6 +262,8 @@ def run_study(
         What the terms remembered then.
     physics : Physics
         Terms and factors beyond the machine's own; their memory goes on from phase to phase.
+    keep : callable, optional
+        Given the state every ``fields_every``, and where phases begin and end; those there twice.
     """
     machine, physics = with_factors(machine, physics)
     point = OperatingPoint.of(machine.spec)
@@ -275,13 +280,45 @@ def run_study(
         given = {name: getattr(phase, field) for name, field in FIELD_OF.items()}
         values |= {name: value for name, value in given.items() if value is not None}
         beyond = (physics, memory)
-        result = _run_phase(machine, study, phase, values, state, options, beyond, progress)
+        watch = _StudyWatch(progress, keep, study.fields_every)
+        result = _run_phase(machine, study, phase, values, state, options, beyond, watch)
         results.append(result)
         memory = result.transient.memory
         # the step's size says nothing after the inputs jump
         last = result.transient.state
         state = ThermalState(last.time, last.temperature, last.lumped_temperature)
     return StudyResult(study, tuple(results))
+
+
+@dataclass(frozen=True, slots=True)
+class _StudyWatch:
+    """Who is told how far a study is, and who keeps fields."""
+
+    progress: Callable[[str], None]
+    keep: Callable[[ThermalState], None]
+    every: float | None
+
+    def field_times(self, begin: float, end: float) -> tuple[float, ...]:
+        """Whole multiples of the time between fields within a phase."""
+        if self.every is None:
+            return ()
+        every = self.every
+        return tuple((every * np.arange(np.floor(begin / every) + 1.0, np.ceil(end / every))).tolist())
+
+    def observed(
+        self, stop: Callable[[ThermalState], bool] | None, times: tuple[float, ...]
+    ) -> Callable[[ThermalState], bool] | None:
+        """A stop condition that keeps the states at some times as they pass."""
+        if not times:
+            return stop
+        wanted = frozenset(times)
+
+        def look(state: ThermalState) -> bool:
+            if state.time in wanted:
+                self.keep(state)
+            return stop is not None and stop(state)
+
+        return look
 
 
 def _run_phase(
@@ -292,7 +329,7 @@ def _run_phase(
     state: ThermalState | None,
     options: TransientOptions,
     beyond: tuple[Physics, Array | None],
-    progress: Callable[[str], None],
+    watch: _StudyWatch,
 ) -> PhaseResult:
     until = study.end_of(phase)
     length = phase.duration if until is None else until.at_most
@@ -308,7 +345,9 @@ def _run_phase(
         names = CoupledInputs(machine, history, 0.0).lumped_names(state.temperature)
         stop = Settled(ReadingRows.of(machine, names), history, until, state)
         looks = tuple(stop.looks)
-    progress(f"{phase.name}, from {begin / 3600.0:.2f} h")
+    kept = watch.field_times(begin, begin + length)
+    watch.progress(f"{phase.name}, from {begin / 3600.0:.2f} h")
+    watch.keep(state)
     transient = simulate_full(
         machine,
         inputs,
@@ -317,8 +356,9 @@ def _run_phase(
         options=options,
         physics=beyond[0],
         memory=beyond[1],
-        watch=Watch(stop, looks, progress),
+        watch=Watch(watch.observed(stop, kept), (*looks, *kept), watch.progress),
     )
+    watch.keep(transient.state)
     settled = None if until is None else transient.stopped
     return PhaseResult(phase.name, history.at(begin), begin, transient.state.time, settled, transient)
 

@@ -4,6 +4,7 @@ import json
 import pkgutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -143,7 +144,8 @@ def test_no_module_can_stand_in_the_place_of_a_function():
 def test_a_transient(tmp_path):
     study = tmp_path / "study.toml"
     phase = 'phase = [{name = "warm", speed = "3000 rpm", duration = "10 min"}]'
-    study.write_text(f'schema = "spindle-fem/transient/1"\nname = "warm"\n{phase}\n', encoding="utf-8")
+    heading = 'schema = "spindle-fem/transient/1"\nname = "warm"\nfields_every = "4 min"\n'
+    study.write_text(f"{heading}{phase}\n", encoding="utf-8")
     overrides = ["mesh.preset=coarse", "mesh.order=1"]
     machine = spindle_fem.load_machine("small_two_start", overrides)
     found = spindle_fem.transient(study, machine=machine)
@@ -155,6 +157,10 @@ def test_a_transient(tmp_path):
         expected
     )
     assert found.to_pyvista()["temperature_degC"].max() == pytest.approx(found["phases"][-1]["hottest_degC"])
+    with h5py.File(found.save(tmp_path / "kept") / "fields.vtkhdf") as series:
+        assert series["VTKHDF/Steps/Values"][:].tolist() == [0.0, 240.0, 480.0, 600.0]
+        last = series["VTKHDF/PointData/temperature_degC"][-len(found.machine.mesh.points) :]
+    assert last == pytest.approx(found.to_pyvista()["temperature_degC"], abs=1e-5)
     for plot in ("probes", "bearings", "heat"):
         assert isinstance(getattr(found, f"plot_{plot}")(), Figure)
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import meshio
 import numpy as np
 import pytest
+import pyvista as pv
 
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes, build_tube
 from spindle_fem.results.field_file import heat_flux, write_tagged_vtu
+from spindle_fem.results.field_series import FieldSeries
+from tests.support.made_result import make_result
 
 RADII = (0.04, 0.07)
 
@@ -97,3 +100,24 @@ def test_vtk_finds_faces_of_a_surface_with_their_film(written):
     assert chosen.sum() == len(mesh.surfaces[name])
     assert np.all(grid.cell_data["film_coefficient_W_m2K"][chosen] == 12.0)
     assert np.all(np.isnan(grid.cell_data["film_coefficient_W_m2K"][: mesh.n_elements]))
+
+
+def test_vtk_reads_a_series_of_fields(tmp_path):
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    result = make_result()
+    file = tmp_path / "fields.vtkhdf"
+    with FieldSeries(file, result.mesh) as series:
+        for time in (0.0, 60.0, 60.0, 300.0):
+            series.add(time, result.temperature + time / 60.0)
+    reader = vtkHDFReader()
+    reader.SetFileName(str(file))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == 3
+    for time in (300.0, 60.0):
+        reader.UpdateTimeStep(time)
+        grid = pv.wrap(reader.GetOutput())
+        expected = result.temperature + time / 60.0 - 273.15
+        assert grid["temperature_degC"] == pytest.approx(expected, abs=1e-4)
+    assert grid.cell_data["part"].tolist() == result.mesh.part_of_element.tolist()
+    assert grid.compute_cell_sizes()["Volume"].min() > 0.0
