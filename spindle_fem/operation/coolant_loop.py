@@ -13,7 +13,7 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.duct_friction import PressureDrop, channel_pressure_drop
 from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
-from spindle_fem.physics.coolant.march import ChannelMarch, FilmChoice, march_channel
+from spindle_fem.physics.coolant.march import ChannelMarch, DrivenChannel, FilmChoice
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
 
@@ -82,23 +82,26 @@ class CoolantLoop:
         inlet = point.coolant_inlet_temperature
         pressure = self.pressure_drop(point.coolant_flow, inlet)
         factor = film_factor * settings.film_factor.value * self.cell_factors(point.coolant_flow, inlet)
-        local = settings.properties_at == "bulk"
-        march = march_channel(
+        march = DrivenChannel(
             self.section,
             self.coolant,
             point.coolant_flow,
             inlet,
-            wall_temperature,
             self.cells.cell_area,
-            FilmChoice(settings.film_model, "local" if local else "inlet", local, factor),
-            pumping_power=pressure.pumping_power if settings.pumping_heat else 0.0,
-        )
+            self.film_choice(factor),
+            pressure.pumping_power if settings.pumping_heat else 0.0,
+        ).settle(wall_temperature)
         shape = self.cells.cell_area.shape
         value, low, high = (
             np.broadcast_to(factor * np.asarray(item), shape)
             for item in (march.film.value, march.film.low, march.film.high)
         )
         return CoolantState(march, value, low, high, pressure)
+
+    def film_choice(self, factor: ArrayLike) -> FilmChoice:
+        """The film that the definition asks for, times a factor."""
+        local = self.spec.coolant.properties_at == "bulk"
+        return FilmChoice(self.spec.coolant.film_model, "local" if local else "inlet", local, factor)
 
     def pressure_drop(self, flow: float, inlet: float) -> PressureDrop:
         """Pressure drop of the channel at a flow (m³/s), properties at the inlet temperature (K)."""

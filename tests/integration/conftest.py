@@ -30,8 +30,8 @@ def recorded_result(recorded):
 
 @pytest.fixture(scope="session")
 def reference():
-    """The reference spindle prepared on its coarse mesh."""
-    return prepare_machine(load_machine("wu_tan_2016", ["mesh.preset=coarse"]))
+    """The reference spindle with linear temperatures on its coarse mesh."""
+    return prepare_machine(load_machine("wu_tan_2016", ["mesh.preset=coarse", "mesh.order=1"]))
 
 
 @pytest.fixture(scope="session")

@@ -169,7 +169,8 @@ def test_grease_beyond_its_limit_fails_the_run(recorded):
 def following():
     return prepare_machine(
         load_machine(
-            "wu_tan_2016", ["mesh.preset=coarse", "heat.thermal_preload=true", "operation.speed=600rpm"]
+            "wu_tan_2016",
+            ["mesh.preset=coarse", "mesh.order=1", "heat.thermal_preload=true", "operation.speed=600rpm"],
         )
     )
 
@@ -228,6 +229,7 @@ def test_spring_preload_keeps_its_force_when_the_rings_grow():
         "wu_tan_2016",
         [
             "mesh.preset=coarse",
+            "mesh.order=1",
             "heat.thermal_preload=true",
             # Warm rings lose their fit: the equilibrium of the sprung sets ends near 3000 rpm.
             "operation.speed=1500rpm",

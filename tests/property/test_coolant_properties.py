@@ -10,7 +10,7 @@ from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
 from spindle_fem.physics.coolant.coolants.water import Water
 from spindle_fem.physics.coolant.duct_friction import channel_pressure_drop
 from spindle_fem.physics.coolant.linear_march import linearise_march
-from spindle_fem.physics.coolant.march import FilmChoice, march_channel, march_enthalpy
+from spindle_fem.physics.coolant.march import DrivenChannel, FilmChoice, march_enthalpy
 from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
 
 OIL = OilIsoVg32()
@@ -141,14 +141,9 @@ def test_channel_march_with_local_properties_closes_for_either_sign(inlet, diffe
     assume(10.5 <= inlet + difference <= 49.5 and abs(difference) > 1e-3)
     section = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
     wall = np.full(number, inlet + difference + 273.15)
-    found = march_channel(
-        section,
-        OIL,
-        litres * 1e-3 / 60,
-        inlet + 273.15,
-        wall,
-        np.full(number, 0.1562 / number),
-        FilmChoice(model),
+    area = np.full(number, 0.1562 / number)
+    found = DrivenChannel(section, OIL, litres * 1e-3 / 60, inlet + 273.15, area, FilmChoice(model)).settle(
+        wall
     )
     assert found.march.imbalance_relative < 1e-12
     assert np.sign(found.march.heat.sum()) == np.sign(difference)

@@ -9,7 +9,7 @@ from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
 from spindle_fem.physics.coolant.coolants.water import Water
 from spindle_fem.physics.coolant.linear_march import MarchMaps, linearise_march, march_maps, outlet_stretch
-from spindle_fem.physics.coolant.march import FilmChoice, march_channel, march_enthalpy
+from spindle_fem.physics.coolant.march import DrivenChannel, FilmChoice, march_enthalpy
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
 OIL = OilIsoVg32()
@@ -180,16 +180,15 @@ def test_march_refuses(changes, message):
     assert message in str(caught.value)
 
 
-class TestMarchChannel:
+class TestDrivenChannel:
     WALL = np.linspace(292.0, 300.0, 30)
     AREA = np.full(30, 0.1562 / 30)
 
     def march(self, **changes):
         options = {"model": "sieder_tate", "properties_at": "inlet", "wall_correction": False} | changes
         coolant, power = options.pop("coolant", OIL), options.pop("pumping_power", 0.0)
-        return march_channel(
-            CHANNEL, coolant, FLOW, INLET, self.WALL, self.AREA, FilmChoice(**options), power
-        )
+        choice = FilmChoice(**options)
+        return DrivenChannel(CHANNEL, coolant, FLOW, INLET, self.AREA, choice, power).settle(self.WALL)
 
     def test_inlet_properties_are_those_of_the_recorded_machine(self):
         # h = 243 W/(m²K) everywhere, mass flow from the density at the inlet.
@@ -197,15 +196,8 @@ class TestMarchChannel:
         assert found.film.value == pytest.approx(243.0, rel=5e-3)
         assert found.mass_flow == pytest.approx(FLOW * 873.3, rel=1e-4)
         units = found.film.value * 0.1562 / (found.mass_flow * 1857.63)
-        uniform = march_channel(
-            CHANNEL,
-            OIL,
-            FLOW,
-            INLET,
-            np.full(30, 300.0),
-            self.AREA,
-            FilmChoice("sieder_tate", "inlet", wall_correction=False),
-        )
+        choice = FilmChoice("sieder_tate", "inlet", wall_correction=False)
+        uniform = DrivenChannel(CHANNEL, OIL, FLOW, INLET, self.AREA, choice).settle(np.full(30, 300.0))
         exact = INLET + (300.0 - INLET) * -np.expm1(-units)
         assert uniform.march.mixed_outlet_temperature == pytest.approx(exact, abs=1e-4)
 
@@ -249,12 +241,8 @@ class TestMarchChannel:
     def test_two_starts_share_flow_and_pumping_power(self):
         double = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0, starts=2)
         wall, area = np.stack([self.WALL, self.WALL]), np.stack([self.AREA, self.AREA])
-        both = march_channel(
-            double, OIL, 2 * FLOW, INLET, wall, area, FilmChoice("helical"), pumping_power=80.0
-        )
-        one = march_channel(
-            CHANNEL, OIL, FLOW, INLET, self.WALL, self.AREA, FilmChoice("helical"), pumping_power=40.0
-        )
+        both = DrivenChannel(double, OIL, 2 * FLOW, INLET, area, pumping_power=80.0).settle(wall)
+        one = DrivenChannel(CHANNEL, OIL, FLOW, INLET, self.AREA, pumping_power=40.0).settle(self.WALL)
         assert both.mass_flow == pytest.approx(one.mass_flow, rel=1e-14)
         np.testing.assert_allclose(both.march.heat[1], one.march.heat, rtol=1e-12)
         assert both.march.pumping_heat.sum() == pytest.approx(80.0, rel=1e-12)
@@ -262,15 +250,13 @@ class TestMarchChannel:
             one.march.mixed_outlet_temperature, abs=1e-9
         )
         # One start given stands for both and reports its own share.
-        twin = march_channel(
-            double, OIL, 2 * FLOW, INLET, self.WALL, self.AREA, FilmChoice("helical"), pumping_power=80.0
-        )
+        twin = DrivenChannel(double, OIL, 2 * FLOW, INLET, self.AREA, pumping_power=80.0).settle(self.WALL)
         assert twin.march.pumping_heat.sum() == pytest.approx(40.0, rel=1e-12)
 
     def test_unequal_starts_mix_by_enthalpy(self):
         double = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0, starts=2)
         wall, area = np.stack([self.WALL, self.WALL + 20.0]), np.stack([self.AREA, self.AREA])
-        found = march_channel(double, OIL, 0.2 * FLOW, INLET, wall, area, FilmChoice("helical"))
+        found = DrivenChannel(double, OIL, 0.2 * FLOW, INLET, area).settle(wall)
         mixed = OIL.specific_enthalpy(found.march.mixed_outlet_temperature)
         assert float(mixed) == pytest.approx(
             OIL.specific_enthalpy(found.march.outlet_temperature).mean(), rel=1e-13
@@ -279,7 +265,7 @@ class TestMarchChannel:
     def test_walls_of_a_wrong_number_of_starts(self):
         wall, area = np.tile(self.WALL, (3, 1)), np.tile(self.AREA, (3, 1))
         with pytest.raises(OutOfValidityError, match="walls of 3 starts are given, the channel has 1"):
-            march_channel(CHANNEL, OIL, FLOW, INLET, wall, area)
+            DrivenChannel(CHANNEL, OIL, FLOW, INLET, area).settle(wall)
 
     def test_unknown_option(self):
         with pytest.raises(OutOfValidityError, match='Did you mean "inlet"'):

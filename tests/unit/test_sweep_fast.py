@@ -142,13 +142,15 @@ def test_many_channels_are_what_each_is_alone(film_model, properties_at, pumping
     for _ in range(12):
         state = batch.at(wall, state)
     matrix, constant = batch.linear(state)
-    assert np.allclose(constant + np.einsum("nsij,nsj->nsi", matrix, wall), state.heat, rtol=1e-9, atol=1e-9)
+    assert np.allclose(
+        constant + np.einsum("nsij,nsj->nsi", matrix, wall), state.march.heat, rtol=1e-9, atol=1e-9
+    )
     for row, (spec, point) in enumerate(zip(specs, points, strict=True)):
         alone = CoolantLoop(spec, CELLS).at(point, wall[row])
         assert np.allclose(state.film[row], alone.film_coefficient, rtol=1e-9)
-        assert np.allclose(state.heat[row], alone.march.march.heat, rtol=1e-8, atol=1e-9)
-        assert np.allclose(state.bulk[row], alone.march.march.bulk_temperature, atol=1e-8)
-        assert state.outlet_edge[row].mean() == pytest.approx(
+        assert np.allclose(state.march.heat[row], alone.march.march.heat, rtol=1e-8, atol=1e-9)
+        assert np.allclose(state.march.bulk_temperature[row], alone.march.march.bulk_temperature, atol=1e-8)
+        assert state.march.outlet_temperature[row].mean() == pytest.approx(
             alone.march.march.mixed_outlet_temperature, abs=1e-7
         )
         assert state.enthalpy_rise[row] == pytest.approx(alone.march.march.enthalpy_rise, rel=1e-6)

@@ -124,7 +124,7 @@ def with_band_ends(inputs: DesignInputs, full: MeshModel) -> DesignInputs:
     """Designs with their nominal, their low and their high channel film."""
     channel = ChannelBatch(full, inputs)
     wall = np.broadcast_to(channel.inlet + 3.0, (len(inputs), *full.cell_area.shape))
-    film = channel.at(wall).source
+    film = channel.at(wall).channel.film
     several = inputs.take(np.tile(np.arange(len(inputs)), 3))
     ratios = [np.ones(len(inputs))]
     for end in (film.low, film.high):

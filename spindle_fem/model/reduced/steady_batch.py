@@ -206,7 +206,7 @@ class _Run:
         residual -= np.einsum("nij,nj->ni", self.base, unknowns)
         residual -= np.einsum("nm,nmr->nr", moving, acted, optimize=True)
         if self.field is not None:
-            residual -= self.field.heat.reshape(self.number, -1) @ self.solver.cell_mean
+            residual -= self.field.march.heat.reshape(self.number, -1) @ self.solver.cell_mean
         return residual
 
     def _heat_slope(self, film: Array) -> Array:

@@ -128,9 +128,10 @@ def march_enthalpy(
     start = edges[..., :-1]
     heat = capacity_rate * (gain - reached * start) - pumping
     bulk = start + (1.0 - mean_share) * (wall_difference - start) + second_share * friction_rise
-    outlet = inlet_temperature + edges[..., -1]
+    edge_temperature = inlet_temperature + edges
+    outlet = edge_temperature[..., -1]
     return MarchResult(
-        edge_temperature=_frozen(inlet_temperature + edges),
+        edge_temperature=_frozen(edge_temperature),
         edge_rise=_frozen(edges),
         bulk_temperature=_frozen(inlet_temperature + bulk),
         heat=_frozen(heat),
@@ -180,7 +181,7 @@ class ChannelMarch:
 
     march: MarchResult
     film: FilmCoefficient
-    mass_flow: float
+    mass_flow: ArrayLike
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,90 +219,109 @@ class FilmChoice:
             )
 
 
-def march_channel(
-    section: ChannelSection,
-    coolant: Coolant,
-    volume_flow: float,
-    inlet_temperature: float,
-    wall_temperature: ArrayLike,
-    wetted_area: ArrayLike,
-    choice: FilmChoice | None = None,
-    pumping_power: float = 0.0,
-) -> ChannelMarch:
-    """March with film coefficients by a named model, at given wall temperatures.
+@dataclass(frozen=True, slots=True)
+class DrivenChannel:
+    """A channel and the flow through it: what a march needs beside its walls.
 
-    Parameters
+    Attributes
     ----------
-    volume_flow : float, [m³/s]
+    volume_flow, inlet_temperature : float or (n, 1, 1) ndarray, [m³/s], [K]
         Total, all starts, at inlet temperature; every start takes its share.
-    inlet_temperature : float, [K]
-    wall_temperature : (..., n) array_like, [K]
-        Area mean in each cell, from inlet to outlet; an axis before the last
-        one counts the starts. Without it the result is that of one start.
+        Arrays are of designs.
     wetted_area : (..., n) array_like, [m²]
-        Of each cell.
-    choice : FilmChoice, optional
-        The helical model without it.
-    pumping_power : float, [W]
-        Friction heat of all starts, spread over the wetted area.
-
-    Raises
-    ------
-    OutOfValidityError
-        No flow, a temperature outside the coolant's range, an unknown option.
-    ConvergenceError
-        The properties do not settle (they do within ten iterations).
+        Of each cell, from inlet to outlet.
+    pumping_power : float or (n, 1, 1) ndarray, [W]
+        Friction heat of all starts, alike in each, spread over the wetted area.
 
     >>> from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
-    >>> channel = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
-    >>> wall, area, film = [295.0] * 20, [0.1562 / 20] * 20, FilmChoice("sieder_tate")
-    >>> result = march_channel(channel, OilIsoVg32(), 20e-3 / 60, 288.15, wall, area, film)
-    >>> result.march.imbalance_relative < 1e-12
+    >>> section = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
+    >>> area = [0.1562 / 20] * 20
+    >>> channel = DrivenChannel(section, OilIsoVg32(), 20e-3 / 60, 288.15, area, FilmChoice("sieder_tate"))
+    >>> channel.settle([295.0] * 20).march.imbalance_relative < 1e-12
     True
     """
-    choice = choice or FilmChoice()
-    wall, area = np.broadcast_arrays(
-        np.atleast_1d(np.asarray(wall_temperature, dtype=np.float64)),
-        np.asarray(wetted_area, dtype=np.float64),
-    )
-    at_inlet = coolant.properties(inlet_temperature)
-    mass_flow = float(at_inlet.density) * volume_flow / section.starts
-    given = wall[..., 0].size
-    if given not in (1, section.starts):
-        raise OutOfValidityError(
-            "coolant march",
-            f"walls of {given} starts are given, the channel has {section.starts}.",
-            "Give every start, or one that stands for all.",
-        )
-    # Friction makes the same heat in every start.
-    pumping = pumping_power / section.starts * area / area.sum(axis=-1, keepdims=True)
 
-    def film_at(bulk: ArrayLike) -> FilmCoefficient:
-        state = ChannelState(coolant, volume_flow, bulk, wall if choice.wall_correction else None)
-        return select_film(choice.model, section, state)
+    section: ChannelSection
+    coolant: Coolant
+    volume_flow: ArrayLike
+    inlet_temperature: ArrayLike
+    wetted_area: ArrayLike
+    choice: FilmChoice = FilmChoice()
+    pumping_power: ArrayLike = 0.0
 
-    bulk: ArrayLike = inlet_temperature
-    capacity: ArrayLike = at_inlet.specific_heat_capacity
-    for _ in range(_ITERATIONS):
-        film = film_at(bulk)
+    def march(self, wall: ArrayLike, before: ChannelMarch | None = None) -> ChannelMarch:
+        """One march, properties at the temperatures of the one before; at the inlet's without any.
+
+        Parameters
+        ----------
+        wall : (..., n) array_like, [K]
+            Area mean in each cell.
+
+        Raises
+        ------
+        OutOfValidityError
+            No flow, a temperature outside the coolant's range.
+        """
+        choice, inlet = self.choice, self.inlet_temperature
+        if before is not None and choice.properties_at == "inlet" and not choice.wall_correction:
+            film, mass_flow, capacity = before.film, before.mass_flow, before.march.specific_heat_capacity
+        else:
+            at_inlet = self.coolant.properties(inlet)
+            mass_flow = at_inlet.density * self.volume_flow / self.section.starts
+            bulk, capacity = inlet, at_inlet.specific_heat_capacity
+            if before is not None and choice.properties_at == "local":
+                bulk, edges = before.march.bulk_temperature, before.march.edge_rise
+                capacity = _mean_heat_capacity(self.coolant, inlet, edges[..., :-1], edges[..., 1:])
+            state = ChannelState(
+                self.coolant, self.volume_flow, bulk, wall if choice.wall_correction else None
+            )
+            film = select_film(choice.model, self.section, state)
         coefficient = np.asarray(choice.factor, dtype=np.float64) * np.asarray(film.value)
-        march = march_enthalpy(inlet_temperature, mass_flow, capacity, wall, area, coefficient, pumping)
-        if choice.properties_at == "inlet":
-            break
-        change = float(np.max(np.abs(march.bulk_temperature - bulk)))
-        if change <= _TEMPERATURE_TOLERANCE_K:
-            march = _with_true_enthalpy(march, coolant, mass_flow)
-            break
-        bulk = march.bulk_temperature
-        edges = march.edge_rise
-        capacity = _mean_heat_capacity(coolant, inlet_temperature, edges[..., :-1], edges[..., 1:])
-    else:
+        area = np.asarray(self.wetted_area, dtype=np.float64)
+        pumping = np.asarray(self.pumping_power) / self.section.starts
+        pumping = pumping * area / area.sum(axis=-1, keepdims=True)
+        march = march_enthalpy(inlet, mass_flow, capacity, wall, area, coefficient, pumping)
+        return ChannelMarch(march=march, film=film, mass_flow=mass_flow)
+
+    def settle(self, wall: ArrayLike) -> ChannelMarch:
+        """The march of one design whose properties are those of its own temperatures.
+
+        Parameters
+        ----------
+        wall : (..., n) array_like, [K]
+            An axis before the last one counts the starts; without it the
+            result is that of one start.
+
+        Raises
+        ------
+        OutOfValidityError
+            As :meth:`march`; walls of another number of starts.
+        ConvergenceError
+            The properties do not settle (they do within ten iterations).
+        """
+        given = np.atleast_1d(wall)[..., 0].size
+        if given not in (1, self.section.starts):
+            raise OutOfValidityError(
+                "coolant march",
+                f"walls of {given} starts are given, the channel has {self.section.starts}.",
+                "Give every start, or one that stands for all.",
+            )
+        found = self.march(wall)
+        if self.choice.properties_at == "inlet":
+            return found
+        for _ in range(_ITERATIONS):
+            bulk = found.march.bulk_temperature
+            found = self.march(wall, found)
+            change = float(np.max(np.abs(found.march.bulk_temperature - bulk)))
+            if change <= _TEMPERATURE_TOLERANCE_K:
+                return replace(
+                    found, march=_with_true_enthalpy(found.march, self.coolant, float(found.mass_flow))
+                )
         raise ConvergenceError(
             "coolant march",
             f"bulk temperature still changes by {change:.3g} K after {_ITERATIONS} iterations.",
             'Use properties_at = "inlet", or more cells.',
         )
-    return ChannelMarch(march=march, film=film, mass_flow=mass_flow)
 
 
 def _with_true_enthalpy(march: MarchResult, coolant: Coolant, mass_flow: float) -> MarchResult:
@@ -318,12 +338,12 @@ def _with_true_enthalpy(march: MarchResult, coolant: Coolant, mass_flow: float) 
 
 
 def _mean_heat_capacity(
-    coolant: Coolant, inlet: float, start: NDArray[np.float64], end: NDArray[np.float64]
+    coolant: Coolant, inlet: ArrayLike, start: NDArray[np.float64], end: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Mean between two rises above the inlet, by Gauss points: no division by a small rise."""
     points, weights = np.polynomial.legendre.leggauss(5)
     rise = 0.5 * (start + end)[..., None] + 0.5 * (end - start)[..., None] * points
-    return coolant.properties(inlet + rise).specific_heat_capacity @ (0.5 * weights)
+    return coolant.properties(np.asarray(inlet)[..., None] + rise).specific_heat_capacity @ (0.5 * weights)
 
 
 def exponential_shares(

@@ -140,9 +140,9 @@ def _coolant(
     velocity = section.velocity(inputs.flow)
     reynolds = velocity * section.hydraulic_diameter / properties.kinematic_viscosity
     films = [mean_film(model, field.film * ratio) for ratio in (1.0, *_band(field))]
-    outlet = field.outlet_edge.mean(axis=1)
+    outlet = field.march.outlet_temperature.mean(axis=1)
     order = np.array(REGIMES)
-    regime = np.asarray(field.source.regime)
+    regime = np.asarray(field.channel.film.regime)
     level = sum((regime == name) * number for number, name in enumerate(REGIMES))
     highest = np.broadcast_to(level.reshape(len(level), -1).max(axis=1), len(inputs))
     drops = pressure_drops(loop, inputs)
@@ -175,8 +175,8 @@ def mean_film(model: ThermalModel, film: Array) -> Array:
 
 def _band(field: Any) -> tuple[Array, Array]:
     """Low and high film over the film, for every cell."""
-    value = np.asarray(field.source.value)
-    return np.asarray(field.source.low) / value, np.asarray(field.source.high) / value
+    value = np.asarray(field.channel.film.value)
+    return np.asarray(field.channel.film.low) / value, np.asarray(field.channel.film.high) / value
 
 
 def band_ratios(field: Any) -> tuple[Array, Array]:
