@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from spindle_fem.commands import sweep_command
 from tests.support.written_texts import manifest_text
 
 
@@ -35,3 +36,10 @@ def write_recording(
 def recorded_in() -> Callable[..., Path]:
     """Writer of a recording; see :func:`write_recording`."""
     return write_recording
+
+
+@pytest.fixture
+def unpictured(monkeypatch):
+    """Sweeps without pictures and report, which take longer than a few small designs."""
+    monkeypatch.setattr(sweep_command, "_pictured", lambda *told, **settings: {})
+    monkeypatch.setattr(sweep_command, "write_sweep_report", lambda *told: None)

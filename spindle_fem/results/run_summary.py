@@ -39,9 +39,15 @@ def package_versions() -> dict[str, str]:
     return versions
 
 
-def build_summary(result: ThermalResult, wall_time_s: float, peak_rss_MB: float) -> dict[str, Any]:
-    """Dictionary written as ``summary.json``; ``nan`` becomes ``None``."""
-    growth = result.growth
+def build_summary(
+    result: ThermalResult, wall_time_s: float, peak_rss_MB: float, *, with_shape: bool = True
+) -> dict[str, Any]:
+    """Dictionary written as ``summary.json``; ``nan`` becomes ``None``.
+
+    ``with_shape``: growth and displacements too, which take as long as a small machine's solve.
+    """
+    growth = result.growth if with_shape else None
+    displacements = result.displacements if with_shape else {}
     maximum_mm = [round(float(value) * 1e3, 3) for value in result.temperature_maximum_at]
     return _without_nan(
         {
@@ -75,7 +81,7 @@ def build_summary(result: ThermalResult, wall_time_s: float, peak_rss_MB: float)
                 "max_at_mm": maximum_mm,
             },
             **({} if growth is None else _growth(growth)),
-            "displacements": {name: 1e6 * value for name, value in result.displacements.items()},
+            "displacements": {name: 1e6 * value for name, value in displacements.items()},
             **({} if result.equilibrium is None else {"equilibrium": _equilibrium(result.equilibrium)}),
             "joints": {name: {"heat_W": value} for name, value in result.heat_flows.items()},
             "iterations": dict(result.iterations),

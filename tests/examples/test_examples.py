@@ -18,6 +18,7 @@ LONGEST = 60
 ALONE = {"own_effect", "own_heat_model"}
 
 
+@pytest.mark.usefixtures("unpictured")
 @pytest.mark.parametrize("script", [path for path in SCRIPTS if path.stem not in ALONE], ids=lambda p: p.stem)
 def test_an_example_runs(script, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", [str(script), str(tmp_path / "out")])

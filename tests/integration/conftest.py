@@ -2,19 +2,11 @@
 
 import pytest
 
-from spindle_fem.commands import sweep_command
 from spindle_fem.definition.load import load_machine
 from spindle_fem.model.reduced.build_reduced import reduced_model_of
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.studies.solve_machine import solve_prepared
-
-
-@pytest.fixture
-def unpictured(monkeypatch):
-    """Sweeps without pictures and report, which take longer than a few small designs."""
-    monkeypatch.setattr(sweep_command, "_pictured", lambda *told, **settings: {})
-    monkeypatch.setattr(sweep_command, "write_sweep_report", lambda *told: None)
 
 
 @pytest.fixture(scope="session")

@@ -139,7 +139,7 @@ def solved():
     return {}
 
 
-@pytest.mark.parametrize("number", [7, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [5, pytest.param(20, marks=pytest.mark.slow)])
 def test_every_temperature_of_designs_not_used_to_build_is_within_20_mk(by_table, solved, number):
     prepared, _, others = by_table
     model, tables = cached_model(prepared)

@@ -394,12 +394,12 @@ def test_the_dataset_keeps_readings_and_what_was_held_out(reported, heated):
     assert data["measured"].attrs["units"] == "degC"
 
 
-def test_figures_may_be_drawn_by_another_process_before_the_report(reported, tmp_path):
+def test_figures_may_be_drawn_before_the_report(reported, tmp_path):
     folder, content, path = reported
     for name in ("diagnosis.nc", "diagnosis.json", "improved_machine.toml"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     known = {key: value for key, value in content.items() if key != "next_measurement"}
-    pictures = Workers(2).ahead(partial(draw_figures, tmp_path, known))()
+    pictures = draw_figures(tmp_path, known)
     assert {item.name for item in (tmp_path / "figures").iterdir()} == {
         item.name for item in (folder / "figures").iterdir()
     }

@@ -262,6 +262,7 @@ def test_pictures_fill_their_page(run_folder):
             assert np.ptp(columns) > 0.85 * ink.shape[1], path.name
 
 
+@pytest.mark.slow
 @pytest.mark.render
 def test_helpers_that_were_started_before_write_the_same_files(run_folder, result, tmp_path):
     with output_folder(tmp_path / "run") as folder, OutputHelpers() as helpers:

@@ -288,7 +288,8 @@ def solve_checked(task: DesignTask, film_ratio: NDArray[np.float64] | None = Non
 
 
 def _values(result: ThermalResult, spec: MachineSpec, outputs: Iterable[str]) -> dict[str, Any]:
-    summary = build_summary(result, 0.0, 0.0)
+    # Nothing of the machine's shape is an output of a study.
+    summary = build_summary(result, 0.0, 0.0, with_shape=False)
     summary["derived"] = derived_values(summary, spec)
     return {path: value_of(summary, path) for path in outputs}
 
