@@ -23,5 +23,11 @@ if abs(summary["energy"]["imbalance_relative"]) > 1e-8:
 missing = [name for name in ("summary.json", "fields.vtu", "result.nc", "report.html", "machine.toml") if not (work / "out" / name).is_file()]
 if missing:
     sys.exit(f"the wheel's run lacks {missing}")
-print(f"wheel: {summary['machine']} solved, hottest {summary['temperature']['max_degC']:.2f} degC")
+import spindle_fem
+from spindle_fem.studies.shipped_files import EXAMPLES, find_study, shipped_folder
+
+site = work / "site"
+if not (find_study("cool_down").is_relative_to(site) and list(shipped_folder(EXAMPLES).glob("*.py"))):
+    sys.exit("the wheel lacks studies or examples")
+print(f"wheel {spindle_fem.__version__}: {summary['machine']} solved, hottest {summary['temperature']['max_degC']:.2f} degC")
 PY

@@ -2,79 +2,27 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
-from spindle_fem import __version__
-
-PLAN_FLAG, WORKER_FLAGS = "--plan", ("--jobs", "-j", "--cluster")
-
-
-class _Commands(TyperGroup):
-    """The commands; ``diagnose --plan`` and ``diagnose --jobs`` ask other things than a diagnosis alone."""
-
-    def resolve_command(self, ctx: typer.Context, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        """Which command arguments are for, and those that are left."""
-        if args[0] == "diagnose" and PLAN_FLAG in args:
-            args = ["plan", *(item for item in args[1:] if item != PLAN_FLAG)]
-        elif args[0] == "diagnose" and any(item.partition("=")[0] in WORKER_FLAGS for item in args):
-            args = ["diagnose-folder", *args[1:]]
-        return super().resolve_command(ctx, args)
-
-
-app = typer.Typer(
-    name="spindle-fem",
-    cls=_Commands,
-    help="Thermal finite elements for grease-lubricated machine-tool spindles.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+from spindle_fem.command_line import diagnosis_commands
+from spindle_fem.command_line.application import (
+    AsJson,
+    Folder,
+    Machine,
+    Overrides,
+    State,
+    app,
+    print_json,
+    say,
 )
 
-Machine = Annotated[str, typer.Argument(help="A TOML definition, or the name of a machine that ships.")]
-Overrides = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="PATH=VALUE", help="Override a value, with its unit: channel.depth=19mm."),
-]
-Folder = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the results.")]
-Calibrate = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--calibrate", metavar="FILE", help="Recording of the same machine with nothing missing; repeatable."
-    ),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")]
-
-
-def _version(asked: bool) -> None:
-    if asked:
-        typer.echo(f"spindle-fem {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    _version_asked: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
-) -> None:
-    _State.debug = debug
-
-
-class _State:
-    debug = False
-
-
-def _print_json(content: Any) -> None:
-    typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
+# Modules whose commands are part of the application once they are imported.
+FAMILIES = (diagnosis_commands,)
 
 
 @app.command()
@@ -95,7 +43,7 @@ def run(
     summary = run_machine(
         machine, output, overrides=set_ or (), estimate_mesh_error=estimate_mesh_error, progress=not as_json
     )
-    _print_json(summary) if as_json else print_run(summary, output)
+    print_json(summary) if as_json else print_run(summary, output)
 
 
 @app.command()
@@ -105,7 +53,7 @@ def check(machine: Machine, set_: Overrides = None, as_json: AsJson = False) -> 
     from spindle_fem.commands.machine_commands import check_machine
 
     content = check_machine(machine, overrides=set_ or ())
-    _print_json(content) if as_json else print_check(content)
+    print_json(content) if as_json else print_check(content)
 
 
 @app.command()
@@ -120,7 +68,7 @@ def mesh(
     from spindle_fem.commands.machine_commands import mesh_machine
 
     content = mesh_machine(machine, output, overrides=set_ or ())
-    _print_json(content) if as_json else print_pairs(f"wrote {output}", content)
+    print_json(content) if as_json else print_pairs(f"wrote {output}", content)
 
 
 @app.command()
@@ -152,7 +100,7 @@ def heat(
         folder=output,
         overrides=set_ or (),
     )
-    _print_json(content) if as_json else print_heat(content)
+    print_json(content) if as_json else print_heat(content)
 
 
 @app.command()
@@ -165,7 +113,7 @@ def bearing(
     from spindle_fem.physics.bearings.bearing_file import bearing_report
 
     content = bearing_report(file)
-    _print_json(content) if as_json else print_bearing(content)
+    print_json(content) if as_json else print_bearing(content)
 
 
 @app.command()
@@ -176,13 +124,15 @@ def crosscheck(machine: Machine, output: Folder, set_: Overrides = None, as_json
 
     with stages(not as_json) as tell:
         content = crosscheck_machine(machine, output, overrides=set_ or (), progress=tell)
-    _print_json(content) if as_json else print_crosscheck(content, output)
+    print_json(content) if as_json else print_crosscheck(content, output)
 
 
 @app.command()
 def sweep(
     machine: Machine,
-    study: Annotated[Path, typer.Argument(help="TOML with parameters, design and outputs.")],
+    study: Annotated[
+        Path, typer.Argument(help="TOML with parameters, design and outputs, or one that ships.")
+    ],
     output: Folder,
     jobs: Annotated[int, typer.Option("--jobs", "-j", help="Worker processes; 0 for one a core.")] = 1,
     scheduler: Annotated[
@@ -204,12 +154,14 @@ def sweep(
         scheduler=scheduler,
         progress=not as_json,
     )
-    _print_json(content) if as_json else print_sweep(content, output)
+    print_json(content) if as_json else print_sweep(content, output)
 
 
 @app.command()
 def transient(
-    study: Annotated[Path, typer.Argument(help="TOML with phases, such as studies/heat_up_3000rpm.toml.")],
+    study: Annotated[
+        Path, typer.Argument(help="TOML with phases, or the name of one that ships: heat_up_3000rpm.")
+    ],
     output: Folder,
     machine: Annotated[str | None, typer.Option("--machine", help="In place of the study's own.")] = None,
     restart: Annotated[Path | None, typer.Option("--restart", help="state.npz of an earlier run.")] = None,
@@ -224,7 +176,7 @@ def transient(
         content = run_transient_study(
             study, output, machine=machine, overrides=set_ or (), restart=restart, progress=tell
         )
-    _print_json(content) if as_json else print_transient(content, output)
+    print_json(content) if as_json else print_transient(content, output)
 
 
 @app.command()
@@ -251,212 +203,7 @@ def simulate(
         content = simulate_machine(
             machine, recording, output, calibrate=calibrate or (), overrides=set_ or (), progress=tell
         )
-    _print_json(content) if as_json else print_simulation(content, output)
-
-
-@app.command()
-def diagnose(
-    machine: Machine,
-    recordings: Annotated[
-        list[Path], typer.Argument(help="Folders or .toml files of the recordings to be explained.")
-    ],
-    output: Folder,
-    calibrate: Calibrate = None,
-    heldout: Annotated[
-        str,
-        typer.Option(
-            "--heldout",
-            metavar="CHOICE",
-            help='Readings that the fit does not see: "blocks" or "last:0.4" (the last 40 % of the time).',
-        ),
-    ] = "blocks",
-    full_model: Annotated[
-        str,
-        typer.Option(
-            "--full-model",
-            metavar="auto|off|coarse|own",
-            help="Run both fits again by the full finite-element model: on the coarse mesh with linear "
-            "temperatures (auto: unless it takes very many time steps) or on the machine's own mesh "
-            "(much longer).",
-        ),
-    ] = "auto",
-    set_: Overrides = None,
-    as_json: AsJson = False,
-) -> None:
-    """Where a recording and the model differ, which physics was left out, and how the fit improves.
-
-    ``diagnose --plan MACHINE -o DIR``, before anything is measured: which effects the sensors and a test
-    could tell apart; the same as ``spindle-fem plan``. A folder with several recordings in it is diagnosed
-    one by one; ``diagnose --jobs N`` or ``--cluster ADDRESS`` does so abreast (``spindle-fem
-    diagnose-folder``).
-    """
-    from spindle_fem.recordings.recording_folder import recordings_in
-
-    if len(recordings) == 1 and recordings_in(recordings[0], calibrate or ()):
-        _diagnose_folder(
-            _folder_order(machine, calibrate, set_, heldout, full_model), recordings[0], output, "1", as_json
-        )
-        return
-    from spindle_fem.commands.console import print_diagnosis, stages
-    from spindle_fem.commands.diagnose_command import diagnose as diagnose_machine
-
-    with stages(not as_json) as tell:
-        content = diagnose_machine(
-            machine,
-            recordings,
-            output,
-            calibrate=calibrate or (),
-            overrides=set_ or (),
-            heldout=heldout,
-            full_model=full_model,
-            progress=tell,
-        )
-    _print_json(content) if as_json else print_diagnosis(content, output)
-
-
-@app.command()
-def diagnose_folder(
-    machine: Machine,
-    recordings: Annotated[Path, typer.Argument(help="Folder with several recordings.")],
-    output: Folder,
-    calibrate: Calibrate = None,
-    full_model: Annotated[
-        str, typer.Option("--full-model", metavar="auto|off|coarse|own", help="As of diagnose.")
-    ] = "auto",
-    jobs: Annotated[
-        str,
-        typer.Option(
-            "--jobs",
-            "-j",
-            "--cluster",
-            metavar="N|ADDRESS",
-            help="Worker processes, 0 for one a core; or the address of a Dask scheduler.",
-        ),
-    ] = "1",
-    set_: Overrides = None,
-    as_json: AsJson = False,
-) -> None:
-    """Every recording of a folder diagnosed by itself, with a table (also diagnose --jobs)."""
-    order = _folder_order(machine, calibrate, set_, "blocks", full_model)
-    _diagnose_folder(order, recordings, output, jobs, as_json)
-
-
-def _folder_order(
-    machine: str, calibrate: list[Path] | None, set_: list[str] | None, heldout: str, full_model: str
-) -> Any:
-    from spindle_fem.commands.diagnose_folder_command import FolderOrder
-
-    return FolderOrder(machine, tuple(calibrate or ()), tuple(set_ or ()), heldout, full_model)
-
-
-def _diagnose_folder(order: Any, recordings: Path, output: Path, jobs: str, as_json: bool) -> None:
-    from spindle_fem.commands.console import print_diagnoses, stages
-    from spindle_fem.commands.diagnose_folder_command import diagnose_folder as diagnose_each
-
-    own = jobs.lstrip("-").isdigit()
-    with stages(not as_json) as tell:
-        content = diagnose_each(
-            order,
-            recordings,
-            output,
-            jobs=int(jobs) if own else 1,
-            scheduler=None if own else jobs,
-            progress=tell,
-        )
-    _print_json(content) if as_json else print_diagnoses(content, output)
-
-
-@app.command()
-def plan(
-    machine: Machine,
-    output: Folder,
-    test: Annotated[
-        str,
-        typer.Option(
-            "--test",
-            metavar="RECORDING|NAME",
-            help="A recording whose inputs are used; or heat_up, steps, cool_down, with a length: steps:4h.",
-        ),
-    ] = "steps",
-    sensors: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--sensors",
-            metavar="NAME[=NOISE],...",
-            help="Probes or nodes that are read, with their noise: SP01,SP04=0.05K; all=0.2K. Default: every "
-            "one of the definition (or of the recording), 0.1 K.",
-        ),
-    ] = None,
-    inputs: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--input",
-            metavar="NAME=VALUE",
-            help='Input at full load in a standard test, with its unit, repeatable: speed="3000 rpm".',
-        ),
-    ] = None,
-    calibrate: Calibrate = None,
-    set_: Overrides = None,
-    as_json: AsJson = False,
-) -> None:
-    """Before measuring: which effects the sensors and a test could tell apart (also diagnose --plan)."""
-    from spindle_fem.commands.console import print_plan, stages
-    from spindle_fem.commands.plan_command import plan as plan_measurement
-
-    with stages(not as_json) as tell:
-        content = plan_measurement(
-            machine,
-            output,
-            test=test,
-            sensors=sensors or (),
-            inputs=inputs or (),
-            calibrate=calibrate or (),
-            overrides=set_ or (),
-            progress=tell,
-        )
-    _print_json(content) if as_json else print_plan(content, output)
-
-
-@app.command()
-def watch(
-    machine: Machine,
-    recording: Annotated[
-        Path,
-        typer.Argument(help='Folder or .toml file of a recording that grows; data = "-": standard input.'),
-    ],
-    calibrate: Calibrate = None,
-    warm_up: Annotated[
-        str | None,
-        typer.Option("--warm-up", metavar="TIME", help="Beginning of the recording that is taken as sound."),
-    ] = None,
-    false_alarms: Annotated[
-        str, typer.Option("--false-alarms", metavar="RATE", help='Stated rate: "1/month", "1/week".')
-    ] = "1/month",
-    heartbeat: Annotated[
-        str | None,
-        typer.Option(
-            "--heartbeat", metavar="TIME", help="A line at least so often, by the recording's clock."
-        ),
-    ] = None,
-    until_end: Annotated[
-        bool, typer.Option("--until-end", help="Stop at the end of what is there, instead of waiting.")
-    ] = False,
-    set_: Overrides = None,
-) -> None:
-    """Follow a recording that grows; one JSON object a line when its readings leave the model."""
-    from spindle_fem.commands.watch_command import watch as watch_machine
-
-    for line in watch_machine(
-        machine,
-        recording,
-        calibrate=calibrate or (),
-        overrides=set_ or (),
-        warm_up=warm_up,
-        false_alarms=false_alarms,
-        heartbeat=heartbeat,
-        until_end=until_end,
-    ):
-        typer.echo(json.dumps(line, ensure_ascii=False))
+    print_json(content) if as_json else print_simulation(content, output)
 
 
 @app.command()
@@ -466,7 +213,19 @@ def report(
     """Rebuild the report of an output folder."""
     from spindle_fem.commands.report_command import rebuild
 
-    typer.echo(f"wrote {rebuild(folder)}")
+    say(f"wrote {rebuild(folder)}")
+
+
+@app.command()
+def examples(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Gets examples/ and studies/.")
+    ],
+) -> None:
+    """Copy the example scripts and the studies that ship; files that are there already stay."""
+    from spindle_fem.studies.shipped_files import copy_shipped
+
+    say(f"wrote {len(copy_shipped(output))} files to {output}")
 
 
 def main() -> None:
@@ -479,12 +238,12 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except SpindleFemError as error:
-        if _State.debug:
+        if State.debug:
             raise
         typer.echo(f"{type(error).__name__}: {error}", err=True)
         sys.exit(error.exit_status)
     except OSError as error:
-        if _State.debug:
+        if State.debug:
             raise
         typer.echo(f"{type(error).__name__}: {error}", err=True)
         sys.exit(1)

@@ -11,11 +11,14 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from spindle_fem.commands.verbosity import Verbosity
+from spindle_fem.results.run_log import LOGGER
+
 
 def _console() -> Console:
     """The terminal's width, or a wide page where the output goes to a file or a pipe."""
-    console = Console()
-    return console if console.is_terminal else Console(width=120)
+    console = Console(quiet=Verbosity.quiet)
+    return console if console.is_terminal else Console(width=120, quiet=Verbosity.quiet)
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -307,19 +310,24 @@ def print_transient(content: dict[str, Any], folder: Path) -> None:
 
 @contextlib.contextmanager
 def stages(show: bool) -> Iterator[Any]:
-    """Stage names on the terminal while they run."""
-    if not show:
-        yield lambda stage: None
+    """Stage names on the terminal while they run, and in the log."""
+    if not show or Verbosity.quiet or Verbosity.verbose:
+        yield LOGGER.info
         return
     console = Console(stderr=True)
     with console.status("starting") as status:
-        yield lambda stage: status.update(f"{stage} ...")
+
+        def tell(stage: str) -> None:
+            LOGGER.info(stage)
+            status.update(f"{stage} ...")
+
+        yield tell
 
 
 @contextlib.contextmanager
 def designs_done(show: bool, total: int) -> Iterator[Callable[[int], None]]:
     """Rows done and time left on the terminal; the callable takes how many more are done."""
-    if not show:
+    if not show or Verbosity.quiet:
         yield lambda done: None
         return
     from rich.progress import (

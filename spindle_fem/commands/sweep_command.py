@@ -14,6 +14,7 @@ from spindle_fem.definition.load import write_machine
 from spindle_fem.report.sweep_report import BEST_PICTURE, FIGURE_FOLDER, write_sweep_report
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.thermal_result import ThermalResult
+from spindle_fem.studies.shipped_files import find_study
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, solve_task
 from spindle_fem.studies.sweep.file_names import MACHINE_FILE, STUDY_FILE, SUMMARY_FILE
 from spindle_fem.studies.sweep.prepared_study import prepare_study
@@ -42,7 +43,7 @@ def sweep_machine(
     machine : str or Path
         A definition file, or the name of a machine that ships.
     study : str or Path
-        A study file.
+        A study file, or the name of one that ships.
     folder : str or Path
         Gets ``results.csv``, ``results.parquet``, ``sweep.json``, ``figures``,
         ``report.html``, and the machine and study that made them.
@@ -66,7 +67,7 @@ def sweep_machine(
         Bad input, before anything runs; or a cluster that fails. A design
         that fails is a row.
     """
-    started = time.perf_counter()
+    started, study = time.perf_counter(), find_study(study)
     prepared = prepare_study(machine, study, overrides)
     require_own_table(Path(folder), prepared.columns)
     with (
@@ -75,7 +76,7 @@ def sweep_machine(
         designs_done(progress, prepared.size) as tell,
     ):
         replace_text(place / MACHINE_FILE, write_machine(prepared.spec))
-        replace_text(place / STUDY_FILE, Path(study).read_text(encoding="utf-8"))
+        replace_text(place / STUDY_FILE, study.read_text(encoding="utf-8"))
         table = ResultTable(place, prepared.columns)
         before = set(table.rows)
         tasks, rows = solve_study(prepared, table, tell, jobs=jobs, scheduler=scheduler)

@@ -20,6 +20,7 @@ from spindle_fem.results.field_series import FieldSeries
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
+from spindle_fem.studies.shipped_files import find_study
 from spindle_fem.studies.transient_study import StudyResult, TransientStudy, load_study, run_study
 from spindle_fem.studies.transient_summary import summarise
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -42,7 +43,7 @@ def run_transient_study(
     Parameters
     ----------
     study : str or Path
-        File with ``schema = "spindle-fem/transient/1"``.
+        File with ``schema = "spindle-fem/transient/1"``, or the name of one that ships.
     folder : str or Path
         Gets ``transient.csv``, ``transient.json``, ``state.npz``,
         ``machine.toml``, ``figures/*.png`` and ``report.html``; of a study with
@@ -63,7 +64,7 @@ def run_transient_study(
     dict
         The content of ``transient.json``.
     """
-    asked = load_study(study)
+    asked = load_study(find_study(study))
     start, memory = (None, None) if restart is None else load_state(restart)
     spec = load_machine(asked.machine if machine is None else machine, overrides)
     with output_folder(folder) as place:

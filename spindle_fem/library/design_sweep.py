@@ -76,7 +76,7 @@ def sweep(
     machine : MachineSpec, str or Path
         Loaded, or its file, or the name of one that ships.
     study : str or Path
-        A study file.
+        A study file, or the name of one that ships.
     folder : str or Path, optional
         Gets what ``spindle-fem sweep`` writes; without it :meth:`FolderResult.save` does.
     overrides : iterable of str

@@ -100,7 +100,7 @@ def transient(
     Parameters
     ----------
     study : str or Path
-        File with ``schema = "spindle-fem/transient/1"``.
+        File with ``schema = "spindle-fem/transient/1"``, or the name of one that ships.
     folder : str or Path, optional
         Gets what ``spindle-fem transient`` writes; without it :meth:`FolderResult.save` does.
     machine : MachineSpec, str or Path, optional

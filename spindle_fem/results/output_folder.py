@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from spindle_fem.errors import BadInputError
+from spindle_fem.results.run_log import logged_in
 
 MARKER = "INCOMPLETE"
 # What commands of this program write; anything else in a folder is the user's.
@@ -52,7 +53,8 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
     """Folder that carries a file ``INCOMPLETE`` until its block ends without error.
 
     Files of an earlier run are replaced one by one; whatever else is there is
-    left alone. After an error the marker stays and names it.
+    left alone. After an error the marker stays and names it. ``log.txt`` tells
+    what was run and how it went.
 
     Parameters
     ----------
@@ -85,7 +87,8 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
             str(path), f"cannot be written ({error.strerror}).", "Give another folder."
         ) from error
     try:
-        yield path
+        with logged_in(path):
+            yield path
     except BaseException as error:
         marker.write_text(f"The command did not finish: {type(error).__name__}: {error}\n", encoding="utf-8")
         raise

@@ -1,10 +1,13 @@
 """What holds for every file of the repository: its length, its name, what its functions ask for."""
 
 import ast
+import re
 from collections import Counter
 from pathlib import Path
 
 import pytest
+
+import spindle_fem
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("spindle_fem", "tests", "examples", "validation", "book", "benchmarks", "scripts")
@@ -63,3 +66,10 @@ def test_no_function_asks_for_more_than_eight_things():
 def test_no_file_name_stands_more_than_twice(folder):
     names = Counter(path.name for path in files(folder) if path.name != "__init__.py")
     assert not {name for name, number in names.items() if number > MOST_OF_ONE_NAME}
+
+
+def test_one_version_stands_everywhere():
+    version = spindle_fem.__version__
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.search(r"^## (\S+)", changes, re.MULTILINE).group(1) == version

@@ -1,0 +1,1 @@
+"""The command line: the application with what all commands share, and families of commands."""
