@@ -24,6 +24,7 @@ from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
 _ITERATIONS = 50
 _TEMPERATURE_TOLERANCE_K = 1.0e-10
+_GAUSS_POINTS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,9 +342,9 @@ def _mean_heat_capacity(
     coolant: Coolant, inlet: ArrayLike, start: NDArray[np.float64], end: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Mean between two rises above the inlet, by Gauss points: no division by a small rise."""
-    points, weights = np.polynomial.legendre.leggauss(5)
-    rise = 0.5 * (start + end)[..., None] + 0.5 * (end - start)[..., None] * points
-    return coolant.properties(np.asarray(inlet)[..., None] + rise).specific_heat_capacity @ (0.5 * weights)
+    rise = 0.5 * (start + end)[..., None] + 0.5 * (end - start)[..., None] * _GAUSS_POINTS
+    capacity = coolant.properties(np.asarray(inlet)[..., None] + rise).specific_heat_capacity
+    return capacity @ (0.5 * _GAUSS_WEIGHTS)
 
 
 def exponential_shares(
