@@ -281,5 +281,5 @@ def true_error(
     readings = batch.unknowns[row] @ model.probes.T
     found += [value - result.probes[name] for name, value in zip(model.probe_names, readings, strict=True)]
     if result.coolant is not None:
-        found.append(batch.channel.outlet_edge[row].mean() - result.coolant.outlet_temperature)
+        found.append(batch.channel.march.outlet_temperature[row].mean() - result.coolant.outlet_temperature)
     return float(np.abs(found).max())

@@ -191,7 +191,7 @@ def _probes(model: ThermalModel, inputs: DesignInputs, batch: SteadyBatch) -> It
         found = dict(zip(model.probe_names, (readings[row] - ZERO_CELSIUS_K).tolist(), strict=True))
         for probe in inputs.specs[0].probe:
             if probe.kind == "coolant_outlet":
-                found[probe.name] = float(batch.channel.outlet_edge[row].mean()) - ZERO_CELSIUS_K
+                found[probe.name] = float(batch.channel.march.outlet_temperature[row].mean()) - ZERO_CELSIUS_K
         yield found
 
 
@@ -206,5 +206,5 @@ def _energy(model: ThermalModel, inputs: DesignInputs, batch: SteadyBatch) -> It
     for row in range(len(inputs)):
         leaves = dict(zip(surfaces, out[row].tolist(), strict=True))
         if wall:
-            leaves[wall] = float(batch.channel.heat[row][:, ~model.cell_is_port].sum())
+            leaves[wall] = float(batch.channel.march.heat[row][:, ~model.cell_is_port].sum())
         yield {"heat_in_W": float(heat[row]), "heat_out_W": leaves}
