@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import (
-    ConvergenceError,
     FaultsError,
     RecordingError,
     SpecError,
@@ -17,7 +16,6 @@ from spindle_fem.errors import (
     did_you_mean,
 )
 from spindle_fem.model.lumped.driven_inputs import boundary_temperatures, source_heat
-from spindle_fem.model.lumped.node_balance import NetworkBalance, explicit_derivative
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.input_samples import InputHistory
@@ -158,12 +156,9 @@ def initial_state(
     ------
     SpecError
         "ambient" in a network without such a boundary.
-    ConvergenceError
-        The balance of the unread nodes cannot be found.
     """
     n, number = network.n_nodes, len(parameters)
-    balance = NetworkBalance(network)
-    inputs = history.at_first()
+    matrix, inputs = network.conductance_matrix(), history.at_first()
     first = {name: history.values[:1, history.column(name)] for name in network.input_names}
     boundary = boundary_temperatures(network, first, 1)[0]
     sources = source_heat(network, first, 1)[0]
@@ -197,21 +192,35 @@ def initial_state(
     unread = np.flatnonzero(~known)
     if unread.size == 0:
         return state, derivative
-    for _ in range(50):
-        net, jacobian = balance(state, boundary, node_heat, inputs)
-        step = np.linalg.solve(jacobian[np.ix_(unread, unread)], -net[unread])
-        state[unread] += step
-        if np.abs(step).max() < 1.0e-8:
-            break
-        if network.is_linear:
-            break
-    else:
-        raise ConvergenceError("initial state", "the balance of the nodes without reading does not converge.")
-    jacobian = balance(state, boundary, node_heat, inputs)[1]
-    explicit = explicit_derivative(network, balance, parameters, state, boundary, sources)
-    driven = explicit[unread] + jacobian[np.ix_(unread, np.flatnonzero(known))] @ derivative[known]
-    derivative[unread] = np.linalg.solve(jacobian[np.ix_(unread, unread)], -driven)
+    # The nodes that are not read are where the others, the sources and the boundaries hold them.
+    own, rest = matrix[np.ix_(unread, unread)], np.flatnonzero(known)
+    load = node_heat - matrix[:, n:] @ boundary
+    state[unread] = np.linalg.solve(own, load[unread] - matrix[np.ix_(unread, rest)] @ state[rest])
+    explicit = _balance_slope(network, matrix, parameters, np.concatenate([state, boundary]), sources)
+    driven = explicit[unread] - matrix[np.ix_(unread, rest)] @ derivative[rest]
+    derivative[unread] = np.linalg.solve(own, driven)
     return state, derivative
+
+
+def _balance_slope(
+    network: ThermalNetwork, matrix: Array, parameters: tuple[Parameter, ...], both: Array, sources: Array
+) -> Array:
+    """Derivative of the net heat to the log-parameters at fixed temperatures, ``(n, p) [W]``."""
+    n = network.n_nodes
+    result = np.zeros((n, len(parameters)))
+    for p, parameter in enumerate(parameters):
+        index = parameter.index
+        if parameter.kind == "conductance":
+            first, second = network.link_first[index], network.link_second[index]
+            flow = network.link_conductance[index] * (both[first] - both[second])
+            for end, sign in ((first, -1.0), (second, 1.0)):
+                if end < n:
+                    result[end, p] += sign * flow
+        elif parameter.kind == "gain":
+            result[network.source_node[index], p] += sources[index]
+        elif parameter.kind == "temperature":
+            result[:, p] -= matrix[:, n + index] * network.boundary_temperature[index]
+    return result
 
 
 def initial_parameters(

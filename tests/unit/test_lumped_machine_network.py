@@ -14,11 +14,9 @@ from spindle_fem.model.lumped.heat_laws import FrictionLaw
 from spindle_fem.model.lumped.machine_balance import SparseBalance
 from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.model.lumped.operating_state import operate
-from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.operation.bearing_heat import heat_model_of
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
-from spindle_fem.solvers.network_steady import solve_steady
 from spindle_fem.solvers.newton import newton
 
 MACHINES = ("recorded_spindle", "small_two_start", "uncooled")
@@ -126,48 +124,6 @@ def test_jacobian_is_the_derivative_of_the_balance(machine):
     ).T
     assert np.abs(analytic - numeric).max() < 1e-6 * np.abs(analytic).max()
     assert balance.net_heat(temperature) == pytest.approx(balance(temperature)[0], abs=1e-9)
-
-
-def as_written(network) -> ThermalNetwork:
-    """The equations of a machine at a point as a written network, laws as dense functions."""
-    n, names = network.n_nodes, network.machine.node_names
-
-    def as_function(law):
-        def heat(nodes, boundaries, inputs):
-            del boundaries, inputs
-            value, (rows, columns, entries) = law(nodes)
-            return value, np.bincount(rows * n + columns, entries, n * n).reshape(n, n)
-
-        return heat
-
-    sources = np.flatnonzero(network.heat)
-    return ThermalNetwork(
-        node_names=names,
-        capacity=network.machine.capacity,
-        link_first=network.first,
-        link_second=network.second,
-        link_conductance=network.conductance,
-        link_names=tuple(f"link{i}" for i in range(len(network.first))),
-        boundary_names=network.boundary_names,
-        boundary_temperature=network.boundary_temperature,
-        source_node=sources,
-        source_input=(None,) * len(sources),
-        source_gain=network.heat[sources],
-        source_exponent=np.ones(len(sources)),
-        stream_upstream=network.streams[0],
-        stream_downstream=network.streams[1],
-        stream_rate=np.full(len(network.streams[0]), network.stream_rate),
-        heat_laws=tuple(as_function(law) for law in network.laws),
-    )
-
-
-@pytest.mark.parametrize("machine", ["recorded_spindle", "small_two_start"])
-def test_the_general_solver_finds_the_same_state(machine):
-    state = solve_machine_network(build_machine_network(load_machine(machine)))
-    ambient = np.full(state.temperature.size, state.network.point.ambient_temperature)
-    general = solve_steady(as_written(state.network), initial=ambient)
-    assert general.temperature == pytest.approx(state.temperature, abs=1e-8)
-    assert general.imbalance_relative < 1e-10
 
 
 def test_coolant_nodes_are_the_enthalpy_march(network):

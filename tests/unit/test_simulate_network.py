@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.errors import FaultsError, RecordingError, SpecError
 from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.network_inputs import NetworkInputs
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare, simulation_summary, write_simulated
 from spindle_fem.recordings.conditions import operating_conditions
@@ -184,7 +185,7 @@ def test_sensitivities_with_the_start_against_finite_differences(tmp_path, netwo
                     run_on_recording(network, recording, parameters=changed, initial=kind).predicted
                 )
             else:
-                other = network.with_values({parameter.name: value})
+                other = NetworkInputs(network).moved({parameter.name: np.exp(sign * step)})
                 shifted.append(run_on_recording(other, recording, parameters=extra, initial=kind).predicted)
         numeric = (shifted[0] - shifted[1]) / (2 * step)
         assert_allclose(derivative[:, :, p], numeric, atol=2e-5 * max(1.0, np.abs(numeric).max()))
@@ -200,7 +201,7 @@ def test_unread_start_carries_its_dependence_on_parameters(tmp_path, network):
     for p, parameter in enumerate(network.parameters):
         shifted = [
             run_on_recording(
-                network.with_values({parameter.name: parameter.value * np.exp(s * step)}), recording
+                NetworkInputs(network).moved({parameter.name: np.exp(s * step)}), recording
             ).predicted
             for s in (1.0, -1.0)
         ]

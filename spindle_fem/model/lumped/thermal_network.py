@@ -1,17 +1,14 @@
-"""A thermal network: named nodes, boundaries, links, sources, and their temperature laws.
+"""A thermal network: named nodes, boundaries, links and sources, linear in the temperatures.
 
 The balance of node i is
 
-    C_i dT_i/dt = Q_i(T, inputs) + sum_links G (T_other - T_i) + sum_streams W (T_upstream - T_i)
-
-where conductances G and heat Q are constants or laws of temperature and
-input that return their own derivatives.
+    C_i dT_i/dt = Q_i(inputs) + sum_links G (T_other - T_i)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,30 +17,6 @@ from spindle_fem.errors import SpecError, UnknownSurfaceError, did_you_mean
 
 Array = NDArray[np.float64]
 Inputs = Mapping[str, float]
-
-#: First and second end's temperatures and the inputs -> conductance and its two derivatives.
-ConductanceFunction = Callable[[Array, Array, Inputs], tuple[Array, Array, Array]]
-#: Node temperatures, boundary temperatures and the inputs -> heat of each node and its (n, n) derivative.
-HeatFunction = Callable[[Array, Array, Inputs], tuple[Array, Array]]
-
-
-@dataclass(frozen=True, slots=True)
-class ConductanceLaw:
-    """Conductance of some links as a law of the temperatures at their ends.
-
-    Attributes
-    ----------
-    links : (k,) int64 ndarray
-        Positions in the network's links; their constant conductance is
-        replaced by the law.
-    function : callable
-        ``(first (k,) [K], second (k,) [K], inputs)`` to conductance
-        ``(k,) [W/K]`` and its derivatives to the first and second
-        temperature ``(k,) [W/K²]``.
-    """
-
-    links: NDArray[np.int64]
-    function: ConductanceFunction
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,16 +68,6 @@ class ThermalNetwork:
         Heat = gain · input^exponent, all in SI (angular speed in rad/s).
     source_gain_unit : tuple of str
         SI base units of each gain, to be checked against the input's.
-    stream_upstream, stream_downstream : (k,) int64 ndarray
-        Fluid streams: the downstream node receives ``rate · (T_up - T_down)``,
-        the upstream end gives nothing (its own balance has its own inflow).
-    stream_rate : (k,) float64 ndarray, [W/K]
-        Mass flow times specific heat.
-    heat_laws : tuple of callable
-        ``(nodes (n,) [K], boundaries (b,) [K], inputs)`` to heat ``(n,) [W]``
-        and its derivative ``(n, n) [W/K]`` to the node temperatures.
-    law_inputs : tuple of str
-        Inputs that the laws read, besides those of boundaries and sources.
     parameters : tuple of Parameter
         Values that carry a prior.
     """
@@ -124,12 +87,6 @@ class ThermalNetwork:
     source_exponent: Array = field(default_factory=lambda: np.empty(0))
     source_gain_unit: tuple[str, ...] = ()
     source_names: tuple[str, ...] = ()
-    stream_upstream: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    stream_downstream: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    stream_rate: Array = field(default_factory=lambda: np.empty(0))
-    conductance_laws: tuple[ConductanceLaw, ...] = ()
-    heat_laws: tuple[HeatFunction, ...] = ()
-    law_inputs: tuple[str, ...] = ()
     parameters: tuple[Parameter, ...] = ()
 
     def __post_init__(self) -> None:
@@ -142,9 +99,6 @@ class ThermalNetwork:
             "source_node": np.int64,
             "source_gain": np.float64,
             "source_exponent": np.float64,
-            "stream_upstream": np.int64,
-            "stream_downstream": np.int64,
-            "stream_rate": np.float64,
         }
         for name, kind in converted.items():
             array = np.array(getattr(self, name), dtype=kind)
@@ -168,40 +122,16 @@ class ThermalNetwork:
         return len(self.node_names)
 
     @property
-    def is_linear(self) -> bool:
-        """Whether no conductance or heat depends on temperature."""
-        return not self.conductance_laws and not self.heat_laws
-
-    @property
-    def is_symmetric(self) -> bool:
-        """Whether heat flows by conduction only (no fluid streams)."""
-        return self.stream_rate.size == 0
-
-    @property
     def input_names(self) -> tuple[str, ...]:
         """Every input the network needs, once, in order of first use."""
-        used = [*self.boundary_input, *self.source_input, *self.law_inputs]
+        used = [*self.boundary_input, *self.source_input]
         return tuple(dict.fromkeys(name for name in used if name is not None))
 
     def conductance_matrix(self) -> Array:
-        """Constant conductances as ``K (n, n + b) [W/K]``: heat out of node i is ``(K T)_i``.
-
-        Columns run over nodes, then boundaries; links that a law governs are left out.
-        """
-        n, total = self.n_nodes, self.n_nodes + len(self.boundary_names)
-        governed = [law.links for law in self.conductance_laws]
-        conductance = self.link_conductance.copy()
-        if governed:
-            conductance[np.concatenate(governed)] = 0.0
-        matrix = np.zeros((total, total))
-        first, second = self.link_first, self.link_second
-        np.add.at(matrix, (first, first), conductance)
-        np.add.at(matrix, (second, second), conductance)
-        np.add.at(matrix, (first, second), -conductance)
-        np.add.at(matrix, (second, first), -conductance)
-        np.add.at(matrix, (self.stream_downstream, self.stream_downstream), self.stream_rate)
-        np.add.at(matrix, (self.stream_downstream, self.stream_upstream), -self.stream_rate)
-        return matrix[:n]
+        """Heat out of node i is ``(K T)_i``: (n, n + b) [W/K], columns nodes, then boundaries."""
+        total = self.n_nodes + len(self.boundary_names)
+        whole = link_matrix(self.link_first, self.link_second, self.link_conductance, total)
+        return whole[: self.n_nodes]
 
     def boundary_values(self, inputs: Inputs) -> Array:
         """Boundary temperatures, ``(b,) [K]``, at given inputs (SI)."""
@@ -225,37 +155,17 @@ class ThermalNetwork:
         spread[np.arange(self.source_node.size), self.source_node] = 1.0
         return source_heat @ spread
 
-    def with_values(self, values: Mapping[str, float]) -> ThermalNetwork:
-        """The same network with some parameters set, by name (SI).
 
-        Raises
-        ------
-        UnknownSurfaceError
-            A name that is not a parameter of this network.
-        """
-        arrays = {
-            "capacity": self.capacity.copy(),
-            "conductance": self.link_conductance.copy(),
-            "gain": self.source_gain.copy(),
-            "temperature": self.boundary_temperature.copy(),
-        }
-        known = {parameter.name: parameter for parameter in self.parameters}
-        for name, value in values.items():
-            if name not in known:
-                raise UnknownSurfaceError("parameters", f'"{name}" is unknown.', did_you_mean(name, known))
-            arrays[known[name].kind][known[name].index] = value
-        parameters = tuple(
-            replace(item, value=float(values[item.name])) if item.name in values else item
-            for item in self.parameters
-        )
-        return replace(
-            self,
-            capacity=arrays["capacity"],
-            link_conductance=arrays["conductance"],
-            source_gain=arrays["gain"],
-            boundary_temperature=arrays["temperature"],
-            parameters=parameters,
-        )
+def link_matrix(first: NDArray[np.int64], second: NDArray[np.int64], conductance: Array, total: int) -> Array:
+    """Heat that leaves each of so many places through links is this times their temperatures, W/K.
+
+    >>> link_matrix(np.array([0]), np.array([1]), np.array([2.0]), 2).tolist()
+    [[2.0, -2.0], [-2.0, 2.0]]
+    """
+    rows = np.concatenate([first, second, first, second])
+    columns = np.concatenate([first, second, second, first])
+    values = np.concatenate([conductance, conductance, -conductance, -conductance])
+    return np.bincount(rows * total + columns, values, total * total).reshape(total, total)
 
 
 def _input_value(inputs: Inputs, name: str) -> float:
@@ -307,14 +217,7 @@ def require_sound_network(network: ThermalNetwork) -> None:
             faults.append(f'conductance of link "{name}" is {value:g} W/K, it must not be negative.')
     for a in network.link_first[network.link_first == network.link_second]:
         faults.append(f'a link joins "{names[a]}" to itself.')
-    for rate in network.stream_rate[~(network.stream_rate >= 0.0)]:
-        faults.append(f"a stream carries {rate:g} W/K, it must not be negative.")
-    floating = floating_nodes(
-        network.n_nodes,
-        len(names),
-        np.concatenate([network.link_first, network.stream_upstream]),
-        np.concatenate([network.link_second, network.stream_downstream]),
-    )
+    floating = floating_nodes(network.n_nodes, len(names), network.link_first, network.link_second)
     faults += [f'node "{names[node]}" floats: no chain of links joins it to a boundary.' for node in floating]
     if faults:
         raise SpecError("network", " ".join(faults))

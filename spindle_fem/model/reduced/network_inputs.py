@@ -101,10 +101,6 @@ class NetworkInputs:
     propagator = staticmethod(build_exact_propagator)
 
     def __init__(self, network: ThermalNetwork, spec: NetworkMachineSpec | None = None) -> None:
-        if not network.is_linear or not network.is_symmetric:
-            raise SpecError(
-                "network", "has laws or streams.", "The fast model takes constant links, sources, boundaries."
-            )
         self.network, self.spec = network, spec
         self.table = NetworkTable.of(network)
         self.bearings = network.source_names

@@ -20,7 +20,7 @@ from scipy.optimize import lsq_linear
 from spindle_fem.model.lumped.heat_laws import CoolantLaw, WallFilmLaw
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.model.lumped.operating_state import operate
-from spindle_fem.model.lumped.thermal_network import ThermalNetwork
+from spindle_fem.model.lumped.thermal_network import ThermalNetwork, link_matrix
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.coefficients import fluid_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -135,12 +135,8 @@ class MatchedNetwork:
 
     def matrices(self, conductance: Array) -> tuple[Array, Array]:
         """``K (n, n)`` and ``K_b (n, b)`` in W/K: ``C dT/dt = q - K T + K_b T_b``."""
-        n, total = self.n_nodes, self.n_nodes + len(self.boundary_names)
-        matrix = np.zeros((total, total))
-        np.add.at(matrix, (self.first, self.first), conductance)
-        np.add.at(matrix, (self.second, self.second), conductance)
-        np.add.at(matrix, (self.first, self.second), -conductance)
-        np.add.at(matrix, (self.second, self.first), -conductance)
+        n = self.n_nodes
+        matrix = link_matrix(self.first, self.second, conductance, n + len(self.boundary_names))
         return matrix[:n, :n], -matrix[:n, n:]
 
     def thermal_network(self, conductance: Array | None = None) -> ThermalNetwork:
