@@ -72,6 +72,22 @@ def mesh(
 
 
 @app.command()
+def export(
+    machine: Machine,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".npz, .json, .py or .c")],
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write the fast model for other programs, such as a control that compensates thermal growth."""
+    from spindle_fem.commands.console import print_export, stages
+    from spindle_fem.commands.export_command import export_machine
+
+    with stages(not as_json) as tell:
+        content = export_machine(machine, output, overrides=set_ or (), progress=tell)
+    _print_json(content) if as_json else print_export(content)
+
+
+@app.command()
 def heat(
     machine: Machine,
     speed: Annotated[
@@ -184,14 +200,7 @@ def simulate(
     machine: Machine,
     recording: Annotated[Path, typer.Argument(help="Folder or .toml file of a recording.")],
     output: Folder,
-    calibrate: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--calibrate",
-            metavar="FILE",
-            help="Recording that may move the uncertain parameters; repeatable.",
-        ),
-    ] = None,
+    calibrate: Calibrate = None,
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:

@@ -108,6 +108,19 @@ def print_pairs(title: str, content: dict[str, Any]) -> None:
         console.print(f"  {key}: {value}")
 
 
+def print_export(content: dict[str, Any]) -> None:
+    """What an exported model takes and gives."""
+    console = _console()
+    console.print(
+        f"wrote {', '.join(content['files'])}: {content['states']} states, {content['scheme']} steps"
+    )
+    for key in ("inputs", "outputs"):
+        named = (f"{item['name']} ({item['unit']})" for item in content[key])
+        console.print(f"  {key}: {', '.join(named)}")
+    for note in content["notes"]:
+        console.print(f"  {note}")
+
+
 _HEAT_ROWS = (
     ("axial_load_N", "axial load N", 0),
     ("preload_N", "preload N", 0),

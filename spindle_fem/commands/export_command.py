@@ -1,0 +1,52 @@
+"""The function behind ``spindle-fem export``: the fast model of a machine as a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.studies.export.export_machine import machine_state_space
+from spindle_fem.studies.export.exported_files import file_writer
+
+
+def export_machine(
+    machine: str | Path,
+    output: str | Path,
+    overrides: Iterable[str] = (),
+    progress: Callable[[str], None] = lambda stage: None,
+) -> dict[str, Any]:
+    """Write the fast model of a machine to a file of the kind that its suffix says.
+
+    Parameters
+    ----------
+    machine : str or Path
+        A definition file or the name of a machine that ships.
+    output : str or Path
+        ``.npz``, ``.json``, ``.py`` or ``.c`` (with a ``.h`` beside it). Its folder is made where there
+        is none.
+
+    Returns
+    -------
+    dict
+        ``files``, ``machine``, ``scheme``, ``states``, ``inputs``, ``outputs`` and ``notes``.
+
+    Raises
+    ------
+    SpindleFemError
+    """
+    path = Path(output)
+    write = file_writer(path)
+    space = machine_state_space(machine, tuple(overrides), progress)
+    progress("writing")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    header = space.header
+    return {
+        "files": [str(file) for file in write(space, path)],
+        "machine": header["machine"],
+        "scheme": header["scheme"],
+        "states": len(space.arrays["uniform"]),
+        "inputs": header["inputs"],
+        "outputs": header["outputs"],
+        "notes": header["notes"],
+    }

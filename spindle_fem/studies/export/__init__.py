@@ -1,0 +1,1 @@
+"""Fast models as files that other programs step: state space, C, Python, functional mock-up unit."""

@@ -1,0 +1,47 @@
+"""The state space of a machine, with geometry or a written network, by its definition."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from spindle_fem.definition import network_load as network_spec
+from spindle_fem.definition.load import find_machine, load_machine, read_definition
+from spindle_fem.errors import SpecError
+from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.network_inputs import fast_network
+from spindle_fem.studies.export.network_export import network_state_space
+from spindle_fem.studies.export.state_space import StateSpace
+
+Progress = Callable[[str], None]
+
+
+def machine_state_space(
+    machine: str | Path, overrides: Sequence[str] = (), progress: Progress = lambda stage: None
+) -> StateSpace:
+    """What :func:`spindle_fem.studies.simulate.simulate_recordings` marches, for other programs.
+
+    Parameters
+    ----------
+    machine : str or Path
+        A definition file or the name of a machine that ships; with geometry or a ``[network]``.
+    overrides : sequence of str
+        ``path=value`` texts.
+
+    Raises
+    ------
+    SpindleFemError
+    """
+    is_network = network_spec.is_network_machine(read_definition(find_machine(machine)))
+    load = network_spec.load_network_machine if is_network else load_machine
+    spec = load(machine, overrides)
+    if spec.effects:
+        raise SpecError(
+            "effect",
+            f'"{spec.effects[0].effect}" follows what only simulate works out.',
+            "Export the machine without its [[effect]] tables.",
+        )
+    if not is_network:
+        raise SpecError("machine", "has geometry.", "Export a [network] machine.")
+    progress("matrices")
+    return network_state_space(fast_network(build_network(spec.network), spec), spec.name)

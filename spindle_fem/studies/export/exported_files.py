@@ -1,0 +1,178 @@
+"""State spaces as files: .npz and .json for programs that read them, .py and .c that run by themselves."""
+
+from __future__ import annotations
+
+import base64
+import inspect
+import json
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader
+from numpy.typing import NDArray
+
+from spindle_fem.errors import BadInputError
+from spindle_fem.studies.export import portable_model
+from spindle_fem.studies.export.portable_model import GAMMA, STAGE_WEIGHT, START_WEIGHT
+from spindle_fem.studies.export.state_space import EXACT, StateSpace
+
+Array = NDArray[np.float64]
+
+TEMPLATES = Path(__file__).parent / "templates"
+SCHEME_TEXTS = {
+    EXACT: "K is diagonal; steps are exact for loads that are linear in time.",
+    "TR-BDF2": "K, B, C and D follow the inputs by tables; steps are of second order and L-stable.",
+}
+
+
+def file_writer(path: Path) -> Callable[[StateSpace, Path], list[Path]]:
+    """What writes a file of this name.
+
+    Raises
+    ------
+    BadInputError
+        A suffix that no program is known for.
+    """
+    if path.suffix not in WRITERS:
+        raise BadInputError(str(path), f'has the suffix "{path.suffix}".', f"Allowed: {', '.join(WRITERS)}.")
+    return WRITERS[path.suffix]
+
+
+def _write_npz(space: StateSpace, path: Path) -> list[Path]:
+    with path.open("wb") as stream:
+        np.savez_compressed(stream, header=json.dumps(dict(space.header)), **space.arrays)
+    return [path]
+
+
+def _write_json(space: StateSpace, path: Path) -> list[Path]:
+    arrays = {name: values.tolist() for name, values in space.arrays.items()}
+    path.write_text(
+        json.dumps({**space.header, "arrays": arrays}, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
+    return [path]
+
+
+def _write_python(space: StateSpace, path: Path) -> list[Path]:
+    path.write_text(python_source(space), encoding="utf-8")
+    return [path]
+
+
+def python_source(space: StateSpace) -> str:
+    """A module that needs numpy alone: the portable model, its numbers and ``model()``."""
+    lines = [
+        inspect.getsource(portable_model).rstrip(),
+        "",
+        "",
+        f"HEADER = {json.dumps(dict(space.header))!r}",
+        "ARRAYS = {",
+    ]
+    for name, values in space.arrays.items():
+        packed = base64.b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode()
+        lines.append(f"    {name!r}: ({list(values.shape)}, {packed!r}),")
+    lines += [
+        "}",
+        "",
+        "",
+        "def model():",
+        f'    """The model of {_plain(space.header["machine"])} at its start."""',
+    ]
+    return "\n".join([*lines, "    return PortableModel.from_text(HEADER, ARRAYS)", ""])
+
+
+def _write_c(space: StateSpace, path: Path) -> list[Path]:
+    header_file = path.with_suffix(".h")
+    names = {"source_file": path.name, "header_file": header_file.name}
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), keep_trailing_newline=True, autoescape=False
+    )
+    environment.filters |= {"numbers": _numbers, "quoted": lambda text: json.dumps(_plain(text))}
+    content = _c_content(space) | names
+    for file in (path, header_file):
+        template = environment.get_template(f"portable_model{file.suffix}.jinja")
+        file.write_text(template.render(content), encoding="utf-8")
+    return [path, header_file]
+
+
+def c_name(machine: str) -> str:
+    """A machine's name as C has names.
+
+    >>> c_name("bench motor 2")
+    'bench_motor_2'
+    """
+    found = re.sub(r"\W+", "_", machine.lower(), flags=re.ASCII).strip("_") or "machine"
+    return f"machine_{found}" if found[0].isdigit() else found
+
+
+def _c_content(space: StateSpace) -> dict[str, Any]:
+    header, kept = space.header, dict(space.arrays)
+    exact = header["scheme"] == EXACT
+    kept["rate"] = np.diag(kept["conduction"])
+    del kept["conduction" if exact else "rate"]
+    ends = {"low": -np.inf, "high": np.inf, "default": 0.0}
+    for end, none in ends.items():
+        kept[f"input_{end}"] = np.array([none if i[end] is None else i[end] for i in header["inputs"]])
+    load_input = kept.pop("load_input").astype(int)
+    tables, weights = _c_tables(header, kept)
+    plain = {key: [{**i, "name": _plain(i["name"])} for i in header[key]] for key in ("inputs", "outputs")}
+    return {
+        "machine": _plain(header["machine"]),
+        "name": c_name(header["machine"]),
+        **plain,
+        "loads": header["loads"],
+        "longest_step_s": header["longest_step_s"],
+        "scheme_text": SCHEME_TEXTS[header["scheme"]],
+        "exact": exact,
+        "states": len(space.arrays["uniform"]),
+        "powers": load_input.size,
+        "load_input": load_input,
+        "magnitudes": [int(item["magnitude"]) for item in header["inputs"]],
+        "arrays": {name.replace(".", "_"): values for name, values in kept.items()},
+        "tables": tables,
+        "most_axes": max((len(table["grids"]) for table in tables), default=1),
+        "weights": max(weights, 1),
+        "gamma": GAMMA,
+        "diagonal": 0.5 * GAMMA,
+        "stage_weight": STAGE_WEIGHT,
+        "start_weight": START_WEIGHT,
+    }
+
+
+def _c_tables(header: Mapping[str, Any], kept: Mapping[str, Array]) -> tuple[list[dict[str, Any]], int]:
+    """Tables as the template has them, and how many weights the operators have."""
+    found, first = [], {True: kept["load_gain"].size, False: 0}
+    for name, inputs in header["table_inputs"].items():
+        of_loads = name in header["load_tables"]
+        *sizes, columns = kept[f"{name}.values"].shape
+        found.append(
+            {
+                "name": name,
+                "of_loads": of_loads,
+                "inputs": inputs,
+                "grids": [f"{name}_axis{axis}" for axis in range(len(inputs))],
+                "sizes": sizes,
+                "columns": columns,
+                "first": first[of_loads],
+            }
+        )
+        first[of_loads] += columns
+    return found, first[False]
+
+
+def _numbers(values: Array) -> str:
+    """Numbers of an array as C has them, a few a line; infinite ones by the macro of math.h."""
+    texts = [
+        "INFINITY" if v == np.inf else "-INFINITY" if v == -np.inf else repr(v)
+        for v in values.ravel().tolist()
+    ]
+    return "\n    " + ",\n    ".join(", ".join(texts[i : i + 6]) for i in range(0, len(texts), 6)) + "\n"
+
+
+def _plain(text: str) -> str:
+    """A name that ends no comment and no string, whatever it holds."""
+    return re.sub(r"[^\w .|:+()-]", "_", text)
+
+
+WRITERS = {".npz": _write_npz, ".json": _write_json, ".py": _write_python, ".c": _write_c}

@@ -1,0 +1,214 @@
+"""A machine's fast model beside the running machine: inputs in, temperatures out, step by step.
+
+It needs numpy alone. Its states are thermal modes of the machine, scaled so that each stores one unit:
+
+    dx/dt = -K x + B w        y = C x + D w        w = loads(inputs)
+
+``w`` are heats [W] and fluid temperatures [°C]: ``gain (input + offset)^exponent``, or tables over
+inputs. With ``scheme = "exact"`` ``K`` is diagonal and a step is exact for loads that are linear in
+time. With ``scheme = "TR-BDF2"`` ``K``, ``B``, ``C`` and ``D`` follow the inputs,
+
+    K = K_0 + a_1 K_1 + a_2 K_2 + ...
+
+with ``a_i`` from tables, and steps are of second order and L-stable. Temperatures are in °C, all else
+in the units that the model names.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+
+SCHEMA = "spindle-fem/state-space/1"
+# TR-BDF2, Bank et al. (1985), IEEE Trans. CAD 4, 436-451.
+GAMMA = 2.0 - math.sqrt(2.0)
+STAGE_WEIGHT, START_WEIGHT = 0.5 + 1.0 / math.sqrt(2.0), 1.0 / math.sqrt(2.0) - 0.5
+
+
+class PortableModel:
+    """A fast model and the state that it is in.
+
+    Parameters
+    ----------
+    header : dict
+        Names, units, ranges and what belongs together, as the .json file has it.
+    arrays : dict of str to ndarray
+
+    Attributes
+    ----------
+    inputs, outputs : list of str
+        Names, in the order of vectors.
+    state : (r,) ndarray
+    """
+
+    def __init__(self, header, arrays):
+        if header.get("schema") != SCHEMA:
+            raise ValueError(f"schema {header.get('schema')!r}: this program reads {SCHEMA!r}.")
+        self.header = header
+        self.arrays = {name: np.asarray(values, dtype=float) for name, values in arrays.items()}
+        self.inputs = [item["name"] for item in header["inputs"]]
+        self.outputs = [item["name"] for item in header["outputs"]]
+        self._low = np.array([-np.inf if i["low"] is None else i["low"] for i in header["inputs"]])
+        self._high = np.array([np.inf if i["high"] is None else i["high"] for i in header["inputs"]])
+        self._default = np.array([item["default"] for item in header["inputs"]], dtype=float)
+        self._unsigned = np.array([item["magnitude"] for item in header["inputs"]], dtype=bool)
+        self._solver = None
+        self.state = self.arrays["uniform"] * header["initial_degC"]
+
+    @classmethod
+    def load(cls, path):
+        """A model from a .npz or .json file."""
+        if Path(path).suffix == ".json":
+            content = json.loads(Path(path).read_text(encoding="utf-8"))
+            arrays = content.pop("arrays")
+            return cls(content, arrays)
+        with np.load(path, allow_pickle=False) as found:
+            arrays = {name: found[name] for name in found.files}
+        return cls(json.loads(str(arrays.pop("header"))), arrays)
+
+    @classmethod
+    def from_text(cls, header, packed):
+        """A model from its header and arrays as (shape, base64 text of little-endian doubles)."""
+        arrays = {
+            name: np.frombuffer(base64.b64decode(text), dtype="<f8").reshape(shape)
+            for name, (shape, text) in packed.items()
+        }
+        return cls(json.loads(header), arrays)
+
+    # ------------------------------------------------------------------- inputs
+    def vector(self, inputs):
+        """Inputs as a vector (m,): a mapping of names, defaults where absent; or the vector itself."""
+        if not hasattr(inputs, "keys"):
+            return np.array(inputs, dtype=float)
+        unknown = [name for name in inputs if name not in self.inputs]
+        if unknown:
+            raise KeyError(f"{unknown[0]!r} is no input. Allowed: {', '.join(self.inputs)}.")
+        return np.array(
+            [inputs.get(n, d) for n, d in zip(self.inputs, self._default, strict=True)], dtype=float
+        )
+
+    def outside(self, inputs):
+        """Names of inputs beyond the range of the model, or no numbers."""
+        values = self._signed(self.vector(inputs))
+        beyond = ~((values >= self._low) & (values <= self._high))
+        return [name for name, out in zip(self.inputs, beyond, strict=True) if out]
+
+    def _signed(self, values):
+        return np.where(self._unsigned, np.abs(values), values)
+
+    def _usable(self, inputs):
+        """Inputs with those beyond the range at its ends, and defaults for what is no number."""
+        values = self._signed(self.vector(inputs))
+        return np.clip(np.where(np.isnan(values), self._default, values), self._low, self._high)
+
+    def loads(self, values):
+        """Heats [W] and fluid temperatures [°C] at usable inputs, (k,)."""
+        kept = self.arrays
+        source = kept["load_input"].astype(int)
+        driven = np.append(values, 1.0)[source] + kept["load_offset"]
+        found = kept["load_gain"] * driven ** kept["load_exponent"]
+        more = [self._lookup(name, values) for name in self.header["load_tables"]]
+        return np.concatenate((found, *more))
+
+    def _lookup(self, name, values):
+        """A table's row at usable inputs: linear between the points of its axes."""
+        found = self.arrays[f"{name}.values"]
+        for axis, number in enumerate(self.header["table_inputs"][name]):
+            grid, value = self.arrays[f"{name}.axis{axis}"], values[number]
+            left = min(max(int(np.searchsorted(grid, value, side="right")) - 1, 0), len(grid) - 2)
+            part = (value - grid[left]) / (grid[left + 1] - grid[left])
+            found = (1.0 - part) * found[left] + part * found[left + 1]
+        return found
+
+    def matrices(self, values):
+        """K, B, C and D at usable inputs."""
+        kept = self.arrays
+        found = [kept["conduction"], kept["load"], kept["output"], kept["feedthrough"]]
+        for name in self.header["operator_tables"]:
+            weights = self._lookup(name, values)
+            for number, part in enumerate(("conduction", "load", "output", "feedthrough")):
+                found[number] = found[number] + np.tensordot(weights, kept[f"{name}.{part}"], axes=1)
+        return found
+
+    # -------------------------------------------------------------------- states
+    def start(self, temperature, inputs=None):
+        """Begin at a uniform temperature, °C, or at readings: a mapping of outputs to °C.
+
+        Between readings the machine starts in the balance in which heat enters or leaves it only where
+        it is read, and as the inputs say.
+        """
+        if not hasattr(temperature, "keys"):
+            self.state = self.arrays["uniform"] * float(temperature)
+            return
+        values = self._usable({} if inputs is None else inputs)
+        conduction, load, output, feedthrough = self.matrices(values)
+        rows = [self.outputs.index(name) for name in temperature]
+        loads, size = self.loads(values), len(self.state)
+        system = np.zeros((size + len(rows), size + len(rows)))
+        system[:size, :size], system[:size, size:], system[size:, :size] = (
+            conduction, output[rows].T, output[rows],
+        )  # fmt: skip
+        read = np.array(list(temperature.values()), dtype=float) - feedthrough[rows] @ loads
+        self.state = np.linalg.solve(system, np.concatenate((load @ loads, read)))[:size]
+
+    def settle(self, inputs):
+        """Go to the steady state of constant inputs."""
+        values = self._usable(inputs)
+        conduction, load, _, _ = self.matrices(values)
+        self.state = np.linalg.solve(conduction, load @ self.loads(values))
+
+    def read(self, inputs):
+        """Every output at this moment, (p,)."""
+        values = self._usable(inputs)
+        _, _, output, feedthrough = self.matrices(values)
+        return output @ self.state + feedthrough @ self.loads(values)
+
+    def step(self, seconds, inputs, inputs_after=None):
+        """Go on by some seconds, with inputs held, or going straight to those after.
+
+        Steps longer than the model's longest are divided; inputs beyond its range count as its end.
+
+        Returns
+        -------
+        list of str
+            Inputs that were beyond the range.
+        """
+        after = inputs if inputs_after is None else inputs_after
+        begin, end = self._usable(inputs), self._usable(after)
+        number = max(1, math.ceil(seconds / self.header["longest_step_s"] - 1e-9))
+        advance = self._exact if self.header["scheme"] == "exact" else self._tr_bdf2
+        for piece in range(number):
+            first, last = (begin + (end - begin) * (at / number) for at in (piece, piece + 1))
+            advance(seconds / number, first, last)
+        return sorted({*self.outside(inputs), *self.outside(after)})
+
+    def _exact(self, step, first, last):
+        """Each mode by itself, for loads that are linear in time."""
+        kept = self.arrays
+        start, end = (kept["load"] @ self.loads(values) for values in (first, last))
+        decay = step * np.diag(kept["conduction"])
+        small = np.abs(decay) < 1e-4
+        usual = np.where(small, 1.0, decay)
+        mean = np.where(small, 1.0 - decay / 2.0 + decay**2 / 6.0, -np.expm1(-usual) / usual)
+        ramp = np.where(small, 0.5 - decay / 6.0 + decay**2 / 24.0, (1.0 - mean) / usual)
+        self.state = np.exp(-decay) * self.state + step * (mean * start + ramp * (end - start))
+
+    def _tr_bdf2(self, step, first, last):
+        """Two implicit stages with the matrices of the step's mean inputs."""
+        key = (round(step, 6), *(0.5 * (first + last)))
+        if self._solver is None or self._solver[0] != key:
+            conduction, load, _, _ = self.matrices(0.5 * (first + last))
+            weight = 0.5 * GAMMA * step
+            inverse = np.linalg.inv(np.eye(len(conduction)) + weight * conduction)
+            self._solver = key, conduction, load, inverse
+        _, conduction, load, inverse = self._solver
+        weight = 0.5 * GAMMA * step
+        start, end = load @ self.loads(first), load @ self.loads(last)
+        before = self.state
+        right = before - weight * (conduction @ before) + weight * ((2.0 - GAMMA) * start + GAMMA * end)
+        stage = inverse @ right
+        self.state = inverse @ (STAGE_WEIGHT * stage - START_WEIGHT * before + weight * end)

@@ -1,0 +1,134 @@
+"""A fast model as named matrices and tables: what every exported file holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from spindle_fem.studies.export.portable_model import SCHEMA, PortableModel
+
+Array = NDArray[np.float64]
+
+# Room and start where a program that steps the model says nothing, °C.
+USUAL_TEMPERATURE = 20.0
+EXACT, TR_BDF2 = "exact", "TR-BDF2"
+
+
+@dataclass(frozen=True, slots=True)
+class StateSpace:
+    """A machine's fast model for other programs.
+
+    Attributes
+    ----------
+    header : mapping
+        ``machine``, ``scheme``, ``inputs``, ``outputs``, ``loads`` with names and units, ranges, and
+        which arrays are tables over which inputs; plain data.
+    arrays : mapping of str to ndarray
+        As :mod:`spindle_fem.studies.export.portable_model` uses them.
+    """
+
+    header: Mapping[str, Any]
+    arrays: Mapping[str, Array]
+
+    def model(self) -> PortableModel:
+        """The model at its start, to be stepped."""
+        return PortableModel(dict(self.header), dict(self.arrays))
+
+
+@dataclass(frozen=True, slots=True)
+class ModelInput:
+    """One input of an exported model.
+
+    Attributes
+    ----------
+    low, high : float or None
+        Range of the model; None where there is no end to it.
+    magnitude : bool
+        Whether its sign says nothing: a rotational speed.
+    """
+
+    name: str
+    unit: str
+    default: float
+    low: float | None = None
+    high: float | None = None
+    magnitude: bool = False
+
+    def as_plain(self) -> dict[str, Any]:
+        """As the header has it."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
+
+@dataclass(frozen=True, slots=True)
+class PowerLoad:
+    """A heat [W] or a fluid's temperature [°C] that is ``gain (input + offset)^exponent``.
+
+    Attributes
+    ----------
+    input : int
+        Position of the input; -1 for none, where the load is its gain.
+    """
+
+    name: str
+    unit: str
+    input: int
+    gain: float = 1.0
+    exponent: float = 1.0
+    offset: float = 0.0
+
+
+def modal_basis(storage: Array, conduction: Array) -> Array:
+    """Modes of a model as columns, each scaled to store one unit, (n, n).
+
+    Parameters
+    ----------
+    storage, conduction : (n, n) ndarray
+        Symmetric; the storage positive definite.
+    """
+    return eigh(conduction, storage)[1]
+
+
+def power_load_arrays(loads: Sequence[PowerLoad]) -> dict[str, Array]:
+    """Arrays of the loads that are powers of inputs."""
+    columns = ("input", "gain", "exponent", "offset")
+    return {f"load_{name}": np.array([float(getattr(load, name)) for load in loads]) for name in columns}
+
+
+def header_of(
+    machine: str,
+    scheme: str,
+    longest_step: float,
+    inputs: Sequence[ModelInput],
+    outputs: Mapping[str, str],
+    loads: Mapping[str, str],
+) -> dict[str, Any]:
+    """Header of a model without tables.
+
+    Parameters
+    ----------
+    longest_step : float, [s]
+    outputs, loads : mapping of name to unit
+    """
+
+    def named(units: Mapping[str, str]) -> list[dict[str, str]]:
+        return [{"name": name, "unit": unit} for name, unit in units.items()]
+
+    return {
+        "schema": SCHEMA,
+        "machine": machine,
+        "scheme": scheme,
+        "longest_step_s": longest_step,
+        "initial_degC": USUAL_TEMPERATURE,
+        "inputs": [item.as_plain() for item in inputs],
+        "outputs": named(outputs),
+        "loads": named(loads),
+        "load_tables": [],
+        "operator_tables": [],
+        "table_inputs": {},
+        "notes": [],
+    }
