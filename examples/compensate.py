@@ -34,8 +34,8 @@ def compensation(power, room):
 
 
 def machine_rates(time, state):
-    """The machine itself: rates of both temperatures, K/s."""
-    between, lost = 3.0 * (state[0] - state[1]), 2.0 * (state[1] - 22.0)
+    """The machine itself, which loses 4 % more than the model has it: rates of both temperatures, K/s."""
+    between, lost = 3.0 * (state[0] - state[1]), 2.08 * (state[1] - 22.0)
     return [(power_at(time) - between) / 500.0, (between - lost) / 900.0]
 
 
@@ -45,12 +45,9 @@ def power_at(time):
 
 
 times = np.arange(0.0, 9000.0, CYCLE)
-true = solve_ivp(machine_rates, (0.0, 9000.0), [COLD, COLD], t_eval=times + CYCLE, max_step=5.0, rtol=1e-8).y[
-    1
-]
+told = solve_ivp(machine_rates, (0.0, 9000.0), [COLD, COLD], t_eval=times + CYCLE, max_step=5.0, rtol=1e-8)
+growth = GROWTH * (told.y[1] - COLD)
 shifts = np.array([compensation(power_at(time), 22.0) for time in times])
-growth = GROWTH * (true - COLD)
-print(
-    f"growth of the shaft up to {growth.max():.1f} µm, up to {np.abs(growth + shifts).max():.2f} µm of it left"
-)
-assert np.abs(growth + shifts).max() < 0.02 * growth.max()
+left = np.abs(growth + shifts).max()
+print(f"growth of the shaft up to {growth.max():.1f} µm, up to {left:.1f} µm of it left")
+assert left < 0.1 * growth.max()

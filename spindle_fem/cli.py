@@ -84,7 +84,7 @@ def export(
 
     with stages(not as_json) as tell:
         content = export_machine(machine, output, overrides=set_ or (), progress=tell)
-    _print_json(content) if as_json else print_export(content)
+    print_json(content) if as_json else print_export(content)
 
 
 @app.command()
@@ -200,7 +200,14 @@ def simulate(
     machine: Machine,
     recording: Annotated[Path, typer.Argument(help="Folder or .toml file of a recording.")],
     output: Folder,
-    calibrate: Calibrate = None,
+    calibrate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--calibrate",
+            metavar="FILE",
+            help="Recording that may move the uncertain parameters; repeatable.",
+        ),
+    ] = None,
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
