@@ -10,7 +10,7 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint lowest wheel-check reference study book proof clean
+.PHONY: run test setup lint lowest docs wheel-check reference study book proof clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
@@ -43,6 +43,11 @@ wheel-check: $(READY)
 # The lowest versions that pyproject.toml allows, in an environment of their own, and a sample of the tests on them.
 lowest: $(READY)
 	bash scripts/lowest_versions.sh $(BIN)/python
+
+# Texts, reference from docstrings and the gallery of examples, which is run for it: build/docs/index.html.
+docs: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(BIN)/python -m scripts.documentation_site build/docs
 
 # Concealed cases from the independent model, diagnosed without their answers, then scored. Resumable.
 STUDY ?= runs/study

@@ -11,6 +11,7 @@ from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.report.crosscheck_charts import write_crosscheck_figures
 from spindle_fem.report.crosscheck_report import write_crosscheck_report
 from spindle_fem.results.output_folder import output_folder, replace_text
+from spindle_fem.results.run_log import LOGGER
 from spindle_fem.studies.crosscheck.crosscheck_study import Crosscheck, crosscheck
 from spindle_fem.studies.crosscheck.network_files import export_network
 
@@ -51,7 +52,7 @@ def crosscheck_machine(
     SpindleFemError
         Bad input, or a model that has no solution.
     """
-    tell = progress or (lambda stage: None)
+    tell = progress or LOGGER.info
     spec = load_machine(machine, overrides)
     with output_folder(folder) as place:
         found = crosscheck(spec, tell)

@@ -28,6 +28,7 @@ from spindle_fem.parallel import thread_count
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.results.output_folder import output_folder, replace_text
+from spindle_fem.results.run_log import LOGGER
 
 Progress = Callable[[str], None]
 STATE_COLUMNS = ("start", "end", "effect", "component", "value", "unit")
@@ -108,7 +109,7 @@ def diagnose_without_report(
 def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
     started = time.perf_counter()
     require_choice(asked.full_model)
-    tell = asked.progress or (lambda stage: None)
+    tell = asked.progress or LOGGER.info
     tell("reading")
     read = [recording_of(item) for item in asked.recordings]
     earlier = [recording_of(item) for item in asked.calibrate]

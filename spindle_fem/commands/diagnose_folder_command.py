@@ -22,6 +22,7 @@ from spindle_fem.recordings.manifest import find_manifest, load_manifest
 from spindle_fem.recordings.recording_folder import recordings_in
 from spindle_fem.report.diagnoses_report import DIAGNOSES, DIAGNOSES_SCHEMA, write_diagnoses_report
 from spindle_fem.results.output_folder import is_complete, output_folder, replace_text
+from spindle_fem.results.run_log import LOGGER
 from spindle_fem.studies.sweep.results_table import FAILED, OK, ResultTable, Row
 from spindle_fem.studies.sweep.study_lock import folder_lock
 
@@ -69,7 +70,7 @@ def diagnose_folder(
     *,
     jobs: int = 1,
     scheduler: str | None = None,
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Callable[[str], None] = LOGGER.info,
 ) -> dict[str, Any]:
     """Diagnose every recording of a folder by itself.
 

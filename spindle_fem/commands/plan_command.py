@@ -36,6 +36,7 @@ from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.machine.view.usual_sizes import short_unit
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.results.output_folder import output_folder, replace_text
+from spindle_fem.results.run_log import LOGGER
 from spindle_fem.units import TEMPERATURE_UNIT, ZERO_CELSIUS_K, to_si
 
 Progress = Callable[[str], None]
@@ -98,7 +99,7 @@ def plan(
     SpindleFemError
     """
     started = time.perf_counter()
-    tell = progress or (lambda stage: None)
+    tell = progress or LOGGER.info
     planned = planned_measurement(
         machine,
         test=test,

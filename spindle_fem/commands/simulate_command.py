@@ -25,6 +25,7 @@ from spindle_fem.recordings.compare import (
 from spindle_fem.report.read_against_predicted import draw_channels
 from spindle_fem.report.simulation_report import write_simulation_report
 from spindle_fem.results.output_folder import output_folder, replace_text
+from spindle_fem.results.run_log import LOGGER
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.studies.simulate import Simulation, simulate_recordings
 
@@ -72,7 +73,7 @@ def simulate_machine(
     SpindleFemError
     """
     started = time.perf_counter()
-    tell = progress or (lambda stage: None)
+    tell = progress or LOGGER.info
     tell("reading")
     read = recording_of(recording)
     others = [recording_of(item) for item in calibrate]

@@ -18,6 +18,7 @@ from spindle_fem.model.reduced.defined_effects import physics_of
 from spindle_fem.report.transient_report import write_transient_report
 from spindle_fem.results.field_series import FieldSeries
 from spindle_fem.results.output_folder import output_folder, replace_text
+from spindle_fem.results.run_log import LOGGER
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
 from spindle_fem.studies.shipped_files import find_study
@@ -35,7 +36,7 @@ def run_transient_study(
     machine: str | Path | None = None,
     overrides: Iterable[str] = (),
     restart: str | Path | None = None,
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Callable[[str], None] = LOGGER.info,
     keep: Callable[[PreparedMachine, StudyResult], None] = lambda machine, result: None,
 ) -> dict[str, Any]:
     """Run a transient study by the full model and write what came of it.

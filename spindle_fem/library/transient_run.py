@@ -12,6 +12,7 @@ from spindle_fem.library.loaded_machine import Machine, Progress, definition_fil
 from spindle_fem.model.mesh.evaluate import temperature_at_nodes
 from spindle_fem.report import transient_charts
 from spindle_fem.report.pyvista_grid import grid_of
+from spindle_fem.results.run_log import LOGGER
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.studies.transient_study import StudyResult
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -93,7 +94,7 @@ def transient(
     machine: Machine | None = None,
     overrides: Iterable[str] = (),
     restart: str | Path | None = None,
-    progress: Progress = lambda stage: None,
+    progress: Progress = LOGGER.info,
 ) -> TransientRun:
     """Run a transient study by the full model.
 

@@ -5,6 +5,7 @@ A figure is a matplotlib ``Figure`` sized in pixels.
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -119,10 +120,19 @@ def grouped(number: int) -> str:
     return f"{number:,}".replace(",", "\u202f")
 
 
+class ShownFigure(Figure):
+    """A figure that notebooks draw when it is the last value of a cell."""
+
+    def _repr_png_(self) -> bytes:
+        stream = io.BytesIO()
+        self.savefig(stream, format="png")
+        return stream.getvalue()
+
+
 def new_figure(height_px: float, width_px: float = WIDTH_PX) -> Figure:
     """Empty white figure of a size in pixels, with the house style."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(width_px / DPI, height_px / DPI), dpi=DPI, facecolor="white")
+        figure = ShownFigure(figsize=(width_px / DPI, height_px / DPI), dpi=DPI, facecolor="white")
         FigureCanvasAgg(figure)
     return figure
 

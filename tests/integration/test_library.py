@@ -99,6 +99,7 @@ def test_a_simulated_recording(simulated, recording, tmp_path):
     kept = simulated.save(tmp_path / "kept")
     assert is_complete(kept)
     assert (kept / "report.html").read_bytes() == simulated.report.read_bytes()
+    assert "INFO    simulation" in (kept / "log.txt").read_text(encoding="utf-8")
 
 
 def test_a_folder_that_was_not_asked_for_goes_with_its_result(recording, tmp_path):
