@@ -1,4 +1,4 @@
-"""The reference has every public name, and the texts of ``docs/`` lead to one another; needs the extra ``docs``."""
+"""The reference has every public name, texts lead to one another; needs the extra ``docs``."""
 
 import re
 

@@ -20,6 +20,7 @@ from spindle_fem.report.run_outputs import OutputHelpers, write_outputs
 from spindle_fem.report.run_report import in_order, rebuild_report, render_run_report
 from spindle_fem.results.dataset import build_dataset, read_dataset
 from spindle_fem.results.output_folder import output_folder
+from spindle_fem.results.run_log import LOG_FILE
 from spindle_fem.results.run_summary import build_summary
 from spindle_fem.results.thermal_result import (
     Check,
@@ -216,7 +217,8 @@ def run_folder(result, tmp_path_factory):
 @pytest.mark.render
 def test_a_run_writes_every_file(run_folder):
     names = {item.name for item in run_folder.iterdir()}
-    assert names == {"summary.json", "fields.vtu", "result.nc", "machine.toml", "figures", "report.html"}
+    expected = {"summary.json", "fields.vtu", "result.nc", "machine.toml", "figures", "report.html", LOG_FILE}
+    assert names == expected
     figures = {item.stem for item in (run_folder / "figures").iterdir()}
     assert figures == {
         *(
