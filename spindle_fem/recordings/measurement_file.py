@@ -1,0 +1,316 @@
+"""Files of measuring devices: cells by column from text, Excel, Parquet, HDF5 or TDMS, as the file has them."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import importlib
+import io
+import re
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from spindle_fem.errors import RecordingError
+from spindle_fem.recordings.column_units import unit_of_text, without_unit
+
+TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".asc", ".dat")
+EXCEL_SUFFIXES = (".xlsx", ".xlsm")
+HDF5_SUFFIXES = (".h5", ".hdf5")
+MEASUREMENT_SUFFIXES = (*TEXT_SUFFIXES, ".csv.gz", *EXCEL_SUFFIXES, ".parquet", *HDF5_SUFFIXES, ".tdms")
+SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar"}
+# Lines by which a file's form is judged: beyond any preamble, and still quick.
+LINES_JUDGED = 400
+_MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
+_NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)*|[.,]\d+)(?:[eE][+-]?\d+)?"
+_VALUE = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf)")
+_STAMP = re.compile(r"(?=.*\d)\d{1,4}[-./:]\d{1,2}[-./:T ]?[\d:.,TZ +\-/APMapm]*")
+
+
+@dataclass(frozen=True, slots=True)
+class MeasurementTable:
+    """One table of a measuring device.
+
+    Attributes
+    ----------
+    cells : DataFrame
+        By column, in file order: text where the file holds text, otherwise numbers or stamps.
+    units : dict of str to str
+        By column, those that the file states.
+    first_line : int
+        Line or row of the file in which the first row of ``cells`` stands.
+    found : tuple of str
+        How the file is built, for whoever reads the draft.
+    unsure : tuple of str
+        What about that could be otherwise.
+    """
+
+    path: Path
+    cells: pd.DataFrame
+    units: dict[str, str]
+    first_line: int
+    found: tuple[str, ...]
+    unsure: tuple[str, ...]
+
+
+def read_measurement(path: Path) -> MeasurementTable:
+    """Cells of a file, its kind told by its ending.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read, is of no known kind, its reader is not installed, or it holds no table.
+    """
+    name = path.name.lower()
+    if not path.is_file():
+        raise RecordingError(str(path), "does not exist.", "Give a file of measurements.")
+    if not name.endswith(MEASUREMENT_SUFFIXES):
+        raise RecordingError(
+            str(path), "is of unknown kind.", f"Allowed endings: {', '.join(MEASUREMENT_SUFFIXES)}."
+        )
+    if name.endswith((*TEXT_SUFFIXES, ".gz")):
+        return _read_text(path)
+    if name.endswith(EXCEL_SUFFIXES):
+        return _read_excel(path)
+    try:
+        frame = _read_binary(path, name)
+    except (OSError, ValueError, KeyError) as error:
+        raise RecordingError(str(path), f"cannot be read ({error}).") from error
+    frame.columns = pd.Index(_distinct([str(item) for item in frame.columns]))
+    return _named(path, frame, [""] * frame.shape[1], 1, [f"{path.suffix[1:].upper()} file"], [])
+
+
+def _read_binary(path: Path, name: str) -> pd.DataFrame:
+    if name.endswith(".parquet"):
+        frame = pd.read_parquet(path)
+        return frame if isinstance(frame.index, pd.RangeIndex) else frame.reset_index()
+    if name.endswith(HDF5_SUFFIXES):
+        return _read_hdf5(path)
+    _require("nptdms", path)
+    from nptdms import TdmsFile
+
+    columns = {}
+    for group in TdmsFile.read(path).groups():
+        for channel in group.channels():
+            unit = channel.properties.get("unit_string", "")
+            columns[f"{channel.name} [{unit}]" if unit else channel.name] = channel[:]
+            if "time" not in columns and "wf_increment" in channel.properties:
+                columns = {"time [s]": channel.time_track(), **columns}
+    return _of_most_common_length(path, columns)
+
+
+def _read_hdf5(path: Path) -> pd.DataFrame:
+    import h5py
+
+    columns: dict[str, np.ndarray] = {}
+
+    def add(name: str, item: object) -> None:
+        if not isinstance(item, h5py.Dataset) or item.ndim != 1:
+            return
+        values = item[:]
+        if values.dtype.names:
+            columns.update({field: values[field] for field in values.dtype.names})
+            return
+        unit = item.attrs.get("units", item.attrs.get("unit", ""))
+        unit = unit.decode() if isinstance(unit, bytes) else str(unit)
+        columns[f"{name} [{unit}]" if unit else name] = values
+
+    with h5py.File(path, "r") as file:
+        file.visititems(add)
+    columns = {
+        name: np.array([cell.decode("utf-8", "replace") for cell in values])
+        if values.dtype.kind in "SO" and len(values) and isinstance(values[0], bytes)
+        else values
+        for name, values in columns.items()
+    }
+    return _of_most_common_length(path, columns)
+
+
+def _of_most_common_length(path: Path, columns: dict[str, np.ndarray]) -> pd.DataFrame:
+    lengths = [len(values) for values in columns.values() if len(values) > 1]
+    if not lengths:
+        raise RecordingError(str(path), "holds no columns of numbers.")
+    usual = max(set(lengths), key=lengths.count)
+    other = [name for name, values in columns.items() if len(values) not in (usual, 0, 1)]
+    if other:
+        raise RecordingError(
+            str(path),
+            f"holds columns of different lengths ({', '.join(other[:3])} beside others of {usual}).",
+            "Write columns of one clock into one file and draft from several files.",
+        )
+    return pd.DataFrame({name: values for name, values in columns.items() if len(values) == usual})
+
+
+def _require(module: str, path: Path) -> None:
+    try:
+        importlib.import_module(module)
+    except ImportError as error:
+        raise RecordingError(
+            str(path),
+            f"needs the package {module}, which is not installed.",
+            'Install it with: pip install "spindle-fem[files]", or save the file as CSV.',
+        ) from error
+
+
+def _read_excel(path: Path) -> MeasurementTable:
+    _require("openpyxl", path)
+    try:
+        sheets = pd.read_excel(path, sheet_name=None, header=None, engine="openpyxl", dtype=object)
+    except Exception as error:  # openpyxl lets through whatever zip, XML and its own checks raise
+        raise RecordingError(str(path), f"is not a readable workbook ({error}).") from error
+    name = max(sheets, key=lambda key: sheets[key].size)
+    rows = [[_as_text(cell) for cell in row] for row in sheets[name].to_numpy()]
+    unsure = []
+    if sum(sheet.size > 0 for sheet in sheets.values()) > 1:
+        others = ", ".join(key for key in sheets if key != name)
+        unsure.append(f'sheet "{name}" is taken, the largest; others: {others}')
+    return _table(path, rows, [f'Excel sheet "{name}"'], unsure, word="row")
+
+
+def _as_text(cell: object) -> str:
+    if cell is None or cell is pd.NaT or (isinstance(cell, float) and np.isnan(cell)):
+        return ""
+    return cell.isoformat(sep=" ") if hasattr(cell, "hour") and hasattr(cell, "year") else str(cell)
+
+
+def _read_text(path: Path) -> MeasurementTable:
+    try:
+        content = path.read_bytes()
+        if path.name.endswith(".gz"):
+            content = gzip.decompress(content)
+    except (OSError, EOFError, zlib.error) as error:
+        raise RecordingError(str(path), f"cannot be read ({error}).") from error
+    text, encoding, unsure = _decoded(content, path)
+    lines = text.splitlines()
+    separator = max(SEPARATORS, key=lambda sign: _fit(lines[:LINES_JUDGED], sign))
+    try:
+        rows = [
+            [cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=separator)
+        ]
+    except csv.Error as error:
+        raise RecordingError(str(path), f"is not a readable table ({error}).") from error
+    if len(rows) != len(lines):
+        unsure.append("quoted cells run over several lines: numbers of lines count rows of the table")
+    found = [f"{encoding} text, cells apart by a {SEPARATORS[separator]}"]
+    return _table(path, rows, found, unsure, word="line")
+
+
+def _decoded(content: bytes, path: Path) -> tuple[str, str, list[str]]:
+    """Text, its encoding, and what is unsure about that."""
+    if not content.strip():
+        raise RecordingError(str(path), "is empty.")
+    for mark, encoding in _MARKS:
+        if content.startswith(mark):
+            return _decode(content, encoding, path), encoding.removesuffix("-sig").upper(), []
+    zeros = np.frombuffer(content[:4000], dtype=np.uint8) == 0
+    if zeros.mean() > 0.3:  # nearly every second byte of Western text in UTF-16
+        encoding = "utf-16-le" if zeros[1::2].mean() > zeros[::2].mean() else "utf-16-be"
+        return _decode(content, encoding, path), encoding.upper(), []
+    if zeros.any():
+        line = content.count(b"\n", 0, content.find(b"\0")) + 1
+        raise RecordingError(f"{path}: line {line}", "holds a zero byte: no text file.")
+    try:
+        return content.decode("utf-8"), "UTF-8", []
+    except UnicodeDecodeError:
+        doubt = "the encoding is taken as Windows-1252 (Latin-1), as Western European devices write it"
+        return content.decode("cp1252", "replace"), "Windows-1252", [doubt]
+
+
+def _decode(content: bytes, encoding: str, path: Path) -> str:
+    try:
+        return content.decode(encoding).removeprefix("\ufeff")
+    except UnicodeDecodeError as error:
+        raise RecordingError(str(path), f"is not {encoding} text to its end ({error.reason}).") from error
+
+
+def _fit(lines: list[str], separator: str) -> float:
+    """How much of some lines reads as numbers and stamps when they are cut at a separator."""
+    rows = [row for row in csv.reader(lines, delimiter=separator) if len(row) > 1]
+    if not rows:
+        return 0.0
+    widths = [len(row) for row in rows]
+    usual = max(set(widths), key=widths.count)
+    cells = [cell.strip() for row in rows if len(row) == usual for cell in row]
+    # of rows of one width, by the share of lines that have it
+    return sum(map(_is_value, cells)) / len(cells) * widths.count(usual) / len(lines)
+
+
+def _is_value(cell: str) -> bool:
+    return bool(_VALUE.fullmatch(cell.lower()) or _STAMP.fullmatch(cell))
+
+
+def _table(
+    path: Path, rows: list[list[str]], found: list[str], unsure: list[str], *, word: str
+) -> MeasurementTable:
+    """Preamble, names, units and cells of rows of text."""
+    body = _first_of_body(rows)
+    if body is None:
+        raise RecordingError(str(path), "holds no table of numbers.", "Rows of numbers and stamps are needed.")
+    widths = [len(row) for row in rows[body:] if any(row)]
+    width = max(set(widths), key=widths.count)
+    heading = [number for number in range(body) if sum(bool(cell) for cell in rows[number]) > width / 2]
+    unit_rows = [n for n in heading if all(unit_of_text(c) for c in rows[n] if c.strip("-[]() "))]
+    named = [number for number in heading if number not in unit_rows]
+    names = (rows[named[-1]] if named else []) + [""] * width
+    units = (rows[unit_rows[-1]] if unit_rows else []) + [""] * width
+    if not named:
+        unsure.append("no row of names: columns are numbered")
+    elif named[-1]:
+        found.append(f"{named[-1]} {word}s before the names are left out")
+    if unit_rows:
+        found.append(f"units in {word} {unit_rows[-1] + 1}")
+    names = _distinct([names[i] or f"column_{i + 1}" for i in range(width)])
+    whole = [row for row in rows[body:]]
+    long = [number for number, row in enumerate(whole) if any(row[width:])]
+    if long:
+        raise RecordingError(
+            f"{path}: {word} {long[0] + body + 1}", f"has {len(whole[long[0]])} cells, others have {width}."
+        )
+    short = sum(bool(row) and len(row) < width for row in whole)
+    if short:
+        unsure.append(f"{short} {word}s have fewer cells than the others: the missing ones count as empty")
+    cells = pd.DataFrame([(row + [""] * width)[:width] for row in whole], columns=names, dtype=object)
+    return _named(path, cells, units, body + 1, found, unsure)
+
+
+def _first_of_body(rows: list[list[str]]) -> int | None:
+    """First row from which on rows hold mostly numbers or stamps."""
+    for number, row in enumerate(rows[:LINES_JUDGED]):
+        filled = [cell for cell in row if cell]
+        if len(filled) < 2 or sum(map(_is_value, filled)) < len(filled) / 2:
+            continue
+        following = [other for other in rows[number + 1 : number + 6] if any(other)]
+        if sum(len(other) == len(row) for other in following) >= max(1, len(following) / 2):
+            return number
+    return None
+
+
+def _named(
+    path: Path, cells: pd.DataFrame, units: list[str], first_line: int, found: list[str], unsure: list[str]
+) -> MeasurementTable:
+    """Names without the units that stand in them."""
+    stated, names = {}, []
+    for name, cell in zip(cells.columns, units, strict=False):
+        plain, inside = without_unit(name)
+        names.append(plain)
+        unit = unit_of_text(cell) or inside
+        if unit:
+            stated[plain] = unit
+    if len(set(names)) == len(names):
+        cells = cells.set_axis(names, axis=1)
+    else:
+        stated = {old: stated[new] for old, new in zip(cells.columns, names, strict=True) if new in stated}
+    return MeasurementTable(path, cells, stated, first_line, tuple(found), tuple(unsure))
+
+
+def _distinct(names: list[str]) -> list[str]:
+    """Names with a number behind those that occur again."""
+    seen: dict[str, int] = {}
+    result = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        result.append(name if seen[name] == 1 else f"{name}_{seen[name]}")
+    return result
