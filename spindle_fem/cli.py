@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from spindle_fem.command_line import diagnosis_commands
+from spindle_fem.command_line import diagnosis_commands, recording_commands
 from spindle_fem.command_line.application import (
     AsJson,
     Folder,
@@ -22,7 +22,7 @@ from spindle_fem.command_line.application import (
 )
 
 # Modules whose commands are part of the application once they are imported.
-FAMILIES = (diagnosis_commands,)
+FAMILIES = (diagnosis_commands, recording_commands)
 
 
 @app.command()

@@ -14,6 +14,9 @@ from rich.table import Table
 from spindle_fem.commands.verbosity import Verbosity
 from spindle_fem.results.run_log import LOGGER
 
+# Lines of one kind that are printed; files have them all.
+MOST_LINES = 12
+
 
 def _console() -> Console:
     """The terminal's width, or a wide page where the output goes to a file or a pipe."""
@@ -363,3 +366,20 @@ def designs_done(show: bool, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task("designs", total=total)
         yield lambda done: bar.advance(task, done)
+
+
+def print_draft(content: dict[str, Any], folder: Path) -> None:
+    """What each column was taken for, how the files were read, and what is unsure."""
+    console = _console()
+    table = _table("Channels", "column", "role", "stands for", "unit")
+    for channel in content["channels"]:
+        means = channel["probe"] or channel["drives"] or "–"
+        table.add_row(channel["column"], channel["role"], means, channel["unit"] or "–")
+    console.print(table)
+    for heading, key in (("found", "found"), ("unsure", "unsure"), ("cells without a number", "lost_cells")):
+        for text in content[key][:MOST_LINES]:
+            console.print(f"{heading}: {text}", markup=False, highlight=False)
+        if len(content[key]) > MOST_LINES:
+            console.print(f"{heading}: and {len(content[key]) - MOST_LINES} more", markup=False)
+    console.print(*content["defects_text"], sep="\n", markup=False, highlight=False)
+    console.print(f"wrote {folder}; check what recording.toml marks UNSURE", markup=False, highlight=False)

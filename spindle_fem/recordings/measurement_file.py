@@ -1,4 +1,4 @@
-"""Files of measuring devices: cells by column from text, Excel, Parquet, HDF5 or TDMS, as the file has them."""
+"""Files of measuring devices (text, Excel, Parquet, HDF5, TDMS): cells by column, as the file has them."""
 
 from __future__ import annotations
 
@@ -187,9 +187,7 @@ def _read_text(path: Path) -> MeasurementTable:
     lines = text.splitlines()
     separator = max(SEPARATORS, key=lambda sign: _fit(lines[:LINES_JUDGED], sign))
     try:
-        rows = [
-            [cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=separator)
-        ]
+        rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=separator)]
     except csv.Error as error:
         raise RecordingError(str(path), f"is not a readable table ({error}).") from error
     if len(rows) != len(lines):
@@ -248,12 +246,16 @@ def _table(
     """Preamble, names, units and cells of rows of text."""
     body = _first_of_body(rows)
     if body is None:
-        raise RecordingError(str(path), "holds no table of numbers.", "Rows of numbers and stamps are needed.")
+        raise RecordingError(
+            str(path), "holds no table of numbers.", "Rows of numbers and stamps are needed."
+        )
     widths = [len(row) for row in rows[body:] if any(row)]
     width = max(set(widths), key=widths.count)
     heading = [number for number in range(body) if sum(bool(cell) for cell in rows[number]) > width / 2]
     unit_rows = [n for n in heading if all(unit_of_text(c) for c in rows[n] if c.strip("-[]() "))]
     named = [number for number in heading if number not in unit_rows]
+    if not named:  # letters such as t, n, T are units too, and names where nothing else is
+        named, unit_rows = unit_rows[:1], unit_rows[1:]
     names = (rows[named[-1]] if named else []) + [""] * width
     units = (rows[unit_rows[-1]] if unit_rows else []) + [""] * width
     if not named:
@@ -263,7 +265,7 @@ def _table(
     if unit_rows:
         found.append(f"units in {word} {unit_rows[-1] + 1}")
     names = _distinct([names[i] or f"column_{i + 1}" for i in range(width)])
-    whole = [row for row in rows[body:]]
+    whole = rows[body:]
     long = [number for number, row in enumerate(whole) if any(row[width:])]
     if long:
         raise RecordingError(

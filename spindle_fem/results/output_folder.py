@@ -44,6 +44,7 @@ _OWN = frozenset(
         "reduced_network.toml",
         "state_space.npz",
         "state_space.json",
+        "recording.toml",
     }
 )
 

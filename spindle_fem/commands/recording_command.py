@@ -1,0 +1,112 @@
+"""The functions behind ``spindle-fem recording``: measurement files drafted, recordings drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.errors import BadInputError
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.recordings.column_roles import MachineNames
+from spindle_fem.recordings.draft_recording import (
+    DATA_NAME,
+    MANIFEST_NAME,
+    data_text,
+    draft_recording,
+    manifest_text,
+)
+from spindle_fem.recordings.manifest import DRIVES_UNITS
+from spindle_fem.report.recording_picture import draw_recording
+from spindle_fem.results.output_folder import output_folder, replace_text
+
+PICTURE_NAME = "recording.png"
+
+
+def draft(
+    files: Iterable[str | Path],
+    folder: str | Path,
+    *,
+    machine: str | Path | None = None,
+    zone: str | None = None,
+) -> dict[str, Any]:
+    """Draft a recording: ``recording.csv``, ``recording.toml`` to be checked, ``recording.png``.
+
+    Parameters
+    ----------
+    files : iterable of path
+        Of measuring devices; the files themselves are left as they are.
+    machine : str or Path, optional
+        Gives the names of probes and inputs.
+    zone : str, optional
+        Time zone of stamps that state none.
+
+    Returns
+    -------
+    dict
+        ``channels``, ``found``, ``unsure``, ``lost_cells``, ``defects``, ``defects_text``.
+
+    Raises
+    ------
+    SpindleFemError
+    """
+    names = None if machine is None else machine_names(machine)
+    drafted = draft_recording([Path(file) for file in files], names, zone=zone)
+    with output_folder(folder) as place:
+        replace_text(place / DATA_NAME, data_text(drafted))
+        replace_text(place / MANIFEST_NAME, manifest_text(drafted))
+        recording = read_recording(place / MANIFEST_NAME)
+        draw_recording(place / PICTURE_NAME, recording)
+    unsure = [f"{g.channel.column}: {g.unsure}" for g in drafted.channels if g.unsure]
+    return {
+        "channels": [guess.channel.model_dump() for guess in drafted.channels],
+        "found": list(drafted.found),
+        "unsure": [*drafted.unsure, *unsure],
+        "lost_cells": list(drafted.lost_cells),
+        "defects": recording.defects.to_json(),
+        "defects_text": recording.defects.lines(),
+    }
+
+
+def show(recording: str | Path, file: str | Path) -> list[str]:
+    """Draw a recording as a picture.
+
+    Returns
+    -------
+    list of str
+        Its defects as lines of text.
+
+    Raises
+    ------
+    SpindleFemError
+        The recording cannot be used, or the picture has another ending or no folder.
+    """
+    file = Path(file)
+    if file.suffix.lower() != ".png":
+        raise BadInputError(str(file), f'"{file.suffix}" is no format of the picture.', "Allowed: .png.")
+    if not file.absolute().parent.is_dir():
+        raise BadInputError(str(file), "there is no such folder.", "Make the folder, or name another one.")
+    read = read_recording(recording)
+    draw_recording(file, read)
+    return read.defects.lines()
+
+
+def machine_names(machine: str | Path) -> MachineNames:
+    """Names of a machine, with geometry or a ``[network]``, that channels of a recording may stand for."""
+    from spindle_fem.commands.checked_machine import load_buildable, load_network
+    from spindle_fem.definition.load import find_machine, read_definition
+    from spindle_fem.definition.network_load import is_network_machine
+
+    if not is_network_machine(read_definition(find_machine(machine))):
+        spec = load_buildable(machine, ())
+        heat = {f"heat.{source.name}": "W" for source in getattr(spec, "source", ())}
+        return MachineNames(
+            tuple(probe.name for probe in spec.probe),
+            tuple(sensor.name for sensor in spec.displacement_sensor),
+            {**DRIVES_UNITS, **heat},
+        )
+    tables = load_network(machine, ()).network
+    inputs = {item.temperature: "K" for item in tables.boundary if isinstance(item.temperature, str)}
+    driven = [source.input for source in tables.source if source.input is not None]
+    known = {name: DRIVES_UNITS.get(name, "") for name in driven}
+    return MachineNames(tuple(node.name for node in tables.node), (), {**known, **inputs})

@@ -1,0 +1,134 @@
+"""Manifests drafted from files as devices write them: form, time, meaning of columns, doubts."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.errors import RecordingError
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.recordings.column_roles import MachineNames
+from spindle_fem.recordings.draft_recording import data_text, draft_recording, manifest_text
+
+MACHINE = MachineNames(probes=("SP01", "SP02"), inputs={"speed": "rad/s", "ambient": "K"})
+TIMES = pd.Timestamp("2016-05-02 12:41:30") + pd.to_timedelta(10.0 * np.arange(60), unit="s")
+WARM = 20.0 + 15.0 * (1.0 - np.exp(-np.arange(60) / 20.0))
+SPEED = np.where(np.arange(60) < 30, 3000, 0)
+
+
+def german():
+    def comma(value):
+        return f"{value:.1f}".replace(".", ",")
+
+    rows = ["Gerät;Prüfstand Süd", "", "Datum;Uhrzeit;SP01;Umgebung;Drehzahl;Temp SP02", ";;°C;°C;1/min;°C"]
+    rows += [
+        f"{stamp:%d.%m.%Y};{stamp:%H:%M:%S},250;{comma(warm)};{comma(20.0)};{speed};{comma(warm - 1.0)}"
+        for stamp, warm, speed in zip(TIMES, WARM, SPEED, strict=True)
+    ]
+    rows[10] = rows[10].replace(comma(WARM[6]) + ";", "Fehler;", 1)
+    return "\r\n".join(rows) + "\r\n"
+
+
+def draft(tmp_path, text, name="device.csv", encoding="utf-8", machine=MACHINE, zone=None):
+    file = tmp_path / name
+    file.write_bytes(text.encode(encoding))
+    return draft_recording([file], machine, zone=zone)
+
+
+def roles(drafted):
+    return {g.channel.column: g.channel.probe or g.channel.drives for g in drafted.channels}
+
+
+def test_german_export(tmp_path):
+    drafted = draft(tmp_path, german(), encoding="latin-1")
+    assert roles(drafted) == {"SP01": "SP01", "Umgebung": "ambient", "Drehzahl": "speed", "Temp SP02": "SP02"}
+    assert drafted.data["time"].iloc[0] == pd.Timestamp("2016-05-02 12:41:30.25")
+    assert drafted.lost_cells == ('device.csv line 11, column SP01: "Fehler"',)
+    assert np.nanmax(np.abs(drafted.data["SP01"] - WARM)) < 0.051
+    assert any("Windows-1252" in text for text in drafted.unsure)
+
+
+def test_what_is_drafted_is_read_as_it_was(tmp_path):
+    drafted = draft(tmp_path, german())
+    (tmp_path / "recording.csv").write_text(data_text(drafted), encoding="utf-8")
+    (tmp_path / "recording.toml").write_text(manifest_text(drafted), encoding="utf-8")
+    recording = read_recording(tmp_path)
+    assert recording.probes == ("SP01", "SP02")
+    assert recording.start == "2016-05-02T12:41:30.250000Z"
+    assert recording.input_at("speed", np.array([0.0])) == pytest.approx(3000.0 * 2.0 * np.pi / 60.0)
+    assert recording.defects.channel("SP01").empty_cells == 1
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le"])
+def test_encodings_read_alike(tmp_path, encoding):
+    drafted = draft(tmp_path, german(), encoding=encoding)
+    assert len(drafted.data) == 60
+    assert roles(drafted)["Umgebung"] == "ambient"
+
+
+def test_american_dates_and_groups_of_thousands(tmp_path):
+    rows = [
+        f'{stamp:%m/%d/%Y %I:%M:%S %p},{warm:.2f},"{speed:,}"'
+        for stamp, warm, speed in zip(TIMES, WARM, SPEED, strict=True)
+    ]
+    drafted = draft(tmp_path, "\n".join(["Time,SP01,Speed", *rows]))
+    assert drafted.data["time"].iloc[0] == TIMES[0]
+    assert drafted.data["Speed"].max() == 3000.0
+
+
+def test_days_of_spreadsheets_are_stamps(tmp_path):
+    rows = [f"{42492.5 + second / 8640.0:.9f};{warm:.2f}" for second, warm in enumerate(WARM)]
+    drafted = draft(tmp_path, "\n".join(["time;SP01", *rows]).replace(".", ","))
+    assert abs(drafted.data["time"].iloc[1] - pd.Timestamp("2016-05-02 12:00:10")) < pd.Timedelta("1ms")
+    assert any("spreadsheets" in text for text in drafted.unsure)
+
+
+def test_zone_resolves_the_end_of_summer_time(tmp_path):
+    clock = pd.date_range("2016-10-30 00:30", periods=6, freq="30min", tz="UTC").tz_convert("Europe/Berlin")
+    text = "\n".join(["time,SP01", *(f"{stamp:%Y-%m-%d %H:%M:%S},{20 + i}" for i, stamp in enumerate(clock))])
+    local, resolved = draft(tmp_path, text), draft(tmp_path, text, zone="Europe/Berlin")
+    assert any("summer time" in text for text in local.unsure)
+    assert (np.diff(resolved.data["time"]) == np.timedelta64(30, "m")).all()
+    assert resolved.data["time"].iloc[0] == pd.Timestamp("2016-10-30 00:30")
+
+
+def test_repeated_and_unordered_rows_stay(tmp_path):
+    text = "time_s,SP01\n0,20\n20,21\n10,20.5\n10,20.5\n30,22\n"
+    assert list(draft(tmp_path, text).data["time"]) == [0.0, 20.0, 10.0, 10.0, 30.0]
+
+
+def test_hostile_names_stay_within_their_comments(tmp_path):
+    rows = "".join(f"{i},{20 + i},{i}\n" for i in range(12))
+    drafted = draft(tmp_path, f'time_s,SP01,"x"" \u2028[[channel]] = \\"\n{rows}')
+    (tmp_path / "recording.csv").write_text(data_text(drafted), encoding="utf-8")
+    (tmp_path / "recording.toml").write_text(manifest_text(drafted), encoding="utf-8")
+    assert len(read_recording(tmp_path).covariate_names) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("a,b\nx,y\n", "no table of numbers"),
+        ("SP01,SP02\n" + "".join(f"{20 + i % 3},21\n" for i in range(9)), "no column of times"),
+        ("time_s,load\n" + "".join(f"{i},{900 + i}\n" for i in range(9)), "no column could be told"),
+        ("", "is empty"),
+    ],
+)
+def test_refusals_say_why(tmp_path, text, reason):
+    with pytest.raises(RecordingError, match=reason):
+        draft(tmp_path, text)
+
+
+def test_files_of_the_same_columns_follow_one_another(tmp_path):
+    for number in range(2):
+        rows = "".join(f"{60 * number + i},{20 + i}\n" for i in range(12))
+        (tmp_path / f"{number}.csv").write_text("time_s,SP01\n" + rows)
+    drafted = draft_recording([tmp_path / "0.csv", tmp_path / "1.csv"], MACHINE)
+    assert len(drafted.data) == 24
+    assert drafted.sources == ("0.csv", "1.csv")
+
+
+def test_names_that_differ_in_signs_only_stay_apart(tmp_path):
+    rows = "".join(f"{i},{20 + i},{40 + i},{i}\n" for i in range(12))
+    drafted = draft(tmp_path, 'time_s,SP01,"SP01,",time [K]\n' + rows)
+    assert list(drafted.data.columns) == ["time", "SP01", "SP01_2", "time_2"]
+    assert drafted.data["SP01_2"].iloc[0] == 40.0
