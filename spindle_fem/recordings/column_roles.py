@@ -145,10 +145,20 @@ def _same(name: str, allowed: tuple[str, ...]) -> str:
 
 
 def _within(name: str, allowed: tuple[str, ...]) -> str:
-    """The one allowed name that stands as a word in another."""
-    words = {_plain(word) for word in re.split(r"[\s\-/:.]+", name)}
-    found = [item for item in allowed if _plain(item) in words]
-    return found[0] if len(found) == 1 else ""
+    """The longest allowed name whose words stand one after another in a name, where it is the only one."""
+    words = _words(name)
+    found: dict[int, list[str]] = {}
+    for item in allowed:
+        parts = _words(item)
+        places = range(len(words) - len(parts) + 1)
+        if parts and any(words[at : at + len(parts)] == parts for at in places):
+            found.setdefault(len(parts), []).append(item)
+    longest = found[max(found)] if found else []
+    return longest[0] if len(longest) == 1 else ""
+
+
+def _words(name: str) -> list[str]:
+    return re.findall(r"[a-z0-9äöüß]+", name.lower())
 
 
 def _near(name: str, allowed: tuple[str, ...]) -> list[str]:
@@ -160,9 +170,14 @@ def _by_words(name: str, inputs: dict[str, str]) -> str:
     words = re.split(r"[^a-zäöüß]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
     for drives in inputs:
         for known in WORDS.get(drives, ()):
-            if any(word == known or (len(known) > 4 and known in word) for word in words):
+            if any(word == known or _compounds(known, word) for word in words):
                 return drives
     return ""
+
+
+def _compounds(known: str, word: str) -> bool:
+    """Whether a word is a compound of a known one, such as Raumtemperatur."""
+    return (len(known) > 4 and known in word) or (len(known) == 4 and word.startswith(known))
 
 
 def _says_temperature(name: str) -> bool:

@@ -14,7 +14,7 @@ import tomli_w
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.column_roles import GuessedChannel, MachineNames, guess_channel
 from spindle_fem.recordings.manifest import RECORDING_SCHEMA, Channel, column_unit
-from spindle_fem.recordings.measurement_file import MeasurementTable, read_measurement
+from spindle_fem.recordings.measurement_file import MeasurementTable, read_measurement, unused_name
 from spindle_fem.recordings.numbers_in_text import decimal_sign, numbers_of
 from spindle_fem.recordings.time_columns import FoundTime, find_time
 
@@ -138,9 +138,8 @@ def _piece(path: Path, zone: str | None) -> _Piece:
             found.append(f'column "{name}" holds no number and is left out')
             continue
         lost += [_place(table, row, name, cell) for row, cell in wrong]
-        plain = _plain_name(name)
-        while plain in columns:  # names that differ in signs only, or are called time as well
-            plain += "_2"
+        # names may differ in signs only, or be called time as well
+        plain = unused_name(_plain_name(name), columns)
         columns[plain] = values
         if name in table.units:
             units[plain] = table.units[name]
@@ -213,5 +212,4 @@ def _one_line(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-
     return tomli_w.dumps({"x": text}).partition(" = ")[2].strip()

@@ -6,8 +6,10 @@ import csv
 import gzip
 import importlib
 import io
+import itertools
 import re
 import zlib
+from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -297,22 +299,28 @@ def _named(
     stated, names = {}, []
     for name, cell in zip(cells.columns, units, strict=False):
         plain, inside = without_unit(name)
+        plain = unused_name(plain, names)
         names.append(plain)
         unit = unit_of_text(cell) or inside
         if unit:
             stated[plain] = unit
-    if len(set(names)) == len(names):
-        cells = cells.set_axis(names, axis=1)
-    else:
-        stated = {old: stated[new] for old, new in zip(cells.columns, names, strict=True) if new in stated}
+    cells = cells.set_axis(names, axis=1)
     return MeasurementTable(path, cells, stated, first_line, tuple(found), tuple(unsure))
+
+
+def unused_name(name: str, taken: Container[str]) -> str:
+    """A name, with a number behind it where it is taken.
+
+    >>> unused_name("SP01", ("SP01", "SP01_2"))
+    'SP01_3'
+    """
+    numbered = (f"{name}_{number}" for number in itertools.count(2))
+    return name if name not in taken else next(item for item in numbered if item not in taken)
 
 
 def _distinct(names: list[str]) -> list[str]:
     """Names with a number behind those that occur again."""
-    seen: dict[str, int] = {}
-    result = []
+    result: list[str] = []
     for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        result.append(name if seen[name] == 1 else f"{name}_{seen[name]}")
+        result.append(unused_name(name, result))
     return result

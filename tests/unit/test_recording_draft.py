@@ -6,7 +6,7 @@ import pytest
 
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.column_roles import MachineNames
+from spindle_fem.recordings.column_roles import MachineNames, guess_channel
 from spindle_fem.recordings.draft_recording import data_text, draft_recording, manifest_text
 
 MACHINE = MachineNames(probes=("SP01", "SP02"), inputs={"speed": "rad/s", "ambient": "K"})
@@ -116,6 +116,23 @@ def test_hostile_names_stay_within_their_comments(tmp_path):
 def test_refusals_say_why(tmp_path, text, reason):
     with pytest.raises(RecordingError, match=reason):
         draft(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("column", "means"),
+    [
+        ("Temp_SP01", "SP01"),
+        ("ch3/SP02", "SP02"),
+        ("Raumtemperatur", "ambient"),
+        ("Hallenluft Temp", "ambient"),
+        ("Oil COOLANT OUT", "COOLANT_OUT"),
+        ("SP01-SP02", None),
+    ],
+)
+def test_names_stand_within_columns(column, means):
+    machine = MachineNames((*MACHINE.probes, "COOLANT", "COOLANT_OUT"), (), MACHINE.inputs)
+    channel = guess_channel(column, "degC", WARM, machine, set()).channel
+    assert (channel.probe or channel.drives) == means
 
 
 def test_files_of_the_same_columns_follow_one_another(tmp_path):
