@@ -14,7 +14,7 @@ import tomli_w
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.column_roles import GuessedChannel, MachineNames, guess_channel
 from spindle_fem.recordings.manifest import RECORDING_SCHEMA, Channel, column_unit
-from spindle_fem.recordings.measurement_file import MeasurementTable, read_measurement, unused_name
+from spindle_fem.recordings.measurement_file import TEXT_SUFFIXES, MeasurementTable, read_measurement, unused_name
 from spindle_fem.recordings.numbers_in_text import decimal_sign, numbers_of
 from spindle_fem.recordings.time_columns import FoundTime, find_time
 
@@ -161,7 +161,8 @@ def _of_unit(time: FoundTime) -> str:
 
 
 def _place(table: MeasurementTable, row: int, column: str, cell: str) -> str:
-    return f'{table.path.name} line {row + table.first_line}, column {column}: "{cell}"'
+    word = "line" if table.path.name.lower().endswith((*TEXT_SUFFIXES, ".gz")) else "row"
+    return f'{table.path.name} {word} {row + table.first_line}, column {column}: "{cell}"'
 
 
 def data_text(draft: DraftedRecording) -> str:

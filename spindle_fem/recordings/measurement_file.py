@@ -11,6 +11,7 @@ import re
 import zlib
 from collections.abc import Container
 from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -175,6 +176,8 @@ def _read_excel(path: Path) -> MeasurementTable:
 def _as_text(cell: object) -> str:
     if cell is None or cell is pd.NaT or (isinstance(cell, float) and np.isnan(cell)):
         return ""
+    if isinstance(cell, timedelta):
+        return str(cell.total_seconds())
     return cell.isoformat(sep=" ") if hasattr(cell, "hour") and hasattr(cell, "year") else str(cell)
 
 
@@ -263,7 +266,7 @@ def _table(
     if not named:
         unsure.append("no row of names: columns are numbered")
     elif named[-1]:
-        found.append(f"{named[-1]} {word}s before the names are left out")
+        found.append(f"{word}s before the names, left out: {named[-1]}")
     if unit_rows:
         found.append(f"units in {word} {unit_rows[-1] + 1}")
     names = _distinct([names[i] or f"column_{i + 1}" for i in range(width)])
@@ -275,7 +278,7 @@ def _table(
         )
     short = sum(bool(row) and len(row) < width for row in whole)
     if short:
-        unsure.append(f"{short} {word}s have fewer cells than the others: the missing ones count as empty")
+        unsure.append(f"{word}s with fewer cells than the others, the missing ones counted as empty: {short}")
     cells = pd.DataFrame([(row + [""] * width)[:width] for row in whole], columns=names, dtype=object)
     return _named(path, cells, units, body + 1, found, unsure)
 

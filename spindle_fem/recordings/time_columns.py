@@ -15,6 +15,7 @@ _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<p
 _HALF = r"\s*(?P<half>[AaPp][Mm])?"
 _ZONE = r"\s*(?P<zone>Z|UTC|[+-]\d{2}:?\d{2})?"
 _FORM = rf"^\s*(?:{_DATE})?[T ,;]*(?:{_CLOCK})?{_HALF}{_ZONE}\s*$"
+_MIDNIGHT = r"[T ]+00:00(?::00(?:[.,]0+)?)?\s*$"
 _NAMES = ("time", "zeit", "date", "datum", "stamp", "stempel", "uhr", "temps", "tiempo", "elapsed")
 # Seconds from 1970 of 2001 and 2100, between which counts of clocks are taken as stamps.
 _EPOCH = (978_307_200.0, 4_102_444_800.0)
@@ -52,7 +53,7 @@ class FoundTime:
 def find_time(
     cells: pd.DataFrame, units: dict[str, str], decimal: str, zone: str | None, where: str
 ) -> FoundTime:
-    """Time of a table: one column of stamps, a date beside a clock, or a column that counts.
+    """Time of a table: a column of stamps, a date beside a clock, a clock, days, or a column that counts.
 
     Parameters
     ----------
@@ -80,10 +81,12 @@ def find_time(
         return _stamps((whole[0],), cells[whole[0]], zone, where)
     if dates and clocks:
         chosen = (dates[0], clocks[0])
-        joined = cells[dates[0]].astype(str).str.strip() + " " + cells[clocks[0]].astype(str).str.strip()
+        joined = _text(cells[dates[0]]).str.replace(_MIDNIGHT, "", regex=True) + " " + _text(cells[clocks[0]])
         return _stamps(chosen, joined, zone, where)
     if clocks:
         return _clock_alone(clocks[0], cells[clocks[0]])
+    if dates and cells[dates[0]].nunique() > 1:
+        return _stamps((dates[0],), cells[dates[0]], zone, where)
     counted = [name for name in cells.columns if _counts(cells[name], name, units.get(name, ""), decimal)]
     if not counted:
         raise RecordingError(
@@ -99,17 +102,20 @@ def _text(column: pd.Series) -> pd.Series:
 
 
 def _form_of(column: pd.Series) -> str:
-    """``stamp``, ``date``, ``clock``, or nothing."""
-    if pd.api.types.is_datetime64_any_dtype(column.dtype):
-        return "stamp"
+    """``stamp``, ``date``, ``clock``, or nothing; stamps that are all of midnight are dates, as in Excel."""
     if pd.api.types.is_numeric_dtype(column.dtype):
         return ""
+    if pd.api.types.is_datetime64_any_dtype(column.dtype):
+        return "date" if (column.dropna() == column.dropna().dt.normalize()).all() else "stamp"
     text = _text(column)
-    parts = text[text != ""].str.extract(_FORM)
+    text = text[text != ""]
+    parts = text.str.extract(_FORM)
     if parts.empty:
         return ""
     date, clock = parts["a"].notna().mean() > _SHARE, parts["hour"].notna().mean() > _SHARE
-    return "stamp" if date and clock else "date" if date else "clock" if clock else ""
+    if date and clock:
+        return "date" if text[parts["a"].notna()].str.contains(_MIDNIGHT).all() else "stamp"
+    return "date" if date else "clock" if clock else ""
 
 
 def _stamps(names: tuple[str, ...], column: pd.Series, zone: str | None, where: str) -> FoundTime:
@@ -130,7 +136,8 @@ def _stamps(names: tuple[str, ...], column: pd.Series, zone: str | None, where: 
         fields = pd.DataFrame({"year": year, "month": month, "day": day, "hour": hour})
         fields["minute"] = pd.to_numeric(parts["minute"]).fillna(0)
         fields["second"] = pd.to_numeric(parts["second"]).fillna(0)
-        possible = parts["a"].notna() & parts["hour"].notna() & (hour < 24)
+        dated = parts["a"].notna() & (parts["hour"].notna() | parts["hour"].isna().all())
+        possible = dated & (hour < 24)
         series = pd.to_datetime(fields.where(possible), errors="coerce").astype("datetime64[us]")
         series = series + pd.to_timedelta(fraction.where(possible, 0), unit="us")
         shift = _shift_of_zone(parts["zone"])

@@ -82,6 +82,14 @@ def test_days_of_spreadsheets_are_stamps(tmp_path):
     assert any("spreadsheets" in text for text in drafted.unsure)
 
 
+def test_dates_as_excel_holds_them_stand_beside_their_clock(tmp_path):
+    rows = [f"{s:%Y-%m-%d} 00:00:00;{s:%H:%M:%S};{w:.2f}" for s, w in zip(TIMES, WARM, strict=True)]
+    drafted = draft(tmp_path, "\n".join(["Datum;Uhrzeit;SP01", *rows]))
+    assert (drafted.data["time"] == TIMES).all()
+    days = "\n".join(["day;SP01", *(f"{d:02d}.05.2016;{20 + d}" for d in range(1, 9))])
+    assert (np.diff(draft(tmp_path, days).data["time"]) == np.timedelta64(1, "D")).all()
+
+
 def test_zone_resolves_the_end_of_summer_time(tmp_path):
     clock = pd.date_range("2016-10-30 00:30", periods=6, freq="30min", tz="UTC").tz_convert("Europe/Berlin")
     text = "\n".join(["time,SP01", *(f"{stamp:%Y-%m-%d %H:%M:%S},{20 + i}" for i, stamp in enumerate(clock))])
