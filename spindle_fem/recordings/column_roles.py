@@ -12,16 +12,26 @@ from spindle_fem.errors import UnitError
 from spindle_fem.recordings.manifest import DRIVES_UNITS, Channel, column_unit
 from spindle_fem.units import registry
 
-# What names of columns say in the languages of machine builders. Words are looked for as whole words or as
-# beginnings or ends of compounds.
+# What names of columns say in the languages of machine builders. Words are looked for as whole words, one after
+# another where there are several, and longer ones within compounds.
 WORDS = {
     "ambient": ("ambient", "umgebung", "raum", "room", "halle", "hall", "luft", "air", "env"),
-    "coolant_inlet": ("inlet", "vorlauf", "zulauf", "supply", "eintritt"),
+    "coolant_inlet": ("inlet", "vorlauf", "zulauf", "supply", "eintritt", "coolant in", "oil in", "öl ein"),
     "coolant_flow": ("flow", "durchfluss", "volumenstrom", "durchfluß"),
     "speed": ("speed", "drehzahl", "rpm", "vitesse", "n"),
     "thrust": ("thrust", "axialkraft", "axialforce", "vorspannkraft"),
 }
 _TEMPERATURE_WORDS = ("temp", "temperatur", "temperature", "tc", "pt100", "thermo", "therm")
+# Units that names without one usually mean, of quantities that a network is free to take in any unit.
+_USUAL_UNITS = {
+    "rpm": WORDS["speed"],
+    "percent": ("load", "auslastung", "last", "override"),
+    "l/min": WORDS["coolant_flow"],
+    "N*m": ("torque", "drehmoment", "moment"),
+    "A": ("current", "strom"),
+    "degC": (*_TEMPERATURE_WORDS, *WORDS["ambient"], *WORDS["coolant_inlet"]),
+    "W": ("power", "leistung", "heat"),
+}
 _UNITS = {"speed": "rpm", "ambient": "degC", "coolant_inlet": "degC", "coolant_flow": "l/min", "thrust": "N"}
 _CLOSE = 0.72
 # Readings of sensors on machines, degC.
@@ -125,7 +135,8 @@ def _input(
     doubt: str = "",
 ) -> GuessedChannel:
     if not unit:
-        unit = _UNITS.get(drives, "degC" if inputs[drives] == "K" else inputs[drives] or "W")
+        usual = next((item for item, words in _USUAL_UNITS.items() if _says(name, words)), "W")
+        unit = _UNITS.get(drives, "degC" if inputs[drives] == "K" else inputs[drives] or usual)
         doubt = "; ".join(filter(None, [doubt, f"no unit is stated: taken as {unit}"]))
     # set values stand still and jump; measured ones hardly ever repeat
     held = present.size > 2 and float(np.mean(np.diff(present) == 0.0)) > 0.5
@@ -167,12 +178,13 @@ def _near(name: str, allowed: tuple[str, ...]) -> list[str]:
 
 
 def _by_words(name: str, inputs: dict[str, str]) -> str:
-    words = re.split(r"[^a-zäöüß]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
-    for drives in inputs:
-        for known in WORDS.get(drives, ()):
-            if any(word == known or _compounds(known, word) for word in words):
-                return drives
-    return ""
+    return next((drives for drives in inputs if _says(name, WORDS.get(drives, ()))), "")
+
+
+def _says(name: str, known: tuple[str, ...]) -> bool:
+    words = re.findall(r"[a-zäöüß]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
+    line = f" {' '.join(words)} "
+    return any(f" {item} " in line or any(_compounds(item, word) for word in words) for item in known)
 
 
 def _compounds(known: str, word: str) -> bool:

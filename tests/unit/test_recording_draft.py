@@ -9,7 +9,7 @@ from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.column_roles import MachineNames, guess_channel
 from spindle_fem.recordings.draft_recording import data_text, draft_recording, manifest_text
 
-MACHINE = MachineNames(probes=("SP01", "SP02"), inputs={"speed": "rad/s", "ambient": "K"})
+MACHINE = MachineNames(probes=("SP01", "SP02"), inputs={"speed": "rad/s", "ambient": "K", "coolant_inlet": "K"})
 TIMES = pd.Timestamp("2016-05-02 12:41:30") + pd.to_timedelta(10.0 * np.arange(60), unit="s")
 WARM = 20.0 + 15.0 * (1.0 - np.exp(-np.arange(60) / 20.0))
 SPEED = np.where(np.arange(60) < 30, 3000, 0)
@@ -135,12 +135,22 @@ def test_refusals_say_why(tmp_path, text, reason):
         ("Hallenluft Temp", "ambient"),
         ("Oil COOLANT OUT", "COOLANT_OUT"),
         ("SP01-SP02", None),
+        ("coolant_in", "coolant_inlet"),
+        ("oil inside", None),
     ],
 )
 def test_names_stand_within_columns(column, means):
     machine = MachineNames((*MACHINE.probes, "COOLANT", "COOLANT_OUT"), (), MACHINE.inputs)
     channel = guess_channel(column, "degC", WARM, machine, set()).channel
     assert (channel.probe or channel.drives) == means
+
+
+@pytest.mark.parametrize(("source", "unit"), [("x_load", "percent"), ("main_speed", "rpm"), ("pump", "W")])
+def test_units_of_network_inputs_by_their_names(source, unit):
+    machine = MachineNames(("SP01",), (), {source: ""})
+    guess = guess_channel(source, "", SPEED.astype(float), machine, set())
+    assert (guess.channel.unit, guess.channel.hold) == (unit, "previous")
+    assert "no unit" in guess.unsure
 
 
 def test_files_of_the_same_columns_follow_one_another(tmp_path):
