@@ -140,7 +140,7 @@ def test_refusals_say_why(tmp_path, text, reason):
     ],
 )
 def test_names_stand_within_columns(column, means):
-    machine = MachineNames((*MACHINE.probes, "COOLANT", "COOLANT_OUT"), (), MACHINE.inputs)
+    machine = MachineNames((*MACHINE.probes, "OUT", "COOLANT_OUT"), (), MACHINE.inputs)
     channel = guess_channel(column, "degC", WARM, machine, set()).channel
     assert (channel.probe or channel.drives) == means
 
