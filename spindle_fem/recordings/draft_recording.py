@@ -14,7 +14,12 @@ import tomli_w
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.column_roles import GuessedChannel, MachineNames, guess_channel
 from spindle_fem.recordings.manifest import RECORDING_SCHEMA, Channel, column_unit
-from spindle_fem.recordings.measurement_file import TEXT_SUFFIXES, MeasurementTable, read_measurement, unused_name
+from spindle_fem.recordings.measurement_file import (
+    TEXT_SUFFIXES,
+    MeasurementTable,
+    read_measurement,
+    unused_name,
+)
 from spindle_fem.recordings.numbers_in_text import decimal_sign, numbers_of
 from spindle_fem.recordings.time_columns import FoundTime, find_time
 

@@ -9,7 +9,9 @@ from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.column_roles import MachineNames, guess_channel
 from spindle_fem.recordings.draft_recording import data_text, draft_recording, manifest_text
 
-MACHINE = MachineNames(probes=("SP01", "SP02"), inputs={"speed": "rad/s", "ambient": "K", "coolant_inlet": "K"})
+MACHINE = MachineNames(
+    probes=("SP01", "SP02"), inputs={"speed": "rad/s", "ambient": "K", "coolant_inlet": "K"}
+)
 TIMES = pd.Timestamp("2016-05-02 12:41:30") + pd.to_timedelta(10.0 * np.arange(60), unit="s")
 WARM = 20.0 + 15.0 * (1.0 - np.exp(-np.arange(60) / 20.0))
 SPEED = np.where(np.arange(60) < 30, 3000, 0)
