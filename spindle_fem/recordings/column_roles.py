@@ -12,8 +12,8 @@ from spindle_fem.errors import UnitError
 from spindle_fem.recordings.manifest import DRIVES_UNITS, Channel, column_unit
 from spindle_fem.units import registry
 
-# What names of columns say in the languages of machine builders. Words are looked for as whole words, one after
-# another where there are several, and longer ones within compounds.
+# What names of columns say in the languages of machine builders. Words are looked for as whole words, one
+# after another where there are several, and longer ones within compounds.
 WORDS = {
     "ambient": ("ambient", "umgebung", "raum", "room", "halle", "hall", "luft", "air", "env"),
     "coolant_inlet": ("inlet", "vorlauf", "zulauf", "supply", "eintritt", "coolant in", "oil in", "öl ein"),
