@@ -20,7 +20,7 @@ from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_set import solve_bearing
 from spindle_fem.physics.bearings.equilibrium import solve_equilibrium
 from spindle_fem.physics.bearings.friction_equilibrium import start_from_race_control
-from spindle_fem.physics.bearings.grease import Lubricant, roelands_viscosity
+from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.heat_models.full import rolling_resistance_houpert
 from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
@@ -63,13 +63,6 @@ def test_roelands_exponent_nbu15() -> None:
     assert printed * 1e3 == pytest.approx(4.179, rel=1e-3)
     fitted = replace(NBU15, viscosity_law="roelands")
     assert float(fitted.dynamic_viscosity(373.15)) * 1e3 == pytest.approx(4.653, rel=1e-3)
-
-
-def test_pressure_viscosity_of_roelands_is_its_slope() -> None:
-    viscosity = float(NBU15.dynamic_viscosity(WARM))
-    step = 1e4
-    slope = math.log(float(roelands_viscosity(step, viscosity)) / viscosity) / step
-    assert float(NBU15.pressure_viscosity_coefficient(WARM)) == pytest.approx(slope, rel=1e-4)
 
 
 @pytest.mark.parametrize(("t", "value"), [(0, 0.398942), (1, 0.0833155), (2, 0.0084907), (3, 3.82154e-4)])

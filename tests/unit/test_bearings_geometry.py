@@ -13,9 +13,7 @@ from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.preload import (
     axial_force,
     axial_state,
-    preload_from_catalogue,
     tandem_approach,
-    thrust_angles,
     unloading_thrust,
 )
 
@@ -77,10 +75,6 @@ def test_arrangements() -> None:
 def test_negative_preload_is_refused() -> None:
     with pytest.raises(SpecError, match=r"preload is -5 N. It must not be negative."):
         tandem_approach((BEARING,), -5.0)
-    with pytest.raises(SpecError, match="must not be negative"):
-        preload_from_catalogue(-1.0)
-    with pytest.raises(SpecError, match="angle_factor: it is 0"):
-        preload_from_catalogue(100.0, 1.0, 0.0)
 
 
 def test_too_much_thrust_climbs_the_shoulder() -> None:
@@ -98,17 +92,6 @@ def test_tandem_shares_by_common_displacement() -> None:
     approach = tandem_approach((BEARING, smaller), 1000.0)
     assert axial_force(BEARING, approach) + axial_force(smaller, approach) == pytest.approx(1000.0)
     assert axial_force(smaller, approach) / axial_force(BEARING, approach) == pytest.approx(20 / 30)
-
-
-def test_thrust_on_a_preloaded_set_follows_eq_3() -> None:
-    front, rear = axial_state(BEARING, 568.6), axial_state(BEARING, 1137.2)
-    total = front.approach + rear.approach
-    # without thrust the angles are those of the preload; eq. 3 holds the contact constant
-    angles = thrust_angles(BEARING, 0.0, total, front=2, rear=1)
-    assert angles == pytest.approx((front.contact_angle, rear.contact_angle), abs=2e-5)
-    loaded = thrust_angles(BEARING, 1750.0, total, front=2, rear=1)
-    assert loaded[0] > angles[0]
-    assert loaded[1] < angles[1]
 
 
 def test_unloading_needs_a_counter_bearing() -> None:

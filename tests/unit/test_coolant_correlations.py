@@ -26,7 +26,6 @@ from spindle_fem.physics.coolant.properties import CoolantProperties
 from spindle_fem.physics.coolant.transition import (
     critical_reynolds_ito,
     critical_reynolds_schmidt,
-    nusselt_transition,
 )
 
 CHANNEL = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
@@ -59,7 +58,6 @@ REFUSALS = [
     (friction_factor_helical_turbulent, (1000.0, 0.05), "reynolds is 1000, allowed 4500 to 100000"),
     (critical_reynolds_schmidt, (0.3,), "curvature_ratio is 0.3, allowed 0 to 0.2"),
     (critical_reynolds_ito, (0.1,), "curvature_ratio is 0.1, allowed 0.0012 to 0.067"),
-    (nusselt_transition, (5.0e3, 8.0e3, 50.0, 900.0), "reynolds_over_critical is 0.625"),
 ]
 
 

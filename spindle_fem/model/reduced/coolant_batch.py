@@ -12,7 +12,7 @@ from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.channel_cells import cells_of_model
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.physics.coolant.duct_friction import PressureDrop
-from spindle_fem.physics.coolant.linear_march import linearise_march
+from spindle_fem.physics.coolant.linear_march import march_maps
 from spindle_fem.physics.coolant.march import ChannelMarch, DrivenChannel, MarchResult
 
 Array = NDArray[np.float64]
@@ -89,15 +89,10 @@ class ChannelBatch:
 
     def linear(self, state: ChannelField) -> tuple[Array, Array]:
         """Heat of the cells from wall temperatures: matrix (n, starts, cells, cells) and constant."""
-        line = linearise_march(
-            self.inlet,
-            state.channel.mass_flow,
-            state.march.specific_heat_capacity,
-            self.driven.wetted_area,
-            state.film,
-            state.march.pumping_heat,
-        )
-        return line.matrix, line.constant
+        march, capacity_rate = state.march, state.channel.mass_flow * state.march.specific_heat_capacity
+        maps = march_maps(capacity_rate, self.driven.wetted_area, state.film, march.pumping_heat)
+        from_inlet = maps.heat_from_wall.sum(axis=-1) * self.inlet
+        return maps.heat_from_wall, maps.heat_from_friction - from_inlet
 
 
 def pressure_drops(loop: CoolantLoop, inputs: DesignInputs) -> list[PressureDrop]:

@@ -212,27 +212,3 @@ class Lubricant:
                 )
             )
         return tuple(warnings)
-
-
-def roelands_viscosity(
-    pressure: ArrayLike, viscosity: ArrayLike, pressure_exponent: ArrayLike = 0.68
-) -> NDArray[np.float64]:
-    """Dynamic viscosity under pressure at the temperature of ``viscosity`` (eq. 15).
-
-    η = exp{-9.67 + (ln η_0 + 9.67)(1 + 5.1e-9 p)^Z}: the temperature power of
-    eq. 15 multiplies the whole pressure bracket, so it is contained in η_0(T).
-
-    Parameters
-    ----------
-    pressure : array_like, [Pa]
-    viscosity : array_like, [Pa s]
-        At ambient pressure.
-    pressure_exponent : array_like, [-]
-
-    Source: Roelands (1966).
-
-    >>> float(roelands_viscosity(0.0, 0.0208).round(6))
-    0.0208
-    """
-    rise = np.exp(np.asarray(pressure_exponent) * np.log1p(ROELANDS_PRESSURE * np.asarray(pressure, float)))
-    return np.exp((np.log(viscosity) + ROELANDS_LOGARITHM) * rise - ROELANDS_LOGARITHM)

@@ -1,4 +1,4 @@
-"""Preload and thrust of axially loaded bearings at rest (eqs 1-3)."""
+"""Preload and thrust of axially loaded bearings at rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from spindle_fem.errors import NoEquilibriumError, SpecError
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
-from spindle_fem.physics.bearings.hertz import contact_polynomials, jones_axial_constant
+from spindle_fem.physics.bearings.hertz import contact_polynomials
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,111 +36,10 @@ class AxialState:
     stiffness: float
 
 
-def preload_from_catalogue(
-    catalogue_preload: float,
-    bearing_factor: float = 1.0,
-    angle_factor: float = 1.0,
-    grade_factor: float = 1.0,
-    material_factor: float = 1.0,
-) -> float:
-    """Preload of the mounted bearing, F_p = ζ ζ1 ζ2 ζ3 F_A (eq. 2), N.
-
-    >>> preload_from_catalogue(200.0, 1.02, 0.99)
-    201.96
-    """
-    require_force("catalogue_preload", catalogue_preload)
-    for key, value in (
-        ("bearing_factor", bearing_factor), ("angle_factor", angle_factor),
-        ("grade_factor", grade_factor), ("material_factor", material_factor),
-    ):  # fmt: skip
-        if not value > 0.0:
-            raise SpecError(key, f"it is {value:g}.", "It must be above 0.")
-    return catalogue_preload * bearing_factor * angle_factor * grade_factor * material_factor
-
-
 def require_force(where: str, force: float) -> None:
     """Refuse a preload that is negative or not finite."""
     if not math.isfinite(force) or force < 0.0:
         raise SpecError(where, f"preload is {force:g} N.", "It must not be negative.")
-
-
-def mounted_contact_angle(geometry: BearingGeometry, preload: float) -> float:
-    """Contact angle α_p under preload by eq. 1 with Jones's axial constant, rad.
-
-    The constant belongs to the free angle; ``axial_state`` lets it follow the
-    running angle (they differ by less than 1e-3).
-
-    Parameters
-    ----------
-    preload : float, [N]
-        Of this bearing: half the set's for each of two in tandem.
-
-    >>> g = BearingGeometry(14.2875e-3, 30, 165e-3, math.radians(15), 0.52, 0.52)
-    >>> round(math.degrees(mounted_contact_angle(g, 568.6)), 2)
-    16.12
-    """
-    require_force("preload", preload)
-    alpha0 = geometry.contact_angle
-    normalised = preload / (geometry.ball_count * geometry.ball_diameter**2 * jones_axial_constant(geometry))
-    highest = 0.5 * math.pi - 1e-9
-    if preload == 0.0:
-        return alpha0
-
-    def excess(angle: float) -> float:
-        stretch = max(math.cos(alpha0) / math.cos(angle) - 1.0, 0.0)
-        return math.sin(angle) * stretch**1.5 - normalised
-
-    return float(brentq(excess, alpha0, highest, xtol=1e-14, rtol=1e-14))
-
-
-def preload_displacement(geometry: BearingGeometry, contact_angle: float) -> float:
-    """Axial approach δ_p = B D sin(α_p - α_0)/cos α_p of eq. 1, m."""
-    distance = geometry.curvature_centre_distance
-    return distance * math.sin(contact_angle - geometry.contact_angle) / math.cos(contact_angle)
-
-
-def thrust_angles(
-    geometry: BearingGeometry, thrust: float, displacement_sum: float, front: int = 2, rear: int = 1
-) -> tuple[float, float]:
-    """Front and rear contact angle of a rigidly preloaded set under thrust (eq. 3), rad.
-
-    Parameters
-    ----------
-    thrust : float, [N]
-        Loads the front bearings further.
-    displacement_sum : float, [m]
-        δ_pA + δ_pB of the preload, which a locknut keeps.
-    front, rear : int
-        Bearings on each side; the paper's factor 2 is ``front`` = 2.
-
-    Raises
-    ------
-    NoEquilibriumError
-        Thrust that no contact angle below 90° carries.
-    """
-    alpha0, distance = geometry.contact_angle, geometry.curvature_centre_distance
-    scale = geometry.ball_count * geometry.ball_diameter**2 * jones_axial_constant(geometry)
-
-    def angle(approach: float) -> float:
-        # sin(α-α0)/cos α = sin... solved in closed form: tan α = tan α0 + δ/(BD cos α0)
-        return math.atan(math.tan(alpha0) + approach / (distance * math.cos(alpha0)))
-
-    def side(approach: float) -> float:
-        running = angle(approach)
-        return math.sin(running) * max(math.cos(alpha0) / math.cos(running) - 1.0, 0.0) ** 1.5
-
-    def excess(front_approach: float) -> float:
-        return (
-            scale * (front * side(front_approach) - rear * side(displacement_sum - front_approach)) - thrust
-        )
-
-    low, high = -distance, displacement_sum + 10.0 * distance
-    if excess(low) > 0.0 or excess(high) < 0.0:
-        raise NoEquilibriumError(
-            "thrust", f"{thrust:g} N is more than the set can carry.", "Lower the thrust."
-        )
-    approach = float(brentq(excess, low, high, xtol=1e-16, rtol=1e-14))
-    return angle(approach), angle(displacement_sum - approach)
 
 
 def axial_force(geometry: BearingGeometry, approach: float) -> float:

@@ -13,7 +13,6 @@ from spindle_fem.errors import OutOfValidityError, SpecError
 
 FloatArray = NDArray[np.float64]
 _SUMMIT_CONSTANT = 0.8968
-_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,25 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.physics.coolant.march import exponential_shares, require_march
-
-
-@dataclass(frozen=True, slots=True)
-class MarchLinearisation:
-    """Heat of the cells as a linear function of all wall temperatures.
-
-    ``heat = constant + matrix @ wall_temperature`` for each channel, exact at
-    fixed film coefficients and heat capacities; the wall's temperature counts absolute.
-
-    Attributes
-    ----------
-    matrix : (..., n, n) ndarray, [W/K]
-        Lower triangular: a cell feels its own wall and those upstream.
-    constant : (..., n) ndarray, [W]
-    """
-
-    matrix: NDArray[np.float64]
-    constant: NDArray[np.float64]
+from spindle_fem.physics.coolant.march import exponential_shares
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,46 +114,3 @@ def outlet_stretch(transfer_units: ArrayLike) -> tuple[NDArray[np.float64], NDAr
     units = np.asarray(transfer_units, dtype=np.float64)
     stretch = np.expm1(units) / units
     return stretch, (np.exp(units) - stretch) / units
-
-
-def linearise_march(
-    inlet_temperature: float,
-    mass_flow: float,
-    specific_heat_capacity: ArrayLike,
-    wetted_area: ArrayLike,
-    film_coefficient: ArrayLike,
-    pumping_heat: ArrayLike = 0.0,
-) -> MarchLinearisation:
-    """Heat of every cell as a linear function of all wall temperatures.
-
-    Parameters
-    ----------
-    inlet_temperature : float, [K]
-    mass_flow : float, [kg/s]
-        Of each channel in parallel.
-    specific_heat_capacity : (..., n) array_like or float, [J/(kg·K)]
-    wetted_area : (..., n) array_like, [m²]
-    film_coefficient : (..., n) array_like or float, [W/(m²·K)]
-    pumping_heat : (..., n) array_like or float, [W]
-
-    Raises
-    ------
-    OutOfValidityError
-        As ``march_enthalpy``.
-
-    >>> from spindle_fem.physics.coolant.march import march_enthalpy
-    >>> line = linearise_march(288.15, 0.3, 1900.0, [0.04] * 4, 250.0)
-    >>> march = march_enthalpy(288.15, 0.3, 1900.0, [300.0, 310.0, 305.0, 290.0], [0.04] * 4, 250.0)
-    >>> bool(np.allclose(line.constant + line.matrix @ [300.0, 310.0, 305.0, 290.0], march.heat))
-    True
-    """
-    area, film, capacity, pumping = np.broadcast_arrays(
-        np.atleast_1d(np.asarray(wetted_area, dtype=np.float64)),
-        np.asarray(film_coefficient, dtype=np.float64),
-        np.asarray(specific_heat_capacity, dtype=np.float64),
-        np.asarray(pumping_heat, dtype=np.float64),
-    )
-    require_march(inlet_temperature, mass_flow, capacity, area, film, pumping)
-    maps = march_maps(mass_flow * capacity, area, film, pumping)
-    constant = maps.heat_from_friction - maps.heat_from_wall.sum(axis=-1) * inlet_temperature
-    return MarchLinearisation(matrix=maps.heat_from_wall, constant=constant)

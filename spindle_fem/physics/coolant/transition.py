@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.correlation import Array, correlation
-from spindle_fem.validity import require_range
 
 TURBULENT_FROM_REYNOLDS = 2.2e4
 
@@ -68,47 +67,3 @@ def transition_weight(reynolds: ArrayLike, critical_reynolds: ArrayLike) -> NDAr
     critical = np.asarray(critical_reynolds, float)
     share = (TURBULENT_FROM_REYNOLDS - np.asarray(reynolds, float)) / (TURBULENT_FROM_REYNOLDS - critical)
     return np.clip(share, 0.0, 1.0)
-
-
-def nusselt_transition(
-    reynolds: ArrayLike,
-    critical_reynolds: ArrayLike,
-    nusselt_laminar_at_critical: ArrayLike,
-    nusselt_turbulent_at_upper: ArrayLike,
-) -> NDArray[np.float64]:
-    """Nusselt number between laminar and turbulent flow in a helical coil.
-
-    Parameters
-    ----------
-    reynolds, critical_reynolds : (n,) array_like, [-]
-    nusselt_laminar_at_critical : (n,) array_like, [-]
-        At the critical Reynolds number.
-    nusselt_turbulent_at_upper : (n,) array_like, [-]
-        At Re = 2.2e4.
-
-    Returns
-    -------
-    (n,) ndarray, [-]
-        Meets both branches without a jump.
-
-    Raises
-    ------
-    OutOfValidityError
-        Reynolds number not between the critical one and 2.2e4.
-
-    Source: Gnielinski (1986); VDI Heat Atlas, section G3.
-
-    >>> float(nusselt_transition(15000.0, 8000.0, 100.0, 900.0))
-    500.0
-    """
-    re, critical = np.broadcast_arrays(np.asarray(reynolds, float), np.asarray(critical_reynolds, float))
-    require_range(
-        "nusselt_transition",
-        critical_reynolds=(critical, 0.0, TURBULENT_FROM_REYNOLDS),
-        reynolds_over_critical=(re / critical, 1.0, np.inf),
-        reynolds=(re, 0.0, TURBULENT_FROM_REYNOLDS),
-        how_to_fix="Let coolant.regimes choose the correlation.",
-    )
-    weight = transition_weight(re, critical)
-    laminar = np.asarray(nusselt_laminar_at_critical, float)
-    return weight * laminar + (1.0 - weight) * np.asarray(nusselt_turbulent_at_upper, float)

@@ -20,7 +20,7 @@ from scipy.optimize import lsq_linear
 from spindle_fem.model.lumped.heat_laws import CoolantLaw, WallFilmLaw
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.model.lumped.operating_state import operate
-from spindle_fem.model.lumped.thermal_network import ThermalNetwork, link_matrix
+from spindle_fem.model.lumped.thermal_network import link_matrix
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.coefficients import fluid_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -138,30 +138,6 @@ class MatchedNetwork:
         n = self.n_nodes
         matrix = link_matrix(self.first, self.second, conductance, n + len(self.boundary_names))
         return matrix[:n, :n], -matrix[:n, n:]
-
-    def thermal_network(self, conductance: Array | None = None) -> ThermalNetwork:
-        """As a general network with inputs ``heat.<bearing>``, ``ambient``, ``coolant_inlet``."""
-        node, bearing = np.nonzero(self.spread)
-        return ThermalNetwork(
-            node_names=self.node_names,
-            capacity=self.capacity,
-            link_first=self.first,
-            link_second=self.second,
-            link_conductance=self.factor * self.base if conductance is None else conductance,
-            boundary_names=self.boundary_names,
-            boundary_temperature=np.where(
-                np.isin(self.boundary_names, ("ambient", "coolant_inlet")),
-                np.nan,
-                self.boundary_temperature(self.matched.point),
-            ),
-            boundary_input=tuple(
-                name if name in ("ambient", "coolant_inlet") else None for name in self.boundary_names
-            ),
-            source_node=node,
-            source_input=tuple(f"heat.{self.bearings[b]}" for b in bearing),
-            source_gain=self.spread[node, bearing],
-            source_exponent=np.ones(len(node)),
-        )
 
 
 def element_state(

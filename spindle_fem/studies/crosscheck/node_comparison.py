@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 INSIDE_PART = "cut through a part: flux of the field integrated over it"
 BOTH = "joint and cut through a part"
 JOINT = "joint"
-FilmKey = tuple[int, str]
 
 
 @dataclass(frozen=True, slots=True)
