@@ -101,7 +101,7 @@ class CoolantLoop:
     def film_choice(self, factor: ArrayLike) -> FilmChoice:
         """The film that the definition asks for, times a factor."""
         local = self.spec.coolant.properties_at == "bulk"
-        return FilmChoice(self.spec.coolant.film_model, "local" if local else "inlet", local, factor)
+        return FilmChoice(self.spec.coolant.film_model, "local" if local else "inlet", factor)
 
     def pressure_drop(self, flow: float, inlet: float) -> PressureDrop:
         """Pressure drop of the channel at a flow (m³/s), properties at the inlet temperature (K)."""

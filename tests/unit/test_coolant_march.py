@@ -175,7 +175,7 @@ class TestDrivenChannel:
     AREA = np.full(30, 0.1562 / 30)
 
     def march(self, **changes):
-        options = {"model": "sieder_tate", "properties_at": "inlet", "wall_correction": False} | changes
+        options = {"model": "sieder_tate", "properties_at": "inlet"} | changes
         coolant, power = options.pop("coolant", OIL), options.pop("pumping_power", 0.0)
         choice = FilmChoice(**options)
         return DrivenChannel(CHANNEL, coolant, FLOW, INLET, self.AREA, choice, power).settle(self.WALL)
@@ -186,7 +186,7 @@ class TestDrivenChannel:
         assert found.film.value == pytest.approx(243.0, rel=5e-3)
         assert found.mass_flow == pytest.approx(FLOW * 873.3, rel=1e-4)
         units = found.film.value * 0.1562 / (found.mass_flow * 1857.63)
-        choice = FilmChoice("sieder_tate", "inlet", wall_correction=False)
+        choice = FilmChoice("sieder_tate", "inlet")
         uniform = DrivenChannel(CHANNEL, OIL, FLOW, INLET, self.AREA, choice).settle(np.full(30, 300.0))
         exact = INLET + (300.0 - INLET) * -np.expm1(-units)
         assert uniform.march.mixed_outlet_temperature == pytest.approx(exact, abs=1e-4)
@@ -194,7 +194,7 @@ class TestDrivenChannel:
     @pytest.mark.parametrize("coolant", [OIL, Water()], ids=lambda fluid: fluid.name)
     @pytest.mark.parametrize("model", ["helical", "paper", "sieder_tate"])
     def test_local_properties_close_the_coolants_own_enthalpy(self, coolant, model):
-        found = self.march(coolant=coolant, model=model, properties_at="local", wall_correction=True)
+        found = self.march(coolant=coolant, model=model, properties_at="local")
         edges = found.march.edge_temperature
         enthalpy = coolant.specific_enthalpy(edges[[0, -1]])
         taken = found.march.heat.sum()

@@ -194,9 +194,8 @@ class FilmChoice:
     model : str
         One of ``FILM_MODELS``.
     properties_at : {"local", "inlet"}
-        Bulk temperature of each cell, or the inlet's everywhere.
-    wall_correction : bool
-        Whether the viscosity at the wall corrects the film coefficient.
+        Bulk temperature of each cell, corrected by the viscosity at the wall,
+        or the inlet's everywhere.
     factor : (..., n) array_like or float, [-]
         Multiplies the film coefficient (fouling, calibration, ports).
 
@@ -208,7 +207,6 @@ class FilmChoice:
 
     model: str = "helical"
     properties_at: str = "local"
-    wall_correction: bool = True
     factor: ArrayLike = 1.0
 
     def __post_init__(self) -> None:
@@ -264,18 +262,17 @@ class DrivenChannel:
             No flow, a temperature outside the coolant's range.
         """
         choice, inlet = self.choice, self.inlet_temperature
-        if before is not None and choice.properties_at == "inlet" and not choice.wall_correction:
+        local = choice.properties_at == "local"
+        if before is not None and not local:
             film, mass_flow, capacity = before.film, before.mass_flow, before.march.specific_heat_capacity
         else:
             at_inlet = self.coolant.properties(inlet)
             mass_flow = at_inlet.density * self.volume_flow / self.section.starts
             bulk, capacity = inlet, at_inlet.specific_heat_capacity
-            if before is not None and choice.properties_at == "local":
+            if before is not None:
                 bulk, edges = before.march.bulk_temperature, before.march.edge_rise
                 capacity = _mean_heat_capacity(self.coolant, inlet, edges[..., :-1], edges[..., 1:])
-            state = ChannelState(
-                self.coolant, self.volume_flow, bulk, wall if choice.wall_correction else None
-            )
+            state = ChannelState(self.coolant, self.volume_flow, bulk, wall if local else None)
             film = select_film(choice.model, self.section, state)
         coefficient = np.asarray(choice.factor, dtype=np.float64) * np.asarray(film.value)
         area = np.asarray(self.wetted_area, dtype=np.float64)
