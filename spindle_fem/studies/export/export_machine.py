@@ -9,7 +9,10 @@ from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.load import find_machine, load_machine, read_definition
 from spindle_fem.errors import SpecError
 from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.build_reduced import ReductionOptions
 from spindle_fem.model.reduced.network_inputs import fast_network
+from spindle_fem.model.reduced.recorded_model import fast_model_for
+from spindle_fem.studies.export.geometry_export import geometry_state_space, require_exportable
 from spindle_fem.studies.export.network_export import network_state_space
 from spindle_fem.studies.export.state_space import StateSpace
 
@@ -41,7 +44,9 @@ def machine_state_space(
             f'"{spec.effects[0].effect}" follows what only simulate works out.',
             "Export the machine without its [[effect]] tables.",
         )
-    if not is_network:
-        raise SpecError("machine", "has geometry.", "Export a [network] machine.")
-    progress("matrices")
-    return network_state_space(fast_network(build_network(spec.network), spec), spec.name)
+    if is_network:
+        return network_state_space(fast_network(build_network(spec.network), spec), spec.name)
+    require_exportable(spec)
+    fast = fast_model_for(spec, (), as_given=True, progress=progress)
+    progress("tables over speed and coolant")
+    return geometry_state_space(fast, spec.name, ReductionOptions().highest_speed_of(spec))

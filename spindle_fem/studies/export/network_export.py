@@ -10,6 +10,7 @@ from spindle_fem.model.reduced.drive import LARGEST_STEP
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.studies.export.state_space import (
+    CELSIUS,
     EXACT,
     USUAL_TEMPERATURE,
     ModelInput,
@@ -21,7 +22,6 @@ from spindle_fem.studies.export.state_space import (
 )
 from spindle_fem.units import ZERO_CELSIUS_K, registry
 
-CELSIUS = "degC"
 # How units of inputs are written where they have these dimensions.
 USUAL_UNITS = ("", "W", "rad/s", "N", "N*m", "A", "V", "m/s", "m**3/s", "Pa")
 

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 # Room and start where a program that steps the model says nothing, °C.
 USUAL_TEMPERATURE = 20.0
 EXACT, TR_BDF2 = "exact", "TR-BDF2"
+CELSIUS = "degC"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,307 @@
+"""The fast model of a machine with geometry as a state space whose matrices follow speed and coolant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.effects.framework.term import CHANNEL_FILM
+from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.model.reduced.coolant_maps import CoolantMaps, coolant_maps
+from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.operation.friction_map import needs_map
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.recordings.standard_inputs import standard_inputs
+from spindle_fem.studies.export.interpolation_axes import refined_axis
+from spindle_fem.studies.export.state_space import (
+    CELSIUS,
+    TR_BDF2,
+    ModelInput,
+    PowerLoad,
+    StateSpace,
+    header_of,
+    modal_basis,
+    power_load_arrays,
+)
+from spindle_fem.units import ZERO_CELSIUS_K
+
+Array = NDArray[np.float64]
+
+UNITS = ("rad/s", "N", CELSIUS, CELSIUS, "m**3/s")
+# Range of the coolant about the definition's: shares of its flow, kelvin about its inlet temperature.
+FLOW_SHARES = (0.25, 2.0)
+INLET_RANGE = (-10.0, 20.0)
+# What friction may warm the coolant by at the upper end of its properties, K.
+OWN_WARMING = 2.0
+# Largest thrust, in the larger of the definition's and the heat table's reference.
+THRUST_SHARE = 2.0
+# Of coefficients, between the points of a table.
+TOLERANCE = 5e-5
+# Of the coolant's operators, left out with the directions in which they hardly vary.
+LEFT_OUT = 1e-7
+PARTS = ("conduction", "load", "output", "feedthrough")
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorTable:
+    """Matrices whose sum, weighted by a table over inputs, is added to those of the nominal point.
+
+    Attributes
+    ----------
+    inputs : tuple of str
+        The table's axes.
+    axes : tuple of ndarray
+    values : (n, ..., m) ndarray
+        Weights.
+    parts : mapping of str to (m, ., .) ndarray
+        ``conduction``, ``load``, ``output``, ``feedthrough``, on the fast model's own unknowns and loads.
+    """
+
+    inputs: tuple[str, ...]
+    axes: tuple[Array, ...]
+    values: Array
+    parts: dict[str, Array]
+
+
+def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> StateSpace:
+    """State space of a fast model whose heat is by table.
+
+    Parameters
+    ----------
+    name : str
+        Of the machine.
+    highest_speed : float, [rad/s]
+
+    Raises
+    ------
+    FaultsError
+        As :func:`require_exportable`.
+    """
+    spec = fast.spec
+    require_exportable(spec)
+    nominal = OperatingPoint.of(spec)
+    inputs = _inputs(spec, highest_speed)
+    position = {item.name: number for number, item in enumerate(inputs)}
+    tables = {"speed": _speed_table(fast, nominal, highest_speed)}
+    if fast.channel is not None:
+        tables["coolant"] = _coolant_table(fast, nominal)
+    tables = {key: table for key, table in tables.items() if table.values.shape[-1]}
+    heat_inputs, heat_axes, heat = _heat_table(fast, inputs)
+    # Loads that are inputs or constants come first, those of the heat table behind.
+    n_heat = len(fast.heat_places)
+    order = [*range(n_heat, len(fast.load_names)), *range(n_heat)]
+    powers = [_fluid_load(fast, load, position) for load in fast.load_names[n_heat:]]
+    operators, storage = fast.operators(nominal, {}), fast.storage({})
+    modes = modal_basis(storage, 0.5 * (operators.conduction + operators.conduction.T))
+
+    def arrays_of(conduction: Array, load: Array, output: Array, feedthrough: Array) -> dict[str, Array]:
+        found = (
+            modes.T @ conduction @ modes,
+            modes.T @ load[..., order],
+            output @ modes,
+            feedthrough[..., order],
+        )
+        return dict(zip(PARTS, found, strict=True))
+
+    arrays = power_load_arrays(powers)
+    arrays |= arrays_of(operators.conduction, operators.loads, operators.outputs, operators.output_inputs)
+    arrays["uniform"] = modes.T @ storage @ fast.model.one
+    arrays |= {"heat.values": heat} | {f"heat.axis{i}": axis for i, axis in enumerate(heat_axes)}
+    for key, table in tables.items():
+        arrays |= {
+            f"{key}.{part}": value for part, value in arrays_of(*(table.parts[p] for p in PARTS)).items()
+        }
+        arrays |= {f"{key}.values": table.values}
+        arrays |= {f"{key}.axis{number}": axis for number, axis in enumerate(table.axes)}
+    sensors = {item.name for item in spec.displacement_sensor}
+    header = header_of(
+        name,
+        TR_BDF2,
+        LARGEST_STEP,
+        inputs,
+        {channel: "um" if channel in sensors else CELSIUS for channel in fast.channels},
+        {load.name: load.unit for load in powers} | {f"heat.{place}": "W" for place in fast.heat_places},
+    )
+    header["load_tables"], header["operator_tables"] = ["heat"], list(tables)
+    header["table_inputs"] = {"heat": [position[item] for item in heat_inputs]} | {
+        key: [position[item] for item in table.inputs] for key, table in tables.items()
+    }
+    return StateSpace(header, arrays)
+
+
+def require_exportable(spec: MachineSpec) -> None:
+    """Refuse what follows temperatures within a step: its matrices are no tables over inputs.
+
+    Raises
+    ------
+    FaultsError
+        Every reason at once.
+    """
+    faults = []
+    if spec.coolant is not None and spec.coolant.properties_at == "bulk":
+        how = "Export with --set coolant.properties_at=inlet."
+        faults.append(SpecError("coolant.properties_at", '"bulk" lets the film follow the wall.', how))
+    if needs_map(spec):
+        how = 'Export with heat.model = "table" (and a [heat.table]) and constant ball rows.'
+        faults.append(SpecError("heat.model", "friction or ball rows follow the temperature of films.", how))
+    for film in spec.film:
+        if isinstance(film, NaturalFilm):
+            how = 'Export with kind = "constant".'
+            faults.append(SpecError(f"film.{film.name}", "follows the temperature of its surface.", how))
+    if faults:
+        raise FaultsError("export", faults)
+
+
+def _inputs(spec: MachineSpec, highest_speed: float) -> list[ModelInput]:
+    """The standard inputs; the coolant's where there is one."""
+    usual = standard_inputs(spec)
+    ranges: dict[str, tuple[float | None, float | None]] = {
+        "speed": (0.0, highest_speed),
+        "thrust": _thrust_range(spec),
+        "ambient": (None, None),
+        "coolant_inlet": _inlet_range(spec),
+        "coolant_flow": tuple(usual["coolant_flow"] * share for share in FLOW_SHARES),
+    }
+    found = []
+    for name, unit in zip(STANDARD, UNITS, strict=True):
+        if spec.channel is None and name.startswith("coolant"):
+            continue
+        default = round(usual[name] - (ZERO_CELSIUS_K if unit == CELSIUS else 0.0), 9)
+        found.append(ModelInput(name, unit, default, *ranges[name], magnitude=name == "speed"))
+    return found
+
+
+def _inlet_range(spec: MachineSpec) -> tuple[float, float]:
+    """Inlet temperatures about the definition's, °C, where the coolant's properties are known."""
+    if spec.coolant is None:
+        return -np.inf, np.inf
+    coolant, usual = coolant_by_name(spec.coolant.fluid), spec.coolant.inlet_temperature
+    low = max(usual + INLET_RANGE[0], coolant.lowest_temperature)
+    high = max(usual, min(usual + INLET_RANGE[1], coolant.highest_temperature - OWN_WARMING))
+    return low - ZERO_CELSIUS_K, high - ZERO_CELSIUS_K
+
+
+def _thrust_range(spec: MachineSpec) -> tuple[float, float]:
+    """Thrusts at which no bearing's heat is cut off at zero, N."""
+    table = spec.heat.table
+    steepest = max((abs(value) for value in table.thrust_coefficient.values()), default=0.0)
+    lowest = table.reference_thrust * (1.0 - 1.0 / steepest) if steepest > 1.0 else 0.0
+    return lowest, THRUST_SHARE * max(table.reference_thrust, spec.operation.thrust)
+
+
+def _fluid_load(fast: FastModel, name: str, position: dict[str, int]) -> PowerLoad:
+    """A fluid's temperature, or the coolant's own friction, whose load is for 1."""
+    if name in position:
+        return PowerLoad(name, CELSIUS, position[name])
+    if name.startswith("fixed["):
+        number = int(name.removeprefix("fixed[").removesuffix("]"))
+        return PowerLoad(name, CELSIUS, -1, fast.inputs.fixed_fluids[number] - ZERO_CELSIUS_K)
+    # Without a coolant its inlet drives nothing.
+    return PowerLoad(name, "1", -1, float(name == "coolant_friction"))
+
+
+def _heat_table(
+    fast: FastModel, inputs: list[ModelInput]
+) -> tuple[tuple[str, ...], tuple[Array, ...], Array]:
+    """Heat of every place over speed, and over thrust where it follows that."""
+    table = fast.spec.heat.table
+    speed, thrust = inputs[0], inputs[1]
+    speeds = np.unique([*(s for s in table.speed if s < speed.high), 0.0, speed.high])
+    thrusts = np.array([thrust.low, thrust.high])
+    grid = np.array(np.meshgrid(speeds, thrusts, indexing="ij")).reshape(2, -1).T
+    rest = np.tile([thrust.default] * (len(STANDARD) - 2), (len(grid), 1))
+    loads, _ = fast.load_inputs(STANDARD, np.hstack((grid, rest)), {})
+    heat = loads[:, : len(fast.heat_places)].reshape(speeds.size, thrusts.size, -1)
+    if any(table.thrust_coefficient.values()):
+        return ("speed", "thrust"), (speeds, thrusts), heat
+    return ("speed",), (speeds,), heat[:, 0]
+
+
+def _speed_table(fast: FastModel, nominal: OperatingPoint, highest: float) -> OperatorTable:
+    """Coefficients that follow the speed, each with its own matrices."""
+    names = [name for name in fast.model.coefficient_names if name != CHANNEL_FILM]
+
+    def at(speed: float) -> Array:
+        found = fast.coefficients(replace(nominal, speed=speed), {})
+        return np.array([found[name] for name in names])
+
+    speeds = refined_axis(at, 0.0, highest, TOLERANCE)
+    values = np.array([at(speed) for speed in speeds])
+    base = at(nominal.speed)
+    moving = np.flatnonzero(np.any(values != base, axis=0))
+    parts: dict[str, list[Array]] = {part: [] for part in PARTS}
+    for row in moving:
+        # Twice the coefficient less once, where it is largest: its own share of the operators.
+        largest = int(np.argmax(np.abs(values[:, row])))
+        point = replace(nominal, speed=float(speeds[largest]))
+        change = fast.change(point, {}, ({names[row]: 2.0}, {names[row]: 1.0}), ({}, {}))
+        own = (change.conduction, change.loads, change.outputs, change.output_inputs)
+        for part, matrix in zip(PARTS, own, strict=True):
+            parts[part].append(matrix / values[largest, row])
+    stacked = {part: np.array(matrices) for part, matrices in parts.items()}
+    return OperatorTable(("speed",), (speeds,), values[:, moving] - base[moving], stacked)
+
+
+def _coolant_table(fast: FastModel, nominal: OperatingPoint) -> OperatorTable:
+    """What the coolant adds over flow and inlet temperature, on the few directions in which it varies."""
+
+    def film(flow: float, inlet: float) -> tuple[Array, float, float]:
+        point = replace(nominal, coolant_flow=flow, coolant_inlet_temperature=inlet + ZERO_CELSIUS_K)
+        return fast.channel.film(point, {})
+
+    def values(flow: float, inlet: float) -> Array:
+        cells, rate, friction = film(flow, inlet)
+        return np.array([cells.mean(), rate, friction])
+
+    flow, inlet = nominal.coolant_flow, nominal.coolant_inlet_temperature - ZERO_CELSIUS_K
+    flows = refined_axis(
+        lambda at: values(at, inlet), *(flow * share for share in FLOW_SHARES), tolerance=TOLERANCE
+    )
+    inlets = refined_axis(lambda at: values(flow, at), *_inlet_range(fast.spec), tolerance=TOLERANCE)
+    shapes = _shapes(fast)
+    sample = _coolant_sampler(fast, film)
+    base = sample(flow, inlet)
+    ends = np.cumsum([np.prod(shape) for shape in shapes])
+    # Heats, loads and temperatures count alike.
+    scale = np.concatenate(
+        [np.full(part.shape, np.linalg.norm(part) or 1.0) for part in np.split(base, ends[:-1])]
+    )
+    rows = np.array([(sample(a, b) - base) / scale for a in flows for b in inlets])
+    squares, directions = np.linalg.eigh(rows @ rows.T)
+    kept = squares > LEFT_OUT**2 * len(rows)
+    # Orthonormal directions of the operators, and every sample's coordinates along them.
+    basis = (directions[:, kept].T @ rows) / np.sqrt(squares[kept])[:, None]
+    weights = (rows @ basis.T).reshape(flows.size, inlets.size, -1)
+    split = np.split(basis * scale, ends[:-1], axis=1)
+    parts = {part: own.reshape(-1, *shape) for part, own, shape in zip(PARTS, split, shapes, strict=True)}
+    return OperatorTable(("coolant_flow", "coolant_inlet"), (flows, inlets), weights, parts)
+
+
+def _shapes(fast: FastModel) -> tuple[tuple[int, int], ...]:
+    size, n_load, n_out = fast.model.size, len(fast.load_names), len(fast.channels)
+    return (size, size), (size, n_load), (n_out, size), (n_out, n_load)
+
+
+def _coolant_sampler(
+    fast: FastModel, film: Callable[[float, float], tuple[Array, float, float]]
+) -> Callable[[float, float], Array]:
+    """Everything that the coolant adds at a flow [m³/s] and inlet [°C], one behind the other."""
+    inlet, friction = (fast.load_names.index(name) for name in ("coolant_inlet", "coolant_friction"))
+    outlets = [row for row, probe in enumerate(fast.spec.probe) if probe.kind == "coolant_outlet"][:1]
+
+    def sample(flow: float, temperature: float) -> Array:
+        maps: CoolantMaps = coolant_maps(fast.model, *film(flow, temperature))
+        conduction, load, output, feedthrough = (np.zeros(shape) for shape in _shapes(fast))
+        conduction += maps.conduction
+        load[:, inlet], load[:, friction] = maps.inlet_load, maps.constant_load
+        output[outlets], feedthrough[outlets, inlet] = maps.outlet, maps.outlet_inlet
+        feedthrough[outlets, friction] = maps.outlet_constant
+        return np.concatenate([part.ravel() for part in (conduction, load, output, feedthrough)])
+
+    return sample

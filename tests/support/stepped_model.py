@@ -1,0 +1,72 @@
+"""An exported model stepped along a drive, and the command line of its C form."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from spindle_fem.units import ZERO_CELSIUS_K
+
+needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+
+
+def inputs_of(model, drive):
+    """Inputs at both ends of every step in the model's order and units, (G, m) each."""
+    offsets = [ZERO_CELSIUS_K if item["unit"] == "degC" else 0.0 for item in model.header["inputs"]]
+    columns = [drive.column(name) for name in model.inputs]
+    return drive.start[:, columns] - offsets, drive.end[:, columns] - offsets
+
+
+def readings_along(model, drive, given, most_steps=None):
+    """Outputs after every step, (G, p); as they are just after it, where inputs jump.
+
+    Parameters
+    ----------
+    given : mapping of int to float or mapping
+        Where the model starts, by point of the drive's grid.
+    """
+    begin, end = inputs_of(model, drive)
+    after = np.vstack((begin[1:], end[-1:]))
+    found = []
+    for step, seconds in enumerate(drive.steps[:most_steps]):
+        if step in given:
+            model.start(given[step], begin[step])
+        assert model.step(seconds, begin[step], end[step]) == []
+        found.append(model.read(after[step]))
+    return np.array(found)
+
+
+PROGRAM = """
+#include <stdio.h>
+#include "model.h"
+int main(void) {
+    static NAME_model model;
+    double seconds, first[UPPER_INPUTS], last[UPPER_INPUTS], after[UPPER_INPUTS], found[UPPER_OUTPUTS];
+    double *rows[] = {first, last, after};
+    if (scanf("%lf", &seconds) != 1) return 1;
+    NAME_start(&model, seconds);
+    while (scanf("%lf", &seconds) == 1) {
+        for (int row = 0; row < 3; row++)
+            for (int i = 0; i < UPPER_INPUTS; i++)
+                if (scanf("%lf", &rows[row][i]) != 1) return 1;
+        if (NAME_step(&model, seconds, first, last)) return 2;
+        NAME_read(&model, after, found);
+        for (int i = 0; i < UPPER_OUTPUTS; i++) printf("%.17g ", found[i]);
+        printf("\\n");
+    }
+    return 0;
+}
+"""
+
+
+def c_readings_along(folder, name, model, drive, start):
+    """The same as :func:`readings_along` by ``model.c`` in a folder, compiled without a warning."""
+    (folder / "main.c").write_text(PROGRAM.replace("NAME", name).replace("UPPER", name.upper()))
+    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    subprocess.run(["gcc", *flags, "main.c", "model.c", "-lm", "-o", "m"], cwd=folder, check=True)
+    begin, end = inputs_of(model, drive)
+    rows = np.column_stack((drive.steps, begin, end, np.vstack((begin[1:], end[-1:]))))
+    text = "\n".join([repr(float(start)), *(" ".join(map(repr, row)) for row in rows.tolist())])
+    answer = subprocess.run([folder / "m"], input=text, capture_output=True, text=True, check=True)
+    return np.array([[float(value) for value in line.split()] for line in answer.stdout.splitlines()])

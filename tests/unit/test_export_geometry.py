@@ -1,0 +1,102 @@
+"""A machine with geometry as a state space, on a spindle of one unknown per part; what it refuses."""
+
+import numpy as np
+import pytest
+
+from spindle_fem.commands.export_command import export_machine
+from spindle_fem.errors import FaultsError
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.studies.export.exported_files import file_writer
+from spindle_fem.studies.export.geometry_export import geometry_state_space
+from spindle_fem.studies.export.interpolation_axes import refined_axis
+from spindle_fem.studies.export.portable_model import PortableModel
+from spindle_fem.units import ZERO_CELSIUS_K
+from tests.support.lumped_spindle import RPM, drive_of
+from tests.support.stepped_model import c_readings_along, needs_compiler, readings_along
+
+# Largest difference from simulate, K.
+AGREEMENT = 1e-3
+START = 22.0
+
+
+@pytest.fixture(scope="module")
+def space(fast):
+    return geometry_state_space(fast, "lumped", 4500.0 * RPM)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    """Speed, standstill and another flow, with thrust, air and inlet that move."""
+    times = np.arange(0.0, 7200.0, 30.0)
+    speed = np.where(times < 3000.0, 3000.0, np.where(times < 5000.0, 0.0, 1234.0))
+    return drive_of(
+        times,
+        speed,
+        ambient=293.15 + np.sin(times / 1000.0),
+        inlet=290.15 + np.cos(times / 700.0),
+        thrust=1000.0 + 0.1 * times,
+        flow=np.where(times < 4000.0, 20.0, 14.0) / 60e3,
+    )
+
+
+@pytest.fixture(scope="module")
+def simulated(fast, drive):
+    return simulate_fast(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+
+
+def test_agrees_with_simulate(space, drive, simulated):
+    found = readings_along(space.model(), drive, {0: START})
+    assert np.abs(found - simulated).max() < AGREEMENT
+
+
+def test_settles_with_heat_in_balance(space, fast):
+    model = space.model()
+    inputs = {"speed": 3000.0 * RPM, "coolant_inlet": 17.0, "ambient": 17.0}
+    model.settle(inputs)
+    rises = model.read(inputs) - 17.0
+    model.settle({**inputs, "coolant_inlet": 20.0, "ambient": 20.0})
+    # The same heat above surroundings that are 3 K warmer; films know the coolant's temperature.
+    assert model.read({**inputs, "coolant_inlet": 20.0, "ambient": 20.0}) - 20.0 == pytest.approx(
+        rises, rel=0.02
+    )
+    conduction, load, _, _ = model.matrices(model.vector(inputs))
+    assert conduction @ model.arrays["uniform"] == pytest.approx(load[:, :2].sum(axis=1), abs=1e-6)
+
+
+@needs_compiler
+def test_c_agrees_with_python(space, drive, tmp_path):
+    path = tmp_path / "model.c"
+    file_writer(path)(space, path)
+    found = c_readings_along(tmp_path, "lumped", space.model(), drive, START)
+    np.testing.assert_allclose(found, readings_along(space.model(), drive, {0: START}), rtol=0.0, atol=1e-9)
+
+
+def test_names_inputs_beyond_its_range(space):
+    model = space.model()
+    assert model.step(1.0, {"speed": 9000.0 * RPM, "coolant_flow": 0.0}) == ["coolant_flow", "speed"]
+
+
+def test_files_hold_it_all(space, tmp_path):
+    path = tmp_path / "model.npz"
+    file_writer(path)(space, path)
+    read = PortableModel.load(path)
+    assert read.header == space.header
+    assert all(np.array_equal(read.arrays[name], values) for name, values in space.arrays.items())
+
+
+@pytest.mark.parametrize(
+    ("machine", "named"),
+    [("wu_tan_2016", ("properties_at", "heat.model")), ("uncooled", ("heat.model", "surface"))],
+)
+def test_refuses_what_follows_temperatures_before_it_makes_a_model(machine, named, tmp_path):
+    with pytest.raises(FaultsError) as refused:
+        export_machine(machine, tmp_path / "m.npz")
+    assert all(text in str(refused.value) for text in named)
+
+
+def test_axes_are_refined_at_bends_and_jumps():
+    found = refined_axis(lambda x: np.array([1.0 if x == 0.0 else 2.0 + x**2]), 0.0, 1.0, 1e-3)
+    assert found[1] < 1e-5
+    middle = 0.5 * (found[1:-1] + found[2:])
+    between = 2.0 + 0.5 * (found[1:-1] ** 2 + found[2:] ** 2)
+    assert np.abs(between / (2.0 + middle**2) - 1.0).max() <= 1e-3
