@@ -8,7 +8,8 @@ import pytest
 from spindle_fem.commands.plan_command import plan, planned_measurement
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError
-from spindle_fem.inference import measurement_plan, opened_machine
+from spindle_fem.inference import measurement_plan, misdescription_columns, opened_machine
+from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.planned_test import base_name, conditions_of
 from spindle_fem.inference.predictor import Predictor
@@ -93,6 +94,8 @@ def spindles():
     asked = {"test": "cool_down:1h", "sensors": ["SP01"], "compare": False}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(opened_machine, "fast_model_for", lambda *_, **__: fast)
+        # Directions of the structure need the machine's mesh.
+        patch.setattr(misdescription_columns, "PROVIDERS", (heat_misdescriptions,))
         found = [planned_measurement("recorded_spindle", **asked).plan]
         patch.setattr(measurement_plan, "misdescriptions_of", lambda predictor: ())
         patch.setattr(measurement_plan, "_places", lambda *_: ())
