@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.inference.recording_gaps import GAP_STEPS
+from spindle_fem.inference.recording_gaps import GAP_STEPS, long_spacings
 from spindle_fem.model.reduced.drive import Drive, classes_of, covariate_columns, drive_of_recording
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import Recording
@@ -91,7 +91,7 @@ def even_drive(fast: FastModel, recording: Recording) -> Drive:
     """Inputs of a network on equal steps of the recording's usual spacing, means over each step.
 
     The means keep the integral of every input; one length of step makes one
-    matrix of the model.
+    matrix of the model. A held input that is another after a gap changes amid it.
     """
     fine = fast.inputs.drive(recording, largest_step=np.inf)
     begins = np.array([0, *fine.restarts])
@@ -111,8 +111,24 @@ def even_drive(fast: FastModel, recording: Recording) -> Drive:
         pieces.append(edges)
         count += len(edges)
     grid = np.concatenate(pieces)
-    means = _means(fine, grid)
+    means = _means(fine, grid) + _amid_gaps(fine, grid, recording)
     classes = np.zeros(len(means), dtype=np.int64)
     return replace(
         fine, times=grid, grid=grid, start=means, end=means, step_class=classes, restarts=tuple(restarts)
     )
+
+
+def _amid_gaps(fine: Drive, grid: Array, recording: Recording) -> Array:
+    """What means over steps gain where held inputs change amid gaps instead of at their ends, (G, m)."""
+    held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
+    columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
+    gained = np.zeros((len(grid) - 1, len(fine.names)))
+    for first, last in long_spacings(recording):
+        step = int(np.searchsorted(fine.grid, last - 1e-6))
+        if step >= len(fine.start):
+            continue
+        change = fine.start[step, columns] - fine.end[step - 1, columns]
+        middle = 0.5 * (first + last)
+        share = np.clip(np.minimum(grid[1:], last) - np.maximum(grid[:-1], middle), 0.0, None) / np.diff(grid)
+        gained[:, columns] += np.outer(share, change)
+    return gained

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES
+from spindle_fem.inference.gap_misdescriptions import gap_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.network_misdescriptions import network_misdescriptions
@@ -28,6 +29,7 @@ PROVIDERS: tuple[Provider, ...] = (
     heat_misdescriptions,
     structural_misdescriptions,
     network_misdescriptions,
+    gap_misdescriptions,
 )
 
 

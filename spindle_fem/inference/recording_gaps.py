@@ -43,6 +43,14 @@ def gap_pieces(recording: Recording) -> tuple[tuple[float, float], ...]:
     return tuple(found)
 
 
+def long_spacings(recording: Recording) -> tuple[tuple[float, float], ...]:
+    """Distances of stamps within a segment that are gaps, whatever their length, [s]."""
+    spacing = np.diff(recording.times)
+    rows = np.flatnonzero(spacing > GAP_STEPS * np.median(spacing))
+    begins = set(recording.segments[1:, 0].tolist())
+    return tuple((float(recording.times[i]), float(recording.times[i + 1])) for i in rows if i + 1 not in begins)
+
+
 @dataclass(frozen=True, slots=True)
 class Hidden:
     """What may have happened between two times.

@@ -1,0 +1,161 @@
+"""Heat of a network within gaps of its recordings: what sources may have done there that nobody wrote down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import toeplitz
+
+from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.misdescription import Change, Misdescription
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.recording_gaps import long_spacings
+
+Array = NDArray[np.float64]
+
+# Modes of one gap and source: those that hold less than this share of the variance are left out, and most.
+LEAST_VARIANCE, MOST_MODES = 0.02, 6
+# A gap of more steps is followed at as many points.
+MOST_POINTS = 200
+# What moves no node by this share of the least noise, were it to keep all its heat, is left out.
+LEAST_RISE = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class HeatWithinGap:
+    """Heat of a source beside what is held, over some steps.
+
+    Attributes
+    ----------
+    source : str
+    first : int
+        Step at which the course begins.
+    course : tuple of float, [W]
+        Mean over each step, for an amplitude of one.
+    """
+
+    source: str
+    first: int
+    course: tuple[float, ...]
+
+    def __call__(self, base: BaseRun) -> Change:
+        """Loads of the heat."""
+        fast = base.predictor.fast
+        (row,) = fast.heat_rows(self.source)
+        heat = np.zeros(len(base.drive.steps))
+        heat[self.first : self.first + len(self.course)] = self.course
+        load = heat[:, None] * fast.model.place(fast.heat_places[row])
+        return Change(load, load)
+
+
+def gap_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
+    """Directions of a network whose sources follow inputs that are held over gaps.
+
+    How much a source may have differed from the value held is told by its own record elsewhere: its heat is
+    taken for a stationary Gaussian process of the autocovariance that the rest of the recording has, known
+    at both ends of the gap.
+
+    Source: Rasmussen & Williams (2006), Gaussian Processes for Machine Learning, section 2.2.
+    """
+    if not predictor.is_network:
+        return
+    network, fast = predictor.fast.network, predictor.fast
+    for number, recording in enumerate(predictor.recordings):
+        held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
+        rows = [i for i, name in enumerate(network.source_input) if name is not None and held.get(name)]
+        spans = long_spacings(recording)
+        if not rows or not spans:
+            continue
+        run = predictor.transient(number, {})
+        heat = 0.5 * (run.friction_start + run.friction_end)
+        noise = float(np.min(recording.sigma))
+        for row in rows:
+            source = network.source_names[row]
+            least = LEAST_RISE * noise * float(network.capacity[network.source_node[row]])
+            modes = _modes_in(heat[:, row], run.drive.grid, spans, least)
+            for gap, order, first, size, course in modes:
+                yield Misdescription(
+                    f"gap.{source}.{gap}.{order}",
+                    f"heat of {source} within a gap",
+                    "W",
+                    size,
+                    f"heat of {source} within the gap from {spans[gap][0]:.0f} s, beside what its input was "
+                    f"before and after: mode {order}",
+                    HeatWithinGap(source, first, tuple(course.tolist())),
+                    number,
+                )
+
+
+def _modes_in(
+    heat: Array, grid: Array, spans: Sequence[tuple[float, float]], least: float
+) -> Iterator[tuple[int, int, int, float, Array]]:
+    """Gap, order, first step, standard deviation [W] and course of every mode that brings ``least`` J."""
+    middle, steps = 0.5 * (grid[:-1] + grid[1:]), np.diff(grid)
+    inside = [np.flatnonzero((middle > begin) & (middle < end)) for begin, end in spans]
+    known = np.ones(len(heat), dtype=bool)
+    for own in inside:
+        known[own] = False
+    if not known.any() or np.ptp(heat[known]) == 0.0:
+        return
+    longest = max((len(own) for own in inside), default=0)
+    covariance = autocovariance(np.where(known, heat - heat[known].mean(), 0.0), known, longest + 2)
+    for gap, own in enumerate(inside):
+        if not len(own):
+            continue
+        at = np.unique(np.linspace(0, len(own) - 1, min(len(own), MOST_POINTS)).round().astype(int))
+        for order, (size, shape) in enumerate(bridge_modes(covariance, at + 1, len(own) + 1), 1):
+            course = np.interp(np.arange(len(own)), at, shape)
+            if size * np.abs(np.cumsum(course * steps[own])).max() >= least:
+                yield gap, order, int(own[0]), size, course
+
+
+def autocovariance(values: Array, known: NDArray[np.bool_], lags: int) -> Array:
+    """Autocovariance at lags of 0, 1, ... steps from the pairs that are known, (lags,).
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Deviations from the mean; zero where unknown.
+    """
+    size = 2 * len(values)
+    power = np.abs(np.fft.rfft(values, size)) ** 2
+    pairs = np.abs(np.fft.rfft(known.astype(float), size)) ** 2
+    total, count = (np.fft.irfft(item, size)[:lags] for item in (power, pairs))
+    found = np.zeros(lags)
+    found[: len(total)] = total / np.maximum(count, 1.0)
+    return found
+
+
+def bridge_modes(covariance: Array, at: NDArray[np.int64], end: int) -> list[tuple[float, Array]]:
+    """Independent courses of a stationary process between two instants at which it is known.
+
+    Parameters
+    ----------
+    covariance : (n,) ndarray
+        At lags of 0, 1, ...
+    at : (m,) ndarray of int
+        Instants between 0 and ``end``, at which the process is known.
+
+    Returns
+    -------
+    list of (float, (m,) ndarray)
+        Standard deviation of each, the largest first, and its course, whose largest magnitude is 1.
+    """
+    points = np.concatenate(([0], at, [end]))
+    values, vectors = np.linalg.eigh(toeplitz(covariance[: end + 1])[np.ix_(points, points)])
+    # An estimate at few pairs need not be a covariance: what is below zero is none.
+    whole = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    inner, ends = slice(1, -1), [0, -1]
+    gained = np.linalg.pinv(whole[np.ix_(ends, ends)], rcond=1e-9, hermitian=True)
+    left = whole[inner, inner] - whole[inner, ends] @ gained @ whole[ends, inner]
+    values, vectors = np.linalg.eigh(0.5 * (left + left.T))
+    found = []
+    for value, vector in zip(values[::-1][:MOST_MODES], vectors.T[::-1], strict=False):
+        if value < LEAST_VARIANCE * max(float(np.trace(left)), 1e-30):
+            break
+        peak = vector[np.argmax(np.abs(vector))]
+        found.append((float(np.sqrt(value) * abs(peak)), vector / peak))
+    return found
