@@ -111,24 +111,30 @@ def even_drive(fast: FastModel, recording: Recording) -> Drive:
         pieces.append(edges)
         count += len(edges)
     grid = np.concatenate(pieces)
-    means = _means(fine, grid) + _amid_gaps(fine, grid, recording)
+    means = _means(_amid_gaps(fine, recording), grid)
     classes = np.zeros(len(means), dtype=np.int64)
     return replace(
         fine, times=grid, grid=grid, start=means, end=means, step_class=classes, restarts=tuple(restarts)
     )
 
 
-def _amid_gaps(fine: Drive, grid: Array, recording: Recording) -> Array:
-    """What means over steps gain where held inputs change amid gaps instead of at their ends, (G, m)."""
+def _amid_gaps(fine: Drive, recording: Recording) -> Drive:
+    """The drive with held inputs that are others after a gap changing amid it instead of at its end."""
     held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
-    columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
-    gained = np.zeros((len(grid) - 1, len(fine.names)))
-    for first, last in long_spacings(recording):
-        step = int(np.searchsorted(fine.grid, last - 1e-6))
-        if step >= len(fine.start):
-            continue
-        change = fine.start[step, columns] - fine.end[step - 1, columns]
-        middle = 0.5 * (first + last)
-        share = np.clip(np.minimum(grid[1:], last) - np.maximum(grid[:-1], middle), 0.0, None) / np.diff(grid)
-        gained[:, columns] += np.outer(share, change)
-    return gained
+    columns = [held.get(name, False) for name in fine.names]
+    spans = [(0.5 * (first + last), int(np.searchsorted(fine.grid, last - 1e-6))) for first, last in long_spacings(recording)]
+    spans = [(middle, after) for middle, after in spans if after < len(fine.start)]
+    if not spans:
+        return fine
+    owners = np.array([after - 1 for _, after in spans])
+    first, last, after = fine.start[owners], fine.end[owners], fine.start[owners + 1]
+    # What is not held is straight over the gap.
+    middle = 0.5 * (first + last)
+    end = fine.end.copy()
+    end[owners] = np.where(columns, last, middle)
+    return replace(
+        fine,
+        grid=np.insert(fine.grid, owners + 1, [instant for instant, _ in spans]),
+        start=np.insert(fine.start, owners + 1, np.where(columns, after, middle), axis=0),
+        end=np.insert(end, owners + 1, np.where(columns, after, last), axis=0),
+    )
