@@ -122,7 +122,10 @@ def _amid_gaps(fine: Drive, recording: Recording) -> Drive:
     """The drive with held inputs that are others after a gap changing amid it instead of at its end."""
     held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
     columns = [held.get(name, False) for name in fine.names]
-    spans = [(0.5 * (first + last), int(np.searchsorted(fine.grid, last - 1e-6))) for first, last in long_spacings(recording)]
+    spans = [
+        (0.5 * (first + last), int(np.searchsorted(fine.grid, last - 1e-6)))
+        for first, last in long_spacings(recording)
+    ]
     spans = [(middle, after) for middle, after in spans if after < len(fine.start)]
     if not spans:
         return fine

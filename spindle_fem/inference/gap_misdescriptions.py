@@ -1,4 +1,4 @@
-"""Heat of a network within gaps of its recordings: what sources may have done there that nobody wrote down."""
+"""Heat of a network within gaps of its recordings: what sources may have done there that nobody recorded."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def gap_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
     """
     if not predictor.is_network:
         return
-    network, fast = predictor.fast.network, predictor.fast
+    network = predictor.fast.network
     for number, recording in enumerate(predictor.recordings):
         held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
         rows = [i for i, name in enumerate(network.source_input) if name is not None and held.get(name)]
@@ -92,7 +92,7 @@ def gap_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
 def _modes_in(
     heat: Array, grid: Array, spans: Sequence[tuple[float, float]], least: float
 ) -> Iterator[tuple[int, int, int, float, Array]]:
-    """Gap, order, first step, standard deviation [W] and course of every mode that brings ``least`` J."""
+    """Gap, order, first step, standard deviation [W] and course of each mode that brings ``least`` J."""
     middle, steps = 0.5 * (grid[:-1] + grid[1:]), np.diff(grid)
     inside = [np.flatnonzero((middle > begin) & (middle < end)) for begin, end in spans]
     known = np.ones(len(heat), dtype=bool)

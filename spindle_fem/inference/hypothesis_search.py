@@ -194,9 +194,12 @@ class Search:
                     ),
                 )
 
-    def patterns(self) -> list[tuple[IntervalEffect, Pattern]]:
-        """Every effect of intervals at every spot that it may act at."""
+    def patterns(self, levels: bool = False) -> list[tuple[IntervalEffect, Pattern]]:
+        """Every effect of intervals at every spot that it may act at, or at which its level may change."""
         recorded = self.problem.predictor.drives[0].names
+        # A link between two nodes warms one by what it takes from the other.
+        joints = self.view.joint_coefficients if self.view.kind == "network" else {}
+        ends = {link: str(self.view.fluids[own[0]]) for link, own in joints.items()}
         return [
             (
                 effect,
@@ -206,10 +209,12 @@ class Search:
                     effect.takes_heat_away,
                     "ambient" if "ambient" in recorded else self.view.reference_temperature,
                     effect.link(self.view, spot),
+                    ends.get(spot, "") if effect.link(self.view, spot) else "",
+                    effect.source(self.view, spot),
                 ),
             )
             for effect in self.interval_effects
-            for spot in effect.places(self.view)
+            for spot in (effect.level_places if levels else effect.places)(self.view)
             if not self.view.switched_on(effect.name, self.view.component(spot))
         ]
 

@@ -26,6 +26,8 @@ from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.worker_processes import Workers
+from spindle_fem.machine.view.usual_sizes import LEAST_ON
+from spindle_fem.model.thermal_model import ThermalModel
 
 Array = NDArray[np.float64]
 
@@ -49,6 +51,10 @@ class Pattern:
         Input that is the temperature of these surroundings, or that temperature [K].
     link : str
         Coefficient that ends at them, where there is one.
+    other : str
+        Place at the link's other end, where that is no surroundings.
+    source : str
+        Source whose heat it scales, where there is one; its unit is the mean of that while on.
     """
 
     spot: str
@@ -56,6 +62,29 @@ class Pattern:
     cooling: bool = False
     fluid: str | float = "ambient"
     link: str = ""
+    other: str = ""
+    source: str = ""
+
+    def load(self, model: ThermalModel) -> Array:
+        """Where a unit of heat goes, (r,)."""
+        load = np.mean([model.place(place) for place in self.places], axis=0)
+        return load - model.place(self.other) if self.other else load
+
+    def strength(self, base: BaseRun) -> tuple[Array | float, Array | float]:
+        """How much heat a unit is at both ends of every step, (G,) W."""
+        if self.source:
+            (row,) = base.predictor.fast.heat_rows(self.source)
+            ends = base.run.friction_start[:, row], base.run.friction_end[:, row]
+            heat = 0.5 * (ends[0] + ends[1])
+            on = heat > LEAST_ON * heat.max()
+            usual = float(np.average(heat[on], weights=base.drive.steps[on])) if on.any() else 1.0
+            return ends[0] / usual, ends[1] / usual
+        if not self.cooling:
+            return 1.0, 1.0
+        over = (0.0 if self.other else self.surroundings(base)) - base.states @ self.load(
+            base.predictor.fast.model
+        )
+        return over[:-1], over[1:]
 
     def surroundings(self, base: BaseRun) -> Array:
         """Temperature of the surroundings along a run, (G + 1,) K."""
@@ -204,11 +233,10 @@ def _onsets_of(
 def _march(base: BaseRun, patterns: Sequence[Pattern], onsets: Array) -> Array:
     """Answers of the channels, (G + 1, c, n_patterns * n_onsets)."""
     model, run, drive = base.predictor.fast.model, base.run, base.drive
-    loads = np.array([np.mean([model.place(p) for p in pattern.places], axis=0) for pattern in patterns]).T
-    strength = np.ones((drive.grid.size, len(patterns)))
+    loads = np.array([pattern.load(model) for pattern in patterns]).T
+    before, after = (np.ones((len(drive.steps), len(patterns))) for _ in range(2))
     for index, pattern in enumerate(patterns):
-        if pattern.cooling:
-            strength[:, index] = pattern.surroundings(base) - base.states @ loads[:, index]
+        before[:, index], after[:, index] = pattern.strength(base)
     # Share of each step for which heat that begins at an onset is on.
     on = np.clip((drive.grid[1:, None] - onsets) / drive.steps[:, None], 0.0, 1.0)
     steps, size = len(drive.steps), model.size
@@ -216,7 +244,7 @@ def _march(base: BaseRun, patterns: Sequence[Pattern], onsets: Array) -> Array:
     for key, rows in run.groups.items():
         propagator = run.propagators[key]
         start, end = propagator.from_start @ loads, propagator.from_end @ loads
-        answer = start[None] * strength[rows, None, :] + end[None] * strength[rows + 1, None, :]
+        answer = start[None] * before[rows, None, :] + end[None] * after[rows, None, :]
         forcing[rows] = answer[:, :, :, None] * on[rows, None, None, :]
     tangent = run.tangents(forcing.reshape(steps, size, -1), base.tracks)
     return base.outputs(tangent)

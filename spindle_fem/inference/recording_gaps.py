@@ -48,7 +48,9 @@ def long_spacings(recording: Recording) -> tuple[tuple[float, float], ...]:
     spacing = np.diff(recording.times)
     rows = np.flatnonzero(spacing > GAP_STEPS * np.median(spacing))
     begins = set(recording.segments[1:, 0].tolist())
-    return tuple((float(recording.times[i]), float(recording.times[i + 1])) for i in rows if i + 1 not in begins)
+    return tuple(
+        (float(recording.times[i]), float(recording.times[i + 1])) for i in rows if i + 1 not in begins
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,7 +54,7 @@ def add_steps(search: Search, fit: Fit) -> None:
         return
     predictor = search.problem.predictor
     found = []
-    patterns = search.patterns()
+    patterns = search.patterns(levels=True)
     for recording in range(len(predictor.recordings)):
         answers = onset_answers(
             search.problem,
@@ -222,7 +222,7 @@ def _raised(place: StepPlace, search: Search, values: Mapping[str, float], lowes
     if not probe.sized_by:
         return dict(values)
     now = values.get(probe.sized_by, 1.0)
-    return dict(values) | {probe.sized_by: now + lowest / probe.constants["conductance"]}
+    return dict(values) | {probe.sized_by: now + lowest / probe.constants["nominal"]}
 
 
 def _fitted(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from spindle_fem.effects.framework.card import Card, Makes
-from spindle_fem.effects.framework.effect import Candidate, Reported, place_words, quantity
+from spindle_fem.effects.framework.effect import Candidate, Reported, capital, place_words, quantity
 from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature, rows
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
 from spindle_fem.effects.framework.spread import Spread
@@ -44,7 +44,7 @@ class CoolingTerm(UnrecordedTerm):
 
 
 class LinkTerm(UnrecordedTerm):
-    """A link to the surroundings that conducts better: ``1 + G / G_0`` times as well.
+    """A link that conducts better: ``1 + G / G_0`` times as well.
 
     Parameters
     ----------
@@ -105,6 +105,10 @@ class UnrecordedCooling(UnrecordedEffect):
         joined = {machine.walls[film] for films in machine.films.values() for film in films}
         return (*(spot for spot in super().places(machine) if spot not in joined), *machine.films)
 
+    def level_places(self, machine: MachineView) -> tuple[str, ...]:
+        """Links between nodes as well: what holds them may have come loose."""
+        return (*self.places(machine), *(machine.joint_coefficients if machine.kind == "network" else ()))
+
     def acts_on(self, machine: MachineView, spot: str) -> tuple[str, ...]:
         """Places that a spot stands for; the end of a link."""
         link = self.link(machine, spot)
@@ -112,24 +116,32 @@ class UnrecordedCooling(UnrecordedEffect):
 
     def link(self, machine: MachineView, spot: str) -> str:
         """Coefficient of a network's link."""
-        return machine.films[spot][0] if machine.kind == "network" and spot in machine.films else ""
+        if machine.kind != "network" or spot in machine.spots:
+            return ""
+        return next(iter(machine.films.get(spot) or machine.joint_coefficients.get(spot, ())), "")
 
     def term(
-        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, link: str = ""
+        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, scaled: str = ""
     ) -> UnrecordedTerm:
         """Loss over a spot."""
         usual = self.usual(machine, form)
         if form == "heat":
             return UnrecordedHeatTerm(name, amplitude("heat", usual, "W"), spread, on, sign=-1.0)
-        if link:
-            size = amplitude("conductance", max(usual, machine.conductance[link]), "W/K")
-            return LinkTerm(name, size, on, link, machine.conductance[link])
+        if scaled:
+            nominal = machine.conductance[scaled]
+            size = amplitude("conductance", max(usual, nominal), "W/K")
+            return LinkTerm(name, size, on, scaled, nominal)
         fluid = "ambient" if "ambient" in machine.inputs else machine.reference_temperature
         return CoolingTerm(name, amplitude("conductance", usual, "W/K"), spread, on, fluid)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and how often."""
         size = reported.get("conductance") or reported["heat"]
+        if candidate.terms[0].coefficients:
+            return (
+                f"{capital(place_words(candidate.component))} conducts a further {quantity(size)}"
+                f"{when_words(candidate, reported)}."
+            )
         way = " to the surroundings" if size.unit == "W/K" else ""
         return (
             f"A further {quantity(size)}{way} is lost from "

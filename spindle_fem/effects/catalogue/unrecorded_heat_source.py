@@ -9,7 +9,14 @@ from spindle_fem.effects.framework.effect import Candidate, Reported, capital, p
 from spindle_fem.effects.framework.laws import amplitude
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
 from spindle_fem.effects.framework.spread import Spread
-from spindle_fem.effects.framework.unrecorded import Share, UnrecordedEffect, UnrecordedHeatTerm, when_words
+from spindle_fem.effects.framework.unrecorded import (
+    Share,
+    SourceTerm,
+    UnrecordedEffect,
+    UnrecordedHeatTerm,
+    UnrecordedTerm,
+    when_words,
+)
 
 
 class UnrecordedHeatSource(UnrecordedEffect):
@@ -48,14 +55,37 @@ class UnrecordedHeatSource(UnrecordedEffect):
         """All of them, speeds only by their changes: what grows with speed has laws of its own."""
         return machine.quantities
 
+    def level_places(self, machine: MachineView) -> tuple[str, ...]:
+        """Every spot, and the sources of a network that follow an input."""
+        return (*self.places(machine), *machine.source_heat)
+
+    def acts_on(self, machine: MachineView, spot: str) -> tuple[str, ...]:
+        """Places that a spot stands for; the node that a source heats."""
+        return (machine.inner[spot],) if self.source(machine, spot) else super().acts_on(machine, spot)
+
+    def source(self, machine: MachineView, spot: str) -> str:
+        """The source that a spot is."""
+        return spot if spot in machine.source_heat and spot not in machine.spots else ""
+
     def term(
-        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, link: str = ""
-    ) -> UnrecordedHeatTerm:
-        """Heat over a spot."""
-        return UnrecordedHeatTerm(name, amplitude("heat", self.usual(machine, form), "W"), spread, on)
+        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, scaled: str = ""
+    ) -> UnrecordedTerm:
+        """Heat over a spot, or of a source."""
+        usual = self.usual(machine, form)
+        if scaled:
+            nominal = machine.source_heat[scaled]
+            return SourceTerm(name, amplitude("heat", max(usual, nominal), "W"), on, scaled, nominal)
+        return UnrecordedHeatTerm(name, amplitude("heat", usual, "W"), spread, on)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How much, and how often."""
+        source = next(iter(candidate.terms[0].bearings), "")
+        if source:
+            more = reported["heat"].value / candidate.constants["nominal"]
+            return (
+                f"{source.replace('_', ' ')} heats {1.0 + more:.2f} times as much while on"
+                f"{when_words(candidate, reported)}."
+            )
         return (
             f"{capital(quantity(reported['heat']))} of heat enters "
             f"{place_words(candidate.component)}{when_words(candidate, reported)}."

@@ -409,8 +409,16 @@ class IntervalEffect(Effect):
         """Places of the model that a spot stands for."""
         return machine.spots[spot]
 
+    def level_places(self, machine: MachineView) -> tuple[str, ...]:
+        """Where a level may change once or a few times."""
+        return self.places(machine)
+
     def link(self, machine: MachineView, spot: str) -> str:
         """Coefficient through which it acts at a spot; empty where it acts on places."""
+        return ""
+
+    def source(self, machine: MachineView, spot: str) -> str:
+        """Source of a network whose heat it scales at a spot; empty where it acts on places."""
         return ""
 
     @abstractmethod

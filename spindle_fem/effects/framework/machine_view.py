@@ -226,6 +226,8 @@ class MachineView:
         Nominal, of a network's links.
     source_inputs : mapping of source to str
         Input that drives a network's source.
+    source_heat : mapping of source to float, [W]
+        Mean heat of a network's driven sources while they are on.
     surroundings : mapping of component to tuple of str
         Films whose fluid is that of ``ambient``, or of one boundary of a network.
     """
@@ -272,6 +274,7 @@ class MachineView:
     coolant_links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     conductance: Mapping[str, float] = field(default_factory=dict)
     source_inputs: Mapping[str, str] = field(default_factory=dict)
+    source_heat: Mapping[str, float] = field(default_factory=dict)
     surroundings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, IntervalEffect, Intervals, Reported
-from spindle_fem.effects.framework.laws import Complex, linear, power, relaxed, shape, switched
+from spindle_fem.effects.framework.laws import Complex, linear, power, relaxed, rows, shape, switched
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
 from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
@@ -248,6 +248,25 @@ class UnrecordedHeatTerm(UnrecordedTerm):
         return self.spread.heat(context, self._sign * context.parameters["heat"] * self.on.share(context))
 
 
+class SourceTerm(UnrecordedTerm):
+    """A source of a network that heats more: ``1 + Q / Q_0`` times as much.
+
+    Parameters
+    ----------
+    source : str
+    nominal : float, [W]
+        Its mean heat while it is on; the size counts in units of what a fit makes of that.
+    """
+
+    def __init__(self, name: str, size: TermParameter, on: Share, source: str, nominal: float) -> None:
+        super().__init__(name, size, Spread(()), on)
+        self.bearings, self._nominal = (source,), nominal
+
+    def friction(self, context: TermContext) -> Complex:
+        """Factor on the source's heat, (1, k)."""
+        return rows(context, 1.0 + context.parameters["heat"] * self.on.share(context) / self._nominal)
+
+
 class UnrecordedEffect(IntervalEffect):
     """Places, intervals, laws and reports of both.
 
@@ -269,9 +288,9 @@ class UnrecordedEffect(IntervalEffect):
 
     @abstractmethod
     def term(
-        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, link: str = ""
+        self, machine: MachineView, name: str, spread: Spread, on: Share, form: str, scaled: str = ""
     ) -> UnrecordedTerm:
-        """Term in one of :attr:`interval_forms`, on places or through a link."""
+        """Term in one of :attr:`interval_forms`, on places, or by scaling a link or a source."""
 
     @abstractmethod
     def usual(self, machine: MachineView, form: str) -> float:
@@ -319,18 +338,22 @@ class UnrecordedEffect(IntervalEffect):
         if quantity is not None:
             own = f"{own} {FOLLOWING} {quantity.name}".strip()
         spread = Spread(self.acts_on(machine, spot), machine.sides.get(spot, ()), machine.focal.get(spot, ""))
-        link = self.link(machine, spot)
-        term = self.term(machine, self.term_name(spot, own), spread, on, form, link)
+        link, source = self.link(machine, spot), self.source(machine, spot)
+        term = self.term(machine, self.term_name(spot, own), spread, on, form, link or source)
+        nominal = machine.conductance[link] if link else machine.source_heat.get(source)
         found = self.candidate(
             machine.component(spot),
             term,
             amplitude=term.parameters[0].name,
             reference=self.usual(machine, form),
             form=machine.form(spot, own),
-            constants={"conductance": machine.conductance[link]} if link else None,
+            constants={"nominal": nominal} if nominal else None,
         )
-        parameter = next((seat.parameter for seat in machine.seats if seat.coefficients == (link,)), "")
-        sized = bool(term.coefficients) and parameter in machine.parameters
+        parameter = f"gain.{source}" if source else ""
+        parameter = next(
+            (seat.parameter for seat in machine.seats if seat.coefficients == (link,)), parameter
+        )
+        sized = bool(term.coefficients or term.bearings) and parameter in machine.parameters
         return replace(found, sized_by=parameter) if sized else found
 
     def check_of(self, candidate: Candidate) -> str:

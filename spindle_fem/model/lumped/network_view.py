@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.machine_view import MachineView, Seat
 from spindle_fem.machine.view.defined_point import defined_recording
-from spindle_fem.machine.view.usual_sizes import LEAST_HEAT, lowest_speed, quantities_of, usual_rise
+from spindle_fem.machine.view.usual_sizes import LEAST_HEAT, LEAST_ON, lowest_speed, quantities_of, usual_rise
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.recordings.align import Recording
 from spindle_fem.units import ANGULAR_SPEED_UNIT, ZERO_CELSIUS_K
@@ -118,6 +118,7 @@ def view_of_network(
             for name, source in zip(network.source_names, network.source_input, strict=True)
             if source is not None
         },
+        source_heat=_heat_while_on(network, recording),
         surroundings={name: tuple(links) for name, links in surroundings.items()},
     )
 
@@ -170,6 +171,24 @@ def _network_heat(network: ThermalNetwork, scale: Mapping[str, float]) -> float:
             )
         )
     )
+
+
+def _heat_while_on(network: ThermalNetwork, recording: Recording) -> dict[str, float]:
+    """Mean heat of every driven source while it is on, W."""
+    found = {}
+    for source, gain, name, exponent in zip(
+        network.source_names,
+        network.source_gain,
+        network.source_input,
+        network.source_exponent,
+        strict=True,
+    ):
+        if name in recording.input_names:
+            size = np.abs(recording.input_at(name, recording.times))
+            on = size[size > LEAST_ON * size.max()]
+            if on.size:
+                found[source] = float(gain * np.mean(on**exponent))
+    return found
 
 
 def _room(
