@@ -291,15 +291,19 @@ class _Readings:
 
     def beyond(self, fit: Fit) -> float:
         """Likewise of held-out readings; what switches is on there as all readings tell it."""
-        plant, states = self._plant, self.states(fit)
+        plant = self._plant
         if not plant.heldout:
             return 1.0
+        return left_over_noise(plant, plant.heldout, self._heldout(fit), fit.values, self._unseen)
+
+    def _heldout(self, fit: Fit) -> list[Array]:
+        """What held-out readings should be; what switches is on there as all readings tell it."""
+        plant, states = self._plant, self.states(fit)
         told = self._told(fit)
         if states:
             own = tuple(states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates)
             told = [plant.predict(n, fit.values, own).temperature for n in range(len(plant.recordings))]
-        at = [item.at(told[item.recording][:, item.channel]) for item in plant.heldout]
-        return left_over_noise(plant, plant.heldout, at, fit.values, self._unseen)
+        return [item.at(told[item.recording][:, item.channel]) for item in plant.heldout]
 
     def states(self, fit: Fit) -> Mapping[str, Told]:
         """Hidden states of a fit."""
@@ -309,7 +313,7 @@ class _Readings:
 
     def kept(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Sets without those that predict held-out readings worse than some of their effects alone."""
-        error = {id(h): self._heldout(h.fit) for h in hypotheses}
+        error = {id(h): self._heldout_error(h.fit) for h in hypotheses}
         return [
             h
             for h in hypotheses
@@ -319,13 +323,11 @@ class _Readings:
             )
         ]
 
-    def _heldout(self, fit: Fit) -> float:
+    def _heldout_error(self, fit: Fit) -> float:
         """Root mean square error of held-out readings over their noise."""
-        held = self._plant.heldout
-        told = self._told(fit)
         errors = [
-            np.mean((item.at(told[item.recording][:, item.channel]) - item.values) ** 2) / item.bins.white**2
-            for item in held
+            np.mean((predicted - item.values) ** 2) / item.bins.white**2
+            for item, predicted in zip(self._plant.heldout, self._heldout(fit), strict=True)
         ]
         return float(np.sqrt(np.mean(errors))) if errors else 0.0
 
@@ -391,7 +393,7 @@ def _refit(
     ]
     # A set that could be simulated on the search's basis may run away on the whole one, and is dropped then.
     fitted = [
-        Hypothesis(fit, item.log_prior)
+        replace(item, fit=fit)
         for fit, item in zip(workers.fits(problem, orders), chosen, strict=True)
         if fit is not None
     ]

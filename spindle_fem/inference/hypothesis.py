@@ -20,11 +20,18 @@ class Hypothesis:
     deviance : float or None
         Minus twice the logarithm of likelihood and prior of the values, under the slow error that is most
         probable here; None while all hypotheses share one slow error.
+    course_share : float
+        Share of what hidden states gain that the choice of their courses costs: readings are less likely
+        with states that may take any course than with those that were found.
+    course_cost : float
+        That cost where the set was found, as a logarithm.
     """
 
     fit: Fit
     log_prior: float
     deviance: float | None = None
+    course_share: float = 0.0
+    course_cost: float = 0.0
 
     @property
     def misfit(self) -> float:
@@ -34,7 +41,7 @@ class Hypothesis:
     @property
     def score(self) -> float:
         """Logarithm of evidence times prior."""
-        return self.fit.log_evidence + self.log_prior
+        return self.fit.log_evidence + self.log_prior - self.course_cost
 
     @property
     def keys(self) -> frozenset[tuple[str, str]]:

@@ -70,8 +70,8 @@ class Search:
     workers: Workers = field(default_factory=Workers)
     found: dict[frozenset, Hypothesis] | None = None
     screenings: dict[frozenset, Screened] = field(default_factory=dict)
-    # Places and courses of what switches, by the name of its amplitude.
-    courses: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    # Place and course of what switches, and what share of its gain that costs, by the name of its amplitude.
+    courses: dict[str, tuple[Any, Any, float]] = field(default_factory=dict)
     _paid: dict[frozenset, float] = field(default_factory=dict)
 
     def _families(self) -> dict[str, str]:
@@ -222,6 +222,31 @@ class Search:
         """Keep what the choice of a candidate's intervals costs, as a logarithm."""
         self._paid[identity((candidate,))] = paid
 
+    def hypothesis(self, fit: Fit, paid: float = 0.0) -> Hypothesis:
+        """A fitted set with its prior, and what the courses of hidden states in it cost.
+
+        A course is chosen by single readings, which tell more of it than the means that are fitted: what it
+        costs counts as a share of what it gains.
+
+        Parameters
+        ----------
+        paid : float
+            What the choice of other intervals costs, as a logarithm.
+        """
+        prior = self.log_prior(fit.candidates) - paid
+        states = [c for c in fit.candidates if self.is_hidden_state(c)]
+        share = min(1.0, sum(self.courses[c.amplitude][2] for c in states))
+        if not share:
+            return Hypothesis(fit, prior)
+        rest = self.found.get(identity(c for c in fit.candidates if c not in states))
+        before = (self.found[identity(())] if rest is None else rest).misfit
+        gain = max(0.0, 0.5 * (before - fit.misfit_with_prior))
+        return Hypothesis(fit, prior, course_share=share, course_cost=share * gain)
+
+    def is_hidden_state(self, candidate: Candidate) -> bool:
+        """Whether a candidate is on along a course that was found, of which only the size is free."""
+        return candidate.amplitude in self.courses and candidate.free.keys() == {candidate.amplitude}
+
     def task(
         self, fit: Fit, additions: Sequence[tuple[Variant, float]], intervals: Mapping[int, OnOff]
     ) -> Task:
@@ -260,7 +285,7 @@ class Search:
                 if fitted is None or any(self._unseen(c, fitted.values) for c in candidates):
                     continue
                 paid = sum(self._paid.get(identity((c,)), 0.0) for c in candidates)
-                self.keep(Hypothesis(fitted, self.log_prior(candidates) - paid))
+                self.keep(self.hypothesis(fitted, paid))
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
         """Whether an effect is on only where nothing was recorded, neither readings nor inputs."""
@@ -312,7 +337,7 @@ class Search:
         found = float(np.log(tuned.NUMBER_PRIOR[len(candidates)]))
         for candidate in candidates:
             if self.in_intervals(candidate):
-                places, share = len(self.effects[candidate.effect].places(self.view)), 1.0
+                places, share = len(self.effects[candidate.effect].level_places(self.view)), 1.0
             else:
                 same = [c for c in self.candidates if c.effect == candidate.effect]
                 places = len({c.component for c in same})

@@ -129,9 +129,9 @@ def told_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Told]:
     """Every hidden state of a fit as all readings tell it, by the name of its amplitude."""
     found = {}
     for candidate in fit.candidates:
-        if candidate.amplitude not in search.courses or not _is_state(candidate):
+        if not search.is_hidden_state(candidate):
             continue
-        place, course = search.courses[candidate.amplitude]
+        place, course, _ = search.courses[candidate.amplitude]
         again = course_about(replace(search, problem=problem), fit, place, candidate, course, everything=True)
         if again is None:
             continue
@@ -164,16 +164,11 @@ def settle_best(search: Search) -> None:
     """Follow the state of the best set again, about a fit that holds its other effects too."""
     fit = search.ranked()[0].fit
     for candidate in fit.candidates:
-        if len(fit.candidates) > 1 and candidate.amplitude in search.courses and _is_state(candidate):
-            place, course = search.courses[candidate.amplitude]
+        if len(fit.candidates) > 1 and search.is_hidden_state(candidate):
+            place, course, _ = search.courses[candidate.amplitude]
             again = course_about(search, fit, place, candidate, course)
             if again is not None:
                 settle(search, fit, place, again, candidate)
-
-
-def _is_state(candidate: Candidate) -> bool:
-    """Whether nothing but its size is free."""
-    return candidate.free.keys() == {candidate.amplitude}
 
 
 def settle(
@@ -181,7 +176,7 @@ def settle(
 ) -> None:
     """Course and fit in turn, the best of them kept."""
     problem = search.problem
-    rest, values = fit.candidates, dict(fit.values)
+    rest, values = (fit.candidates, dict(fit.values)) if left_out is None else without(fit, left_out)
     best: Hypothesis | None = None
     for _ in range(ROUNDS):
         grid = problem.predictor.drives[place.recording].grid
@@ -195,14 +190,16 @@ def settle(
             fitted = problem.fit((*rest, candidate), start)
         except (ConvergenceError, OutOfValidityError, SpecError):
             return
-        paid = course.log_choice + 0.5 * len(course.chain.begin) * 2.0 * float(np.log(len(course.on)))
-        hypothesis = Hypothesis(fitted, search.log_prior((*rest, candidate)) - paid)
+        paid = course.log_choice + len(course.chain.begin) * float(np.log(len(course.on)))
+        known = search.courses.get(candidate.amplitude)
+        search.courses[candidate.amplitude] = place, course, paid / (course.log_evidence + course.log_choice)
+        hypothesis = search.hypothesis(fitted)
         better = best is None or hypothesis.score > best.score
         enough = best is not None and hypothesis.score < best.score + WORTH_ANOTHER
         if better:
             best = hypothesis
-            search.remember_cost(candidate, paid)
-            search.courses[candidate.amplitude] = place, course
+        elif known is not None:
+            search.courses[candidate.amplitude] = known
         if enough:
             break
         values = fitted.values
@@ -210,8 +207,8 @@ def settle(
         if again is None or np.array_equal(again.on, course.on):
             break
         course = again
-    known = search.found.get(identity(best.fit.candidates))
-    if known is None or known.score < best.score:
+    earlier = search.found.get(identity(best.fit.candidates))
+    if earlier is None or earlier.score < best.score:
         search.keep(best)
 
 

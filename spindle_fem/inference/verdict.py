@@ -111,7 +111,7 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
         How many times less a gain counts between sizes than on a machine that is drawn.
     """
     null = next(h for h in hypotheses if not h.fit.candidates)
-    gains = [0.5 * (null.misfit - h.misfit) for h in hypotheses]
+    gains = [0.5 * (1.0 - h.course_share) * (null.misfit - h.misfit) for h in hypotheses]
     # Within a size; the best of it stands for the size beside others.
     scores = [
         float(
@@ -186,7 +186,7 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness:
     likely = max((h.log_prior for h in hypotheses if len(h.fit.candidates) == 1), default=0.0)
     for item in hypotheses:
         freedom = len(item.fit.coordinates) - len(null.fit.coordinates)
-        gain = null.misfit - item.misfit
+        gain = (1.0 - item.course_share) * (null.misfit - item.misfit)
         if freedom and gain > 0.0:
             # Pairs, and what is on in intervals, were chosen among so many more.
             chosen_among = max(0.0, likely - item.log_prior)
