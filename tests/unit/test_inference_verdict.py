@@ -26,6 +26,7 @@ from spindle_fem.inference.verdict import (
     judge,
     kind_of,
     rank,
+    tempered,
     within_prior,
 )
 
@@ -120,6 +121,17 @@ def test_a_gain_counts_less_beside_a_large_one_but_never_nothing():
     values = np.array([counted(gain) for gain in gains])
     assert np.all(np.diff(values) > 0.0)
     assert counted(-5.0) == -5.0
+
+
+def test_the_choice_of_a_course_costs_a_share_of_what_it_gains():
+    state = replace(hypothesis(PRELOAD, misfit=400.0), course_share=0.25)
+    plain = hypothesis(CHURNING, misfit=600.0)
+    empty = hypothesis(misfit=1200.0)
+    assert tempered([state, plain, empty])[0] == pytest.approx(tempered([plain, state, empty])[0])
+    probability = {
+        next(iter(i.fit.keys))[0]: i.probability for i in rank([state, plain, empty]) if i.fit.keys
+    }
+    assert probability["thermal_preload"] == pytest.approx(probability["grease_churning"])
 
 
 def test_complexity_and_prior_count_in_full():
