@@ -288,8 +288,8 @@ class Search:
                 self.keep(self.hypothesis(fitted, paid))
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
-        """Whether an effect is on only where nothing was recorded, neither readings nor inputs."""
-        if not self.in_intervals(candidate):
+        """Whether an event is told where nothing was recorded, neither readings nor inputs."""
+        if not self.in_intervals(candidate) or self.is_hidden_state(candidate):
             return False
         on = self.effects[candidate.effect].intervals(candidate, values)
         return self._within_gaps(on, candidate.recording or 0)

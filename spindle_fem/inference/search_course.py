@@ -63,19 +63,40 @@ def run_search(search: Search) -> list[Hypothesis]:
     if not is_network and search.ranked()[0].fit.reduced_misfit > tuned.UNEXPLAINED_MISFIT**2:
         _what_changes(search, null)
     settle_best(search)
+    if is_network:
+        _beside(search)
     return search.ranked()
 
 
-def _what_changes(search: Search, null: Fit) -> None:
-    """Add what changed its level at unknown moments, and what switches.
+def _beside(search: Search) -> None:
+    """What else there is beside the best set, as long as that leaves something and becomes better.
+
+    Laws that stand out hide what switches beside them, and the other way round: either is looked for again
+    once the other is known.
+    """
+    best = search.ranked()[0]
+    while 0 < len(best.keys) < LARGEST_SET and not search.is_explained(best):
+        search.progress("diagnosis: beside the best set")
+        if _only_laws(search, best):
+            _what_changes(search, best.fit)
+        screened, intervals = search.screened(best.fit)
+        search.extend(best.fit, screened, intervals, 1, tuned.ADDITIONS)
+        settle_best(search)
+        if search.ranked()[0] is best:
+            return
+        best = search.ranked()[0]
+
+
+def _what_changes(search: Search, fit: Fit) -> None:
+    """Add what changed its level at unknown moments, and what switches, to what a fit holds.
 
     What fits well with heat in intervals may fit better with a cooling that changed at the same moments.
     """
     best = search.ranked()[0]
     if not search.is_explained(best) or any(search.in_intervals(c) for c in best.fit.candidates):
         search.progress("diagnosis: changes and states that switch")
-        add_steps(search, null)
-        add_states(search, null)
+        add_steps(search, fit)
+        add_states(search, fit)
 
 
 def improve(search: Search) -> None:
