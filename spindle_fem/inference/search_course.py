@@ -42,7 +42,7 @@ def run_search(search: Search) -> list[Hypothesis]:
         )
     is_network = search.problem.predictor.is_network
     if is_network:
-        _what_changes(search, null)
+        _what_changes(search, starts[-1][0])
     if not search.is_explained(search.ranked()[0]):
         search.progress("diagnosis: 2 effects")
         for fit, screened, intervals in reversed(starts):
@@ -77,8 +77,9 @@ def _beside(search: Search) -> None:
     best = search.ranked()[0]
     while 0 < len(best.keys) < LARGEST_SET and not search.is_explained(best):
         search.progress("diagnosis: beside the best set")
-        if _only_laws(search, best):
-            _what_changes(search, best.fit)
+        if not any(search.is_hidden_state(c) for c in best.fit.candidates):
+            laws = [h.fit for h in search.ranked() if _only_laws(search, h)]
+            _what_changes(search, laws[0])
         screened, intervals = search.screened(best.fit)
         search.extend(best.fit, screened, intervals, 1, tuned.ADDITIONS)
         settle_best(search)
