@@ -64,26 +64,23 @@ def readings_about(
     """
     predictor = problem.predictor
     recording, grid = predictor.recordings[number], predictor.drives[number].grid
-    predicted = predictor.predict(number, fit.values, fit.candidates, [c.name for c in fit.coordinates])
-    root = np.eye(len(fit.coordinates))
+    rest, values = (fit.candidates, fit.values) if left_out is None else without(fit, left_out)
+    kept = [i for i, c in enumerate(fit.coordinates) if c.name in values]
+    coordinates = [fit.coordinates[i] for i in kept]
+    # About the machine without what is left out, whose part would else pass for that of the parameters.
+    predicted = predictor.predict(number, values, rest, [c.name for c in coordinates])
+    root = np.eye(len(coordinates))
     machine = len(problem.belief.coordinates)
     root[:machine, :machine] = problem.belief.root
-    mean = np.concatenate((problem.belief.mean, np.zeros(len(fit.coordinates) - machine)))
-    by = predicted.sensitivity * np.array([c.sigma for c in fit.coordinates])
+    mean = np.concatenate((problem.belief.mean, np.zeros(len(coordinates) - machine)))
+    by = predicted.sensitivity * np.array([c.sigma for c in coordinates])
     model = predicted.temperature
-    own = np.zeros(len(fit.coordinates), dtype=bool)
-    if left_out is not None:
-        rest, values = without(fit, left_out)
-        model = predictor.predict(number, values, rest).temperature
-        names = {c.name for c in candidate_coordinates(left_out)}
-        own = np.array([c.name in names for c in fit.coordinates])
-    by, root = by[:, :, ~own], root[np.ix_(~own, ~own)]
     if everything:
         # Parameters stay as they were fitted, as far as that knows them.
-        slopes = by @ np.linalg.cholesky(fit.covariance[np.ix_(~own, ~own)])
+        slopes = by @ np.linalg.cholesky(fit.covariance[np.ix_(kept, kept)])
     else:
         # Coordinates count from what is known of them before, in units of what is not known.
-        model = model - by @ (fit.position - mean)[~own]
+        model = model - by @ (fit.position[kept] - mean)
         slopes = np.linalg.solve(root.T, by.reshape(-1, by.shape[2]).T).T.reshape(by.shape)
     usable = recording.usable & (True if everything else predictor.use[number][:, None])
     owner = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), recording.times)
