@@ -9,8 +9,11 @@ import pytest
 
 from spindle_fem import registry
 from spindle_fem.cache import source_digest
+from spindle_fem.definition.load import find_machine, read_definition
 from spindle_fem.errors import BadInputError
 from spindle_fem.physics.coolant.coolants import COOLANTS
+from spindle_fem.studies.sweep.designs import Design
+from spindle_fem.studies.sweep.evaluate_design import Question, TaskBuilder
 
 ROOT = Path(__file__).parents[2]
 MODULE = '''
@@ -109,3 +112,16 @@ def test_what_comes_from_outside_is_part_of_cache_keys(beside):
     file.write_text(MODULE.replace("FACTOR = 1.0", "FACTOR = 2.0"), encoding="utf-8")
     assert source_digest(bearings) != first
     assert source_digest(meshes) == mesh
+
+
+def test_a_row_of_a_sweep_is_not_taken_again_after_an_own_model_changed(beside):
+    content, design = read_definition(find_machine("small_two_start")), Design(1, ("heat.model=rubbing",), {})
+    question = Question((), False, backend="full")
+
+    def key():
+        return TaskBuilder(content, question).task(design).key
+
+    first = key()
+    assert key() == first
+    (beside / "own_models.py").write_text(MODULE.replace("1.0", "2.0"), encoding="utf-8")
+    assert key() != first

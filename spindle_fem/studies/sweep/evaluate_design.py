@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spindle_fem import __version__
-from spindle_fem.cache import cache_directory
+from spindle_fem.cache import cache_directory, source_digest
 from spindle_fem.definition.inherit import apply_overrides
 from spindle_fem.definition.load import validate
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects import registry as effects
 from spindle_fem.errors import FaultsError, GeometryError, MeshQualityError, SpecError, SpindleFemError
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
@@ -31,6 +32,7 @@ from spindle_fem.model.reduced.heat_tables import mechanical_key
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.parallel import one_thread
+from spindle_fem.registry import source_from_outside
 from spindle_fem.results.run_summary import build_summary
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.solvers.prepared_machine import machine_on_mesh
@@ -134,6 +136,8 @@ class TaskBuilder:
         self._content = content
         self._question = question
         self._geometries: dict[str, _Shape] = {}
+        # Rows of an earlier version of the program, or of a user's own model, are not taken for this one's.
+        self._made_by = [__version__, source_digest(__name__), source_from_outside(effects.GROUP)]
 
     def task(self, design: Design) -> DesignTask:
         """Task of a design, checked as ``spindle-fem check`` would."""
@@ -170,7 +174,7 @@ class TaskBuilder:
     def _key(self, machine: Any) -> str:
         question = self._question
         asked = [question.outputs, question.film_uncertainty, question.backend, question.mesh]
-        return _digest([__version__, asked, machine])[:24]
+        return _digest([*self._made_by, asked, machine])[:24]
 
 
 def _examine_geometry(spec: MachineSpec, mesh: str) -> _Shape:
