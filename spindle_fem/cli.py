@@ -74,7 +74,9 @@ def mesh(
 @app.command()
 def export(
     machine: Machine,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".npz, .json, .py or .c")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help=".npz, .json, .py, .c or .fmu")
+    ],
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:

@@ -23,8 +23,7 @@ def export_machine(
     machine : str or Path
         A definition file or the name of a machine that ships.
     output : str or Path
-        ``.npz``, ``.json``, ``.py`` or ``.c`` (with a ``.h`` beside it). Its folder is made where there
-        is none.
+        ``.npz``, ``.json``, ``.py``, ``.c`` (with a ``.h`` beside it) or ``.fmu``; its folder is made.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""State spaces as files: .npz and .json for programs that read them, .py and .c that run by themselves."""
+"""State spaces as files: .npz and .json to be read by programs; .py, .c and .fmu that run by themselves."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import BadInputError
 from spindle_fem.studies.export import portable_model
+from spindle_fem.studies.export.functional_mockup import write_functional_mockup
 from spindle_fem.studies.export.portable_model import GAMMA, STAGE_WEIGHT, START_WEIGHT
 from spindle_fem.studies.export.state_space import EXACT, StateSpace
 
@@ -94,6 +95,11 @@ def _write_c(space: StateSpace, path: Path) -> list[Path]:
         template = environment.get_template(f"portable_model{file.suffix}.jinja")
         file.write_text(template.render(content), encoding="utf-8")
     return [path, header_file]
+
+
+def _write_fmu(space: StateSpace, path: Path) -> list[Path]:
+    write_functional_mockup(space, path, python_source(space), c_name(space.header["machine"]))
+    return [path]
 
 
 def c_name(machine: str) -> str:
@@ -175,4 +181,4 @@ def _plain(text: str) -> str:
     return re.sub(r"[^\w .|:+()-]", "_", text)
 
 
-WRITERS = {".npz": _write_npz, ".json": _write_json, ".py": _write_python, ".c": _write_c}
+WRITERS = {".npz": _write_npz, ".json": _write_json, ".py": _write_python, ".c": _write_c, ".fmu": _write_fmu}
