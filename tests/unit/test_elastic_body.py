@@ -9,7 +9,6 @@ from spindle_fem.machine.geometry.part_shapes import AnnularSegment
 from spindle_fem.model.elastic.elastic_body import ElasticBody, Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL, RADIAL, SIDEWAYS, BodyOutputs
 from spindle_fem.model.elastic.meridian_mesh import MeridianMesh
-from spindle_fem.physics.bearings.seat_contact import solve_seats
 from spindle_fem.physics.elasticity.elastic_material import ElasticMaterial
 
 STEEL = ElasticMaterial(206e9, 0.3, 12e-6, 7850.0)
@@ -57,22 +56,6 @@ def test_pressure_in_the_bore_by_lame() -> None:
     shape = (OUTSIDE**2 + INSIDE**2) / (OUTSIDE**2 - INSIDE**2)
     exact = INSIDE / 206e9 * (shape + 0.3)
     assert outputs.compliance(np.array([BORE.area]))[0, 0] == pytest.approx(exact, rel=2e-6)
-
-
-def test_press_fit_of_thick_rings() -> None:
-    """δ on the radius; p = δ / (softness of both), Lamé."""
-    length, seat, delta = 0.02, 0.05, 10e-6
-    face = Face((0.0, length), (seat, seat))
-    ring, hub = cylinder(0.002, length, seat, 0.08), cylinder(0.002, length, 0.02, seat)
-    softness = sum(
-        BodyOutputs.of(body, {"seat": body.mean_shift(face, RADIAL)}).compliance(np.array([face.area]))[0, 0]
-        for body in (ring, hub)
-    )
-    pressure, gap = solve_seats(np.array([-delta]), np.array([[softness]]), np.array([face.area]))
-    outer = (0.08**2 + seat**2) / (0.08**2 - seat**2) + 0.3
-    inner = (seat**2 + 0.02**2) / (seat**2 - 0.02**2) - 0.3
-    assert pressure[0] == pytest.approx(delta / (seat / 206e9 * (outer + inner)), rel=1e-5)
-    assert gap[0] == 0.0
 
 
 def test_rotating_disc() -> None:
