@@ -110,7 +110,6 @@ def solve_machine_network(
     point: OperatingPoint | None = None,
     *,
     heat_model: HeatModel | None = None,
-    start: Array | None = None,
 ) -> MachineNetworkState:
     """Steady state of a machine's network with heat, contacts and films at its own temperatures.
 
@@ -120,7 +119,6 @@ def solve_machine_network(
         The definition's own by default.
     heat_model : HeatModel, optional
         The definition's own by default.
-    start : (n,) ndarray, [K], optional
 
     Raises
     ------
@@ -135,17 +133,17 @@ def solve_machine_network(
     point = OperatingPoint.of(machine.spec) if point is None else point
     heat_model = heat_model_of(machine.spec) if heat_model is None else heat_model
     if not follows_preload(machine.spec):
-        return _Operation(machine, point, heat_model, start).solve()
+        return _Operation(machine, point, heat_model).solve()
 
     def settles(speed: float) -> bool:
         try:
-            _follow_preload(machine, replace(point, speed=speed), heat_model, start)
+            _follow_preload(machine, replace(point, speed=speed), heat_model)
         except (NoSteadyStateError, ConvergenceError):
             return False
         return True
 
     try:
-        return _follow_preload(machine, point, heat_model, start)
+        return _follow_preload(machine, point, heat_model)
     except NoSteadyStateError as error:
         limit = highest_settling_speed(point.speed, settles)
         begins = f"A thermal equilibrium exists up to about {limit * 30.0 / np.pi:.0f} rpm."
@@ -153,24 +151,22 @@ def solve_machine_network(
 
 
 def _follow_preload(
-    machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel, start: Array | None
+    machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel
 ) -> MachineNetworkState:
     rigid = replace(machine, spec=at_assembly_size(machine.spec))
-    first = _Operation(rigid, point, heat_model_of(rigid.spec), None).solve()
-    return _PreloadOperation(machine, point, heat_model, start).solve(first.bearing_temperatures())
+    first = _Operation(rigid, point, heat_model_of(rigid.spec)).solve()
+    return _PreloadOperation(machine, point, heat_model).solve(first.bearing_temperatures())
 
 
 class _Operation:
     """A machine's network at one point, bearing temperatures by bearing temperatures."""
 
-    def __init__(
-        self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel, start: Array | None
-    ) -> None:
+    def __init__(self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel) -> None:
         self.machine, self.point, self.heat_model = machine, point, heat_model
         self.friction = tabulate_friction(machine.spec, point, heat_model)
         self.coolant = None if machine.coolant is None else coolant_law(machine, point)
         ambient = point.ambient_temperature
-        self.temperature = np.full(machine.n_nodes, ambient) if start is None else start
+        self.temperature = np.full(machine.n_nodes, ambient)
         self.cold = {name: BearingTemperatures(*(ambient,) * 5) for name in machine.ball_nodes}
         self.network: OperatingNetwork | None = None
         self.newton_steps = 0
@@ -210,10 +206,8 @@ class _Operation:
 class _PreloadOperation(_Operation):
     """The same while expansion changes the preload, and with it the heat."""
 
-    def __init__(
-        self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel, start: Array | None
-    ) -> None:
-        super().__init__(machine, point, heat_model, start)
+    def __init__(self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel) -> None:
+        super().__init__(machine, point, heat_model)
         self.guard = PreloadGuard.of(heat_model(point, self.cold)[0])
         self.change, self.growing = np.inf, 0
 

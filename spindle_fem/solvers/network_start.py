@@ -25,6 +25,8 @@ from spindle_fem.units import ANGULAR_SPEED_UNIT, registry
 Array = NDArray[np.float64]
 
 INITIAL_KINDS = ("first_reading", "ambient", "steady")
+# K; standard deviation of a node that nothing reads, about its estimate.
+UNREAD_SIGMA = 5.0
 
 
 def require_compatible(network: ThermalNetwork, recording: Recording) -> tuple[str, ...]:
@@ -223,15 +225,8 @@ def _balance_slope(
     return result
 
 
-def initial_parameters(
-    network: ThermalNetwork, recording: Recording, *, unread_sigma: float = 5.0
-) -> tuple[Parameter, ...]:
+def initial_parameters(network: ThermalNetwork, recording: Recording) -> tuple[Parameter, ...]:
     """Initial temperatures of the first segment as parameters with priors.
-
-    Parameters
-    ----------
-    unread_sigma : float, [K]
-        Standard deviation of a node that nothing reads, about its estimate.
 
     Returns
     -------
@@ -250,7 +245,7 @@ def initial_parameters(
             kind="initial",
             index=index,
             value=float(state[index]),
-            sigma_log=(sigma[name] if name in readings else unread_sigma) / float(state[index]),
+            sigma_log=(sigma[name] if name in readings else UNREAD_SIGMA) / float(state[index]),
             unit="K",
         )
         for index, name in enumerate(network.node_names)

@@ -33,6 +33,9 @@ from spindle_fem.studies.heat_study import heat_study
 from spindle_fem.studies.machine_equilibrium import equilibrium_of
 from spindle_fem.validity import CodedWarning
 
+# Between the element sizes of the two meshes of an estimate.
+REFINEMENT_RATIO = 1.5
+
 
 def solve(
     machine: MachineSpec | str | Path,
@@ -305,14 +308,10 @@ def with_heat_study(result: ThermalResult) -> ThermalResult:
     return replace(result, heat_study=heat_study(spec, temperatures=temperatures))
 
 
-def estimate_refinement(result: ThermalResult, spec: MachineSpec, ratio: float = 1.5) -> ThermalResult:
+def estimate_refinement(result: ThermalResult, spec: MachineSpec) -> ThermalResult:
     """Add what the probes and the hottest point change by on a second mesh.
 
-    Parameters
-    ----------
-    ratio : float
-        Between the element sizes of both meshes. The second one is coarser, or
-        finer where the preset is the coarsest already.
+    The second mesh is coarser, or finer where the preset is the coarsest already.
 
     Returns
     -------
@@ -322,11 +321,11 @@ def estimate_refinement(result: ThermalResult, spec: MachineSpec, ratio: float =
         errors fall with the power ``order + 1`` of the element size.
     """
     coarser = spec.mesh.preset != "coarse"
-    factor = spec.mesh.size_factor * (ratio if coarser else 1.0 / ratio)
+    factor = spec.mesh.size_factor * (REFINEMENT_RATIO if coarser else 1.0 / REFINEMENT_RATIO)
     second = solve_prepared(prepare_machine(spec, size_factor=factor))
     change = {name: value - second.probes[name] for name, value in result.probes.items()}
     change["hottest"] = result.temperature_maximum - second.temperature_maximum
-    power = ratio ** (spec.mesh.order + 1)
+    power = REFINEMENT_RATIO ** (spec.mesh.order + 1)
     # A coarser mesh errs by `power` times as much as this one, a finer one by 1/power.
     share = 1.0 / (power - 1.0) if coarser else power / (power - 1.0)
     refinement = {

@@ -50,7 +50,6 @@ def build_model_for_designs(
     specs: Sequence[MachineSpec],
     *,
     film_band: bool = False,
-    wanted: float = WANTED,
 ) -> tuple[ThermalModel, SteadySolver]:
     """Basis for some designs of one structure: sampled where its own estimate is largest.
 
@@ -67,8 +66,6 @@ def build_model_for_designs(
         The designs.
     film_band : bool
         Whether they are also asked for at both ends of the channel film's band.
-    wanted : float, [K]
-        Of the estimated error, where the basis stops growing.
 
     Returns
     -------
@@ -98,7 +95,7 @@ def build_model_for_designs(
         solver = SteadySolver(model, tables, bearings)
         batch = solver.solve(inputs)
         worst = float(batch.estimate.max())
-        if worst <= wanted or attempt == MOST_ROUNDS - 1:
+        if worst <= WANTED or attempt == MOST_ROUNDS - 1:
             break
         if not samples.add_worst(batch):
             break

@@ -28,9 +28,7 @@ Array = NDArray[np.float64]
 SIDES = ("inner_raceway", "outer_raceway", "balls")
 
 
-def fast_spindle(
-    model: ThermalModel, spec: MachineSpec, extra_terms: Sequence[Term] = (), spread: Array | None = None
-) -> FastModel:
+def fast_spindle(model: ThermalModel, spec: MachineSpec, extra_terms: Sequence[Term] = ()) -> FastModel:
     """Fast model of a machine with geometry.
 
     Parameters
@@ -41,10 +39,8 @@ def fast_spindle(
     extra_terms : sequence of Term
         Always there, as the machine's natural films are: with a tabulated
         machine, its :class:`spindle_fem.model.reduced.film_heat.FilmHeat`.
-    spread : (r,) ndarray, optional
-        As :class:`FastModel` takes it.
     """
-    return FastModel(model, SpindleInputs(model, spec, extra_terms), spread)
+    return FastModel(model, SpindleInputs(model, spec, extra_terms))
 
 
 class SpindleInputs:

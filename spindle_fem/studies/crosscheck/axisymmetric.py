@@ -135,15 +135,15 @@ class _Assembly:
         self.columns.append(entries.col + column)
         self.values.append(entries.data)
 
-    def tie(self, basis, coefficient: Array, lump: int, scale: float = 1.0) -> None:
-        """Exchange of an edge (or area) with a lumped unknown; ``scale`` on what the lump receives."""
+    def tie(self, basis, coefficient: Array, lump: int) -> None:
+        """Exchange of an edge (or area) with a lumped unknown."""
         local = np.broadcast_to(coefficient[:, None], basis.dx.shape)
         self.add(_exchange.assemble(basis, h=local))
         load = _supply.assemble(basis, q=local)
         at = np.flatnonzero(load)
         self.rows += [at, np.full(len(at), lump), [lump]]
         self.columns += [np.full(len(at), lump), at, [lump]]
-        self.values += [-load[at], -scale * load[at], [scale * load.sum()]]
+        self.values += [-load[at], -load[at], [load.sum()]]
 
     def entry(self, row: int, column: int, value: float) -> None:
         self.rows.append([row])
