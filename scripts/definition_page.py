@@ -17,6 +17,7 @@ from spindle_fem.definition.machine_spec import MACHINE_SCHEMA, MachineSpec
 from spindle_fem.definition.schema import (
     Shape,
     annotation_of,
+    literal_values,
     quantity_rule,
     registry_of,
     shape_of,
@@ -92,7 +93,7 @@ Every other face is exposed. A `[[surface]]` names some of a part's faces, and e
 def reference_page() -> str:
     """Markdown text that lists every table and key of a machine definition."""
     sections = [_INTRODUCTION, "## Tables\n"]
-    sections += list(_sections("", Shape("table", (MachineSpec,)), in_list=False))
+    sections += list(key_sections("", Shape("table", (MachineSpec,)), in_list=False))
     sections += list(_choices())
     return "\n".join(sections).rstrip() + "\n"
 
@@ -137,7 +138,8 @@ def _range_text(thing: Any) -> str:
     return "; ".join(f"{name.replace('_', ' ')} {range_text(*ends)}" for name, ends in limits.items())
 
 
-def _sections(path: str, shape: Shape, *, in_list: bool) -> Iterator[str]:
+def key_sections(path: str, shape: Shape, *, in_list: bool) -> Iterator[str]:
+    """Lines that list the keys of a table and of those in it."""
     for model in shape.models:
         kind = (
             f" with kind {value_text(annotation_of(model.model_fields['kind']))}"
@@ -152,12 +154,12 @@ def _sections(path: str, shape: Shape, *, in_list: bool) -> Iterator[str]:
             inner = shape_of(annotation_of(field))
             nested = f"{path}.{key}".strip(".")
             if inner.kind == "table":
-                yield from _sections(nested, inner, in_list=False)
+                yield from key_sections(nested, inner, in_list=False)
             elif inner.kind in ("list", "mapping"):
                 entries = shape_of(inner.inner)
                 nested += "" if inner.kind == "list" else ".NAME"
                 if entries.kind == "table":
-                    yield from _sections(nested, entries, in_list=inner.kind == "list")
+                    yield from key_sections(nested, entries, in_list=inner.kind == "list")
 
 
 def _fields(model: type[BaseModel]) -> list[tuple[str, FieldInfo]]:
@@ -181,7 +183,7 @@ def _key_table(model: type[BaseModel]) -> str:
 def _allowed(annotation: Any, key: str) -> str:
     shape = shape_of(annotation)
     if key == "schema":
-        return f'`"{MACHINE_SCHEMA}"`'
+        return f'`"{next(iter(literal_values(annotation)), MACHINE_SCHEMA)}"`'
     if shape.kind == "table":
         return "a table, see below"
     if shape.kind == "mapping":

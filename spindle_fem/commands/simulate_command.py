@@ -101,7 +101,7 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
     for entry in summary["channels"]:
         index = recording.temperature_names.index(entry["channel"])
         read = np.isfinite(comparison.residual[:, index])
-        entry["inside_90_percent_interval"] = float(np.mean(inside[read, index]))
+        entry["inside_90_percent_interval"] = float(np.mean(inside[read, index])) if read.any() else None
         entry["interval_half_width_K"] = float(np.mean(simulation.half_width[:, index]))
     if recording.displacement_names and simulation.displacements.size:
         summary["displacements"] = displacement_errors(recording, simulation.displacements)

@@ -95,6 +95,8 @@ def value_text(annotation: Any) -> str:
             for name in ("ge", "le")
         )
         return "a whole number" + (f" from {least} to {most}" if None not in (least, most) else "")
+    if float in alternatives:
+        return "a number"
     return "a name" if get_args(Name)[1] in metadata else "a text"
 
 

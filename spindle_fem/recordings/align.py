@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import RecordingError, did_you_mean
 from spindle_fem.recordings.channel_checks import (
+    PLAUSIBLE_KELVIN,
     ChannelNoise,
     Flag,
     channel_noise,
@@ -23,6 +24,7 @@ from spindle_fem.recordings.defects import ChannelDefects, DefectReport, Gap
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.recordings.manifest import Channel, ColumnUnit, Manifest, conversions, load_manifest
 from spindle_fem.recordings.read_data import RawTable, read_table
+from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
@@ -228,7 +230,14 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
         aligned[column], flags[column], noises[column] = values, marked, noise
         defects.append(_channel_defects(channel, values, marked, noise, times, table))
         if channel.role == "input" and np.all(marked):
-            raise RecordingError(source, f'the input column "{column}" has no reading.')
+            implausible = _count(marked, Flag.IMPLAUSIBLE)
+            raise RecordingError(
+                source,
+                f'the input column "{column}" has no reading that can be used.',
+                f"{implausible} readings are outside what a sensor reads: {_plausible_text()}."
+                if implausible
+                else "",
+            )
     temperatures = by_role["temperature"]
     if not any((flags[c.column] == 0).any() for c in temperatures):
         raise RecordingError(source, "no temperature channel has a reading that can be used.")
@@ -313,6 +322,11 @@ def _channel_defects(
         noise=noise,
         sigma_declared=channel.sigma,
     )
+
+
+def _plausible_text() -> str:
+    low, high = (limit - ZERO_CELSIUS_K for limit in PLAUSIBLE_KELVIN)
+    return f"{low:g} to {high:g} degC"
 
 
 def _from_first(values: Array) -> Array:

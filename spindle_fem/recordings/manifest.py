@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import pint
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -26,41 +27,73 @@ DRIVES_UNITS = {
     "coolant_inlet": "K",
     "coolant_flow": "m**3/s",
 }
+# Keys of a channel beside column and role: needed, and allowed.
+ROLE_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "temperature": (("probe", "unit"), ("sigma",)),
+    "displacement": (("probe", "unit"), ("sigma",)),
+    "input": (("drives", "unit"), ("hold", "sigma")),
+    "covariate": ((), ("unit", "sigma")),
+}
 _ROTATION_UNITS = ("revolution", "turn", "radian", "degree")
 
 
 class _ManifestModel(BaseModel):
-    model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
+    model_config: ClassVar[ConfigDict] = ConfigDict(
+        extra="forbid", frozen=True, use_attribute_docstrings=True
+    )
+
+
+Table = TypeVar("Table", bound=_ManifestModel)
 
 
 class TimeColumn(_ManifestModel):
-    """Where the time stands: seconds and the like with ``unit``, ISO 8601 stamps without."""
+    """Where the time stands."""
 
     column: str
+    """Column of the data file. Rows may be repeated or out of order."""
     unit: str | None = None
+    """Unit of a column that counts: `s`, `ms`, `min`, `hour`. Without it the column holds ISO 8601 stamps;
+    those without a zone count as UTC."""
 
 
 class Channel(_ManifestModel):
     """One column and what it means."""
 
     column: str
+    """Column of the data file; one channel a column. Columns without a channel are left out and counted."""
     role: Literal["temperature", "displacement", "input", "covariate"]
+    """What it is to the model; which keys it takes follows, see below."""
     unit: str | None = None
+    """Unit of the column, such as `degC`, `rpm`, `l/min`, `percent`. A covariate without one is a pure
+    number."""
     probe: str | None = None
+    """What reads it: a probe or a network node of the machine; of a displacement, a
+    `[[displacement_sensor]]`."""
     sigma: float | None = None
+    """White noise, one standard deviation: above 0, in K, of a displacement in its unit. Measured from the
+    readings where it is not given."""
     drives: str | None = None
+    """What it drives, one channel for each, see below."""
     hold: Literal["previous", "linear"] | None = None
+    """Between readings: the last one holds, or a straight line, which none given means too."""
 
 
 class Manifest(_ManifestModel):
-    """A recording's ``.toml`` file."""
+    """The whole file. At least one channel is a temperature."""
 
     schema_: Annotated[Literal["spindle-fem/recording/1"], Field(alias="schema")]
+    """Form of this file."""
     name: str
+    """What reports call the recording."""
     description: str = ""
+    """For whoever reads the file."""
     data: str
+    """File beside the manifest that ends in `.csv`, `.csv.gz` or `.parquet`; for `watch` also `-`, standard
+    input."""
     time: TimeColumn
+    """The column of times."""
     channel: Annotated[tuple[Channel, ...], Field(min_length=1)]
+    """Every column that counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,92 +197,89 @@ def load_manifest(path: str | Path, *, growing: bool = False) -> tuple[Manifest,
     file = find_manifest(path)
     content = read_toml(file)
     source = str(file)
-    schema = content.get("schema")
+    schema = content.get("schema", RECORDING_SCHEMA)
     if schema != RECORDING_SCHEMA:
         fault = SpecError(f"{source}: schema", f"{schema!r} is not known.", f'Allowed: "{RECORDING_SCHEMA}".')
         raise FaultsError(source, [fault])
-    try:
-        manifest = Manifest.model_validate(content)
-    except ValidationError as error:
-        raise FaultsError(source, validation_faults(error, source, Manifest)) from error
-    faults = manifest_faults(manifest)
-    data = file.parent / manifest.data
-    if growing and manifest.data == STANDARD_INPUT:
-        data = Path(STANDARD_INPUT)
-    elif not manifest.data.endswith(DATA_SUFFIXES):
-        faults.append(
-            SpecError(
-                "data", f'"{manifest.data}" is of unknown kind.', f"Allowed: {', '.join(DATA_SUFFIXES)}."
-            )
-        )
-    elif not data.is_file() and not growing:
-        faults.append(RecordingError("data", f'"{manifest.data}" does not exist beside the manifest.'))
-    if faults:
-        located = [type(f)(f"{source}: {f.where}", f.what, f.how_to_fix) for f in faults]
-        raise FaultsError(source, located)
-    return manifest, data
-
-
-def manifest_faults(manifest: Manifest) -> list[SpindleFemError]:
-    """Contradictions of a well-formed manifest, each named by key."""
     faults: list[SpindleFemError] = []
-    if manifest.time.unit is not None:
-        faults += _unit_faults(manifest.time.unit, "time.unit", "s")
-    columns: dict[str, str] = {manifest.time.column: "time.column"}
+    try:
+        Manifest.model_validate(content)
+    except ValidationError as error:
+        faults += validation_faults(error, source, Manifest)
+    found = [*_contradictions(content), *_data_faults(content.get("data"), file.parent, growing)]
+    faults += [type(fault)(f"{source}: {fault.where}", fault.what, fault.how_to_fix) for fault in found]
+    if faults:
+        raise FaultsError(source, faults)
+    manifest = Manifest.model_validate(content)
+    standard = growing and manifest.data == STANDARD_INPUT
+    return manifest, Path(STANDARD_INPUT) if standard else file.parent / manifest.data
+
+
+def _data_faults(data: Any, folder: Path, growing: bool) -> list[SpindleFemError]:
+    if not isinstance(data, str) or (growing and data == STANDARD_INPUT):
+        return []
+    if not data.endswith(DATA_SUFFIXES):
+        allowed = f"Allowed: {', '.join(DATA_SUFFIXES)}."
+        return [SpecError("data", f'"{data}" is of unknown kind.', allowed)]
+    if not growing and not (folder / data).is_file():
+        return [RecordingError("data", f'"{data}" does not exist beside the manifest.')]
+    return []
+
+
+def _contradictions(content: Mapping[str, Any]) -> list[SpindleFemError]:
+    """Contradictions between keys, each named, of the tables that are well formed by themselves."""
+    faults: list[SpindleFemError] = []
+    time = _well_formed(TimeColumn, content.get("time"))
+    if time is not None and time.unit is not None:
+        faults += _unit_faults(time.unit, "time.unit", "s")
+    columns = {} if time is None else {time.column: "time.column"}
     driven: dict[str, str] = {}
-    for number, channel in enumerate(manifest.channel, 1):
+    tables = content.get("channel")
+    entries = [_well_formed(Channel, table) for table in tables] if isinstance(tables, list) else []
+    for number, channel in enumerate(entries, 1):
+        if channel is None:
+            continue
         where = f"channel[{number}]"
         if channel.column in columns:
-            earlier = columns[channel.column]
-            faults.append(
-                SpecError(
-                    f"{where}.column", f'"{channel.column}" is already {earlier}.', "One channel a column."
-                )
-            )
+            what = f'"{channel.column}" is already {columns[channel.column]}.'
+            faults.append(SpecError(f"{where}.column", what, "One channel a column."))
         columns.setdefault(channel.column, f"{where}.column")
         faults += _role_faults(channel, where)
         if channel.role == "input" and channel.drives is not None:
             if channel.drives in driven:
-                faults.append(
-                    SpecError(
-                        f"{where}.drives",
-                        f'"{channel.drives}" is already driven by {driven[channel.drives]}.',
-                        "One channel for each driven quantity.",
-                    )
-                )
+                what = f'"{channel.drives}" is already driven by {driven[channel.drives]}.'
+                faults.append(SpecError(f"{where}.drives", what, "One channel for each driven quantity."))
             driven.setdefault(channel.drives, where)
-    if not any(channel.role == "temperature" for channel in manifest.channel):
+    if entries and not any(channel is None or channel.role == "temperature" for channel in entries):
         faults.append(
             SpecError("channel", "no channel is a temperature.", 'Give at least one role = "temperature".')
         )
     return faults
 
 
+def _well_formed(model: type[Table], table: Any) -> Table | None:
+    """A table of a manifest, None where it is none by itself."""
+    try:
+        return model.model_validate(table)
+    except ValidationError:
+        return None
+
+
 def _role_faults(channel: Channel, where: str) -> list[SpindleFemError]:
-    needed: dict[str, tuple[str, ...]] = {
-        "temperature": ("probe", "unit"),
-        "displacement": ("probe", "unit"),
-        "input": ("drives", "unit"),
-        "covariate": (),
-    }
-    allowed: dict[str, tuple[str, ...]] = {
-        "temperature": ("probe", "unit", "sigma"),
-        "displacement": ("probe", "unit", "sigma"),
-        "input": ("drives", "unit", "hold", "sigma"),
-        "covariate": ("unit", "sigma"),
-    }
     faults: list[SpindleFemError] = []
     role, label = channel.role, f'"{channel.column}"'
-    for key in needed[role]:
+    needed, optional = ROLE_KEYS[role]
+    allowed = (*needed, *optional)
+    for key in needed:
         if getattr(channel, key) is None:
             faults.append(SpecError(f"{where}.{key}", f"is missing for {label}, a channel of role {role}."))
     for key in ("probe", "unit", "sigma", "drives", "hold"):
-        if getattr(channel, key) is not None and key not in allowed[role]:
+        if getattr(channel, key) is not None and key not in allowed:
             faults.append(
                 SpecError(
                     f"{where}.{key}",
                     f"{getattr(channel, key)!r} has no meaning for role {role}.",
-                    f"Allowed: column, role, {', '.join(allowed[role])}.",
+                    f"Allowed: column, role, {', '.join(allowed)}.",
                 )
             )
     if channel.sigma is not None and not 0.0 < channel.sigma < float("inf"):

@@ -31,13 +31,25 @@ def decimal_sign(cells: pd.DataFrame) -> tuple[str, str]:
     return ".", ""
 
 
-def numbers_of(column: pd.Series, decimal: str = ".") -> tuple[np.ndarray, tuple[tuple[int, str], ...]]:
+def numbers_of(
+    column: pd.Series, decimal: str = ".", *, groups: bool = True
+) -> tuple[np.ndarray, tuple[tuple[int, str], ...]]:
     """Numbers of a column, and the rows whose cell is filled and no number, with the cell.
+
+    Parameters
+    ----------
+    decimal : str
+        Sign before the decimals.
+    groups : bool
+        Whether the other sign may part groups of three digits; a cell in which it could is no number
+        otherwise.
 
     >>> numbers_of(pd.Series(["21,5", "Fehler", ""]), ",")
     (array([21.5,  nan,  nan]), ((1, 'Fehler'),))
     >>> numbers_of(pd.Series(["3,000", "12.5"]))[0]
     array([3000. ,   12.5])
+    >>> numbers_of(pd.Series(["3,000", "12.5"]), groups=False)[1]
+    ((0, '3,000'),)
     """
     if pd.api.types.is_bool_dtype(column.dtype):
         return column.to_numpy(dtype=float), ()
@@ -47,7 +59,7 @@ def numbers_of(column: pd.Series, decimal: str = ".") -> tuple[np.ndarray, tuple
     empty = text.str.lower().isin(EMPTY_WORDS)
     group = _SIGNS[decimal]
     grouped = text.str.match(rf"^[+-]?\d{{1,3}}(?:[{group}]\d{{3}})+(?:[{decimal}]\d*)?$")
-    plain = text.where(~grouped, text.str.replace(group, ""))
+    plain = text.where(~grouped, text.str.replace(group, "") if groups else "")
     # the other sign where it cannot part groups is a decimal sign as well: devices mix them
     values = pd.to_numeric(plain.str.replace(",", "."), errors="coerce").where(~empty).to_numpy(float)
     wrong = np.flatnonzero(np.isnan(values) & ~empty.to_numpy())

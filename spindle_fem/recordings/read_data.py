@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import RecordingError, did_you_mean
 from spindle_fem.recordings.manifest import Manifest, time_scale
+from spindle_fem.recordings.numbers_in_text import decimal_sign, numbers_of
 
 MAX_LISTED_CELLS = 5
+# Bytes by which a text file's decimal sign is judged.
+LENGTH_JUDGED = 20_000
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
 
 
@@ -65,19 +68,22 @@ def read_table(data: Path, manifest: Manifest) -> RawTable:
         The file cannot be opened or decoded, a column is missing, a cell
         holds text (each named by line and column), or no row has a time.
     """
+    decimal = "."
     if data.name.endswith(".parquet"):
         frame, blank, short, truncated = _read_parquet(data, manifest), 0, 0, False
         present = [str(name) for name in frame.columns]
         first_line, word = 1, "row"
     else:
-        frame, present, blank, short, truncated = _read_csv(data, manifest)
+        frame, present, decimal, blank, short, truncated = _read_csv(data, manifest)
         first_line, word = 2, "line"
-    seconds, start, first_time = _read_time(frame[manifest.time.column], manifest, data, first_line, word)
+    seconds, start, first_time = _read_time(
+        frame[manifest.time.column], manifest, data, decimal, (word, first_line)
+    )
     faults: list[str] = []
     columns, infinite = {}, {}
     for channel in manifest.channel:
-        values, wrong = _numbers(frame[channel.column], first_line, word)
-        faults += [f"{place} column {channel.column} holds {text}" for place, text in wrong]
+        values, wrong = _numbers(frame[channel.column], decimal)
+        faults += [f'{word} {row + first_line} column {channel.column} holds "{cell}"' for row, cell in wrong]
         beyond = np.isinf(values)
         infinite[channel.column] = int(beyond.sum())
         columns[channel.column] = np.where(beyond, np.nan, values)
@@ -130,12 +136,12 @@ def _read_parquet(data: Path, manifest: Manifest) -> pd.DataFrame:
     return frame
 
 
-def _read_csv(data: Path, manifest: Manifest) -> tuple[pd.DataFrame, list[str], int, int, bool]:
+def _read_csv(data: Path, manifest: Manifest) -> tuple[pd.DataFrame, list[str], str, int, int, bool]:
     content = _bytes(data)
     names, separator = names_of_header(content.partition(b"\n")[0].decode("utf-8").strip("\r"))
     require_columns(data, manifest, names)
     content, blank, short, truncated = _check_lines(data, content, separator, len(names))
-    decimal = "," if separator != "," and _has_decimal_comma(content) else "."
+    decimal = _decimal(content, separator, names, manifest)
     used = set(required_columns(manifest))
     try:
         with warnings.catch_warnings():
@@ -154,7 +160,7 @@ def _read_csv(data: Path, manifest: Manifest) -> tuple[pd.DataFrame, list[str], 
             )
     except (pd.errors.ParserError, pd.errors.ParserWarning, pd.errors.EmptyDataError, ValueError) as error:
         raise RecordingError(str(data), f"is not a readable table ({error}).") from error
-    return frame, names, blank, short, truncated
+    return frame, names, decimal, blank, short, truncated
 
 
 def names_of_header(header: str) -> tuple[list[str], str]:
@@ -231,42 +237,41 @@ def _quoted_cells(data: Path, content: bytes, separator: str, lines: int) -> NDA
     return np.maximum(np.array(cells, dtype=np.int64), 1)
 
 
-def _has_decimal_comma(content: bytes) -> bool:
-    sample = content[:20000].split(b"\n")[1:-1]
-    return any(b"," in line for line in sample) and not any(b"." in line for line in sample)
+def _decimal(content: bytes, separator: str, names: list[str], manifest: Manifest) -> str:
+    """Decimal sign of the channels, judged by the first rows; stamps may have a sign of their own."""
+    end = content.find(b"\n", LENGTH_JUDGED)
+    rows = csv.reader(
+        io.StringIO(content[: None if end < 0 else end].decode("utf-8")), delimiter=separator, strict=False
+    )
+    columns = [names.index(channel.column) for channel in manifest.channel]
+    cells = [[row[at].strip() for at in columns] for row in rows if len(row) == len(names)]
+    sign, doubt = decimal_sign(pd.DataFrame(cells[1:], columns=columns, dtype=object))
+    # where commas part cells, "1,234" is as well a thousand: such cells are refused, not guessed at
+    return "." if doubt and separator == "," else sign
 
 
-def _numbers(
-    column: pd.Series, first_line: int, word: str
-) -> tuple[NDArray[np.float64], list[tuple[str, str]]]:
-    """Numbers of a column and the cells that are none."""
-    if pd.api.types.is_bool_dtype(column.dtype):
-        return np.full(len(column), np.nan), [(f"{word} {first_line}", f'"{column.iloc[0]}"')]
-    if pd.api.types.is_numeric_dtype(column.dtype):
-        return column.to_numpy(dtype=np.float64, na_value=np.nan), []
-    if pd.api.types.is_datetime64_any_dtype(column.dtype) or column.dtype.kind == "m":
-        return np.full(len(column), np.nan), [(f"{word} {first_line}", f'"{column.iloc[0]}"')]
-    numbers = pd.to_numeric(column, errors="coerce")
-    blank = column.isna() | (column.astype(str).str.strip() == "")
-    wrong = np.flatnonzero((numbers.isna() & ~blank).to_numpy())
-    cells = [(f"{word} {row + first_line}", f'"{column.iloc[row]}"') for row in wrong]
-    return numbers.to_numpy(dtype=np.float64, na_value=np.nan), cells
+def _numbers(column: pd.Series, decimal: str) -> tuple[NDArray[np.float64], tuple[tuple[int, str], ...]]:
+    """Numbers of a column, and the rows whose cell is filled and no number, with the cell."""
+    if pd.api.types.is_bool_dtype(column.dtype) or column.dtype.kind in "mM":
+        return np.full(len(column), np.nan), ((0, str(column.iloc[0])),)
+    return numbers_of(column, decimal, groups=False)
 
 
 def _read_time(
-    column: pd.Series, manifest: Manifest, data: Path, first_line: int, word: str
+    column: pd.Series, manifest: Manifest, data: Path, decimal: str, rows_from: tuple[str, int]
 ) -> tuple[NDArray[np.float64], str | None, float]:
     scale = time_scale(manifest)
     name = manifest.time.column
+    word, first_line = rows_from
     if column.dtype.kind == "m":  # durations carry their own unit
         column, scale = column.dt.total_seconds(), 1.0
     if scale is not None:
-        values, wrong = _numbers(column, first_line, word)
+        values, wrong = _numbers(column, decimal)
         if wrong:
-            place, text = wrong[0]
+            row, cell = wrong[0]
             raise RecordingError(
-                f"{data}: {place} column {name}",
-                f"holds {text}, not a number of {manifest.time.unit}.",
+                f"{data}: {word} {row + first_line} column {name}",
+                f'holds "{cell}", not a number of {manifest.time.unit}.',
                 "Leave time.unit out where the column holds ISO 8601 stamps.",
             )
         values = np.where(np.isfinite(values), values, np.nan) * scale
@@ -302,10 +307,16 @@ def _read_time(
 
 def _earliest(values: NDArray[np.float64], data: Path, name: str) -> float:
     present = values[np.isfinite(values)]
-    if np.unique(present).size < 2:
+    if present.size > 1 and np.ptp(present) == 0.0:
         raise RecordingError(
             str(data),
-            f'has {present.size} rows with a time in column "{name}".',
+            f'has the same time in all {present.size} rows of column "{name}".',
+            "Name the column whose times grow.",
+        )
+    if present.size < 2:
+        raise RecordingError(
+            str(data),
+            f'has {present.size} row{"s" * (present.size != 1)} with a time in column "{name}".',
             "At least two times are needed.",
         )
     return float(present.min())

@@ -80,9 +80,14 @@ def _channel_table(content: Mapping[str, Any]) -> Table:
         fixed("largest / K", "max_K", 3),
         fixed("noise / K", "noise_K", 3),
         fixed("90 % interval ± / K", "interval_half_width_K", 2),
-        fixed("inside / %", lambda item: 100.0 * item["inside_90_percent_interval"], 0),
+        fixed("inside / %", _inside_percent, 0),
     )
     return table_of(fields, content["channels"], "Predicted less read; error: root mean square.")
+
+
+def _inside_percent(item: Mapping[str, Any]) -> float | None:
+    share = item["inside_90_percent_interval"]
+    return None if share is None else 100.0 * share
 
 
 def _condition_table(content: Mapping[str, Any]) -> Table:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from scripts import manifest_page
 from spindle_fem.errors import FaultsError, RecordingError, SpecError, UnitError
 from spindle_fem.recordings.manifest import column_unit, find_manifest, load_manifest
 
@@ -113,6 +114,18 @@ def test_every_fault_at_once(folder):
     assert len(caught.value.faults) == 3
 
 
+def test_contradictions_are_told_beside_keys_that_are_no_keys(folder):
+    rewrite(folder, "sigma = 0.1", "sigm = 0.1")
+    rewrite(folder, 'unit = "s"', 'unit = "m"')
+    rewrite(folder, 'hold = "previous"', 'hold = "last"')
+    rewrite(folder, 'unit = "percent"', 'unit = "percent"\nhold = "linear"')
+    rewrite(folder, 'schema = "spindle-fem/recording/1"\n', "")
+    with pytest.raises(FaultsError) as caught:
+        load_manifest(folder)
+    places = [fault.where.rpartition(": ")[2] for fault in caught.value.faults]
+    assert sorted(places) == ["channel[1].sigm", "channel[2].hold", "channel[3].hold", "schema", "time.unit"]
+
+
 def test_two_channels_cannot_drive_the_same(folder):
     with (folder / "recording.toml").open("a") as file:
         file.write('[[channel]]\ncolumn = "speed2"\nrole = "input"\ndrives = "speed"\nunit = "rpm"\n')
@@ -153,3 +166,8 @@ def test_conversion_of_columns(unit, raw, si):
 def test_unknown_unit_is_refused():
     with pytest.raises(UnitError, match='x: "wibble" is not'):
         column_unit("wibble", "x")
+
+
+def test_the_page_lists_every_key():
+    page = manifest_page.PAGE.read_text(encoding="utf-8")
+    assert page == manifest_page.renewed(page), "run: python -m scripts.manifest_page"

@@ -204,7 +204,7 @@ def test_unused_columns_are_listed(tmp_path):
         (b"", "is empty"),
         (b"\n\n", "is empty"),
         (b"time_s,SP01,SP03,speed\n", "has 0 rows with a time"),
-        (b"time_s,SP01,SP03,speed\n0,1,2,3\n", "has 1 rows with a time"),
+        (b"time_s,SP01,SP03,speed\n0,1,2,3\n", "has 1 row with a time"),
         (b"time_s,SP01,SP03,speed\n0,1,2,3\n1,\xff,2,3\n", "line 3: is not UTF-8 text"),
         (b"time_s,SP01,SP03,speed\n0,1,2,3\n1,\0,2,3\n", "line 3: holds a zero byte"),
         (b"time_s,SP01,SP03,speed\n0,,,3\n1,,,3\n", "no temperature channel has a reading"),
@@ -293,3 +293,49 @@ def test_time_in_hours_counts_from_the_earliest(tmp_path):
     assert recording.times[1] == pytest.approx(36000.0)
     shifted = [f"{1000 + 10 * k}," + row.split(",", 1)[1] for k, row in enumerate(rows())]
     assert read_recording(write(tmp_path, shifted)).times[0] == 0.0
+
+
+@pytest.mark.parametrize("stamp", ["{k}", "2016-05-02T12:41:{k:02d}.250"])
+def test_one_bad_cell_of_a_file_with_decimal_commas_is_named_alone(tmp_path, stamp):
+    lines = [f"{stamp.format(k=k)};{20 + 0.01 * k:.2f};21;0".replace(".", ",") for k in range(40)]
+    lines = [line.replace(",250;", ".250;") for line in lines]
+    lines[15] = lines[15].replace("20,15", "Fehler")
+    folder = write(
+        tmp_path,
+        lines,
+        header="time_s;SP01;SP03;speed",
+        time=SECONDS if stamp == "{k}" else '{column = "time_s"}',
+    )
+    with pytest.raises(RecordingError, match=r'data.csv: line 17 column SP01 holds "Fehler"\. Allowed'):
+        read_recording(folder)
+    (folder / "data.csv").write_text((folder / "data.csv").read_text().replace("Fehler", "-"))
+    recording = read_recording(folder)
+    assert recording.temperature[3, 0] == pytest.approx(293.18)
+    assert recording.defects.channel("SP01").empty_cells == 1
+
+
+def test_a_comma_that_may_part_thousands_is_not_guessed_at(tmp_path):
+    lines = rows()
+    lines[3] = '30,20,21,"3,000"'
+    with pytest.raises(RecordingError, match='line 5 column speed holds "3,000"'):
+        read_recording(write(tmp_path, lines))
+
+
+def test_times_that_are_all_the_same_are_said_to_be(tmp_path):
+    lines = [line.replace(f"{10 * k},", "7,", 1) for k, line in enumerate(rows())]
+    with pytest.raises(RecordingError, match=r'the same time in all 30 rows of column "time_s"'):
+        read_recording(write(tmp_path, lines))
+
+
+def test_an_input_that_no_sensor_can_read_is_refused_with_the_reason(tmp_path):
+    folder = write(
+        tmp_path,
+        [",".join(["-300" if i == 3 else c for i, c in enumerate(row.split(","))]) for row in rows()],
+    )
+    manifest = (folder / "recording.toml").read_text()
+    manifest = manifest.replace('drives = "speed"\nunit = "rpm"', 'drives = "coolant_inlet"\nunit = "degC"')
+    (folder / "recording.toml").write_text(manifest)
+    with pytest.raises(
+        RecordingError, match=r"no reading that can be used\. 30 readings are outside .* -60 to 400"
+    ):
+        read_recording(folder)

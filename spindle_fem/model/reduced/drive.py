@@ -14,6 +14,7 @@ from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.errors import RecordingError
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.input_limits import require_possible_inputs
 from spindle_fem.recordings.standard_inputs import standard_inputs
 
 Array = NDArray[np.float64]
@@ -102,20 +103,10 @@ def drive_of_recording(
     Raises
     ------
     RecordingError
-        An input that the machine does not know, or a speed that is not given.
+        An input that the machine does not know or cannot take, or a speed that is not given.
     """
+    unusual = require_possible_inputs(spec, recording)
     known = standard_inputs(spec)
-    unknown = [n for n in recording.input_names if n not in known and not n.startswith("heat.")]
-    if unknown:
-        raise RecordingError(
-            recording.source,
-            f'drives "{unknown[0]}", which a machine with geometry does not have.',
-            f"Allowed: {', '.join(known)}, heat.<source>.",
-        )
-    if "speed" not in recording.input_names:
-        raise RecordingError(
-            recording.source, "no channel drives the speed.", 'Add an input channel with drives = "speed".'
-        )
     notes = [
         f'"{name}" is not recorded: the definition\'s value is used'
         for name in known
@@ -143,7 +134,7 @@ def drive_of_recording(
         names,
         np.column_stack(columns),
         np.array(held),
-        notes=tuple(notes),
+        notes=(*notes, *unusual),
         largest_step=largest_step,
     )
 

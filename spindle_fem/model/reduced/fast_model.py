@@ -434,13 +434,12 @@ class FastModel:
         Raises
         ------
         SpecError
-            A probe that the machine does not have.
+            Probes that the machine does not have.
         """
-        for probe in probes:
-            if probe not in self.channels:
-                raise SpecError(
-                    where,
-                    f'reads "{probe}", no channel of this model.',
-                    did_you_mean(probe, self.channels),
-                )
+        unknown = [probe for probe in probes if probe not in self.channels]
+        if unknown:
+            listing = ", ".join(f'"{probe}"' for probe in unknown)
+            raise SpecError(
+                where, f"reads {listing}, no channel of this model.", did_you_mean(unknown[0], self.channels)
+            )
         return np.array([self.channels.index(probe) for probe in probes], dtype=np.int64)

@@ -14,6 +14,7 @@ from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tab
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.friction_map import needs_map, tabulate_friction, thrusts_between
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.input_limits import require_possible_inputs
 
 Progress = Callable[[str], None]
 
@@ -38,7 +39,11 @@ def fast_model_for(
     ------
     SpecError
         Heat that follows expansion.
+    RecordingError or FaultsError
+        Inputs that the machine cannot take.
     """
+    for recording in recordings:
+        require_possible_inputs(spec, recording)
     options = options_for(spec, recordings)
     if not needs_map(spec):
         model = reduced_model_of(spec, options=options, as_given=as_given, progress=progress)

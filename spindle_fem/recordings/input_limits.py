@@ -1,0 +1,107 @@
+"""Recorded inputs held against what a machine can do: what none can is refused, what is unusual is said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.errors import FaultsError, RecordingError, SpindleFemError
+from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.standard_inputs import standard_inputs
+from spindle_fem.units import ZERO_CELSIUS_K
+
+# Speed times pitch diameter that no rolling bearing runs at, m·rad/s: 5 million mm/min. On a rig, ball
+# bearings of 120 mm bore (pitch diameter 155 mm) ran at 25,000 rpm, 3.9 million: Zaretsky, Bamberger and
+# Signer (1974), NASA TN D-7837.
+HIGHEST_PITCH_SPEED = 5.0e3 * 2.0 * np.pi / 60.0
+# Air about machines, K: what industrial electronics beside them is made for.
+USUAL_AMBIENT = (233.15, 358.15)
+_RPM = 30.0 / np.pi
+
+
+def require_possible_inputs(spec: MachineSpec, recording: Recording) -> tuple[str, ...]:
+    """Refuse inputs that a machine with geometry does not have or cannot take; what is unusual, as sentences.
+
+    Raises
+    ------
+    RecordingError or FaultsError
+        Every input that is unknown, a speed that is not given or no rolling bearing reaches, a flow below
+        zero.
+    """
+    faults = list(_faults(spec, recording))
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        raise FaultsError(recording.source, faults)
+    return tuple(_unusual(spec, recording))
+
+
+def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError]:
+    source, known = recording.source, standard_inputs(spec)
+    for name in recording.input_names:
+        if name not in known and not name.startswith("heat."):
+            yield RecordingError(
+                source,
+                f'drives "{name}", which a machine with geometry does not have.',
+                f"Allowed: {', '.join(known)}, heat.<source>.",
+            )
+    if "speed" not in recording.input_names:
+        yield RecordingError(
+            source, "no channel drives the speed.", 'Add an input channel with drives = "speed".'
+        )
+    pitch = max((spec.bearing_types[group.bearing_type].pitch for group in spec.bearing_set), default=0.0)
+    fastest = max(np.abs(_ends(recording, "speed")))
+    if fastest * pitch > HIGHEST_PITCH_SPEED:
+        yield RecordingError(
+            source,
+            f'column "{_column(recording, "speed")}" (speed) reaches {fastest * _RPM:.0f} rpm.',
+            f"No rolling bearing of {1e3 * pitch:.0f} mm pitch diameter runs above "
+            f"{HIGHEST_PITCH_SPEED / pitch * _RPM:.0f} rpm; is the unit right?",
+        )
+    lowest = _ends(recording, "coolant_flow")[0]
+    if lowest < 0.0:
+        yield RecordingError(
+            source,
+            f'column "{_column(recording, "coolant_flow")}" (coolant_flow) falls to '
+            f"{6e4 * lowest:.3g} l/min.",
+            "Allowed: 0 and above.",
+        )
+
+
+def _unusual(spec: MachineSpec, recording: Recording) -> Iterator[str]:
+    fastest = max(np.abs(_ends(recording, "speed")))
+    if spec.heat.model == "table" and fastest > spec.heat.table.speed[-1] * (1.0 + 1e-9):
+        yield (
+            f"speed reaches {fastest * _RPM:.0f} rpm, the heat table ends at "
+            f"{spec.heat.table.speed[-1] * _RPM:.0f} rpm: its last segment is continued"
+        )
+    yield from _outside(recording, "ambient", USUAL_AMBIENT, "what is usual about machines")
+    if spec.coolant is not None:
+        fluid = coolant_by_name(spec.coolant.fluid)
+        limits = (fluid.lowest_temperature, fluid.highest_temperature)
+        yield from _outside(recording, "coolant_inlet", limits, f"the range of {spec.coolant.fluid}")
+
+
+def _outside(recording: Recording, name: str, limits: tuple[float, float], what: str) -> Iterator[str]:
+    low, high = _ends(recording, name)
+    if low < limits[0] or high > limits[1]:
+        shown = [value - ZERO_CELSIUS_K for value in (low, high, *limits)]
+        yield (
+            f"{name} runs from {shown[0]:.1f} to {shown[1]:.1f} °C, "
+            f"{what} from {shown[2]:g} to {shown[3]:g} °C"
+        )
+
+
+def _column(recording: Recording, name: str) -> str:
+    return recording.input_columns[recording.input_names.index(name)]
+
+
+def _ends(recording: Recording, name: str) -> tuple[float, float]:
+    """Lowest and highest reading of an input, NaN where it is not recorded."""
+    if name not in recording.input_names:
+        return np.nan, np.nan
+    values = recording.inputs[:, recording.input_names.index(name)]
+    return float(np.nanmin(values)), float(np.nanmax(values))
