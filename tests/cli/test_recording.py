@@ -59,7 +59,7 @@ def test_an_export_becomes_a_recording_that_is_simulated(folder, process):
 
 
 def test_a_picture_of_what_is_no_recording_is_refused(folder, command):
-    status, _, told = command("recording", "show", folder / "export.csv", "-o", folder / "picture.png")
-    assert status == 2
-    assert "is not a manifest" in told
+    told = command("recording", "show", folder / "export.csv", "-o", folder / "picture.png")
+    assert told.returncode == 2
+    assert "is not a manifest" in told.stderr
     assert not (folder / "picture.png").exists()
