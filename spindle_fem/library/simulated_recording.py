@@ -15,6 +15,7 @@ from spindle_fem.library.loaded_machine import Machine, Progress, definition_fil
 from spindle_fem.recordings import align
 from spindle_fem.recordings.align import Recording
 from spindle_fem.report.read_against_predicted import simulated_courses, simulated_figure
+from spindle_fem.report.recording_picture import recording_figure
 from spindle_fem.results.presented import Presented
 from spindle_fem.studies.simulate import Simulation
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -54,6 +55,10 @@ class ReadRecording(Presented, Recording):
             },
             {"name": self.name, "start": self.start or ""},
         )
+
+    def plot_channels(self) -> Figure:
+        """Every channel over time, with gaps and readings that are not used marked."""
+        return recording_figure(self)
 
     def _headline(self) -> str:
         hours = float(np.ptp(self.times)) / 3600.0

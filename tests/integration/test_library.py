@@ -61,6 +61,7 @@ def test_a_recording(recording):
     assert data["temperature"].sel(channel="T2").values[0] == pytest.approx(22.0)
     assert data["input_unit"].sel(driven="ambient") == "kelvin"
     assert data["probe"].values.tolist() == ["motor", "casing"]
+    assert len(recording.plot_channels().axes) == 4
 
 
 def test_a_solved_machine(solved):
