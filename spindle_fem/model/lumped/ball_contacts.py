@@ -129,19 +129,6 @@ class BallContactLaw:
         slope = np.where(at == kelvin, (3.0 * c3 * x + 2.0 * c2) * x + c1, 0.0)
         return ((c3 * x + c2) * x + c1) * x + c0, slope
 
-    def value(self, temperature: Array) -> Array:
-        """Heat into every node, W."""
-        heat = self.friction.heat(temperature)[0]
-        conductance, _ = self.conductance(self.friction.weights @ temperature + self.friction.feedback * heat)
-        link, kept = _link(conductance[self.raceway], self.area_share, self.resistance)
-        return self._net(link, kept, temperature, heat)
-
-    def _net(self, link: Array, kept: Array, temperature: Array, heat: Array) -> Array:
-        drop = temperature[self.node] - temperature[self.ball]
-        moved = (self.link - link) * drop + heat[self.bearing] * self.heat_share * (kept - self.kept)
-        n = self.n_nodes
-        return np.bincount(self.node, moved, n) - np.bincount(self.ball, moved, n)
-
     def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
         """Heat into every node and its derivative."""
         law = self.friction
@@ -161,7 +148,9 @@ class BallContactLaw:
         places = (self.node, self.ball, self.node, self.ball, columns, columns)
         values = (own, -own, -own, own, felt, -felt)
         triplets = tuple(np.concatenate(part) for part in (rows, places, values))
-        return self._net(link, kept, temperature, heat), triplets
+        moved = own * drop + heat[b] * self.heat_share * (kept - self.kept)
+        n = self.n_nodes
+        return np.bincount(self.node, moved, n) - np.bincount(self.ball, moved, n), triplets
 
 
 def _link(conductance: Array, area_share: Array, resistance: Array) -> tuple[Array, Array]:

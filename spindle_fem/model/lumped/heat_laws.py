@@ -84,11 +84,6 @@ class WallFilmLaw:
         by_wall = self.patch.area * self.flux_slope(wall)
         return self.patch.area * self.flux(wall), by_wall / (1.0 + self.patch.resistance * by_wall)
 
-    def value(self, temperature: Array) -> Array:
-        """Heat into every node, W."""
-        heat = self.patch.area * self.flux(self.wall(temperature))
-        return np.bincount(self.patch.node, -heat, len(temperature))
-
     def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
         """Heat into every node and its derivative."""
         heat, slope = self.heat(temperature)
@@ -138,12 +133,6 @@ class CoolantLaw:
     bulk_range: tuple[float, float]
     wall_range: tuple[float, float]
 
-    def coefficient(self, temperature: Array) -> Array:
-        """Film coefficient of each coolant cell, W/(m²·K)."""
-        if isinstance(self.film, float):
-            return np.full(len(self.nodes), self.film)
-        return self.film.ev(*self._inside(temperature))
-
     def require_valid(self, temperature: Array) -> None:
         """Refuse a state beyond the law's table."""
         if not isinstance(self.film, float):
@@ -184,22 +173,14 @@ class CoolantLaw:
         value = stretch[self.cell] * plain
         return value, stretch[self.cell] * plain_by_h + stretch_by_h[self.cell] * plain
 
-    def _spread(self, flow: Array, size: int) -> Array:
-        return np.bincount(self.nodes[self.cell], flow, size) - np.bincount(self.patch.node, flow, size)
-
-    def value(self, temperature: Array) -> Array:
-        """Heat into every node, W."""
-        conductance, _ = self.conductances(self.coefficient(temperature))
-        difference = temperature[self.patch.node] - temperature[self.nodes[self.cell]]
-        return self._spread(conductance * difference, len(temperature))
-
     def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
         """Heat into every node (walls and coolant) and its derivative."""
         h, by_bulk, by_wall = self.coefficients(temperature)
         conductance, by_h = self.conductances(h)
         node, coolant = self.patch.node, self.nodes[self.cell]
         difference = temperature[node] - temperature[coolant]
-        heat = self._spread(conductance * difference, len(temperature))
+        flow, n = conductance * difference, len(temperature)
+        heat = np.bincount(coolant, flow, n) - np.bincount(node, flow, n)
         # derivative of the flow through each face: (face, column, value)
         faces = [np.arange(len(node))] * 2
         columns, values = [node, coolant], [conductance, -conductance]
@@ -315,10 +296,6 @@ class FrictionLaw:
         base = self.weights @ temperature
         for name, value, breaks in zip(self.names, base, self.breaks, strict=True):
             require_inside(np.array([value]), breaks[0], breaks[-1], f"friction heat of {name}, film")
-
-    def value(self, temperature: Array) -> Array:
-        """Heat into every node, W."""
-        return self.spread @ self.heat(temperature)[0]
 
     def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
         """Heat into every node and its derivative."""

@@ -56,13 +56,6 @@ class SparseBalance:
         """Imbalance that rounding leaves: that of conductance times absolute temperature, W."""
         return 1.0e-13 * float(np.abs(derivative.diagonal()).max()) * float(temperature.max())
 
-    def net_heat(self, temperature: Array) -> Array:
-        """Net heat into every node, (n,) [W]."""
-        net = self.load - self.matrix @ temperature
-        for law in self.network.laws:
-            net = net + law.value(temperature)
-        return net
-
     def __call__(self, temperature: Array) -> tuple[Array, sparse.csc_array | Array]:
         """Net heat (n,) [W] and derivative (n, n) [W/K]."""
         net = self.load - self.matrix @ temperature
