@@ -116,7 +116,7 @@ def test_jacobian_is_the_derivative_of_the_balance(machine):
     state = solve_machine_network(network)
     balance = SparseBalance(state.network)
     temperature = state.temperature + np.random.default_rng(0).normal(size=network.n_nodes)
-    analytic = balance.jacobian(temperature)
+    analytic = balance(temperature)[1]
     step = 1e-4
     moved = step * np.eye(network.n_nodes)
     numeric = np.array(

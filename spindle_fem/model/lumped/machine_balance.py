@@ -69,11 +69,6 @@ class SparseBalance:
             derivative = derivative + sparse.csc_array((values, (rows, columns)), shape=(self.n, self.n))
         return net, derivative.tocsc()
 
-    def jacobian(self, temperature: Array) -> Array:
-        """Derivative of the net heat as a full matrix, (n, n) [W/K]."""
-        derivative = self(temperature)[1]
-        return derivative if isinstance(derivative, np.ndarray) else derivative.toarray()
-
     def _full(self, net: Array, temperature: Array) -> tuple[Array, Array]:
         derivative = -self.full
         for law in self.network.laws:
