@@ -14,6 +14,7 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     from spindle_fem.definition.effect_entries import EffectEntry
+    from spindle_fem.definition.machine_spec import HeatSource
     from spindle_fem.units import Uncertain
 
 
@@ -124,6 +125,7 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
         "probes": [
             {"name": probe.name, "detail": probe.part or "mixed coolant outlet"} for probe in spec.probe
         ],
+        "sources": [{"name": source.name, "detail": _source_detail(source)} for source in spec.source],
         "effects": _effect_rows(spec.effects),
         "warnings": [{"code": "geometry_note", "text": note} for note in assembly.notes],
     }
@@ -190,6 +192,13 @@ def _check_network(machine: str | Path, overrides: Iterable[str]) -> dict[str, A
         "effects": _effect_rows(spec.effects),
         "warnings": [],
     }
+
+
+def _source_detail(source: HeatSource) -> str:
+    heat = "no heat of its own" if source.heat is None else "heat by a table"
+    if isinstance(source.heat, float):
+        heat = f"{source.heat:g} W"
+    return f"{heat} into {source.place}" + (f', follows "{source.input}"' if source.input else "")
 
 
 def _amount(value: Uncertain, unit: str, zero: float = 0.0) -> str:

@@ -13,7 +13,18 @@ from spindle_fem.definition.machine_spec import BearingType, MachineSpec, Probe
 from spindle_fem.definition.schema import names_of
 from spindle_fem.errors import SpecError, SpindleFemError, UnknownSurfaceError, did_you_mean
 
-_LISTS = ("part", "bearing_set", "joint", "surface", "film", "gap", "factor", "probe", "displacement_sensor")
+_LISTS = (
+    "part",
+    "bearing_set",
+    "joint",
+    "surface",
+    "film",
+    "gap",
+    "factor",
+    "probe",
+    "displacement_sensor",
+    "source",
+)
 _TOLERANCE = 1.0e-9
 
 
@@ -118,6 +129,7 @@ def find_faults(spec: MachineSpec, declared: Declared | None = None) -> list[Spi
         *_bearings(spec, declared),
         *_cooling(spec, declared),
         *_heat(spec, declared),
+        *_sources(spec, declared),
         *_joints(spec, declared),
         *followed_joint_faults(spec),
         *_surfaces(spec, declared),
@@ -234,6 +246,17 @@ def _heat(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
     for name in names:
         if name not in spec.heat.table.heat:
             yield SpecError(f"heat.table.heat.{name}", "is missing.", "Every bearing needs a row.")
+
+
+def _sources(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
+    segments = tuple(f"{part.name}.{item.name}" for part in spec.part for item in part.segment)
+    surfaces = tuple(dict.fromkeys((*declared.names["surface"], *(s.name for s in spec.all_surfaces))))
+    for source in spec.source:
+        where = f"source.{source.name}"
+        if source.part is not None and source.part not in (*declared.parts, *segments):
+            yield _unknown(f"{where}.part", source.part, "part or segment", (*declared.parts, *segments))
+        if source.surface is not None and source.surface not in surfaces:
+            yield _unknown(f"{where}.surface", source.surface, "surface", surfaces)
 
 
 def _joints(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:

@@ -60,6 +60,7 @@ from spindle_fem.definition.solid_tables import (
     Part,
     SetBearing,
 )
+from spindle_fem.definition.source_tables import HeatSource, SourceTable
 from spindle_fem.units import Uncertain
 
 MACHINE_SCHEMA = "spindle-fem/machine/1"
@@ -274,6 +275,8 @@ class MachineSpec(SpecModel):
     """Goes with ``[channel]``."""
     heat: Heat
     """Friction heat."""
+    source: tuple[HeatSource, ...] = ()
+    """Heat beside friction."""
     joint: tuple[JointGroup, ...] = ()
     """Conductances of contacts."""
     surface: tuple[Surface, ...] = ()
@@ -297,6 +300,11 @@ class MachineSpec(SpecModel):
     def bearings(self) -> tuple[tuple[BearingSet, SetBearing], ...]:
         """Every bearing with its set, in file order."""
         return tuple((group, bearing) for group in self.bearing_set for bearing in group.bearing)
+
+    @property
+    def source_inputs(self) -> tuple[str, ...]:
+        """Recorded quantities that heat sources follow."""
+        return tuple(dict.fromkeys(source.input for source in self.source if source.input is not None))
 
     @property
     def all_surfaces(self) -> tuple[Surface, ...]:
@@ -345,6 +353,7 @@ __all__ = [
     "Gap",
     "Grease",
     "Heat",
+    "HeatSource",
     "HeatTable",
     "JointGroup",
     "MachineSpec",
@@ -359,5 +368,6 @@ __all__ = [
     "SensorSpot",
     "SetBearing",
     "SharedFactor",
+    "SourceTable",
     "Surface",
 ]

@@ -121,6 +121,8 @@ class Loads:
     films : mapping of surface to FilmLoad
     bearing_heat : mapping of bearing to BearingHeat
     heat_to : mapping of bearing to {"inner", "outer", "balls"} shares in W
+    source_heat : mapping of heat source to float, [W]
+        Of the definition; where it enters is the conduction problem's.
     change : LoadChange
         What is in them already, but for joints, conductivities, nodal heat
         and capacities, which are the conduction problem's.
@@ -133,9 +135,11 @@ class Loads:
     heat_to: Mapping[str, Mapping[str, float]]
     warnings: tuple = field(default=())
     change: LoadChange = NO_CHANGE
+    source_heat: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def total_heat(self) -> float:
         """All heat put in, W."""
         nodal = sum(float(heat.sum()) for heat in self.change.nodal_heat.values())
-        return sum(self.surface_heat.values()) + sum(node.heat for node in self.lumped) + nodal
+        given = sum(self.surface_heat.values()) + sum(self.source_heat.values())
+        return given + sum(node.heat for node in self.lumped) + nodal

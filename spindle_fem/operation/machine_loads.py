@@ -25,6 +25,7 @@ from spindle_fem.operation.gap_bands import GapBands, angle_of, build_gap_bands
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads, LumpedLoad
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.source_terms import source_heat
 from spindle_fem.operation.seat_joints import SeatJoints
 from spindle_fem.validity import CodedWarning, fold_warnings
 
@@ -188,6 +189,7 @@ class LoadsBuilder:
             heat_to,
             fold_warnings(warnings, tuple(heats)),
             change,
+            {source.name: float(source_heat(source, point.inputs)) for source in self.spec.source},
         )
         return loads, coolant
 

@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.machine_spec import AnnulusSegment, MachineSpec
+from spindle_fem.errors import SpecError
 from spindle_fem.machine.view.place_names import ACROSS, UP, ringed_probes, sided_names
 from spindle_fem.model.mesh.thermal_operators import ThermalOperators
 from spindle_fem.operation.machine_loads import LoadsBuilder
@@ -51,33 +52,29 @@ def named_places(machine: MachineOnMesh, lumped: tuple[str, ...], size: int) -> 
     """
     spec, operators = machine.spec, machine.operators
     mesh = operators.mesh
-    z = mesh.points[: operators.n_unknowns, 2]
 
     def padded(vector: Array) -> Array:
         return np.concatenate((vector, np.zeros(size - len(vector)))) / vector.sum()
 
     sided = dict.fromkeys(sided_names(spec))
 
-    for index, part in enumerate(mesh.part_names):
-        own = np.where(operators.part_of_unknown == index, operators.part_load, 0.0)
+    for part in mesh.part_names:
+        own = _part_load(operators, part)
         yield part, padded(own)
         for segment in next((p.segment for p in spec.part if p.name == part), ()):
-            inside = (z >= segment.z[0] - 1e-9) & (z <= segment.z[1] + 1e-9)
-            vector = np.where(inside, own, 0.0)
-            # Quadratic corner functions integrate to less than zero: a thin slice may have no volume left.
-            if vector.sum() > 1e-3 * own.sum():
+            vector = _segment_load(operators, own, segment)
+            if vector is not None:
                 name = f"{part}.{segment.name}"
                 yield name, padded(vector)
                 if name in sided:
                     sided[name] = vector / vector.sum()
     for surface, rows in operators.surface_rows.items():
         if not surface.endswith(".adiabatic"):
-            yield surface, padded(operators.facet_vector(np.ones(rows.stop - rows.start), rows))
+            yield surface, padded(_surface_load(operators, rows))
     for contact, sides in operators.joint_rows.items():
         if not contact.endswith(":face"):
             for number, rows in enumerate(sides):
-                vector = operators.facet_vector(np.ones(rows.stop - rows.start), rows)
-                yield f"{contact}@{number}", padded(vector)
+                yield f"{contact}@{number}", padded(_surface_load(operators, rows))
     for _, bearing in spec.bearings:
         nodes = [
             operators.n_unknowns + lumped.index(node) for node in machine.builder.ball_nodes(bearing.name)
@@ -93,3 +90,44 @@ def named_places(machine: MachineOnMesh, lumped: tuple[str, ...], size: int) -> 
         if mean is not None:
             for prefix, harmonic in zip((UP, ACROSS), harmonics(operators, mean), strict=True):
                 yield prefix + name, np.concatenate((harmonic, np.zeros(size - len(harmonic))))
+
+
+def place_load(spec: MachineSpec, operators: ThermalOperators, place: str) -> Array:
+    """Load of 1 W spread over a part, a ring, a segment ``part.segment`` or a surface, (n_unknowns,).
+
+    Raises
+    ------
+    SpecError
+        A segment too thin for the mesh to tell apart.
+    """
+    if place in operators.surface_rows:
+        found = _surface_load(operators, operators.surface_rows[place])
+    elif place in operators.mesh.part_names:
+        found = _part_load(operators, place)
+    else:
+        part, _, name = place.partition(".")
+        segment = next(s for p in spec.part if p.name == part for s in p.segment if s.name == name)
+        found = _segment_load(operators, _part_load(operators, part), segment)
+        if found is None:
+            raise SpecError(
+                place, "is too thin for this mesh.", "Take a finer mesh.preset, or the whole part."
+            )
+    return found / found.sum()
+
+
+def _part_load(operators: ThermalOperators, part: str) -> Array:
+    own = operators.part_of_unknown == operators.mesh.part_names.index(part)
+    return np.where(own, operators.part_load, 0.0)
+
+
+def _segment_load(operators: ThermalOperators, part_load: Array, segment: AnnulusSegment) -> Array | None:
+    """Share of a part's load between a segment's ends; None where a mesh cannot tell it apart."""
+    z = operators.mesh.points[: operators.n_unknowns, 2]
+    inside = (z >= segment.z[0] - 1e-9) & (z <= segment.z[1] + 1e-9)
+    vector = np.where(inside, part_load, 0.0)
+    # Quadratic corner functions integrate to less than zero: a thin slice may have no volume left.
+    return vector if vector.sum() > 1e-3 * part_load.sum() else None
+
+
+def _surface_load(operators: ThermalOperators, rows: slice) -> Array:
+    return operators.facet_vector(np.ones(rows.stop - rows.start), rows)

@@ -20,7 +20,8 @@ class OperatingPoint:
     coolant_flow : float, [m³/s]
     extra_heat : mapping of source name to float, [W]
     beside : mapping of str to float
-        What was recorded beside the inputs and only terms may follow, ``covariate.<column>``.
+        What was recorded beside the inputs and only terms follow, ``covariate.<column>``, or what
+        the machine's own heat sources follow.
     """
 
     speed: float
@@ -42,6 +43,19 @@ class OperatingPoint:
             coolant_inlet_temperature=coolant.inlet_temperature if coolant else operation.ambient_temperature,
             coolant_flow=coolant.flow if coolant else 0.0,
         )
+
+    @property
+    def inputs(self) -> dict[str, float]:
+        """Inputs by the names that terms know."""
+        return {
+            "speed": self.speed,
+            "thrust": self.thrust,
+            "ambient": self.ambient_temperature,
+            "coolant_inlet": self.coolant_inlet_temperature,
+            "coolant_flow": self.coolant_flow,
+            **{f"heat.{name}": heat for name, heat in self.extra_heat.items()},
+            **self.beside,
+        }
 
     @property
     def coldest(self) -> float:

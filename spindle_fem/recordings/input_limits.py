@@ -40,7 +40,7 @@ def require_possible_inputs(spec: MachineSpec, recording: Recording) -> tuple[st
 
 
 def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError]:
-    source, known = recording.source, standard_inputs(spec)
+    source, known = recording.source, (*standard_inputs(spec), *spec.source_inputs)
     for name in recording.input_names:
         if name not in known and not name.startswith("heat."):
             yield RecordingError(

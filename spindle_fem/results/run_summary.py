@@ -7,6 +7,7 @@ import math
 import platform
 from typing import TYPE_CHECKING, Any
 
+from spindle_fem.operation.source_terms import SOURCE_PREFIX
 from spindle_fem.results.thermal_result import BearingResult, CoolantResult, Equilibrium, ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -71,6 +72,10 @@ def build_summary(
                 "heat_in_by_W": dict(result.energy.heat_in_by),
                 "heat_out_W": dict(result.energy.heat_out),
                 "imbalance_relative": result.energy.imbalance_relative,
+            },
+            "sources": {
+                source.name: result.energy.heat_in_by.get(SOURCE_PREFIX + source.name, 0.0)
+                for source in result.spec.source
             },
             "bearings": {name: _bearing(bearing) for name, bearing in result.bearings.items()},
             "coolant": None if result.coolant is None else _coolant(result.coolant),

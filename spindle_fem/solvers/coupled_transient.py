@@ -332,7 +332,7 @@ class CoupledInputs:
 
 def _same_inputs(one: OperatingPoint, other: OperatingPoint) -> bool:
     """Whether two operating points are the same but for rounding."""
-    return one.extra_heat == other.extra_heat and all(
+    return (one.extra_heat, one.beside) == (other.extra_heat, other.beside) and all(
         math.isclose(getattr(one, name), getattr(other, name), rel_tol=SAME) for name in FIELD_OF.values()
     )
 

@@ -11,6 +11,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import COVARIATE, RecordedHeat
 from spindle_fem.errors import RecordingError, did_you_mean
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.source_terms import heated_places
 from spindle_fem.recordings.input_samples import InputHistory
 
 Array = NDArray[np.float64]
@@ -24,8 +25,9 @@ FIELD_OF = {
     "coolant_flow": "coolant_flow",
 }
 # Changes below this pass inside a step: share of the largest value, or K for temperatures.
+TEMPERATURES = ("ambient", "coolant_inlet")
 RELATIVE_RESOLUTION = {"speed": 2.0e-3, "thrust": 1.0e-2, "coolant_flow": 1.0e-2}
-# Heat that the inputs give for a place, in W; its resolution is that of covariates, too.
+# Heat that the inputs give for a place, in W; its resolution is that of all that only terms follow.
 HEAT = "heat."
 HEAT_RESOLUTION = 1.0e-2
 TEMPERATURE_RESOLUTION = 0.05
@@ -42,14 +44,20 @@ class OperatingHistory:
     inputs : InputHistory
         Columns named ``speed`` [rad/s], ``thrust`` [N], ``ambient``,
         ``coolant_inlet`` [K], ``coolant_flow`` [m³/s], ``heat.<place>`` [W],
-        ``covariate.<column>``;
+        ``covariate.<column>``, those of heat sources;
         before the first time the first value holds, after the last one the last.
     defined : OperatingPoint
         The definition's own values.
+    followed : tuple of str
+        Inputs that the machine's heat sources follow.
+    heated : tuple of str
+        Inputs ``heat.<place>`` that no heat source takes.
     """
 
     inputs: InputHistory
     defined: OperatingPoint
+    followed: tuple[str, ...] = ()
+    heated: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, spec: MachineSpec, inputs: InputHistory) -> OperatingHistory:
@@ -60,12 +68,15 @@ class OperatingHistory:
         RecordingError
             An input that a machine with geometry does not have.
         """
+        followed = spec.source_inputs
         for name in inputs.names:
-            if name not in FIELD_OF and not name.startswith((HEAT, COVARIATE)):
+            if name not in (*FIELD_OF, *followed) and not name.startswith((HEAT, COVARIATE)):
                 raise RecordingError(
-                    "inputs", f'"{name}" drives nothing in this machine.', did_you_mean(name, FIELD_OF)
+                    "inputs",
+                    f'"{name}" drives nothing in this machine.',
+                    did_you_mean(name, (*FIELD_OF, *followed)),
                 )
-        return cls(inputs, OperatingPoint.of(spec))
+        return cls(inputs, OperatingPoint.of(spec), followed, heated_places(spec, inputs.names))
 
     def at(self, time: float) -> OperatingPoint:
         """Operating point just after a time [s]; friction does not know which way a spindle turns."""
@@ -79,7 +90,7 @@ class OperatingHistory:
             value = float(samples[left] if held else np.interp(time, times, samples))
             if name in FIELD_OF:
                 values[FIELD_OF[name]] = value
-            elif name.startswith(COVARIATE):
+            elif name in self.followed or name.startswith(COVARIATE):
                 beside[name] = value
             else:
                 extra_heat[name.removeprefix(HEAT)] = value
@@ -88,13 +99,13 @@ class OperatingHistory:
 
     def given_heat(self) -> tuple[RecordedHeat, ...]:
         """Terms that put the heat of the inputs into their places."""
-        return tuple(RecordedHeat(name) for name in self.inputs.names if name.startswith(HEAT))
+        return tuple(RecordedHeat(name) for name in self.heated)
 
     def _resolution(self, column: int, temperature: float = TEMPERATURE_RESOLUTION) -> float:
         name = self.inputs.names[column]
-        share = HEAT_RESOLUTION if name.startswith((HEAT, COVARIATE)) else RELATIVE_RESOLUTION.get(name)
-        if share is None:
+        if name in TEMPERATURES:
             return temperature
+        share = RELATIVE_RESOLUTION.get(name, HEAT_RESOLUTION)
         largest = float(np.abs(self.inputs.values[:, column]).max())
         return share * max(largest, 1.0e-9)
 

@@ -208,7 +208,7 @@ class FieldTerms:
             )
         sensed = self._sensed(temperature, lumped)
         remembered = self._initial if memory is None else memory
-        self._begin = _Begin(time, sensed, remembered, inputs_of(point))
+        self._begin = _Begin(time, sensed, remembered, point.inputs)
 
     def accept(
         self,
@@ -228,23 +228,23 @@ class FieldTerms:
         temperature, lumped : ndarray, [K]
         """
         sensed = self._sensed(temperature, lumped)
-        memory = self._memory(time, sensed, inputs_of(before))
-        self._begin = _Begin(time, sensed, memory, inputs_of(after))
+        memory = self._memory(time, sensed, before.inputs)
+        self._begin = _Begin(time, sensed, memory, after.inputs)
 
     def at(self, time: float, point: OperatingPoint, temperature: Array, lumped: Array) -> LoadChange:
         """What the terms do at a stage of the time step that has begun."""
-        sensed, inputs = self._sensed(temperature, lumped), inputs_of(point)
+        sensed, inputs = self._sensed(temperature, lumped), point.inputs
         return self._change(time, point, inputs, sensed, self._memory(time, sensed, inputs))
 
     def steady(self, point: OperatingPoint, temperature: Array, lumped: Array) -> LoadChange:
         """What the terms do in the long run: memories have gone where they go, clocks stand at zero."""
-        sensed, inputs = self._sensed(temperature, lumped), inputs_of(point)
+        sensed, inputs = self._sensed(temperature, lumped), point.inputs
         return self._change(0.0, point, inputs, sensed, self.settled(point, temperature, lumped))
 
     def settled(self, point: OperatingPoint, temperature: Array, lumped: Array) -> Array:
         """Memory of terms that have long seen the same."""
         sensed = self._sensed(temperature, lumped)
-        return self._advanced(0.0, LONG, inputs_of(point), sensed, self._initial)
+        return self._advanced(0.0, LONG, point.inputs, sensed, self._initial)
 
     # --------------------------------------------------------------- details
     def _sensed(self, temperature: Array, lumped: Array) -> Array:
@@ -384,19 +384,6 @@ def _terms_of(machine: PreparedMachine, physics: Physics) -> FieldTerms:
     uniform = np.full(machine.operators.n_unknowns, first.ambient_temperature)
     loads, _ = machine.builder.at(first, machine.field_state(uniform, {}))
     return FieldTerms(machine, tuple(node.name for node in loads.lumped), physics)
-
-
-def inputs_of(point: OperatingPoint) -> dict[str, float]:
-    """Inputs by the names that terms know."""
-    return {
-        "speed": point.speed,
-        "thrust": point.thrust,
-        "ambient": point.ambient_temperature,
-        "coolant_inlet": point.coolant_inlet_temperature,
-        "coolant_flow": point.coolant_flow,
-        **{f"heat.{name}": heat for name, heat in point.extra_heat.items()},
-        **point.beside,
-    }
 
 
 def with_capacity(storage: sparse.sparray, scale: Array, inside: NDArray[np.bool_], capacity: float) -> Array:

@@ -26,7 +26,9 @@ from spindle_fem.operation.bearing_heat import (
 from spindle_fem.operation.coefficients import joint_conductances
 from spindle_fem.operation.loads import Loads
 from spindle_fem.operation.machine_loads import FieldState, LoadsBuilder
+from spindle_fem.operation.named_places import place_load
 from spindle_fem.operation.seat_joints import SeatJoints
+from spindle_fem.operation.source_terms import SOURCE_PREFIX
 from spindle_fem.parallel import beside
 
 Progress = Callable[[str], None]
@@ -36,7 +38,8 @@ Progress = Callable[[str], None]
 class PreparedMachine:
     """A machine with mesh, operators and sorted loads, ready to be solved at any operating point.
 
-    ``growth`` is there where preload follows the fits.
+    ``growth`` is there where preload follows the fits; ``source_spread`` is the load of 1 W of each
+    heat source, (n_unknowns,).
     """
 
     spec: MachineSpec
@@ -48,6 +51,7 @@ class PreparedMachine:
     volumetric_capacity: Mapping[str, float]
     geometry_notes: tuple[str, ...] = ()
     growth: GrowthModel | None = None
+    source_spread: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
 
     def field_state(self, unknowns: NDArray[np.float64], lumped: Mapping[str, float]) -> FieldState:
@@ -93,7 +97,13 @@ class PreparedMachine:
             if change.coefficients
             else self.joint_conductance,
             surface_heat=loads.surface_heat,
-            nodal_heat=change.nodal_heat,
+            nodal_heat={
+                **change.nodal_heat,
+                **{
+                    SOURCE_PREFIX + name: heat * self.source_spread[name]
+                    for name, heat in loads.source_heat.items()
+                },
+            },
             capacity_scale=change.capacity_scale,
             lumped_nodes=lumped,
             volumetric_capacity=self.volumetric_capacity,
@@ -163,6 +173,7 @@ def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOpera
         volumetric_capacity={
             part: capacity_factor * material.volumetric_heat_capacity for part, material in materials.items()
         },
+        source_spread={source.name: place_load(spec, operators, source.place) for source in spec.source},
     )
 
 

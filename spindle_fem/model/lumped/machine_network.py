@@ -140,6 +140,20 @@ class MachineNetwork:
         """First node of the coolant."""
         return self.air_start + sum(gap.n_bands for gap in self.gaps.values())
 
+    def spread(self, place: str) -> Array:
+        """Share of the heat of a part, segment or surface that each node takes up, (n,).
+
+        By volume and area; what enters a surface enters the nodes behind it.
+        """
+        found = np.zeros(self.n_nodes)
+        if place in self.surfaces:
+            patch = self.surfaces[place]
+            np.add.at(found, patch.node, patch.area)
+        else:
+            cells = cells_of(self.spec, self.cells, place)
+            np.add.at(found, self.partition.node_of_cell[cells], self.cells.volume[cells])
+        return found / found.sum()
+
 
 def build_machine_network(
     spec: MachineSpec,
@@ -251,6 +265,17 @@ def build_machine_network(
             for ring in (f"{bearing.name}.inner_ring", f"{bearing.name}.outer_ring")
         },
     )
+
+
+def cells_of(spec: MachineSpec, cells: MeridianCells, place: str) -> NDArray[np.int64]:
+    """Cells of a part, a ring or a segment ``part.segment``."""
+    if place in cells.part_names:
+        return np.flatnonzero(cells.part == cells.part_names.index(place))
+    part, _, name = place.partition(".")
+    ends = next(s.z for p in spec.part if p.name == part for s in p.segment if s.name == name)
+    middle = cells.z.mean(axis=1)
+    inside = (cells.part == cells.part_names.index(part)) & (middle > ends[0]) & (middle < ends[1])
+    return np.flatnonzero(inside)
 
 
 def _seat(cells: MeridianCells, partition: Partition, ring: str) -> tuple[NDArray[np.int64], Array]:

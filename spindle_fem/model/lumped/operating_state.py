@@ -21,6 +21,7 @@ from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.source_terms import source_heat
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import Coolant
 from spindle_fem.physics.coolant.regimes import ChannelState, select_film
@@ -166,6 +167,8 @@ def operate(
         faces = _contact_faces(machine, friction, heats, heat_to)
         if faces:
             laws.append(BallContactLaw.of(faces, law_of_friction, machine.n_nodes))
+    for source in spec.source:
+        heat += float(source_heat(source, point.inputs)) * machine.spread(source.place)
     _air(machine, point, boundaries, links, laws)
     streams, rate, law = (np.empty(0, int), np.empty(0, int)), 0.0, None
     if machine.coolant is not None:

@@ -282,7 +282,7 @@ def build_reduced_model(
 
 
 def _source_places(full: MeshModel, spec: MachineSpec) -> list[str]:
-    """Places where a diagnosis may need a source, beside those of friction."""
+    """Places that the machine's own heat sources warm, or a diagnosis may need one, beside friction's."""
     rings = {
         f"{bearing.name}.{side}" for _, bearing in spec.bearings for side in ("inner_ring", "outer_ring")
     }
@@ -291,7 +291,7 @@ def _source_places(full: MeshModel, spec: MachineSpec) -> list[str]:
     other = [name for name in full.place_names if name in segments - single or name in rings]
     other += [part.name for part in spec.part if len(part.segment) == 1]
     other += [name for name in full.place_names if name.startswith((NEAR, AROUND, UP, ACROSS))]
-    return other
+    return list(dict.fromkeys((*other, *(source.place for source in spec.source))))
 
 
 def _add_nominal(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: MachineSpec) -> None:

@@ -112,7 +112,7 @@ def drive_of_recording(
         for name in known
         if name not in recording.input_names
     ]
-    names = (*known, *(n for n in recording.input_names if n.startswith("heat.")))
+    names = (*known, *(n for n in recording.input_names if n not in known))
     history = recording.input_history()
     columns, held = [], []
     for name in names:

@@ -37,6 +37,8 @@ def _content(spec: MachineSpec) -> dict[str, Any]:
     # The operating point and the words change nothing in the operators.
     for key in ("operation", "name", "title", "description", "initial", "effects"):
         content.pop(key, None)
+    # Of heat sources only where they enter: the basis holds the fields of these places.
+    content["source"] = sorted({source.place for source in spec.source})
     return _without_tolerances(content)
 
 

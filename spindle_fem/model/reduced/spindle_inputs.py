@@ -22,6 +22,7 @@ from spindle_fem.operation.bearing_heat import heat_of_table
 from spindle_fem.operation.coefficient_table import INNER_SHARE, build_coefficient_table
 from spindle_fem.operation.heat_shares import heat_share_slopes, heat_shares
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.source_terms import heated_places, source_terms
 
 Array = NDArray[np.float64]
 
@@ -113,7 +114,7 @@ class SpindleInputs:
 
     # --------------------------------------------------------------------- loads
     def own_terms(self, drive: Drive) -> tuple[Term, ...]:
-        """Terms that are always there: natural films, those given, and heat that the drive gives.
+        """Terms that are always there: natural films, heat sources, those given, and heat that the drive gives.
 
         Raises
         ------
@@ -126,8 +127,8 @@ class SpindleInputs:
                 f'"{self.spec.heat.model}" follows the temperatures of every bearing.',
                 'The fast model takes heat.model = "table"; recorded_model.fast_model_for makes one.',
             )
-        recorded = tuple(RecordedHeat(name) for name in drive.names if name.startswith("heat."))
-        return (*natural_film_terms(self.spec), *self.extra_terms, *recorded)
+        recorded = tuple(RecordedHeat(name) for name in heated_places(self.spec, drive.names))
+        return (*natural_film_terms(self.spec), *source_terms(self.spec), *self.extra_terms, *recorded)
 
     def load_inputs(
         self,

@@ -19,7 +19,7 @@ from skfem import Basis, BilinearForm, ElementQuad2, FacetBasis, LinearForm, Mes
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.model.lumped.cells import Faces, MeridianCells
 from spindle_fem.model.lumped.heat_laws import CoolantLaw
-from spindle_fem.model.lumped.machine_network import MachineNetwork
+from spindle_fem.model.lumped.machine_network import MachineNetwork, cells_of
 from spindle_fem.operation.coefficients import (
     ball_conductances,
     film_coefficient,
@@ -27,6 +27,7 @@ from spindle_fem.operation.coefficients import (
     gap_coefficient,
     joint_conductances,
 )
+from spindle_fem.operation.source_terms import source_heat
 from spindle_fem.physics.coolant.linear_march import outlet_stretch
 from spindle_fem.solvers.machine_network_steady import MachineNetworkState
 
@@ -177,7 +178,7 @@ def solve_axisymmetric(state: MachineNetworkState) -> AxisymmetricState:
         )
     )
     _joints(system, machine)
-    heat = _balls(system, state)
+    heat = _balls(system, state) + _sources(system, state)
     lost = _films(system, state)
     _gaps(system, state)
     _coolant(system, state)
@@ -247,6 +248,23 @@ def _balls(system: _Assembly, state: MachineNetworkState) -> float:
             system.load[: system.n_field] += _supply.assemble(basis, q=np.full(basis.dx.shape, flux))
         system.load[lump] += network.heat_to[bearing.name]["balls"] * heat[bearing.name]
     return float(sum(heat.values())) + float(_coolant_heat(state).sum())
+
+
+def _sources(system: _Assembly, state: MachineNetworkState) -> float:
+    """Heat sources of the definition, even over the volume or surface that each one heats."""
+    network, machine = state.network, state.network.machine
+    total = 0.0
+    for source in machine.spec.source:
+        heat = float(source_heat(source, network.point.inputs))
+        if source.place in machine.surfaces:
+            basis = _surface(system, source.place)
+        else:
+            cells = cells_of(machine.spec, machine.cells, source.place)
+            basis = Basis(system.mesh, system.element, elements=cells, intorder=5)
+        load = _supply.assemble(basis, q=np.ones(basis.dx.shape))
+        system.load[: system.n_field] += heat * load / load.sum()
+        total += heat
+    return total
 
 
 def _coolant_heat(state: MachineNetworkState) -> Array:

@@ -63,4 +63,6 @@ def refusal(spec: MachineSpec) -> str:
         return "rotating parts are not averaged around the axis"
     if spec.effects:
         return "the machine has effects"
+    if spec.source:
+        return "the machine has heat sources"
     return ""

@@ -1,0 +1,152 @@
+"""Heat sources of a definition: what may be written, what each gives, and that every model takes it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spindle_fem.definition.load import load_machine, write_machine
+from spindle_fem.errors import BadInputError
+from spindle_fem.model.lumped.machine_network import build_machine_network
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from spindle_fem.operation.source_terms import source_heat
+from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.solvers.input_history import OperatingHistory
+from spindle_fem.solvers.machine_network_steady import solve_machine_network
+from spindle_fem.studies.crosscheck.axisymmetric import solve_axisymmetric
+from spindle_fem.studies.solve_machine import solve
+from tests.support.lumped_spindle import drive_of, lumped_model
+
+RPM = np.pi / 30.0
+ROTOR = """
+[[source]]
+name = "rotor"
+part = "shaft.drive_end"
+heat = {speed = ["0 rpm", "8000 rpm"], heat = ["0 W", "120 W"]}
+"""
+SEAL = """
+[[source]]
+name = "seal"
+surface = "cover.labyrinth"
+heat = "20 W"
+"""
+
+
+def machine(tmp_path, text: str, base: str = "small_two_start", overrides: tuple[str, ...] = ()):
+    path = tmp_path / "machine.toml"
+    path.write_text(f'schema = "spindle-fem/machine/1"\nbase = "{base}"\nname = "heated"\n{text}')
+    return load_machine(path, overrides)
+
+
+def table(tmp_path, text: str):
+    return machine(tmp_path, f'[[source]]\nname = "motor"\npart = "shaft"\n{text}').source[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('part = "shafft"\nheat = "1 W"', 'motor.part: "shafft".*Did you mean "shaft"'),
+        ('part = "shaft.nos"\nheat = "1 W"', 'Did you mean "shaft.nose"'),
+        ('surface = "cover.labyrint"\nheat = "1 W"', 'Did you mean "cover.labyrinth"'),
+        ('part = "shaft"\nsurface = "cover.labyrinth"\nheat = "1 W"', "part: is given beside surface"),
+        ('heat = "1 W"', "part: is missing"),
+        ('part = "shaft"', "heat: is missing"),
+        ('part = "shaft"\nheat = "1 W"\ngain = "2 W/W"', "gain: is given"),
+        ('part = "shaft"\nheat = "1 N"', "heat"),
+        (
+            'part = "shaft"\nheat = {speed = ["0 rpm", "1 rpm"], heat = ["1 W"]}',
+            "Allowed: 2, as many as speed",
+        ),
+        ('part = "shaft"\nheat = {speed = ["1 rpm", "0 rpm"], heat = ["1 W", "1 W"]}', "do not all grow"),
+    ],
+)
+def test_a_source_that_says_too_little_or_too_much_is_refused(tmp_path, text: str, message: str) -> None:
+    with pytest.raises(BadInputError, match=message):
+        machine(tmp_path, f'[[source]]\nname = "motor"\n{text}')
+
+
+def test_two_sources_of_one_name_are_refused(tmp_path) -> None:
+    with pytest.raises(BadInputError, match='source: the name "seal" is used 2 times'):
+        machine(tmp_path, '[[source]]\nname = "a"\npart = "shaft"\nheat = "1 W"' + 2 * SEAL)
+
+
+def test_a_written_machine_keeps_its_sources(tmp_path) -> None:
+    spec = machine(tmp_path, ROTOR + SEAL + 'input = "motor_power"\ngain = "0.1 W/W"\n')
+    (tmp_path / "again.toml").write_text(write_machine(spec))
+    assert load_machine(tmp_path / "again.toml").source == spec.source
+
+
+def test_a_table_is_linear_in_speed_and_thrust_and_holds_its_ends(tmp_path) -> None:
+    by_speed = table(tmp_path, 'heat = {speed = ["100 rad/s", "300 rad/s"], heat = ["10 W", "30 W"]}')
+    speeds = np.array([0.0, 100.0, -200.0, 400.0])
+    inputs = {"speed": speeds, "thrust": np.zeros(4)}
+    assert source_heat(by_speed, inputs) == pytest.approx([10.0, 10.0, 20.0, 30.0])
+    both = table(
+        tmp_path,
+        'heat = {speed = ["0 rad/s", "100 rad/s"], thrust = ["0 N", "1 kN"], '
+        'heat = ["0 W", "10 W", "0 W", "30 W"]}',
+    )
+    found = source_heat(both, {"speed": np.array([50.0, 100.0, 50.0]), "thrust": np.array([0.0, 500.0, 2e3])})
+    assert found == pytest.approx([5.0, 20.0, 15.0])
+
+
+def test_what_is_recorded_comes_before_the_definition(tmp_path) -> None:
+    source = table(tmp_path, 'heat = "7 W"\ninput = "motor_power"\ngain = "0.1 kW/kW"')
+    inputs = {"speed": 0.0, "thrust": 0.0}
+    assert source_heat(source, inputs) == 7.0
+    assert source_heat(source, inputs | {"motor_power": 300.0}) == pytest.approx(30.0)
+    assert source_heat(source, inputs | {"motor_power": 300.0, "heat.motor": 4.0}) == 4.0
+
+
+def test_every_steady_model_takes_the_same_heat(tmp_path) -> None:
+    spec = machine(
+        tmp_path, ROTOR + SEAL, overrides=("heat.model=table", "mesh.preset=coarse", "mesh.order=1")
+    )
+    given = sum(source_heat(source, {"speed": spec.operation.speed, "thrust": 0.0}) for source in spec.source)
+    assert given == pytest.approx(140.0)
+    result = solve(spec)
+    heat_in = result.energy.heat_in_by
+    assert (heat_in["source.rotor"], heat_in["source.seal"]) == pytest.approx((120.0, 20.0), rel=1e-12)
+    assert abs(result.energy.imbalance_relative) < 1e-8
+    state = solve_machine_network(build_machine_network(spec, refinement=4))
+    assert state.heat_in == pytest.approx(result.energy.heat_in, rel=1e-12)
+    elements = solve_axisymmetric(state)
+    assert abs(elements.residual_relative) < 1e-8
+    warmest = state.temperature.max()
+    assert result.temperature_maximum == pytest.approx(warmest, abs=0.03 * (warmest - 295.0))
+
+
+def test_the_fast_model_marches_with_a_source_as_with_the_same_heat_recorded(tmp_path) -> None:
+    spec = machine(tmp_path, "", "recorded_spindle")
+    motor = '[[source]]\nname = "motor"\npart = "shaft"\ninput = "motor_power"\ngain = "0.1 W/W"\n'
+    heated = machine(tmp_path, motor, "recorded_spindle")
+    times = np.arange(0.0, 1200.0, 60.0)
+    power = np.where(times < 600.0, 500.0, 0.0)
+    plain = drive_of(times, np.full(times.size, 1500.0))
+    column = 0.5 * (power[:-1] + power[1:])[:, None]
+
+    def with_input(name: str, scale: float):
+        start, end = (np.hstack((values, scale * column)) for values in (plain.start, plain.end))
+        return replace(plain, names=(*plain.names, name), start=start, end=end)
+
+    as_heat = simulate_fast(fast_spindle(lumped_model(spec), spec), with_input("heat.shaft", 0.1), 293.15)
+    model = fast_spindle(lumped_model(heated), heated)
+    followed = simulate_fast(model, with_input("motor_power", 1.0), 293.15)
+    assert followed.temperature == pytest.approx(as_heat.temperature, abs=1e-9)
+    cold = simulate_fast(model, plain, 293.15)
+    assert np.abs(followed.temperature - cold.temperature).max() > 0.05
+
+
+def test_the_full_model_knows_the_inputs_that_sources_follow(tmp_path) -> None:
+    spec = machine(tmp_path, SEAL + 'input = "motor_power"\ngain = "0.1 W/W"\n')
+    names = ("speed", "motor_power", "heat.shaft", "heat.seal")
+    inputs = InputHistory(np.array([0.0, 1.0]), names, np.ones((2, 4)), np.zeros(4, dtype=bool))
+    history = OperatingHistory.of(spec, inputs)
+    assert [term.name for term in history.given_heat()] == ["heat.shaft"]
+    assert history.at(0.5).inputs["motor_power"] == 1.0
+    assert source_heat(spec.source[0], history.at(0.5).inputs) == 1.0
+    with pytest.raises(BadInputError, match="motor_power"):
+        OperatingHistory.of(load_machine("small_two_start"), inputs)
