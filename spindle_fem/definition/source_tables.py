@@ -64,8 +64,7 @@ class HeatSource(SpecModel):
         ]
         | None
     ) = None
-    """A quantity such as "200 W", or a table over speed. With ``input``: where that is not recorded, 0 W where
-    not given."""
+    """A quantity such as "200 W", or a table over speed. With ``input``: where that is not recorded."""
     input: Name | None = None
     """Recorded quantity that the heat follows, as a channel's ``drives`` names it."""
     gain: GainField | None = None

@@ -114,7 +114,7 @@ class SpindleInputs:
 
     # --------------------------------------------------------------------- loads
     def own_terms(self, drive: Drive) -> tuple[Term, ...]:
-        """Terms that are always there: natural films, heat sources, those given, and heat that the drive gives.
+        """Terms always there: natural films, heat sources, those given, and heat that the drive gives.
 
         Raises
         ------
