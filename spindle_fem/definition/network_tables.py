@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-import pint
 from pydantic import BeforeValidator, Field, PlainSerializer
 
 from spindle_fem.definition.effect_entries import EffectEntry
@@ -44,6 +43,8 @@ def base_unit_of(text: Any) -> str:
     match = _NUMBER_AND_UNIT.fullmatch(str(text))
     if match is None or not match[1]:
         return ""
+    import pint  # takes as long to load as a definition to read, which often has no gain
+
     units = registry()
     try:
         base = units.Quantity(1.0, units.parse_units(match[1])).to_base_units().units
