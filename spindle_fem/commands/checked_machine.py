@@ -30,11 +30,14 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
     from spindle_fem.definition.load import examine_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+    from spindle_fem.operation.assembled_sets import assembled_set
 
     overrides = tuple(overrides)
 
     def fits_together(spec: MachineSpec) -> None:
         group_of_contacts(spec, build_assembly(spec).joint_names)
+        for group in spec.bearing_set:
+            assembled_set(spec, group)
 
     def has_possible_effects(spec: MachineSpec) -> None:
         if not spec.effects:

@@ -33,7 +33,19 @@ def seat_diameter(
 
 
 def seat_faults(spec: MachineSpec, group: BearingSet, kind: BearingType) -> Iterator[SpindleFemError]:
-    """Rings of a set with a fit that sit on nothing."""
+    """Rings of a set with a fit that sit on nothing, or looser than their bearing."""
+    play = kind.play
+    for key, clearance in (
+        ("inner_interference", -group.fit.inner_interference),
+        ("outer_clearance", group.fit.outer_clearance),
+    ):
+        if clearance > play:
+            yield SpecError(
+                f"bearing_set.{group.name}.fit.{key}",
+                f"the ring has {clearance * 1e6:.0f} µm of clearance on its seat, more than the play "
+                f"of the bearing itself ({play * 1e6:.0f} µm on the diameter).",
+                "Give a tighter fit, or leave the fit out.",
+            )
     for bearing in group.bearing:
         for side, diameter in (("inner", kind.bore_diameter), ("outer", kind.outer_diameter)):
             if seat_diameter(spec, kind, bearing, side) is None:

@@ -1,4 +1,4 @@
-"""Displacement sensors that look at nothing, hang on nothing, or read a machine that does not grow."""
+"""Displacement sensors that look at nothing or hang on nothing; machines that are to grow, but cannot."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ _TOLERANCE = 1.0e-6
 
 
 def displacement_faults(spec: MachineSpec) -> Iterator[SpindleFemError]:
-    """Every fault of the displacement sensors of a machine."""
+    """Every fault of the displacement sensors of a machine, and of materials that must expand."""
     for sensor in spec.displacement_sensor:
         yield from _target(spec, sensor)
         yield from _mount(spec, sensor)
-    if not spec.displacement_sensor:
-        return
-    if not spec.bearing_set:
+    reads = "displacement sensors read how parts grow" if spec.displacement_sensor else ""
+    if spec.displacement_sensor and not spec.bearing_set:
         first = spec.displacement_sensor[0].name
         what = "no bearing holds the shaft."
         yield SpecError(f"displacement_sensor.{first}", what, "Add a [[bearing_set]].")
-    for name in dict.fromkeys(part.material for part in spec.part):
+    if spec.heat is not None and spec.heat.thermal_preload:
+        reads = reads or "heat.thermal_preload follows how parts grow"
+    for name in dict.fromkeys(part.material for part in spec.part) if reads else ():
         material = spec.materials.get(name)
         if material is not None and not material.thermal_expansion > 0.0:
-            what = "it is 0, but displacement sensors read how parts grow."
+            what = f"it is 0, but {reads}."
             yield SpecError(f"materials.{name}.thermal_expansion", what, 'Give it, such as "1.2e-5 1/K".')
 
 

@@ -213,6 +213,12 @@ class BearingType(SpecModel):
             return self.pitch_diameter
         return 0.5 * (self.bore_diameter + self.outer_diameter)
 
+    @property
+    def play(self) -> float:
+        """Of the raceways on the diameter before mounting, m."""
+        apart = (self.groove_curvature_inner + self.groove_curvature_outer - 1.0) * self.ball_diameter
+        return 2.0 * apart * (1.0 - math.cos(self.contact_angle))
+
 
 class SetBearing(SpecModel):
     """One bearing of a set."""

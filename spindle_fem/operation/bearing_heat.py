@@ -10,31 +10,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.definition.bearing_seats import seat_diameter
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
-from spindle_fem.definition.solid_tables import Material, SetBearing
 from spindle_fem.errors import OutOfValidityError
+from spindle_fem.operation.assembled_sets import assembled_set
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings import mounting
-from spindle_fem.physics.bearings.bearing_geometry import STEEL_EXPANSION, BearingGeometry
 from spindle_fem.physics.bearings.bearing_set import solve_bearing_set, solve_states
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.contact_conduction import BallConductance, ball_conductance
-from spindle_fem.physics.bearings.fits import RingFits
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
-from spindle_fem.physics.bearings.rings import SeatMaterial
 from spindle_fem.physics.bearings.seat_contact import SeatBodies
 from spindle_fem.validity import CodedWarning
-
-_ORIENTATION = {"towards_rear": 1, "towards_nose": -1}
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +192,7 @@ class BearingMechanics:
         )
         elastic = seats or {}
         self.sets = {
-            group.name: replace(_bearing_set(spec, group), seats=elastic.get(group.name))
+            group.name: replace(assembled_set(spec, group), seats=elastic.get(group.name))
             for group in spec.bearing_set
         }
 
@@ -405,83 +398,3 @@ class BearingMechanics:
 def _control(options: HeatOptions) -> str:
     """What decides the attitude of the balls, as the heat model needs it."""
     return HEAT_MODELS[options.level].ball_attitude
-
-
-def _bearing_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
-    kind = spec.bearing_types[group.bearing_type]
-    geometry = BearingGeometry(
-        ball_diameter=kind.ball_diameter,
-        ball_count=kind.ball_count,
-        pitch_diameter=kind.pitch,
-        contact_angle=kind.contact_angle,
-        groove_curvature_inner=kind.groove_curvature_inner,
-        groove_curvature_outer=kind.groove_curvature_outer,
-        young_modulus=kind.young_modulus,
-        poisson_ratio=kind.poisson_ratio,
-        density=spec.materials[kind.ball_material].density,
-        thermal_expansion=spec.materials[kind.ring_material].thermal_expansion,
-        ball_thermal_expansion=spec.materials[kind.ball_material].thermal_expansion,
-        bore_diameter=kind.bore_diameter,
-        outer_diameter=kind.outer_diameter,
-        width=kind.width,
-        static_load_rating=kind.basic_static_load,
-        kind=kind.kind,
-    )
-    return mounting.BearingSet(
-        bearings=tuple(
-            mounting.MountedBearing(
-                bearing.name,
-                geometry,
-                _ORIENTATION[bearing.takes_thrust],
-                0.5 * (bearing.z[0] + bearing.z[1]),
-                _ring_fits(spec, group, bearing),
-            )
-            for bearing in group.bearing
-        ),
-        preload=group.preload,
-        preload_kind=group.preload_kind,
-        shaft_expansion=_seat_expansion(spec, group, "inner"),
-        housing_expansion=_seat_expansion(spec, group, "outer"),
-        shaft_bore_diameter=_shaft_bore(spec, group),
-        raceway_roughness=kind.roughness_raceway,
-        ball_roughness=kind.roughness_ball,
-    )
-
-
-def _ring_fits(spec: MachineSpec, group: BearingSet, bearing: SetBearing) -> RingFits | None:
-    """Seats of one bearing's rings; None where the set has no fit."""
-    if group.fit is None:
-        return None
-    kind = spec.bearing_types[group.bearing_type]
-    shaft, shaft_bore = seat_diameter(spec, kind, bearing, "inner")
-    housing, wall = seat_diameter(spec, kind, bearing, "outer")
-    own = group.fit.housing_outer_diameter
-    return RingFits(
-        inner_interference=group.fit.inner_interference,
-        outer_clearance=group.fit.outer_clearance,
-        housing_outer_diameter=wall if own is None else own,
-        shaft_bore_diameter=shaft_bore,
-        inner_ring_outer_diameter=kind.inner_ring_outer_diameter,
-        outer_ring_inner_diameter=kind.outer_ring_inner_diameter,
-        ring_density=spec.materials[kind.ring_material].density,
-        shaft=_seat_material(spec.part_material(shaft)),
-        housing=_seat_material(spec.part_material(housing)),
-    )
-
-
-def _seat_material(material: Material) -> SeatMaterial:
-    return SeatMaterial(
-        material.young_modulus, material.poisson_ratio, material.density, material.thermal_expansion
-    )
-
-
-def _seat_expansion(spec: MachineSpec, group: BearingSet, side: Literal["inner", "outer"]) -> float:
-    """Thermal expansion of what carries the set, 1/K; steel's where its rings sit on no part."""
-    seat = seat_diameter(spec, spec.bearing_types[group.bearing_type], group.bearing[0], side)
-    return STEEL_EXPANSION if seat is None else spec.part_material(seat[0]).thermal_expansion
-
-
-def _shaft_bore(spec: MachineSpec, group: BearingSet) -> float | None:
-    """Bore of the rotating part that carries the set; None under a solid shaft."""
-    seat = seat_diameter(spec, spec.bearing_types[group.bearing_type], group.bearing[0], "inner")
-    return None if seat is None else seat[1] or None

@@ -7,7 +7,7 @@ import pytest
 from spindle_fem.definition.bearing_seats import followed_joint_faults, seat_diameter
 from spindle_fem.definition.exchange_tables import SeatSurface
 from spindle_fem.definition.load import load_machine
-from spindle_fem.errors import BadInputError
+from spindle_fem.errors import BadInputError, SpecError
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.operating_point import OperatingPoint
 
@@ -83,6 +83,19 @@ def test_wetted_share_sets_the_way_of_heat_through_the_grease() -> None:
         ),
         (["materials.cast_iron.thermal_expansion=12 K"], "thermal_expansion"),
         (
+            ["bearing_set.front.fit.outer_clearance=60 um"],
+            "front.fit.outer_clearance: the ring has 60 µm of clearance on its seat, more than the play "
+            "of the bearing itself (39 µm on the diameter)",
+        ),
+        (
+            ["bearing_set.rear.fit.inner_interference=-60 um"],
+            "rear.fit.inner_interference: the ring has 60 µm",
+        ),
+        (
+            ["heat.thermal_preload=true", "materials.cast_iron.thermal_expansion=0 1/K"],
+            "materials.cast_iron.thermal_expansion: it is 0, but heat.thermal_preload follows",
+        ),
+        (
             [
                 "joint.inner_ring_seats.seat.slope=0.1",
                 *(f"bearing_set.{s}.fit=none" for s in ("front", "rear")),
@@ -95,6 +108,23 @@ def test_bad_fits_are_refused(settings: list[str], message: str) -> None:
     with pytest.raises(BadInputError) as caught:
         load_machine("wu_tan_2016", settings)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        (
+            "front.fit.inner_interference=60 um",
+            "front.fit.inner_interference: the fits bring the raceways of F1 51 µm together, all of "
+            "the play of the bearing .39 µm on the diameter.",
+        ),
+        ("rear.fit.outer_clearance=-80 um", "rear.fit.outer_clearance: the fits bring the raceways of R1"),
+        ("front.preload=400 kN", r"front.preload: it presses the balls of F3 on with 4.27 GPa.*up to 4.2 GPa"),
+    ],
+)
+def test_fits_and_preload_that_do_not_go_together_are_refused(setting: str, message: str) -> None:
+    with pytest.raises(SpecError, match="bearing_set." + message):
+        mechanics("bearing_set." + setting)
 
 
 def test_a_perfect_joint_cannot_follow_its_fit() -> None:

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_state import BearingHeat
 from spindle_fem.physics.bearings.heat_model import HeatOptions
-from spindle_fem.physics.bearings.hertz import INNER, bearing_contact_constants
-
-_STATIC_PRESSURE = 4200.0e6
+from spindle_fem.physics.bearings.hertz import INNER, STATIC_PRESSURE, bearing_contact_constants
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +43,7 @@ def static_load_rating(geometry: BearingGeometry) -> float:
         return geometry.static_load_rating
     constants = bearing_contact_constants(geometry, geometry.contact_angle, INNER)
     area = math.pi * float(constants.semi_major) * float(constants.semi_minor)
-    load = (_STATIC_PRESSURE * area / 1.5) ** 3
+    load = (STATIC_PRESSURE * area / 1.5) ** 3
     return geometry.ball_count * load * math.cos(geometry.contact_angle) / 5.0
 
 

@@ -14,6 +14,8 @@ from scipy.special import ellipe, ellipkm1
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 
 INNER, OUTER = 0, 1
+# Pa; of ball on raceway at rest (ISO 76)
+STATIC_PRESSURE = 4.2e9
 _TABLE_DEGREE = 8
 
 

@@ -16,7 +16,7 @@ from spindle_fem.physics.bearings.equilibrium import Equilibrium
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatInputs, HeatOptions, bearing_heat
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
-from spindle_fem.physics.bearings.hertz import INNER, OUTER, maximum_pressure
+from spindle_fem.physics.bearings.hertz import INNER, OUTER, STATIC_PRESSURE, maximum_pressure
 from spindle_fem.physics.bearings.lubricant_film import (
     film_central_hamrock_dowson,
     film_fit_warnings,
@@ -43,7 +43,6 @@ FloatArray = NDArray[np.float64]
 _GYROSCOPIC_FRICTION = 0.02
 _ASPERITY_LIMIT = 0.05
 _FULL_FILM = 3.0
-_PRESSURE_LIMIT = 4.2e9
 
 
 def lubricant_state(
@@ -315,7 +314,7 @@ def _load_warnings(
             CodedWarning("balls_unloaded", f"{name}: {share} balls do not touch the inner raceway.")
         )
     highest = float(np.max(balls.pressure))
-    if highest > _PRESSURE_LIMIT:
+    if highest > STATIC_PRESSURE:
         text = f"{name}: contact pressure {highest * 1e-9:.2f} GPa, above the static limit of 4.2 GPa."
         warnings.append(CodedWarning("contact_pressure", text))
     if speed > 0.0 and control in ("outer", "inner") and not free.all():
