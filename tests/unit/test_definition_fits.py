@@ -119,7 +119,10 @@ def test_bad_fits_are_refused(settings: list[str], message: str) -> None:
             "the play of the bearing .39 µm on the diameter.",
         ),
         ("rear.fit.outer_clearance=-80 um", "rear.fit.outer_clearance: the fits bring the raceways of R1"),
-        ("front.preload=400 kN", r"front.preload: it presses the balls of F3 on with 4.27 GPa.*up to 4.2 GPa"),
+        (
+            "front.preload=400 kN",
+            r"front.preload: it presses the balls of F3 on with 4.27 GPa.*up to 4.2 GPa",
+        ),
     ],
 )
 def test_fits_and_preload_that_do_not_go_together_are_refused(setting: str, message: str) -> None:
