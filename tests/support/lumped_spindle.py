@@ -3,10 +3,14 @@
 Parts conduct without limit; contacts, films and gaps have round areas.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
+from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.thermal_model import ThermalModel
 
 CELLS = 12
@@ -86,6 +90,37 @@ def lumped_model(spec):
         n_full=size,
         digest="lumped",
     )
+
+
+def with_natural_film(fast):
+    """The same with natural convection and radiation outside."""
+    spec = fast.spec
+    film = NaturalFilm(
+        name="outside",
+        kind="natural_convection_radiation",
+        surface=("housing.outside",),
+        orientation="horizontal_cylinder",
+        characteristic_length="0.3 m",
+        emissivity=0.9,
+    )
+    others = tuple(item for item in spec.film if item.name != "outside")
+    changed = spec.model_copy(update={"film": (film, *others), "factor": spec.factor[1:]})
+    keep = [i for i, name in enumerate(fast.model.coefficient_names) if name != "film.cover.outside"]
+    fluids = [i for i, name in enumerate(fast.model.fluid_names) if name != "film.cover.outside"]
+    natural = fast_spindle(
+        replace(
+            fast.model,
+            coefficient_names=tuple(fast.model.coefficient_names[i] for i in keep),
+            operators=fast.model.operators[keep],
+            fluid_names=tuple(fast.model.fluid_names[i] for i in fluids),
+            fluid_load=fast.model.fluid_load[fluids],
+        ),
+        changed,
+    )
+    # The lumped model has no surfaces of its own: the housing stands for its outside.
+    places = (*natural.model.place_names, "housing.outside")
+    rows = np.vstack((natural.model.places, natural.model.place("housing")))
+    return fast_spindle(replace(natural.model, place_names=places, places=rows), changed)
 
 
 def drive_of(times, speed_rpm, *, ambient=293.15, inlet=290.15, thrust=1750.0, flow=20e-3 / 60):

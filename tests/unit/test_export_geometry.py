@@ -4,14 +4,18 @@ import numpy as np
 import pytest
 
 from spindle_fem.commands.export_command import export_machine
-from spindle_fem.errors import FaultsError
+from spindle_fem.definition.load import load_machine
+from spindle_fem.errors import BadInputError, SpecError
+from spindle_fem.model.reduced.film_heat import FilmHeat, tabulated_machine
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from spindle_fem.operation.friction_map import tabulate_friction
 from spindle_fem.studies.export.exported_files import file_writer
 from spindle_fem.studies.export.geometry_export import geometry_state_space
 from spindle_fem.studies.export.interpolation_axes import refined_axis
 from spindle_fem.studies.export.portable_model import PortableModel
 from spindle_fem.units import ZERO_CELSIUS_K
-from tests.support.lumped_spindle import RPM, drive_of
+from tests.support.lumped_spindle import RPM, drive_of, lumped_model, with_natural_film
 from tests.support.stepped_model import c_readings_along, needs_compiler, readings_along
 
 # Largest difference from simulate, K.
@@ -24,19 +28,22 @@ def space(fast):
     return geometry_state_space(fast, "lumped", 4500.0 * RPM)
 
 
-@pytest.fixture(scope="module")
-def drive():
+def driven(**changes):
     """Speed, standstill and another flow, with thrust, air and inlet that move."""
     times = np.arange(0.0, 7200.0, 30.0)
     speed = np.where(times < 3000.0, 3000.0, np.where(times < 5000.0, 0.0, 1234.0))
-    return drive_of(
-        times,
-        speed,
-        ambient=293.15 + np.sin(times / 1000.0),
-        inlet=290.15 + np.cos(times / 700.0),
-        thrust=1000.0 + 0.1 * times,
-        flow=np.where(times < 4000.0, 20.0, 14.0) / 60e3,
-    )
+    inputs = {
+        "ambient": 293.15 + np.sin(times / 1000.0),
+        "inlet": 290.15 + np.cos(times / 700.0),
+        "thrust": 1000.0 + 0.1 * times,
+        "flow": np.where(times < 4000.0, 20.0, 14.0) / 60e3,
+    }
+    return drive_of(times, speed, **inputs | changes)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return driven()
 
 
 @pytest.fixture(scope="module")
@@ -84,14 +91,41 @@ def test_files_hold_it_all(space, tmp_path):
     assert all(np.array_equal(read.arrays[name], values) for name, values in space.arrays.items())
 
 
-@pytest.mark.parametrize(
-    ("machine", "named"),
-    [("wu_tan_2016", ("properties_at", "heat.model")), ("uncooled", ("heat.model", "surface"))],
-)
-def test_refuses_what_follows_temperatures_before_it_makes_a_model(machine, named, tmp_path):
-    with pytest.raises(FaultsError) as refused:
-        export_machine(machine, tmp_path / "m.npz")
-    assert all(text in str(refused.value) for text in named)
+def test_refuses_films_that_follow_the_wall_before_it_makes_a_model(tmp_path):
+    with pytest.raises(SpecError, match="properties_at=inlet"):
+        export_machine("wu_tan_2016", tmp_path / "m.npz")
+
+
+def agrees(fast, drive):
+    """Whether an exported model's readings along a drive are those of simulate; the model."""
+    told = simulate_fast(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+    model = geometry_state_space(fast, "lumped", 4500.0 * RPM).model()
+    assert np.abs(readings_along(model, drive, {0: START}) - told).max() < AGREEMENT
+    return model
+
+
+def test_natural_films_follow_their_walls(fast, drive, tmp_path):
+    natural = with_natural_film(fast)
+    model = agrees(natural, drive)
+    inputs = {"speed": 3000.0 * RPM, "ambient": 23.0, "coolant_inlet": 17.0}
+    model.settle(inputs)
+    settled = model.read(inputs)
+    model.step(3600.0, inputs)
+    assert model.read(inputs) == pytest.approx(settled, abs=1e-6)
+    path = tmp_path / "m.c"
+    with pytest.raises(BadInputError, match="C form"):
+        file_writer(path)(geometry_state_space(natural, "lumped", 4500.0 * RPM), path)
+    assert not path.exists()
+
+
+@pytest.mark.slow
+def test_friction_and_ball_rows_follow_their_films():
+    spec = load_machine("wu_tan_2016", ["coolant.properties_at=inlet"])
+    friction = tabulate_friction(spec, 4500.0 * RPM, (1000.0, 1750.0))
+    table = tabulated_machine(spec, friction)
+    fast = fast_spindle(lumped_model(table), table, (FilmHeat(friction, spec, table),))
+    # Simulate takes one thrust and steps of 1 K of the inlet for its operators, which here follow both.
+    agrees(fast, driven(inlet=290.15, thrust=1300.0))
 
 
 def test_axes_are_refined_at_bends_and_jumps():

@@ -1,6 +1,5 @@
 """The fast model on a spindle of one unknown per part, where everything can be checked by hand."""
 
-from dataclasses import replace
 from pickle import loads
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from joblib.externals.loky.backend.reduction import dumps
 
 from spindle_fem.definition.load import load_machine
-from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
@@ -17,7 +15,7 @@ from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.coefficient_table import free_parameters
 from spindle_fem.physics.surroundings.still_air import outside_coefficient
-from tests.support.lumped_spindle import drive_of
+from tests.support.lumped_spindle import drive_of, with_natural_film
 
 
 def test_nothing_changes_where_everything_has_one_temperature(fast):
@@ -100,33 +98,8 @@ def test_halving_the_steps_changes_little_and_less_each_time(fast):
     assert np.abs(runs[2] - runs[1]).max() < 1e-3
 
 
-def test_a_natural_film_carries_what_its_correlation_says(fast, spec):
-    film = NaturalFilm(
-        name="outside",
-        kind="natural_convection_radiation",
-        surface=("housing.outside",),
-        orientation="horizontal_cylinder",
-        characteristic_length="0.3 m",
-        emissivity=0.9,
-    )
-    others = tuple(item for item in spec.film if item.name != "outside")
-    changed = spec.model_copy(update={"film": (film, *others), "factor": spec.factor[1:]})
-    keep = [i for i, name in enumerate(fast.model.coefficient_names) if name != "film.cover.outside"]
-    fluids = [i for i, name in enumerate(fast.model.fluid_names) if name != "film.cover.outside"]
-    natural = fast_spindle(
-        replace(
-            fast.model,
-            coefficient_names=tuple(fast.model.coefficient_names[i] for i in keep),
-            operators=fast.model.operators[keep],
-            fluid_names=tuple(fast.model.fluid_names[i] for i in fluids),
-            fluid_load=fast.model.fluid_load[fluids],
-        ),
-        changed,
-    )
-    # The lumped model has no surfaces of its own: the housing stands for its outside.
-    places = (*natural.model.place_names, "housing.outside")
-    rows = np.vstack((natural.model.places, natural.model.place("housing")))
-    natural = fast_spindle(replace(natural.model, place_names=places, places=rows), changed)
+def test_a_natural_film_carries_what_its_correlation_says(fast):
+    natural = with_natural_film(fast)
     times = np.linspace(0.0, 5.0e5, 334)
     # Not at the definition's own ambient temperature.
     drive = drive_of(times, 3000.0, ambient=296.15)

@@ -84,6 +84,12 @@ def python_source(space: StateSpace) -> str:
 
 
 def _write_c(space: StateSpace, path: Path) -> list[Path]:
+    if space.header["feedback_tables"]:
+        raise BadInputError(
+            str(path),
+            "has friction or films that follow temperatures, which the C form does not.",
+            "Export .py, .fmu, .npz or .json; or heat by table, constant ball rows and films.",
+        )
     header_file = path.with_suffix(".h")
     names = {"source_file": path.name, "header_file": header_file.name}
     environment = Environment(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,15 +10,21 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.term import CHANNEL_FILM
-from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.errors import SpecError
+from spindle_fem.model.reduced.class_operators import NO_CHANGES
 from spindle_fem.model.reduced.coolant_maps import CoolantMaps, coolant_maps
 from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.operation.friction_map import needs_map
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.standard_inputs import standard_inputs
-from spindle_fem.studies.export.interpolation_axes import refined_axis
+from spindle_fem.studies.export.feedback_export import (
+    SURROUNDINGS_RANGE,
+    FeedbackTable,
+    feedback_tables,
+    film_heat_of,
+)
+from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
 from spindle_fem.studies.export.state_space import (
     CELSIUS,
     TR_BDF2,
@@ -45,6 +51,8 @@ THRUST_SHARE = 2.0
 TOLERANCE = 5e-5
 # Of the coolant's operators, left out with the directions in which they hardly vary.
 LEFT_OUT = 1e-7
+# A load that is 1, for heats that follow temperatures.
+CONSTANT = "constant"
 PARTS = ("conduction", "load", "output", "feedthrough")
 
 
@@ -70,7 +78,7 @@ class OperatorTable:
 
 
 def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> StateSpace:
-    """State space of a fast model whose heat is by table.
+    """State space of a fast model.
 
     Parameters
     ----------
@@ -80,27 +88,35 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
 
     Raises
     ------
-    FaultsError
+    SpecError
         As :func:`require_exportable`.
     """
     spec = fast.spec
     require_exportable(spec)
     nominal = OperatingPoint.of(spec)
-    inputs = _inputs(spec, highest_speed)
+    film_heat = film_heat_of(fast)
+    inputs = _inputs(fast, highest_speed)
     position = {item.name: number for number, item in enumerate(inputs)}
     tables = {"speed": _speed_table(fast, nominal, highest_speed)}
     if fast.channel is not None:
         tables["coolant"] = _coolant_table(fast, nominal)
     tables = {key: table for key, table in tables.items() if table.values.shape[-1]}
-    heat_inputs, heat_axes, heat = _heat_table(fast, inputs)
-    # Loads that are inputs or constants come first, those of the heat table behind.
-    n_heat = len(fast.heat_places)
-    order = [*range(n_heat, len(fast.load_names)), *range(n_heat)]
+    # Loads that are inputs or constants come first, those of a heat table behind.
+    n_heat, n_load = len(fast.heat_places), len(fast.load_names)
+    by_table = film_heat is None or not film_heat.bearings
+    order = [*range(n_heat, n_load), n_load, *(range(n_heat) if by_table else ())]
     powers = [_fluid_load(fast, load, position) for load in fast.load_names[n_heat:]]
-    operators, storage = fast.operators(nominal, {}), fast.storage({})
+    powers.append(PowerLoad(CONSTANT, "1", -1))
+    loads = {load.name: load.unit for load in powers}
+    if by_table:
+        loads |= {f"heat.{place}": "W" for place in fast.heat_places}
+    operators = fast.operators(nominal, {}, changes=_changes(fast, nominal))
+    storage = fast.storage({})
     modes = modal_basis(storage, 0.5 * (operators.conduction + operators.conduction.T))
 
     def arrays_of(conduction: Array, load: Array, output: Array, feedthrough: Array) -> dict[str, Array]:
+        # The constant load drives nothing by itself.
+        load, feedthrough = (np.pad(m, (*[(0, 0)] * (m.ndim - 1), (0, 1))) for m in (load, feedthrough))
         found = (
             modes.T @ conduction @ modes,
             modes.T @ load[..., order],
@@ -112,59 +128,81 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
     arrays = power_load_arrays(powers)
     arrays |= arrays_of(operators.conduction, operators.loads, operators.outputs, operators.output_inputs)
     arrays["uniform"] = modes.T @ storage @ fast.model.one
-    arrays |= {"heat.values": heat} | {f"heat.axis{i}": axis for i, axis in enumerate(heat_axes)}
-    for key, table in tables.items():
-        arrays |= {
-            f"{key}.{part}": value for part, value in arrays_of(*(table.parts[p] for p in PARTS)).items()
-        }
-        arrays |= {f"{key}.values": table.values}
-        arrays |= {f"{key}.axis{number}": axis for number, axis in enumerate(table.axes)}
     sensors = {item.name for item in spec.displacement_sensor}
-    header = header_of(
-        name,
-        TR_BDF2,
-        LARGEST_STEP,
-        inputs,
-        {channel: "um" if channel in sensors else CELSIUS for channel in fast.channels},
-        {load.name: load.unit for load in powers} | {f"heat.{place}": "W" for place in fast.heat_places},
-    )
-    header["load_tables"], header["operator_tables"] = ["heat"], list(tables)
-    header["table_inputs"] = {"heat": [position[item] for item in heat_inputs]} | {
-        key: [position[item] for item in table.inputs] for key, table in tables.items()
-    }
+    outputs = {channel: "um" if channel in sensors else CELSIUS for channel in fast.channels}
+    header = header_of(name, TR_BDF2, LARGEST_STEP, inputs, outputs, loads)
+
+    def add_table(key: str, kind: str, axes: tuple[Array, ...], numbers: list[int], values: Array) -> None:
+        header[kind].append(key)
+        header["table_inputs"][key] = numbers
+        arrays[f"{key}.values"] = values
+        arrays.update({f"{key}.axis{number}": axis for number, axis in enumerate(axes)})
+
+    if by_table:
+        heat_inputs, heat_axes, heat = _heat_table(fast, inputs)
+        add_table("heat", "load_tables", heat_axes, [position[item] for item in heat_inputs], heat)
+    for key, table in tables.items():
+        parts = arrays_of(*(table.parts[part] for part in PARTS))
+        arrays |= {f"{key}.{part}": value for part, value in parts.items()}
+        add_table(key, "operator_tables", table.axes, [position[item] for item in table.inputs], table.values)
+    followed = feedback_tables(fast, CONSTANT, highest_speed)
+    for number, table in enumerate(followed):
+        numbers = [len(inputs) + number, *(position[item] for item in table.inputs)]
+        add_table(f"follows{number}", "feedback_tables", table.axes, numbers, table.values)
+    if followed:
+        arrays |= _feedback_arrays(followed, modes, list(loads))
     return StateSpace(header, arrays)
 
 
+def _feedback_arrays(tables: list[FeedbackTable], modes: Array, loads: list[str]) -> dict[str, Array]:
+    """Arrays of all heats that follow temperatures, one behind the other."""
+
+    def rows(weights: list[dict[str, float]]) -> Array:
+        return np.array([[own.get(name, 0.0) for name in loads] for own in weights])
+
+    first = np.cumsum([0, *(table.values.shape[-1] for table in tables)])
+    columns = [table.column + start for table, start in zip(tables, first, strict=False)]
+    return {
+        "feedback.sense": np.array([table.sense for table in tables]) @ modes,
+        "feedback.sense_load": rows([table.sense_load for table in tables]),
+        "feedback.column": np.concatenate(columns).astype(float),
+        "feedback.out": np.concatenate([table.out for table in tables]) @ modes,
+        "feedback.into": np.concatenate([table.into for table in tables]) @ modes,
+        "feedback.load": rows([own for table in tables for own in table.load]),
+    }
+
+
+def _changes(fast: FastModel, point: OperatingPoint) -> Mapping[str, float]:
+    """Factors on coefficients at a point: ball rows whose contacts follow speed and thrust."""
+    film_heat = film_heat_of(fast)
+    return NO_CHANGES if film_heat is None else film_heat.operating_factor(point, {})
+
+
 def require_exportable(spec: MachineSpec) -> None:
-    """Refuse what follows temperatures within a step: its matrices are no tables over inputs.
+    """Refuse a coolant's film that follows its wall, cell by cell: it is no table over inputs.
 
     Raises
     ------
-    FaultsError
-        Every reason at once.
+    SpecError
     """
-    faults = []
     if spec.coolant is not None and spec.coolant.properties_at == "bulk":
-        how = "Export with --set coolant.properties_at=inlet."
-        faults.append(SpecError("coolant.properties_at", '"bulk" lets the film follow the wall.', how))
-    if needs_map(spec):
-        how = 'Export with heat.model = "table" (and a [heat.table]) and constant ball rows.'
-        faults.append(SpecError("heat.model", "friction or ball rows follow the temperature of films.", how))
-    for film in spec.film:
-        if isinstance(film, NaturalFilm):
-            how = 'Export with kind = "constant".'
-            faults.append(SpecError(f"film.{film.name}", "follows the temperature of its surface.", how))
-    if faults:
-        raise FaultsError("export", faults)
+        raise SpecError(
+            "coolant.properties_at",
+            '"bulk" lets the film follow the wall.',
+            "Export with --set coolant.properties_at=inlet.",
+        )
 
 
-def _inputs(spec: MachineSpec, highest_speed: float) -> list[ModelInput]:
+def _inputs(fast: FastModel, highest_speed: float) -> list[ModelInput]:
     """The standard inputs; the coolant's where there is one."""
+    spec, film_heat = fast.spec, film_heat_of(fast)
     usual = standard_inputs(spec)
+    thrusts = _thrust_range(spec) if film_heat is None else film_heat.friction_map.thrust[[0, -1]].tolist()
+    follows = any(isinstance(film, NaturalFilm) and film.temperature == "ambient" for film in spec.film)
     ranges: dict[str, tuple[float | None, float | None]] = {
         "speed": (0.0, highest_speed),
-        "thrust": _thrust_range(spec),
-        "ambient": (None, None),
+        "thrust": tuple(thrusts),
+        "ambient": SURROUNDINGS_RANGE if follows else (None, None),
         "coolant_inlet": _inlet_range(spec),
         "coolant_flow": tuple(usual["coolant_flow"] * share for share in FLOW_SHARES),
     }
@@ -172,7 +210,7 @@ def _inputs(spec: MachineSpec, highest_speed: float) -> list[ModelInput]:
     for name, unit in zip(STANDARD, UNITS, strict=True):
         if spec.channel is None and name.startswith("coolant"):
             continue
-        default = round(usual[name] - (ZERO_CELSIUS_K if unit == CELSIUS else 0.0), 9)
+        default = round(usual[name] - ZERO_CELSIUS_K, 9) if unit == CELSIUS else usual[name]
         found.append(ModelInput(name, unit, default, *ranges[name], magnitude=name == "speed"))
     return found
 
@@ -224,28 +262,41 @@ def _heat_table(
 
 
 def _speed_table(fast: FastModel, nominal: OperatingPoint, highest: float) -> OperatorTable:
-    """Coefficients that follow the speed, each with its own matrices."""
+    """Coefficients that follow the speed, ball rows also the thrust, each with its own matrices."""
     names = [name for name in fast.model.coefficient_names if name != CHANNEL_FILM]
 
-    def at(speed: float) -> Array:
-        found = fast.coefficients(replace(nominal, speed=speed), {})
+    def at(speed: float, thrust: float = nominal.thrust) -> Array:
+        point = replace(nominal, speed=speed, thrust=thrust)
+        found = fast.coefficients(point, {}, _changes(fast, point))
         return np.array([found[name] for name in names])
 
-    speeds = refined_axis(at, 0.0, highest, TOLERANCE)
-    values = np.array([at(speed) for speed in speeds])
+    inputs, axes = ("speed",), (refined_axis(at, 0.0, highest, TOLERANCE),)
+    film_heat = film_heat_of(fast)
+    if film_heat is not None and film_heat.friction_map.thrust.size > 1:
+        ends = film_heat.friction_map.thrust[[0, -1]].tolist()
+        inputs, axes = (
+            ("speed", "thrust"),
+            (*axes, refined_axis(lambda thrust: at(0.5 * highest, thrust), *ends, TOLERANCE)),
+        )
+    values = values_on(at, axes)
     base = at(nominal.speed)
-    moving = np.flatnonzero(np.any(values != base, axis=0))
+    every = values.reshape(-1, len(names))
+    moving = np.flatnonzero(np.any(every != base, axis=0))
     parts: dict[str, list[Array]] = {part: [] for part in PARTS}
+    own = fast.coefficients(nominal, {})
     for row in moving:
-        # Twice the coefficient less once, where it is largest: its own share of the operators.
-        largest = int(np.argmax(np.abs(values[:, row])))
-        point = replace(nominal, speed=float(speeds[largest]))
+        # Twice the coefficient less once: its own share of the operators.
+        point, value = nominal, own[names[row]]
+        if value == 0.0:
+            turning = float(axes[0][np.argmax(np.abs(every[:: every.shape[0] // axes[0].size, row]))])
+            point = replace(nominal, speed=turning)
+            value = fast.coefficients(point, {})[names[row]]
         change = fast.change(point, {}, ({names[row]: 2.0}, {names[row]: 1.0}), ({}, {}))
-        own = (change.conduction, change.loads, change.outputs, change.output_inputs)
-        for part, matrix in zip(PARTS, own, strict=True):
-            parts[part].append(matrix / values[largest, row])
+        matrices = (change.conduction, change.loads, change.outputs, change.output_inputs)
+        for part, matrix in zip(PARTS, matrices, strict=True):
+            parts[part].append(matrix / value)
     stacked = {part: np.array(matrices) for part, matrices in parts.items()}
-    return OperatorTable(("speed",), (speeds,), values[:, moving] - base[moving], stacked)
+    return OperatorTable(inputs, axes, values[..., moving] - base[moving], stacked)
 
 
 def _coolant_table(fast: FastModel, nominal: OperatingPoint) -> OperatorTable:

@@ -10,8 +10,10 @@ time. With ``scheme = "TR-BDF2"`` ``K``, ``B``, ``C`` and ``D`` follow the input
 
     K = K_0 + a_1 K_1 + a_2 K_2 + ...
 
-with ``a_i`` from tables, and steps are of second order and L-stable. Temperatures are in °C, all else
-in the units that the model names.
+with ``a_i`` from tables, and steps are of second order and L-stable. Friction, ball rows and natural
+films that follow temperatures add heats ``a(s, inputs) (in x + drive w)`` with ``s`` a temperature of the
+machine; their values at the end of a step are found by Newton's method. Temperatures are in °C, all else in
+the units that the model names.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ SCHEMA = "spindle-fem/state-space/1"
 # TR-BDF2, Bank et al. (1985), IEEE Trans. CAD 4, 436-451.
 GAMMA = 2.0 - math.sqrt(2.0)
 STAGE_WEIGHT, START_WEIGHT = 0.5 + 1.0 / math.sqrt(2.0), 1.0 / math.sqrt(2.0) - 0.5
+# Slopes of tables [K]; last change of Newton's method, as a share of the largest of the state.
+SLOPE_STEP, CLOSE, MOST_ROUNDS = 1e-3, 1e-9, 30
 
 
 class PortableModel:
@@ -134,6 +138,24 @@ class PortableModel:
                 found[number] = found[number] + np.tensordot(weights, kept[f"{name}.{part}"], axes=1)
         return found
 
+    def _feedback(self, values, loads, state):
+        """Heats that follow temperatures (d,) [W], and their derivatives to the state (d, r)."""
+        kept = self.arrays
+        sensed = kept["feedback.sense"] @ state + kept["feedback.sense_load"] @ loads
+        known = np.concatenate((values, sensed))
+        flux = kept["feedback.into"] @ state + kept["feedback.load"] @ loads
+        factors, slopes = [], []
+        for number, name in enumerate(self.header["feedback_tables"]):
+            value = self._lookup(name, known)
+            moved = known.copy()
+            moved[len(values) + number] += SLOPE_STEP
+            slope = (self._lookup(name, moved) - value) / SLOPE_STEP
+            factors.append(value)
+            slopes.append(slope[:, None] * kept["feedback.sense"][number])
+        column = kept["feedback.column"].astype(int)
+        factor, slope = np.concatenate(factors)[column], np.concatenate(slopes)[column]
+        return factor * flux, factor[:, None] * kept["feedback.into"] + flux[:, None] * slope
+
     # -------------------------------------------------------------------- states
     def start(self, temperature, inputs=None):
         """Begin at a uniform temperature, °C, or at readings: a mapping of outputs to °C.
@@ -153,13 +175,31 @@ class PortableModel:
             conduction, output[rows].T, output[rows],
         )  # fmt: skip
         read = np.array(list(temperature.values()), dtype=float) - feedthrough[rows] @ loads
-        self.state = np.linalg.solve(system, np.concatenate((load @ loads, read)))[:size]
+        self.state = self._balanced(system, np.concatenate((load @ loads, read)), values)
 
     def settle(self, inputs):
         """Go to the steady state of constant inputs."""
         values = self._usable(inputs)
         conduction, load, _, _ = self.matrices(values)
-        self.state = np.linalg.solve(conduction, load @ self.loads(values))
+        self.state = self._balanced(conduction, load @ self.loads(values), values)
+
+    def _balanced(self, system, right, values):
+        """State in which a system holds, what follows temperatures included."""
+        size = len(self.state)
+        found = np.linalg.solve(system, right)
+        if not self.header["feedback_tables"]:
+            return found[:size]
+        loads, out = self.loads(values), self.arrays["feedback.out"]
+        for _ in range(MOST_ROUNDS):
+            heat, slope = self._feedback(values, loads, found[:size])
+            residual, matrix = right - system @ found, system.copy()
+            residual[:size] += out.T @ heat
+            matrix[:size, :size] -= out.T @ slope
+            change = np.linalg.solve(matrix, residual)
+            found = found + change
+            if np.abs(change).max() < CLOSE * np.abs(found).max():
+                return found[:size]
+        raise ArithmeticError("friction and films find no steady state.")
 
     def read(self, inputs):
         """Every output at this moment, (p,)."""
@@ -207,8 +247,28 @@ class PortableModel:
             self._solver = key, conduction, load, inverse
         _, conduction, load, inverse = self._solver
         weight = 0.5 * GAMMA * step
-        start, end = load @ self.loads(first), load @ self.loads(last)
-        before = self.state
+        before, followed = self.state, self.header["feedback_tables"]
+        first_loads, last_loads = self.loads(first), self.loads(last)
+        start, end = load @ first_loads, load @ last_loads
+        if followed:
+            out = self.arrays["feedback.out"]
+            heat, slope = self._feedback(first, first_loads, before)
+            start = start + out.T @ heat
         right = before - weight * (conduction @ before) + weight * ((2.0 - GAMMA) * start + GAMMA * end)
         stage = inverse @ right
-        self.state = inverse @ (STAGE_WEIGHT * stage - START_WEIGHT * before + weight * end)
+        state = inverse @ (STAGE_WEIGHT * stage - START_WEIGHT * before + weight * end)
+        if followed:
+            # What the state answers to heats at the step's end.
+            warmed = weight * (inverse @ out.T)
+            answer = warmed + GAMMA * STAGE_WEIGHT * (inverse @ warmed)
+            base, state = state, state + answer @ heat
+            for _ in range(MOST_ROUNDS):
+                found, slope = self._feedback(last, last_loads, state)
+                change = np.linalg.solve(np.eye(len(heat)) - slope @ answer, found - heat)
+                heat = heat + change
+                state = base + answer @ heat
+                if np.abs(answer @ change).max() < CLOSE * np.abs(state).max():
+                    break
+            else:
+                raise ArithmeticError("friction and films find no common state; take shorter steps.")
+        self.state = state

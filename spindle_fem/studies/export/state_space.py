@@ -130,6 +130,7 @@ def header_of(
         "loads": named(loads),
         "load_tables": [],
         "operator_tables": [],
+        "feedback_tables": [],
         "table_inputs": {},
         "notes": [],
     }

@@ -1,0 +1,188 @@
+"""What follows temperatures in an exported model: friction and ball rows, films of natural convection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.definition.machine_spec import NaturalFilm
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.film_heat import FilmHeat
+from spindle_fem.operation.coefficients import film_coefficient, fluid_temperature, natural_reference
+from spindle_fem.operation.friction_map import CONDUCTANCES, FILM_TEMPERATURES, MOMENT
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
+from spindle_fem.units import ZERO_CELSIUS_K
+
+Array = NDArray[np.float64]
+
+# Of heats and coefficients, between the points of a table.
+TOLERANCE = 1e-4
+# Of a wall above its surroundings, K, and of these, °C.
+WALL_RANGE, SURROUNDINGS_RANGE = (-60.0, 120.0), (-10.0, 50.0)
+# Raceways and balls count for the temperature of a film.
+FILM_SHARES = (0.25, 0.25, 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackTable:
+    """Heats that follow one temperature of the machine, and inputs.
+
+    Attributes
+    ----------
+    sense : (r,) ndarray
+        The temperature, °C, from the unknowns.
+    sense_load : mapping of load to float
+        And from the loads.
+    inputs : tuple of str
+        Axes behind that temperature.
+    axes : tuple of ndarray
+    values : (n, ..., m) ndarray
+    column : (d,) int ndarray
+        Which of the m values each heat is proportional to.
+    out, into : (d, r) ndarray
+        What each heat warms, and the temperature that it is proportional to.
+    load : list of d mappings of load to float
+        And the loads that it is proportional to.
+    """
+
+    sense: Array
+    sense_load: dict[str, float]
+    inputs: tuple[str, ...]
+    axes: tuple[Array, ...]
+    values: Array
+    column: NDArray[np.int64]
+    out: Array
+    into: Array
+    load: list[dict[str, float]]
+
+
+def film_heat_of(fast: FastModel) -> FilmHeat | None:
+    """The term that brings friction and ball rows to their films, where there is one."""
+    return next((term for term in fast.inputs.extra_terms if isinstance(term, FilmHeat)), None)
+
+
+def feedback_tables(fast: FastModel, constant: str, highest: float) -> list[FeedbackTable]:
+    """Every table of a fast model's own terms.
+
+    Parameters
+    ----------
+    constant : str
+        Load that is 1.
+    highest : float, [rad/s]
+    """
+    found = [] if film_heat_of(fast) is None else _bearing_tables(fast, constant, highest)
+    return found + [
+        _natural_table(fast, film, surface)
+        for film in fast.spec.film
+        if isinstance(film, NaturalFilm)
+        for surface in film.surface
+    ]
+
+
+def _bearing_tables(fast: FastModel, constant: str, highest: float) -> list[FeedbackTable]:
+    """Friction heat and what ball rows conduct beyond films at 30 °C, of every bearing."""
+    term, names = film_heat_of(fast), fast.bearings
+    known = term.friction_map
+    films = np.linspace(*FILM_TEMPERATURES, 3)
+    factors = np.array([group.heat_factor.value for group, _ in fast.spec.bearings]) * bool(term.bearings)
+    followed = np.isin(np.arange(len(names)), term.follow)
+
+    def at(speed: float, thrust: float, film: Array) -> Array:
+        """Friction heat and conductances beyond the nominal, (n_bearings, 3, k)."""
+        series = known.at(speed, thrust)
+        kelvin = np.tile(film, (len(names), 1))
+        heat = speed * np.exp(series.at(kelvin, MOMENT)) * factors[:, None, None]
+        nominal = known.nominal_conductance(speed, thrust)[:, :, None]
+        more = (np.exp(series.at(kelvin, CONDUCTANCES)) - nominal) * followed[:, None, None]
+        return np.concatenate((heat, more), axis=1)
+
+    thrusts = known.thrust
+    middle = float(thrusts[thrusts.size // 2])
+    # Sums that do not vanish, for the tolerance.
+    nominal = known.nominal_conductance(highest, middle)[:, :, None]
+    speeds = refined_axis(
+        lambda speed: (at(speed, middle, films) + np.pad(nominal, ((0, 0), (1, 0), (0, 0)))).ravel(),
+        0.0,
+        highest,
+        TOLERANCE,
+    )
+    kelvin = refined_axis(
+        lambda film: (
+            at(0.5 * highest, middle, np.array([film])) + np.pad(nominal, ((0, 0), (1, 0), (0, 0)))
+        ).ravel(),
+        *FILM_TEMPERATURES,
+        TOLERANCE,
+    )
+    loads = thrusts
+    if thrusts.size > 1:
+        loads = refined_axis(
+            lambda thrust: at(0.5 * highest, thrust, films[1:2])[:, 0].ravel() + 1e-9,
+            float(thrusts[0]),
+            float(thrusts[-1]),
+            TOLERANCE,
+        )
+    values = np.array([[at(speed, thrust, kelvin) for thrust in loads] for speed in speeds])
+    # Speed, thrust, bearing, quantity, film to bearing, film, speed, thrust, quantity.
+    values = values.transpose(2, 4, 0, 1, 3)
+    inputs, axes = ("speed", "thrust"), (kelvin - ZERO_CELSIUS_K, speeds, loads)
+    if loads.size == 1:
+        values, inputs, axes = values[:, :, :, 0], inputs[:1], axes[:2]
+    shares, _ = fast.inputs.friction_loads(np.eye(len(names)), {})
+    none = np.zeros(fast.model.size)
+    found = []
+    for row, name in enumerate(names):
+        inner, outer, balls = (
+            fast.model.place(f"{name}.{side}") for side in ("inner_raceway", "outer_raceway", "balls")
+        )
+        warmed = shares[row, list(fast.heat_rows(name))] @ np.array([inner, outer, balls])
+        found.append(
+            FeedbackTable(
+                FILM_SHARES @ np.array([inner, outer, balls]),
+                {},
+                inputs,
+                axes,
+                values[row],
+                np.arange(3),
+                np.array([warmed, inner - balls, outer - balls]),
+                np.array([none, balls - inner, balls - outer]),
+                [{constant: 1.0}, {}, {}],
+            )
+        )
+    return found
+
+
+def _natural_table(fast: FastModel, film: NaturalFilm, surface: str) -> FeedbackTable:
+    """A natural film beyond what the operators hold, over the wall's rise and its surroundings."""
+    coefficient = f"film.{surface}"
+    fluid = fast.inputs.fluid_input(coefficient)
+    reference = natural_reference(fast.spec, film)
+
+    def more(rise: float, surroundings: float) -> Array:
+        kelvin = fluid_temperature(film, surroundings + ZERO_CELSIUS_K)
+        point = OperatingPoint(0.0, 0.0, kelvin, kelvin, 0.0)
+        return film_coefficient(film, point, np.array([kelvin + rise]), kelvin)[0] - reference
+
+    usual = np.mean(SURROUNDINGS_RANGE)
+    rises = refined_axis(lambda rise: more(rise, usual) + reference, *WALL_RANGE, TOLERANCE)
+    axes, inputs = (rises,), ()
+    if fluid == "ambient":
+        low, high = SURROUNDINGS_RANGE
+        axes = (rises, refined_axis(lambda air: more(10.0, air) + reference, low, high, TOLERANCE))
+        inputs = ("ambient",)
+    values = values_on(more if inputs else lambda rise: more(rise, 0.0), axes)
+    vectors, spectrum = fast.directions.of(coefficient)
+    uniform = vectors.T @ fast.model.one
+    return FeedbackTable(
+        fast.model.place(surface),
+        {fluid: -1.0},
+        inputs,
+        axes,
+        values,
+        np.zeros(len(spectrum), dtype=np.int64),
+        vectors.T,
+        -spectrum[:, None] * vectors.T,
+        [{fluid: float(weight)} for weight in spectrum * uniform],
+    )
