@@ -26,7 +26,14 @@ MARKS = {
     Flag.STUCK: ("stuck", "#7b2cbf", "s"),
     Flag.IMPLAUSIBLE: ("implausible", "#c1121f", "x"),
 }
-_SHOWN_UNITS = {"kelvin": "°C", "radian / second": "1/min", "meter": "µm", "meter ** 3 / second": "l/min"}
+_SHOWN_UNITS = {
+    "kelvin": "°C",
+    "radian / second": "1/min",
+    "meter": "µm",
+    "meter ** 3 / second": "l/min",
+    "kilogram * meter ** 2 / second ** 3": "W",
+    "kilogram * meter / second ** 2": "N",
+}
 _READ_AS = {"1/min": "rpm", "µm": "um", "l/min": "l/min"}
 TOP, HEIGHT, PITCH, FOOT = 160.0, 118.0, 160.0, 60.0
 
@@ -59,15 +66,22 @@ def recording_figure(recording: Recording) -> Figure:
         usable = np.flatnonzero(~missing & (flags == 0))
         usable = usable[:: max(1, len(usable) // MOST_POINTS)]
         axes.plot(times[usable], values[usable], ".", color=CYCLE[_ROLES.index(role)], markersize=2.2)
+        axes.margins(x=0.005, y=0.12)
+        low, high = axes.get_ylim()
         for flag, (_, colour, sign) in MARKS.items():
             at = np.flatnonzero(~missing & ((flags & flag) > 0))
             if at.size:
                 marked.add(flag)
-                axes.plot(times[at], values[at], sign, color=colour, markersize=4.5, fillstyle="none")
+                # far readings stand at the edge: they would leave nothing to see of the others
+                shown_at = np.clip(values[at], low, high) if usable.size else values[at]
+                axes.plot(
+                    times[at], shown_at, sign, color=colour, markersize=4.5, fillstyle="none", clip_on=False
+                )
+        if usable.size:
+            axes.set_ylim(low, high)
         axes.set_title(name, fontsize=9.5, pad=3.0)
         axes.set_ylabel(label)
         axes.yaxis.set_label_coords(-105.0 / 1400.0, 0.5)
-        axes.margins(x=0.005, y=0.12)
         axes.locator_params(axis="y", nbins=4)
         axes.tick_params(labelbottom=number == len(shown) - 1)
     axes.set_xlabel(f"time from {recording.start} / {unit}" if recording.start else f"time / {unit}")
@@ -110,7 +124,7 @@ def _in_shown_unit(values: Array, unit: str) -> tuple[Array, str]:
         return values - ZERO_CELSIUS_K, label
     if not label:
         return values, f"{registry().Unit(unit):~P}" if unit else ""
-    return registry().Quantity(values, unit).to(_READ_AS[label]).magnitude, label
+    return registry().Quantity(values, unit).to(_READ_AS.get(label, label)).magnitude, label
 
 
 def _draw_key(figure: Figure, roles: set[str], marked: set[Flag]) -> None:
@@ -130,6 +144,8 @@ def _draw_key(figure: Figure, roles: set[str], marked: set[Flag]) -> None:
         list(entries.values()),
         list(entries),
         ncols=len(entries),
+        columnspacing=1.2,
+        handletextpad=0.4,
         loc="upper left",
         bbox_to_anchor=(15.0 / width, 1.0 - 82.0 / height),
     )
