@@ -15,6 +15,8 @@ _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<p
 _HALF = r"\s*(?P<half>[AaPp][Mm])?"
 _ZONE = r"\s*(?P<zone>Z|UTC|[+-]\d{2}:?\d{2})?"
 _FORM = rf"^\s*(?:{_DATE})?[T ,;]*(?:{_CLOCK})?{_HALF}{_ZONE}\s*$"
+# Dates that leave no doubt which number is the month: English months, or ISO 8601 without signs between.
+_IN_WORDS = r"(?i)(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec).*:|^\d{8}T\d{4}"
 _MIDNIGHT = r"[T ]+00:00(?::00(?:[.,]0+)?)?\s*$"
 _NAMES = ("time", "zeit", "date", "datum", "stamp", "stempel", "uhr", "temps", "tiempo", "elapsed")
 # Seconds from 1970 of 2001 and 2100, between which counts of clocks are taken as stamps.
@@ -87,8 +89,20 @@ def find_time(
         return _clock_alone(clocks[0], cells[clocks[0]])
     if dates and cells[dates[0]].nunique() > 1:
         return _stamps((dates[0],), cells[dates[0]], zone, where)
+    worded = [name for name in cells.columns if _in_words(cells[name]).notna().mean() > _SHARE]
+    if worded:
+        return _stamps((worded[0],), _in_words(cells[worded[0]]), zone, where)
     counted = [name for name in cells.columns if _counts(cells[name], name, units.get(name, ""), decimal)]
     if not counted:
+        still = [
+            n for n in cells.columns if _is_called_time(n) and cells[n].nunique() == 1 and len(cells) > 1
+        ]
+        if still:
+            raise RecordingError(
+                where,
+                f'has the same time in all {len(cells)} rows of column "{still[0]}".',
+                "Times must grow.",
+            )
         raise RecordingError(
             where,
             f"has no column of times (columns: {', '.join(map(str, cells.columns))}).",
@@ -116,6 +130,16 @@ def _form_of(column: pd.Series) -> str:
     if date and clock:
         return "date" if text[parts["a"].notna()].str.contains(_MIDNIGHT).all() else "stamp"
     return "date" if date else "clock" if clock else ""
+
+
+def _in_words(column: pd.Series) -> pd.Series:
+    """Stamps with months as words, or ISO 8601 without signs between; NaT where a cell is none."""
+    if pd.api.types.is_numeric_dtype(column.dtype):
+        return pd.Series(pd.NaT, index=column.index, dtype="datetime64[us]")
+    text = _text(column)
+    possible = text.str.contains(_IN_WORDS)
+    stamps = pd.to_datetime(text.where(possible), format="mixed", errors="coerce", utc=True)
+    return stamps.dt.tz_localize(None).astype("datetime64[us]")
 
 
 def _stamps(names: tuple[str, ...], column: pd.Series, zone: str | None, where: str) -> FoundTime:
@@ -223,7 +247,7 @@ def _clock_alone(name: str, column: pd.Series) -> FoundTime:
         + pd.to_numeric("0." + parts["part"].fillna("0"))
     )
     half = parts["half"].str.lower()
-    seconds = seconds.where(half.isna(), seconds % 43200.0 + 43200.0 * (half == "pm")).to_numpy(float)
+    seconds = np.array(seconds.where(half.isna(), seconds % 43200.0 + 43200.0 * (half == "pm")), dtype=float)
     present = np.flatnonzero(np.isfinite(seconds))
     days = np.cumsum(np.diff(seconds[present], prepend=seconds[present[:1]]) < -43200.0)
     seconds[present] += 86400.0 * days
@@ -238,13 +262,17 @@ def _counts(column: pd.Series, name: str, unit: str, decimal: str) -> bool:
     present = values[np.isfinite(values)]
     if present.size < 2 or len(wrong) > 0.1 * len(column):
         return False
-    plain = str(name).lower()
-    called = any(word in plain for word in _NAMES) or plain in ("t", "index")
+    called = _is_called_time(name)
     measured = unit in ("s", "ms", "min", "hour")
     # rows out of order are a defect that recordings may have: two hints outweigh many of them
     needed = 0.5 if called and measured else _SHARE
     grows = float(np.mean(np.diff(present) >= 0.0)) > needed and np.ptp(present) > 0.0
     return (called or measured) and bool(grows)
+
+
+def _is_called_time(name: str) -> bool:
+    plain = str(name).lower()
+    return any(word in plain for word in _NAMES) or plain in ("t", "index")
 
 
 def _counted(name: str, column: pd.Series, unit: str, decimal: str) -> FoundTime:

@@ -92,6 +92,20 @@ def test_dates_as_excel_holds_them_stand_beside_their_clock(tmp_path):
     assert (np.diff(draft(tmp_path, days).data["time"]) == np.timedelta64(1, "D")).all()
 
 
+@pytest.mark.parametrize("form", ["%d-%b-%Y %H:%M:%S", "%a %b %d %H:%M:%S %Y", "%Y%m%dT%H%M%S"])
+def test_stamps_with_months_in_words_or_without_signs(tmp_path, form):
+    rows = [f"{stamp:{form}},{warm:.2f}" for stamp, warm in zip(TIMES, WARM, strict=True)]
+    drafted = draft(tmp_path, "\n".join(["Timestamp,SP01", *rows]))
+    assert (drafted.data["time"] == TIMES).all()
+
+
+def test_a_clock_without_dates_passes_midnight(tmp_path):
+    rows = [f"{(23 + k // 6) % 24}:{k % 6}0:00,{20 + k}" for k in range(12)]
+    drafted = draft(tmp_path, "\n".join(["Uhrzeit,SP01", *rows]))
+    assert (np.diff(drafted.data["time"]) == 600.0).all()
+    assert any("no date" in text for text in drafted.unsure)
+
+
 def test_zone_resolves_the_end_of_summer_time(tmp_path):
     clock = pd.date_range("2016-10-30 00:30", periods=6, freq="30min", tz="UTC").tz_convert("Europe/Berlin")
     text = "\n".join(["time,SP01", *(f"{stamp:%Y-%m-%d %H:%M:%S},{20 + i}" for i, stamp in enumerate(clock))])
@@ -119,6 +133,7 @@ def test_hostile_names_stay_within_their_comments(tmp_path):
     [
         ("a,b\nx,y\n", "no table of numbers"),
         ("SP01,SP02\n" + "".join(f"{20 + i % 3},21\n" for i in range(9)), "no column of times"),
+        ("time,SP01\n" + "".join(f"5,{20 + i}\n" for i in range(9)), "the same time in all 9 rows"),
         ("time_s,load\n" + "".join(f"{i},{900 + i}\n" for i in range(9)), "no column could be told"),
         ("", "is empty"),
     ],
