@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -280,7 +281,8 @@ def test_speeds_beyond_the_table_get_a_range_of_their_own(fast, monkeypatch):
 
     monkeypatch.setattr("spindle_fem.model.reduced.recorded_model.reduced_model_of", remember)
     for speed in (4000.0, 6000.0):
-        recording = type("R", (), {"input_names": ("speed",), "inputs": np.array([[speed * RPM]])})()
+        given = {"source": "made", "input_names": ("speed",), "inputs": np.array([[speed * RPM]])}
+        recording = SimpleNamespace(**given)
         fast_model_for(fast.spec, [recording])
     assert asked[0].highest_speed is None
     assert asked[1].highest_speed == pytest.approx(6000.0 * RPM)
