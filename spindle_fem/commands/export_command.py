@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -40,8 +41,11 @@ def export_machine(
     progress("writing")
     path.parent.mkdir(parents=True, exist_ok=True)
     header = space.header
+    # Nobody sees half a file.
+    with tempfile.TemporaryDirectory(dir=path.parent) as place:
+        files = [file.replace(path.parent / file.name) for file in write(space, Path(place) / path.name)]
     return {
-        "files": [str(file) for file in write(space, path)],
+        "files": [str(file) for file in files],
         "machine": header["machine"],
         "scheme": header["scheme"],
         "states": len(space.arrays["uniform"]),

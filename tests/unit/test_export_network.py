@@ -189,3 +189,9 @@ def test_refuses_other_kinds_of_file_and_effects(machine, tmp_path):
     with pytest.raises(SpecError, match="radiation"):
         export_machine(path, tmp_path / "m.npz")
     assert not (tmp_path / "m.npz").exists()
+
+
+def test_leaves_a_c_file_and_its_header_alone_in_a_new_folder(machine, tmp_path):
+    content = export_machine(machine, tmp_path / "new" / "m.c")
+    assert content["files"] == [str(tmp_path / "new" / name) for name in ("m.c", "m.h")]
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["m.c", "m.h"]
