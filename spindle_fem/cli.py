@@ -47,12 +47,29 @@ def run(
 
 
 @app.command()
-def check(machine: Machine, set_: Overrides = None, as_json: AsJson = False) -> None:
+def new(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="Definition to write, .toml")],
+) -> None:
+    """Write a commented machine to start from."""
+    from spindle_fem.commands.new_command import new_machine
+
+    say(f"wrote {new_machine(output)}; next: spindle-fem check {output} --picture {output.with_suffix('.png')}")
+
+
+@app.command()
+def check(
+    machine: Machine,
+    set_: Overrides = None,
+    as_json: AsJson = False,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw it, faults marked, .png")
+    ] = None,
+) -> None:
     """Validate a machine without solving; every fault at once."""
     from spindle_fem.commands.console import print_check
     from spindle_fem.commands.machine_commands import check_machine
 
-    content = check_machine(machine, overrides=set_ or ())
+    content = check_machine(machine, overrides=set_ or (), picture=picture)
     print_json(content) if as_json else print_check(content)
 
 

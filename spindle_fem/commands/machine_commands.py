@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from spindle_fem.commands.checked_machine import load_buildable, load_network
 from spindle_fem.commands.console import stages
-from spindle_fem.errors import SpecError
+from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -81,14 +82,21 @@ def run_machine(
     return read_content(place / "summary.json", SUMMARY_SCHEMA, "run")
 
 
-def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict[str, Any]:
+def check_machine(
+    machine: str | Path, *, overrides: Iterable[str] = (), picture: Path | None = None
+) -> dict[str, Any]:
     """Validate a machine without meshing or solving; every fault at once.
+
+    Parameters
+    ----------
+    picture : Path, optional
+        Drawing of the section to write, of a faulty machine with the faults marked.
 
     Returns
     -------
     dict
         ``machine``, ``parts``, ``surfaces``, ``contacts``, ``probes``,
-        ``effects``, ``warnings``; of a ``[network]`` machine ``machine``,
+        ``sources``, ``effects``, ``warnings``; of a ``[network]`` machine ``machine``,
         ``nodes``, ``boundaries``, ``links``, ``sources``, ``effects``,
         ``warnings``.
 
@@ -101,9 +109,22 @@ def check_machine(machine: str | Path, *, overrides: Iterable[str] = ()) -> dict
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 
+    if picture is not None and picture.suffix != ".png":
+        raise SpecError(str(picture), f'"{picture.suffix}" is no format of pictures.', "Allowed: .png.")
     if is_network_machine(read_definition(find_machine(machine))):
+        if picture is not None:
+            raise SpecError(str(machine), "is a network.", "--picture draws machines with geometry.")
         return _check_network(machine, overrides)
-    spec = load_buildable(machine, overrides)
+    try:
+        spec = load_buildable(machine, overrides)
+    except FaultsError as error:
+        if picture is not None:
+            _draw_faults(picture, machine, overrides, error)
+        raise
+    if picture is not None:
+        from spindle_fem.report.definition_picture import draw_definition
+
+        draw_definition(picture, spec)
     assembly = build_assembly(spec)
     groups = group_of_contacts(spec, assembly.joint_names)
 
@@ -192,6 +213,17 @@ def _check_network(machine: str | Path, overrides: Iterable[str]) -> dict[str, A
         "effects": _effect_rows(spec.effects),
         "warnings": [],
     }
+
+
+def _draw_faults(picture: Path, machine: str | Path, overrides: Iterable[str], error: FaultsError) -> None:
+    """Picture of what is sound in a faulty definition."""
+    from spindle_fem.definition.load import examine_machine
+    from spindle_fem.report.definition_picture import draw_definition
+
+    spec = None
+    with contextlib.suppress(FaultsError):  # of overrides, which are among the faults
+        spec = examine_machine(machine, overrides).spec
+    draw_definition(picture, spec, error.faults)
 
 
 def _source_detail(source: HeatSource) -> str:

@@ -128,7 +128,7 @@ def _operating_point(spec: MachineSpec) -> str:
     )
     if spec.coolant is not None:
         text += (
-            f", oil {spec.coolant.flow * 6.0e4:.3g} L/min at "
+            f", coolant {spec.coolant.flow * 6.0e4:.3g} L/min at "
             f"{spec.coolant.inlet_temperature - ZERO_CELSIUS_K:.1f} °C"
         )
     return text + ". Section through the axis: top θ = 0, bottom θ = 180°."
@@ -294,7 +294,7 @@ def _above(spec: MachineSpec) -> list[Label]:
         labels.append(Label(text, np.array([probe.z * MM, side * probe.r * MM])))
     for z, sign in _ports_in_plane(spec):
         if sign > 0.0:
-            text = "oil in" if abs(z - spec.channel.z_start) < 1.0e-9 else "oil out"
+            text = "coolant in" if abs(z - spec.channel.z_start) < 1.0e-9 else "coolant out"
             labels.append(Label(text, np.array([z * MM, _outside_radius(spec, z) * MM])))
     return labels
 

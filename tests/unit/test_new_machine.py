@@ -1,0 +1,57 @@
+"""A machine to start from, and the picture of a definition with its faults."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from spindle_fem.commands.machine_commands import check_machine
+from spindle_fem.commands.new_command import new_machine
+from spindle_fem.definition.load import examine_machine
+from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.report.definition_picture import draw_definition
+
+
+def test_the_machine_to_start_from_is_sound_and_named_as_its_file(tmp_path) -> None:
+    content = check_machine(new_machine(tmp_path / "my-spindle.toml"))
+    assert content["machine"] == "my_spindle"
+    assert content["warnings"] == []
+    assert [row["name"] for row in content["sources"]] == ["belt"]
+
+
+def test_a_file_that_is_there_is_kept(tmp_path) -> None:
+    file = new_machine(tmp_path / "a.toml")
+    with pytest.raises(SpecError, match="is there already"):
+        new_machine(file)
+    with pytest.raises(SpecError, match="ends in .toml"):
+        new_machine(tmp_path / "a.txt")
+
+
+def test_the_picture_marks_each_fault_where_it_belongs(tmp_path) -> None:
+    file = new_machine(tmp_path / "a.toml")
+    text = file.read_text()
+    text = text.replace('name = "R1", z = ["260 mm"', 'name = "R1", z = ["255 mm"')
+    text = text.replace('emperature = "22 degC"', 'emperature = "22 N"').replace("turns = 6", "turns = 9")
+    file.write_text(text)
+    picture = tmp_path / "a.png"
+    with pytest.raises(FaultsError) as refused:
+        check_machine(file, picture=picture)
+    assert picture.stat().st_size > 10_000
+    told = "\n".join(str(fault) for fault in refused.value.faults)
+    assert re.search(r"ambient_temperature(.|\n)*R1(.|\n)*channel", told)
+    placed = draw_definition(picture, examine_machine(file).spec, refused.value.faults)
+    assert len(placed) == len(refused.value.faults) - 1
+    assert not any("ambient_temperature" in str(fault) for fault in placed)
+
+
+def test_a_sound_machine_and_a_file_without_parts_are_drawn_too(tmp_path) -> None:
+    picture = tmp_path / "a.png"
+    check_machine("small_two_start", picture=picture)
+    assert picture.stat().st_size > 10_000
+    (tmp_path / "b.toml").write_text('schema = "spindle-fem/machine/1"\nname = "b"\n')
+    with pytest.raises(FaultsError):
+        check_machine(tmp_path / "b.toml", picture=tmp_path / "b.png")
+    assert (tmp_path / "b.png").exists()
+    with pytest.raises(SpecError, match="Allowed: .png"):
+        check_machine("small_two_start", picture=tmp_path / "a.svg")
