@@ -48,12 +48,15 @@ def run(
 
 @app.command()
 def new(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="Definition to write, .toml")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Definition to write, .toml")
+    ],
 ) -> None:
     """Write a commented machine to start from."""
     from spindle_fem.commands.new_command import new_machine
 
-    say(f"wrote {new_machine(output)}; next: spindle-fem check {output} --picture {output.with_suffix('.png')}")
+    picture = output.with_suffix(".png")
+    say(f"wrote {new_machine(output)}; next: spindle-fem check {output} --picture {picture}")
 
 
 @app.command()

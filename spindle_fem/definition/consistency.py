@@ -26,6 +26,8 @@ _LISTS = (
     "source",
 )
 _TOLERANCE = 1.0e-9
+# Makers of bearing balls give 300 to 315 GPa, 0.24 to 0.27, 2.2e-6 to 3.3e-6 1/K.
+SILICON_NITRIDE = {"young_modulus": "310 GPa", "poisson_ratio": "0.26", "thermal_expansion": "3.2e-6 1/K"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +173,17 @@ def _materials(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemErro
         for key in ("ring_material", "ball_material"):
             if getattr(kind, key) not in materials:
                 yield _unknown(f"bearing_types.{name}.{key}", getattr(kind, key), "material", materials)
+    # Steel's values, the defaults, are wrong by half for ceramics.
+    for name in sorted(
+        {t.ball_material for t in spec.bearing_types.values() if t.ball_material != t.ring_material}
+    ):
+        balls = spec.materials.get(name)
+        for key in ("young_modulus", "poisson_ratio", "thermal_expansion") if balls is not None else ():
+            if key not in balls.model_fields_set:
+                what = "is missing, but balls of other material than their rings are made of it."
+                yield SpecError(
+                    f"materials.{name}.{key}", what, f"Give it; silicon nitride: {SILICON_NITRIDE[key]}."
+                )
 
 
 def _bearings(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:

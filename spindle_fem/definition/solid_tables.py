@@ -55,9 +55,10 @@ class Material(SpecModel):
     specific_heat_capacity: SpecificHeat
     """Constant over temperature."""
     young_modulus: Pressure = 206.0e9
-    """Where bearings sit with a `fit`; rings take that of their type."""
+    """Where bearings sit with a `fit`, and of balls of other material than their rings, which must give it
+    (310 GPa for silicon nitride); rings take that of their type."""
     poisson_ratio: PoissonRatio = 0.3
-    """Where bearings sit with a `fit`; rings take that of their type."""
+    """As `young_modulus`; 0.26 for silicon nitride."""
     thermal_expansion: ThermalExpansion = 12.5e-6
     """Linear, for rings, balls, shaft and housing with `heat.thermal_preload`."""
 
@@ -142,9 +143,9 @@ class BearingType(SpecModel):
     ball_material: Name
     """A key of `[materials]`."""
     young_modulus: Pressure = 206.0e9
-    """Young's modulus of rings and balls."""
+    """Young's modulus of the rings, and of balls of the same material."""
     poisson_ratio: PoissonRatio = 0.3
-    """Poisson's ratio of rings and balls."""
+    """Poisson's ratio of the rings, and of balls of the same material."""
     roughness_raceway: PositiveLength = 0.05e-6
     """Root mean square (Rq)."""
     roughness_ball: PositiveLength = 0.01e-6

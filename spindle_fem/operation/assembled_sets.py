@@ -32,6 +32,8 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
         A fit that leaves no play for the preload, or a preload that the balls do not bear.
     """
     kind = spec.bearing_types[group.bearing_type]
+    rings, balls = spec.materials[kind.ring_material], spec.materials[kind.ball_material]
+    hybrid = kind.ball_material != kind.ring_material
     geometry = BearingGeometry(
         ball_diameter=kind.ball_diameter,
         ball_count=kind.ball_count,
@@ -41,9 +43,12 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
         groove_curvature_outer=kind.groove_curvature_outer,
         young_modulus=kind.young_modulus,
         poisson_ratio=kind.poisson_ratio,
-        density=spec.materials[kind.ball_material].density,
-        thermal_expansion=spec.materials[kind.ring_material].thermal_expansion,
-        ball_thermal_expansion=spec.materials[kind.ball_material].thermal_expansion,
+        density=balls.density,
+        ball_young_modulus=balls.young_modulus if hybrid else None,
+        ball_poisson_ratio=balls.poisson_ratio if hybrid else None,
+        ring_density=rings.density,
+        thermal_expansion=rings.thermal_expansion,
+        ball_thermal_expansion=balls.thermal_expansion,
         bore_diameter=kind.bore_diameter,
         outer_diameter=kind.outer_diameter,
         width=kind.width,

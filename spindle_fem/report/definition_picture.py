@@ -1,4 +1,4 @@
-"""Picture of a definition before anything is solved: the section where it is sound, what there is of it where not.
+"""Picture of a definition before anything is solved: the section, or of a faulty one what there is of it.
 
 Faults are numbered in the drawing at the part, bearing, surface or probe that they name, and listed below.
 """
@@ -49,7 +49,7 @@ def draw_definition(
 
 
 def _boxes(spec: MachineSpec) -> Iterator[tuple[str, Box]]:
-    """Cylinders in the meridian plane by name, [m]: segments, then the rings of bearings whose type is sound."""
+    """Cylinders in the meridian plane by name, [m]: segments, and rings of bearings whose type is sound."""
     for part in spec.part:
         for segment in part.segment:
             radii = (0.5 * segment.inner_diameter, 0.5 * segment.outer_diameter)
@@ -66,7 +66,7 @@ def _boxes(spec: MachineSpec) -> Iterator[tuple[str, Box]]:
 def _place(
     fault: SpindleFemError, boxes: dict[str, Box], spec: MachineSpec | None
 ) -> tuple[float, float] | None:
-    """Where in the meridian plane a fault belongs, (z, r) [m]: what its key names, else what its text names."""
+    """Where in the meridian plane a fault belongs, (z, r) [m]: what its key names, else its text."""
     if spec is None:
         return None
     parts = {surface.name: surface.part for surface in spec.surface}
@@ -76,9 +76,9 @@ def _place(
     if spec.channel is not None:
         parts["channel"] = spec.channel.part
     for text in (fault.where, fault.what):
-        words = re.findall(r"[\w.]+", text)
+        words = {tail for dotted in re.findall(r"[\w.]+", text) for tail in _tails(dotted)}
         # The longest name says most: a segment before its part.
-        for word in sorted({w for word in words for w in _tails(word)}, key=len, reverse=True):
+        for word in sorted(words, key=lambda item: (-len(item), item)):
             named = parts.get(word, word)
             found = [b for name, b in boxes.items() if name == named or name.startswith(named + ".")]
             if named and found:
@@ -119,7 +119,7 @@ def _faulty_figure(
     figure = new_figure(TOP + height + FOOT + LINE * rows, WIDTH)
     number = f"{len(faults)} fault{'s' if len(faults) != 1 else ''}"
     named = (spec.title or spec.name) if spec is not None else ""
-    set_title(figure, named or "A machine", f"{number}. Drawn are sound parts and bearings, not to be solved.")
+    set_title(figure, named or "A machine", f"{number}. Drawn are the sound parts and bearings.")
     if boxes:
         axes = meridian_axes(figure, (MARGIN, TOP, width, height), z_range, (0.0, reach))
         owners = [name if name.endswith("_ring") else name.partition(".")[0] for name in boxes]

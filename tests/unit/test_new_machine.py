@@ -24,7 +24,7 @@ def test_a_file_that_is_there_is_kept(tmp_path) -> None:
     file = new_machine(tmp_path / "a.toml")
     with pytest.raises(SpecError, match="is there already"):
         new_machine(file)
-    with pytest.raises(SpecError, match="ends in .toml"):
+    with pytest.raises(SpecError, match=r"ends in \.toml"):
         new_machine(tmp_path / "a.txt")
 
 
@@ -53,5 +53,5 @@ def test_a_sound_machine_and_a_file_without_parts_are_drawn_too(tmp_path) -> Non
     with pytest.raises(FaultsError):
         check_machine(tmp_path / "b.toml", picture=tmp_path / "b.png")
     assert (tmp_path / "b.png").exists()
-    with pytest.raises(SpecError, match="Allowed: .png"):
+    with pytest.raises(SpecError, match=r"Allowed: \.png"):
         check_machine("small_two_start", picture=tmp_path / "a.svg")

@@ -33,6 +33,8 @@ class BearingGeometry:
         Of the balls.
     ball_young_modulus, ball_poisson_ratio : float or None
         Where the balls differ from the rings (silicon nitride); None: as the rings.
+    ring_density : float, [kg/m³]
+        Of the inner ring, which turns.
     thermal_expansion, ball_thermal_expansion : float, [1/K]
         Of the rings and of the balls.
     bore_diameter, outer_diameter, width : float or None, [m]
@@ -66,6 +68,7 @@ class BearingGeometry:
     density: float = STEEL_DENSITY
     ball_young_modulus: float | None = None
     ball_poisson_ratio: float | None = None
+    ring_density: float = STEEL_DENSITY
     thermal_expansion: float = STEEL_EXPANSION
     ball_thermal_expansion: float = STEEL_EXPANSION
     bore_diameter: float | None = None
@@ -146,8 +149,8 @@ def bearing_faults(geometry: BearingGeometry) -> list[tuple[str, str, str]]:
     faults: list[tuple[str, str, str]] = []
     for key in (
         "ball_diameter", "pitch_diameter", "groove_curvature_inner", "groove_curvature_outer",
-        "young_modulus", "density", "ball_young_modulus", "bore_diameter", "outer_diameter", "width",
-        "static_load_rating",
+        "young_modulus", "density", "ring_density", "ball_young_modulus", "bore_diameter", "outer_diameter",
+        "width", "static_load_rating",
     ):  # fmt: skip
         value = getattr(geometry, key)
         if value is not None and not (math.isfinite(value) and value > 0.0):

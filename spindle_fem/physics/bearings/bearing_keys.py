@@ -54,6 +54,7 @@ GEOMETRY: dict[str, Reader] = {
     "young_modulus": _PRESSURE,
     "poisson_ratio": _NUMBER,
     "density": _quantity("kg/m**3"),
+    "ring_density": _quantity("kg/m**3"),
     "ball_young_modulus": _PRESSURE,
     "ball_poisson_ratio": _NUMBER,
     "bore_diameter": _LENGTH,

@@ -243,4 +243,4 @@ def rotation_growth(geometry: BearingGeometry, speed: float, shaft_bore: float |
         )
     ratio = geometry.poisson_ratio
     shape = (1.0 - ratio) * outside**2 + (3.0 + ratio) * inside**2
-    return geometry.density * speed**2 * outside / (4.0 * geometry.young_modulus) * shape
+    return geometry.ring_density * speed**2 * outside / (4.0 * geometry.young_modulus) * shape
