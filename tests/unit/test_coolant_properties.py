@@ -121,7 +121,7 @@ def test_user_coolant_that_cannot_be(changes, message):
 
 
 def test_names():
-    assert tuple(COOLANTS) == ("iso_vg_32", "water")
+    assert {"iso_vg_32", "water"} <= set(COOLANTS)
     assert coolant_by_name("water").name == "water"
     with pytest.raises(OutOfValidityError, match='Did you mean "iso_vg_32"'):
-        coolant_by_name("iso_vg_46")
+        coolant_by_name("iso_vg_3")

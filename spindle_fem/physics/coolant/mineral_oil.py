@@ -1,4 +1,4 @@
-"""Mineral hydraulic oil of an ISO viscosity grade: everything else follows from two viscosities and the density."""
+"""Mineral hydraulic oil of an ISO viscosity grade: all follows from two viscosities and the density."""
 
 from __future__ import annotations
 
