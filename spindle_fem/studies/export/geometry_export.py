@@ -185,6 +185,12 @@ def require_exportable(spec: MachineSpec) -> None:
     ------
     SpecError
     """
+    if spec.source:
+        raise SpecError(
+            f"source.{spec.source[0].name}",
+            "exported models take no heat beside friction.",
+            "Export the machine without its [[source]] tables.",
+        )
     if spec.coolant is not None and spec.coolant.properties_at == "bulk":
         raise SpecError(
             "coolant.properties_at",
