@@ -102,7 +102,7 @@ class FilmHeat(OneInstant, Term):
         """Conductances between balls and raceways at a speed and thrust, over the constant ones."""
         found = self.friction_map.nominal_conductance(point.speed, point.thrust) / self._conductance[:, None]
         return {
-            f"balls.{self.bearings[row]}.{side}": float(found[row, column])
+            f"balls.{self.friction_map.bearings[row]}.{side}": float(found[row, column])
             for row in self.follow
             for column, side in enumerate(("inner", "outer"))
         }
