@@ -55,7 +55,8 @@ def _lines() -> list[str]:
     lines += ["", "### What inputs drive", "", "| `drives` | what it is | unit |", "|---|---|---|"]
     lines += [f"| `{name}` | {DRIVES[name][0]} | {DRIVES[name][1]} |" for name in DRIVES_UNITS]
     lines += [
-        "| `heat.NAME` | heat of the machine's source of that name | `W`, `kW` |",
+        "| `heat.NAME` | heat of the `[[source]]` of that name | `W`, `kW` |",
+        "| of a `[[source]]` | what its `input` names | any that its gain is made for |",
         "| of a `[network]` | the name that a boundary's `temperature` or a source's `input` gives | "
         "a temperature; any that gain and exponent are made for |",
     ]

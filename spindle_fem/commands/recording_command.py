@@ -99,7 +99,9 @@ def machine_names(machine: str | Path) -> MachineNames:
 
     if not is_network_machine(read_definition(find_machine(machine))):
         spec = load_buildable(machine, ())
-        heat = {f"heat.{source.name}": "W" for source in getattr(spec, "source", ())}
+        heat = {f"heat.{source.name}": "W" for source in spec.source}
+        # without a gain the input is the heat itself
+        heat |= {source.input: "W" if source.gain is None else "" for source in spec.source if source.input}
         return MachineNames(
             tuple(probe.name for probe in spec.probe),
             tuple(sensor.name for sensor in spec.displacement_sensor),

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from spindle_fem.commands.recording_command import machine_names
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.column_roles import MachineNames, guess_channel
@@ -184,3 +185,14 @@ def test_names_that_differ_in_signs_only_stay_apart(tmp_path):
     drafted = draft(tmp_path, 'time_s,SP01,"SP01,",time [K]\n' + rows)
     assert list(drafted.data.columns) == ["time", "SP01", "SP01_2", "time_2"]
     assert drafted.data["SP01_2"].iloc[0] == 40.0
+
+
+def test_recorded_quantities_of_heat_sources_are_inputs(tmp_path):
+    machine = tmp_path / "motor.toml"
+    machine.write_text(
+        'base = "small_two_start"\n[[source]]\nname = "rotor"\npart = "shaft"\ninput = "motor_power"\n'
+    )
+    names = machine_names(machine)
+    assert names.inputs["motor_power"] == names.inputs["heat.rotor"] == "W"
+    guess = guess_channel("motor power", "kW", 1.0 + np.arange(12) % 2, names, set())
+    assert (guess.channel.drives, guess.channel.unit) == ("motor_power", "kW")
