@@ -159,11 +159,12 @@ def diagnose_recordings(
     found = run_search(search)
     clock.lap("search")
     progress("diagnosis: final fits")
-    best = rank(found)[0].best
+    coarseness = tuned.NETWORK_COARSENESS if machine.is_network else 1.0
+    best = rank(found, coarseness)[0].best
     slow = slow_error_of(problem, best.fit)
     trials = len({(c.effect, c.component) for c in candidates})
     empty = next(h for h in found if not h.fit.candidates)
-    wrong = wrong_direction(problem.belief, empty.fit, directions, trials)
+    wrong = wrong_direction(problem.belief, empty.fit, directions, trials, coarseness)
     if wrong is not None and wrong.log_gain > max(0.0, best.score - empty.score):
         belief = wrong.belief
         problem = Problem(small, belief, slow, small.observations)
@@ -179,7 +180,7 @@ def diagnose_recordings(
     final = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
     unseen = machine.unseen[: len(recordings)]
-    refitted = _refit(final, found, workers, overlapping, _Readings(final, final, unseen))
+    refitted = _refit(final, found, workers, overlapping, _Readings(final, final, unseen), coarseness)
     # Nothing missing is the likelier of what directions do about its own run and about that of the set.
     plain = Problem(unchanged, belief, slow, predictor.observations)
     own = plain.fit((), empty.fit.values)
@@ -199,6 +200,7 @@ def diagnose_recordings(
         apart=readings.apart,
         left=readings.left,
         beyond=readings.beyond,
+        coarseness=coarseness,
     )
     null = next(h.fit for h in refitted if not h.fit.candidates)
     judgement = with_wrong_definition(judgement, null, wrong)
@@ -351,9 +353,10 @@ def _refit(
     workers: Workers,
     overlapping: Mapping[str, frozenset[str]],
     readings: _Readings,
+    coarseness: float,
 ) -> list[Hypothesis]:
     """The most probable hypotheses, what reads nearly as the first, and the empty one, on the whole basis."""
-    score = {id(h): value for h, value in zip(found, tempered(found), strict=True)}
+    score = {id(h): value for h, value in zip(found, tempered(found, coarseness), strict=True)}
     ranked = sorted(found, key=lambda h: -score[id(h)])
     best = score[id(ranked[0])]
     chosen = [

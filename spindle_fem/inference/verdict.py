@@ -78,10 +78,13 @@ class Judgement:
     gain_of_more: float = 0.0
 
 
-def rank(hypotheses: Sequence[Hypothesis]) -> list[Ranked]:
-    """Probabilities of sets of effects at places, forms added up, the most probable first."""
+def rank(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[Ranked]:
+    """Probabilities of sets of effects at places, forms added up, the most probable first.
+
+    ``coarseness`` as :func:`tempered` has it.
+    """
     groups: dict[frozenset, list[tuple[float, Hypothesis]]] = {}
-    for item, score in zip(hypotheses, tempered(hypotheses), strict=True):
+    for item, score in zip(hypotheses, tempered(hypotheses, coarseness), strict=True):
         groups.setdefault(item.keys, []).append((score, item))
     highest = max(score for group in groups.values() for score, _ in group)
     weights = {
@@ -94,7 +97,7 @@ def rank(hypotheses: Sequence[Hypothesis]) -> list[Ranked]:
     return sorted(found, key=lambda item: -item.probability)
 
 
-def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
+def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[float]:
     """Logarithm of prior, complexity and likelihood over nothing missing, the last as far as it counts.
 
     Complexity (the determinants of Laplace's evidence) counts in full, with
@@ -104,6 +107,8 @@ def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
     ----------
     hypotheses : sequence of Hypothesis
         The empty one among them.
+    coarseness : float
+        How many times less a gain counts between sizes than on a machine that is drawn.
     """
     null = next(h for h in hypotheses if not h.fit.candidates)
     gains = [0.5 * (1.0 - h.course_share) * (null.misfit - h.misfit) for h in hypotheses]
@@ -124,7 +129,8 @@ def tempered(hypotheses: Sequence[Hypothesis]) -> list[float]:
         if size not in best or scores[index] > scores[best[size]]:
             best[size] = index
     less = {
-        size: counted(gains[index]) / tuned.GAIN_DIVISOR - gains[index] / tuned.GAIN_DIVISOR_IN_A_SIZE
+        size: counted(gains[index]) / (coarseness * tuned.GAIN_DIVISOR)
+        - gains[index] / tuned.GAIN_DIVISOR_IN_A_SIZE
         for size, index in best.items()
     }
     return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]
@@ -157,7 +163,7 @@ def counted(gain: float) -> float:
     return float(tuned.INEXACT_BEYOND * np.log1p(inside / tuned.INEXACT_BEYOND) + beyond + min(gain, 0.0))
 
 
-def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
+def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness: float = 1.0) -> float:
     """Probability that some set of effects would improve a consistent recording as much.
 
     Wilks' theorem for each set with its free parameters; the lowest level is
@@ -172,6 +178,8 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
         The empty one among them.
     trials : int
         Candidates that were tried.
+    coarseness : float
+        As :func:`tempered` has it.
     """
     null = next(h for h in hypotheses if not h.fit.candidates)
     lowest = 0.0
@@ -185,7 +193,7 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int) -> float:
             lowest = min(lowest, float(chi2.logsf(gain, freedom)) + chosen_among)
     if lowest == 0.0:
         return 1.0
-    single = min(float(np.exp(lowest / tuned.CHANCE_DIVISOR)), 1.0 - 1e-16)
+    single = min(float(np.exp(lowest / (coarseness * tuned.CHANCE_DIVISOR))), 1.0 - 1e-16)
     return float(-np.expm1((1.0 + trials / tuned.CANDIDATES_A_TRIAL) * np.log1p(-single)))
 
 
@@ -225,6 +233,7 @@ def judge(
     apart: Callable[[Fit, Fit], float] = lambda one, other: np.inf,
     left: Callable[[Fit], float] = lambda fit: 1.0,
     beyond: Callable[[Fit], float] = lambda fit: 1.0,
+    coarseness: float = 1.0,
 ) -> Judgement:
     """Conclude from fitted hypotheses.
 
@@ -245,9 +254,11 @@ def judge(
     beyond : callable, optional
         Likewise of readings that no fit has seen: a set that leaves more there than where it
         was fitted is not the whole truth.
+    coarseness : float
+        As :func:`tempered` has it.
     """
-    ranked = rank(hypotheses)
-    p_value = detection_p_value(hypotheses, trials)
+    ranked = rank(hypotheses, coarseness)
+    p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:

@@ -42,7 +42,7 @@ class WrongDirection:
 
 
 def wrong_direction(
-    belief: Belief, null: Fit, directions: Sequence[Misdescription], trials: int
+    belief: Belief, null: Fit, directions: Sequence[Misdescription], trials: int, coarseness: float = 1.0
 ) -> WrongDirection | None:
     """The direction whose prior had best be given up; None where there are no directions.
 
@@ -69,9 +69,9 @@ def wrong_direction(
     left = np.maximum(left, 0.0)
     misfit = pull**2 / (left + WIDER**-2)
     prior = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(len(owned) + trials)
-    gains = 0.5 * misfit / tuned.GAIN_DIVISOR - 0.5 * np.log1p(WIDER**2 * left) + prior
+    gains = 0.5 * misfit / (coarseness * tuned.GAIN_DIVISOR) - 0.5 * np.log1p(WIDER**2 * left) + prior
     best = int(np.argmax(gains))
-    level = float(chi2.sf(misfit[best] / tuned.CHANCE_DIVISOR, 1))
+    level = float(chi2.sf(misfit[best] / (coarseness * tuned.CHANCE_DIVISOR), 1))
     p_value = float(-np.expm1(len(owned) * np.log1p(-min(level, 1.0 - 1e-16))))
     return WrongDirection(owned[best], without_prior(belief, rows[best]), float(gains[best]), p_value)
 
