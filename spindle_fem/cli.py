@@ -143,7 +143,9 @@ def heat(
 
 @app.command()
 def bearing(
-    file: Annotated[Path, typer.Argument(help="TOML with [bearing], [operation] and perhaps [lubricant].")],
+    file: Annotated[
+        Path, typer.Argument(help=r"TOML with \[bearing], \[operation] and perhaps \[lubricant].")
+    ],
     as_json: AsJson = False,
 ) -> None:
     """One bearing or one preloaded set, without a machine."""
@@ -172,7 +174,7 @@ def sweep(
         Path, typer.Argument(help="TOML with parameters, design and outputs, or one that ships.")
     ],
     output: Folder,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", help="Worker processes; 0 for one a core.")] = 1,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=0, help="Worker processes; 0 for one a core.")] = 1,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler instead.")
     ] = None,

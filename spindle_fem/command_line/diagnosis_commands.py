@@ -119,6 +119,8 @@ def _diagnose_folder(order: Any, recordings: Path, output: Path, jobs: str, as_j
     from spindle_fem.commands.diagnose_folder_command import diagnose_folder as diagnose_each
 
     own = jobs.lstrip("-").isdigit()
+    if own and int(jobs) < 0:
+        raise typer.BadParameter("Input should be greater than or equal to 0", param_hint="--jobs")
     with stages(not as_json) as tell:
         content = diagnose_each(
             order,

@@ -56,9 +56,10 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
             _number(bearing["lambda"], 1),
         )
     console.print(table)
-    probes = _table("Probes", *(["", *summary["probes"]]))
-    probes.add_row("°C", *(_number(value, 2) for value in summary["probes"].values()))
-    console.print(probes)
+    if summary["probes"]:
+        probes = _table("Probes", *(["", *summary["probes"]]))
+        probes.add_row("°C", *(_number(value, 2) for value in summary["probes"].values()))
+        console.print(probes)
     coolant = summary["coolant"]
     if coolant:
         film = coolant["film_coefficient_W_m2K"]
@@ -205,9 +206,11 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
 
 def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     """Verdict, findings, alternatives and the fit before and after."""
+    from spindle_fem.report.diagnosis_words import level
+
     console = _console()
     mismatch, fit = content["mismatch"], content["fit"]
-    console.print(f"[bold]{content['verdict']}[/bold]  (p = {mismatch['p_value']:.2g})")
+    console.print(f"[bold]{content['verdict']}[/bold]  (p {level(mismatch['p_value'])})")
     if content["reason"]:
         console.print(content["reason"])
     for finding in content["findings"]:

@@ -169,6 +169,7 @@ def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = 
         )
     spec = load_buildable(machine, overrides)
     assembly = build_assembly(spec)
+    file.parent.mkdir(parents=True, exist_ok=True)
     if file.suffix == ".step":
         from spindle_fem.machine.geometry.step_file import export_step
 

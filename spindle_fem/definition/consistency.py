@@ -174,9 +174,12 @@ def _materials(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemErro
             if getattr(kind, key) not in materials:
                 yield _unknown(f"bearing_types.{name}.{key}", getattr(kind, key), "material", materials)
     # Steel's values, the defaults, are wrong by half for ceramics.
-    for name in sorted(
-        {t.ball_material for t in spec.bearing_types.values() if t.ball_material != t.ring_material}
-    ):
+    mixed = {
+        kind.ball_material
+        for kind in spec.bearing_types.values()
+        if kind.ball_material != kind.ring_material and kind.ring_material in materials
+    }
+    for name in sorted(mixed):
         balls = spec.materials.get(name)
         for key in ("young_modulus", "poisson_ratio", "thermal_expansion") if balls is not None else ():
             if key not in balls.model_fields_set:

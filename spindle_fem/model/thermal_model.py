@@ -131,6 +131,8 @@ class ThermalModel:
         """``Σ c_i K_i`` with the channel's film by cell [W/(m²·K)]; the coolant counts as given."""
         values = [coefficients[name] for name in self.coefficient_names]
         total = _weighted(self.operators, values, self.size)
+        if not len(self.cell_film):
+            return total
         return total + _weighted(self.cell_film, np.ravel(channel_film), self.size)
 
     def capacity(self, volumetric: Mapping[str, float]) -> Matrix:

@@ -138,7 +138,7 @@ def _read_parquet(data: Path, manifest: Manifest) -> pd.DataFrame:
 
 def _read_csv(data: Path, manifest: Manifest) -> tuple[pd.DataFrame, list[str], str, int, int, bool]:
     content = _bytes(data)
-    names, separator = names_of_header(content.partition(b"\n")[0].decode("utf-8").strip("\r"))
+    names, separator = names_of_header(content.partition(b"\n")[0].decode("utf-8"))
     require_columns(data, manifest, names)
     content, blank, short, truncated = _check_lines(data, content, separator, len(names))
     decimal = _decimal(content, separator, names, manifest)
@@ -174,14 +174,14 @@ def names_of_header(header: str) -> tuple[list[str], str]:
 
 
 def _bytes(data: Path) -> bytes:
-    """The decoded bytes of a text file, without byte-order mark."""
+    """The decoded bytes of a text file, without byte-order mark, its lines ended as on Unix."""
     try:
         content = data.read_bytes()
         if data.name.endswith(".gz"):
             content = gzip.decompress(content)
     except (OSError, EOFError, zlib.error) as error:
         raise RecordingError(str(data), f"cannot be read ({error}).") from error
-    content = content.removeprefix(b"\xef\xbb\xbf")
+    content = content.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if not content.strip():
         raise RecordingError(str(data), "is empty.")
     zero = content.find(b"\0")
@@ -200,14 +200,12 @@ def _bytes(data: Path) -> bytes:
 
 def _check_lines(data: Path, content: bytes, separator: str, expected: int) -> tuple[bytes, int, int, bool]:
     """Count cells of each line; pandas would shift or fill uneven lines in silence."""
-    ended = content.endswith((b"\n", b"\r"))
-    content = content.rstrip(b"\r\n") + b"\n"
+    ended = content.endswith(b"\n")
+    content = content.rstrip(b"\n") + b"\n"
     codes = np.frombuffer(content, dtype=np.uint8)
     ends = np.flatnonzero(codes == ord("\n"))
     starts = np.concatenate([[0], ends[:-1] + 1])
-    lengths = ends - starts
-    carriage = codes[np.maximum(ends - 1, 0)] == ord("\r")
-    blank = (lengths - carriage) <= 0
+    blank = ends == starts
     if b'"' in content:
         cells = _quoted_cells(data, content, separator, ends.size)
     else:
@@ -244,7 +242,10 @@ def _decimal(content: bytes, separator: str, names: list[str], manifest: Manifes
         io.StringIO(content[: None if end < 0 else end].decode("utf-8")), delimiter=separator, strict=False
     )
     columns = [names.index(channel.column) for channel in manifest.channel]
-    cells = [[row[at].strip() for at in columns] for row in rows if len(row) == len(names)]
+    try:
+        cells = [[row[at].strip() for at in columns] for row in rows if len(row) == len(names)]
+    except csv.Error as error:  # a cell beyond the reader's limit
+        raise RecordingError(f"{manifest.data}: line {rows.line_num}", f"cannot be read ({error}).") from error
     sign, doubt = decimal_sign(pd.DataFrame(cells[1:], columns=columns, dtype=object))
     # where commas part cells, "1,234" is as well a thousand: such cells are refused, not guessed at
     return "." if doubt and separator == "," else sign

@@ -187,7 +187,7 @@ def confidence_words(content: Mapping[str, Any]) -> list[str]:
     mismatch, fit = content["mismatch"], content["fit"]
     found = [
         f"If nothing were missing, a difference as large would have the probability "
-        f"p = {significant(mismatch['p_value'], 2)}.",
+        f"p {level(mismatch['p_value'])}.",
         f"Held out, never seen by the fit: {fit['heldout']}.",
     ]
     if content.get("candidates_tried"):

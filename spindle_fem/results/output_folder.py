@@ -13,16 +13,14 @@ from spindle_fem.errors import BadInputError
 from spindle_fem.results.run_log import logged_in
 
 MARKER = "INCOMPLETE"
-# What commands of this program write; anything else in a folder is the user's.
+# What only commands of this program write: pages and figures may be anybody's, the rest is the user's.
 _OWN = frozenset(
     {
         MARKER,
         "summary.json",
         "fields.vtu",
         "result.nc",
-        "report.html",
         "machine.toml",
-        "figures",
         "crosscheck.json",
         "results.csv",
         "simulation.json",

@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 import pytest
 
-from spindle_fem.cache import CACHE_VARIABLE, _module_file, cache_directory, source_digest
+from spindle_fem.cache import CACHE_VARIABLE, _module_file, _package_digest, cache_directory, source_digest
 from spindle_fem.errors import BadInputError, MeshTagError
 from spindle_fem.machine.geometry.assembly import assemble
 from spindle_fem.machine.geometry.part_shapes import AnnularSegment, PartGeometry
@@ -69,7 +69,7 @@ def test_a_key_follows_the_source_and_what_it_imports(tmp_path, monkeypatch):
     monkeypatch.setattr("spindle_fem.cache._IMPORT", re.compile(r"^\s*from (lathe[\w.]*) import (.*)", re.M))
 
     def digest(name):
-        source_digest.cache_clear()
+        _package_digest.cache_clear()
         _module_file.cache_clear()
         return source_digest(name)
 
@@ -82,7 +82,7 @@ def test_a_key_follows_the_source_and_what_it_imports(tmp_path, monkeypatch):
     with pytest.raises(FileNotFoundError):
         digest("lathe.missing")
     monkeypatch.undo()
-    source_digest.cache_clear()
+    _package_digest.cache_clear()
     _module_file.cache_clear()
 
 

@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -131,6 +131,7 @@ SCRAPS = [
 @given(
     st.lists(st.tuples(st.integers(0, len(PLAIN)), st.integers(0, 8), st.sampled_from(SCRAPS)), max_size=4)
 )
+@example([(0, 0, b"\r")])
 def test_damaged_files_are_read_or_refused_but_never_crash(damages):
     content = PLAIN.encode()
     for at, length, scrap in damages:

@@ -1,5 +1,7 @@
 """A machine with geometry as a state space, on a spindle of one unknown per part; what it refuses."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.friction_map import tabulate_friction
 from spindle_fem.studies.export.exported_files import file_writer
-from spindle_fem.studies.export.geometry_export import geometry_state_space
+from spindle_fem.studies.export.geometry_export import geometry_state_space, require_exportable
 from spindle_fem.studies.export.interpolation_axes import refined_axis
 from spindle_fem.studies.export.portable_model import PortableModel
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -94,6 +96,11 @@ def test_files_hold_it_all(space, tmp_path):
 def test_refuses_films_that_follow_the_wall_before_it_makes_a_model(tmp_path):
     with pytest.raises(SpecError, match="properties_at=inlet"):
         export_machine("wu_tan_2016", tmp_path / "m.npz")
+
+
+def test_refuses_sources_that_it_would_leave_out(spec):
+    with pytest.raises(SpecError, match=r"source.motor"):
+        require_exportable(spec.model_copy(update={"source": (SimpleNamespace(name="motor"),)}))
 
 
 def agrees(fast, drive):

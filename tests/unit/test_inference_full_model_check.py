@@ -28,7 +28,6 @@ from spindle_fem.parallel import WorkerPool
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.report.diagnosis_full_model import full_model_sections
 from spindle_fem.solvers.input_history import OperatingHistory
-from spindle_fem.solvers.mesh_terms import inputs_of
 from tests.support.lumped_spindle import lumped_model
 
 MANIFEST = """
@@ -298,7 +297,7 @@ def test_a_covariate_reaches_the_full_model_where_a_term_follows_it(predictor):
     assert inputs_of_drive(beside).names == drive.names
     history = OperatingHistory.of(predictor.fast.spec, inputs)
     middle = 0.5 * (drive.grid[5] + drive.grid[6])
-    seen = inputs_of(history.at(middle))
+    seen = history.at(middle).inputs
     assert seen["covariate.load"] == pytest.approx(load[5, 0])
     assert seen["speed"] == history.at(middle).speed
     assert history.given_heat() == ()

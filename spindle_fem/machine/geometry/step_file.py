@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,8 +48,23 @@ def export_step(assembly: AssemblyGeometry, path: str | Path) -> Path:
         geometry.synchronize()
         for tag, name in names.items():
             gmsh.model.setEntityName(3, tag, name)
-        gmsh.write(str(path))
+        with _quiet_writer():
+            gmsh.write(str(path))
     return path
+
+
+@contextmanager
+def _quiet_writer() -> Iterator[None]:
+    """OpenCASCADE reports on the process's own standard output, past gmsh's options and Python's stream."""
+    sys.stdout.flush()
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def _in_millimetres(assembly: AssemblyGeometry) -> AssemblyGeometry:

@@ -368,7 +368,9 @@ def solve_bordered(
 
 
 def _solve_rings(tangent: FloatArray, right: FloatArray) -> FloatArray:
-    """Displacement step; the shortest one where the rings can move without force."""
+    """Displacement step; the shortest one where the rings can move without force, NaN if there is none."""
+    if not (np.isfinite(tangent).all() and np.isfinite(right).all()):
+        return np.full_like(right, np.nan)
     try:
         step = np.linalg.solve(tangent, right)
     except np.linalg.LinAlgError:

@@ -365,10 +365,10 @@ def _continue_in_speed(
                 if solver.control == "equilibrium"
                 else "no ball position balances the forces"
             )
-            onset = f"from about {rpm * target:.0f} rpm on"
+            onset = f" from about {rpm * target:.0f} rpm on" if reached > 0.0 else ""
             raise NoEquilibriumError(
                 where,
-                f"no quasi-static equilibrium at {rpm:.0f} rpm: {cause} {onset}.",
+                f"no quasi-static equilibrium at {rpm:.0f} rpm: {cause}{onset}.",
                 "Raise preload or axial load, or lower the speed.",
             )
     return attempt
