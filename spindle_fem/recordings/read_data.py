@@ -245,7 +245,9 @@ def _decimal(content: bytes, separator: str, names: list[str], manifest: Manifes
     try:
         cells = [[row[at].strip() for at in columns] for row in rows if len(row) == len(names)]
     except csv.Error as error:  # a cell beyond the reader's limit
-        raise RecordingError(f"{manifest.data}: line {rows.line_num}", f"cannot be read ({error}).") from error
+        raise RecordingError(
+            f"{manifest.data}: line {rows.line_num}", f"cannot be read ({error})."
+        ) from error
     sign, doubt = decimal_sign(pd.DataFrame(cells[1:], columns=columns, dtype=object))
     # where commas part cells, "1,234" is as well a thousand: such cells are refused, not guessed at
     return "." if doubt and separator == "," else sign
