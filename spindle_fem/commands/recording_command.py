@@ -106,6 +106,7 @@ def machine_names(machine: str | Path) -> MachineNames:
             tuple(probe.name for probe in spec.probe),
             tuple(sensor.name for sensor in spec.displacement_sensor),
             {**DRIVES_UNITS, **heat},
+            tuple(probe.name for probe in spec.probe if probe.kind == "coolant_outlet"),
         )
     tables = load_network(machine, ()).network
     inputs = {item.temperature: "K" for item in tables.boundary if isinstance(item.temperature, str)}

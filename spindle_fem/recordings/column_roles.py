@@ -21,6 +21,7 @@ WORDS = {
     "speed": ("speed", "drehzahl", "rpm", "vitesse", "n"),
     "thrust": ("thrust", "axialkraft", "axialforce", "vorspannkraft"),
 }
+_OUTLET_WORDS = ("outlet", "rücklauf", "auslauf", "austritt", "return", "coolant out", "oil out", "öl aus")
 _TEMPERATURE_WORDS = ("temp", "temperatur", "temperature", "tc", "pt100", "thermo", "therm")
 # Units that names without one usually mean, of quantities that a network is free to take in any unit.
 _USUAL_UNITS = {
@@ -48,11 +49,14 @@ class MachineNames:
         Probes or network nodes; displacement sensors.
     inputs : dict of str to str
         What may be driven, with its SI unit; empty where any unit will do.
+    outlets : tuple of str
+        Probes that read the coolant where it leaves.
     """
 
     probes: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
     inputs: dict[str, str] | None = None
+    outlets: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +105,10 @@ def guess_channel(
         return GuessedChannel(Channel(column=name, role="covariate", unit=unit or None), why)
     if warm and not unit:
         doubt = doubt or "no unit is stated: taken as °C"
+    if len(machine.outlets) == 1 and machine.outlets[0] not in taken and _says(name, _OUTLET_WORDS):
+        return _read(
+            name, unit, machine.outlets[0], "the coolant's outlet by its name", doubt, machine, taken
+        )
     if not named:
         doubt = "; ".join(filter(None, [doubt, "no machine given: probe named after the column"]))
         return _read(name, unit, name, "a temperature", doubt, machine, taken)

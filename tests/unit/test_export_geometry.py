@@ -1,19 +1,20 @@
 """A machine with geometry as a state space, on a spindle of one unknown per part; what it refuses."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from spindle_fem.commands.export_command import export_machine
 from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.machine_spec import HeatSource
 from spindle_fem.errors import BadInputError, SpecError
 from spindle_fem.model.reduced.film_heat import FilmHeat, tabulated_machine
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.friction_map import tabulate_friction
 from spindle_fem.studies.export.exported_files import file_writer
-from spindle_fem.studies.export.geometry_export import geometry_state_space, require_exportable
+from spindle_fem.studies.export.geometry_export import geometry_state_space
 from spindle_fem.studies.export.interpolation_axes import refined_axis
 from spindle_fem.studies.export.portable_model import PortableModel
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -98,11 +99,6 @@ def test_refuses_films_that_follow_the_wall_before_it_makes_a_model(tmp_path):
         export_machine("wu_tan_2016", tmp_path / "m.npz")
 
 
-def test_refuses_sources_that_it_would_leave_out(spec):
-    with pytest.raises(SpecError, match=r"source.motor"):
-        require_exportable(spec.model_copy(update={"source": (SimpleNamespace(name="motor"),)}))
-
-
 def agrees(fast, drive):
     """Whether an exported model's readings along a drive are those of simulate; the model."""
     told = simulate_fast(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
@@ -123,6 +119,58 @@ def test_natural_films_follow_their_walls(fast, drive, tmp_path):
     with pytest.raises(BadInputError, match="C form"):
         file_writer(path)(geometry_state_space(natural, "lumped", 4500.0 * RPM), path)
     assert not path.exists()
+
+
+def with_sources(fast, *sources):
+    changed = fast.spec.model_copy(update={"source": tuple(HeatSource(**source) for source in sources)})
+    return fast_spindle(fast.model, changed)
+
+
+def with_input(drive, name, values):
+    """A drive with one more input, (G,), held over each step."""
+    start, end = (np.column_stack((old, values)) for old in (drive.start, drive.end))
+    return replace(drive, names=(*drive.names, name), start=start, end=end)
+
+
+@needs_compiler
+def test_sources_are_inputs_or_tables(fast, drive, tmp_path):
+    table = {
+        "speed": ["0 rpm", "2000 rpm", "8000 rpm"],
+        "thrust": ["1200 N", "1500 N"],
+        "heat": ["10 W", "90 W", "80 W", "0 W", "50 W", "90 W"],
+    }
+    heated = with_sources(
+        fast,
+        {"name": "rotor", "part": "shaft", "input": "motor_power", "gain": "0.1 W/W", "heat": "12 W"},
+        {"name": "seal", "part": "housing", "heat": "20 W"},
+        {"name": "belt", "part": "shaft", "heat": table},
+    )
+    power = with_input(drive, "motor_power", np.linspace(400.0, 900.0, drive.steps.size))
+    model = geometry_state_space(heated, "lumped", 4500.0 * RPM).model()
+    told = simulate_fast(heated, power, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+    named = {item["name"]: (item["unit"], item["default"]) for item in model.header["inputs"]}
+    assert (named["motor_power"], named["heat.seal"]) == (("W", pytest.approx(120.0)), ("W", 20.0))
+    every = with_input(power, "heat.seal", np.full(drive.steps.size, 20.0))
+    found = readings_along(model, every, {0: START})
+    assert np.abs(found - told).max() < AGREEMENT
+    space, path = geometry_state_space(heated, "lumped", 4500.0 * RPM), tmp_path / "model.c"
+    file_writer(path)(space, path)
+    in_c = c_readings_along(tmp_path, "lumped", space.model(), every, START)
+    np.testing.assert_allclose(in_c, found, rtol=0.0, atol=1e-9)
+
+
+def test_a_source_without_its_quantity_gives_what_the_definition_says(fast, drive):
+    source = {"name": "rotor", "part": "shaft", "input": "motor_power", "gain": "0.1 W/W", "heat": "12 W"}
+    heated = with_sources(fast, source, {**source, "name": "stator", "heat": None})
+    model = geometry_state_space(heated, "lumped", 4500.0 * RPM).model()
+    assert model.inputs.count("motor_power") == 1
+    loads = dict(
+        zip([load["name"] for load in model.header["loads"]], model.loads(model.vector({})), strict=True)
+    )
+    assert (loads["source.rotor"], loads["source.stator"]) == pytest.approx((12.0, 12.0))
+    alone = with_sources(fast, {**source, "heat": {"speed": ["0 rpm", "1 rpm"], "heat": ["0 W", "1 W"]}})
+    (note,) = geometry_state_space(alone, "lumped", 4500.0 * RPM).header["notes"]
+    assert "its table" in note
 
 
 @pytest.mark.slow

@@ -17,7 +17,6 @@ from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
 from spindle_fem.studies.crosscheck.axisymmetric import solve_axisymmetric
-from spindle_fem.studies.export.geometry_export import require_exportable
 from spindle_fem.studies.solve_machine import solve
 from tests.support.lumped_spindle import drive_of, lumped_model
 
@@ -151,8 +150,3 @@ def test_the_full_model_knows_the_inputs_that_sources_follow(tmp_path) -> None:
     assert source_heat(spec.source[0], history.at(0.5).inputs) == 1.0
     with pytest.raises(BadInputError, match="motor_power"):
         OperatingHistory.of(load_machine("small_two_start"), inputs)
-
-
-def test_an_export_does_not_leave_a_source_out_silently(tmp_path) -> None:
-    with pytest.raises(BadInputError, match=r"source\.seal.*without its \[\[source\]\]"):
-        require_exportable(machine(tmp_path, SEAL))

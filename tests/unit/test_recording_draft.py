@@ -163,6 +163,18 @@ def test_names_stand_within_columns(column, means):
     assert (channel.probe or channel.drives) == means
 
 
+@pytest.mark.parametrize(
+    ("column", "probe"),
+    [("Kühlmittel Rücklauf", "COOLANT_OUT"), ("oil outlet", "COOLANT_OUT"), ("Rest", None)],
+)
+def test_the_outlet_is_told_by_its_name(column, probe):
+    names = machine_names("recorded_spindle")
+    taken: set[str] = set()
+    guess = guess_channel(column, "degC", WARM, names, taken)
+    assert (guess.channel.probe, guess.unsure == "") == (probe, probe is not None)
+    assert guess_channel("Rücklauf 2", "degC", WARM, names, taken | {"COOLANT_OUT"}).channel.probe is None
+
+
 @pytest.mark.parametrize(("source", "unit"), [("x_load", "percent"), ("main_speed", "rpm"), ("pump", "W")])
 def test_units_of_network_inputs_by_their_names(source, unit):
     machine = MachineNames(("SP01",), (), {source: ""})

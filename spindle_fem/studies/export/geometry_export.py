@@ -16,6 +16,7 @@ from spindle_fem.model.reduced.coolant_maps import CoolantMaps, coolant_maps
 from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.source_terms import SOURCE_PREFIX
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.standard_inputs import standard_inputs
 from spindle_fem.studies.export.feedback_export import (
@@ -25,6 +26,7 @@ from spindle_fem.studies.export.feedback_export import (
     film_heat_of,
 )
 from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
+from spindle_fem.studies.export.source_export import source_loads
 from spindle_fem.studies.export.state_space import (
     CELSIUS,
     TR_BDF2,
@@ -96,27 +98,36 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
     nominal = OperatingPoint.of(spec)
     film_heat = film_heat_of(fast)
     inputs = _inputs(fast, highest_speed)
+    sources = source_loads(spec, inputs)
+    inputs += sources.inputs
     position = {item.name: number for number, item in enumerate(inputs)}
     tables = {"speed": _speed_table(fast, nominal, highest_speed)}
     if fast.channel is not None:
         tables["coolant"] = _coolant_table(fast, nominal)
     tables = {key: table for key, table in tables.items() if table.values.shape[-1]}
-    # Loads that are inputs or constants come first, those of a heat table behind.
+    # Loads that are inputs or constants come first, those of tables behind.
     n_heat, n_load = len(fast.heat_places), len(fast.load_names)
     by_table = film_heat is None or not film_heat.bearings
-    order = [*range(n_heat, n_load), n_load, *(range(n_heat) if by_table else ())]
+    heats = range(n_heat) if by_table else ()
+    own = range(n_load, n_load + 1 + len(sources.powers) + len(sources.tables))
+    order = [*range(n_heat, n_load), *own[: 1 + len(sources.powers)], *heats, *own[1 + len(sources.powers) :]]
     powers = [_fluid_load(fast, load, position) for load in fast.load_names[n_heat:]]
-    powers.append(PowerLoad(CONSTANT, "1", -1))
+    powers += [PowerLoad(CONSTANT, "1", -1), *sources.powers]
     loads = {load.name: load.unit for load in powers}
     if by_table:
         loads |= {f"heat.{place}": "W" for place in fast.heat_places}
+    loads |= {table.load: "W" for table in sources.tables}
+    places = [*sources.places, *(table.place for table in sources.tables)]
+    # The constant load drives nothing by itself.
+    warmed = np.array([np.zeros(fast.model.size), *(fast.model.place(place) for place in places)]).T
     operators = fast.operators(nominal, {}, changes=_changes(fast, nominal))
     storage = fast.storage({})
     modes = modal_basis(storage, 0.5 * (operators.conduction + operators.conduction.T))
 
     def arrays_of(conduction: Array, load: Array, output: Array, feedthrough: Array) -> dict[str, Array]:
-        # The constant load drives nothing by itself.
-        load, feedthrough = (np.pad(m, (*[(0, 0)] * (m.ndim - 1), (0, 1))) for m in (load, feedthrough))
+        load, feedthrough = (
+            np.pad(m, (*[(0, 0)] * (m.ndim - 1), (0, len(own)))) for m in (load, feedthrough)
+        )
         found = (
             modes.T @ conduction @ modes,
             modes.T @ load[..., order],
@@ -127,10 +138,14 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
 
     arrays = power_load_arrays(powers)
     arrays |= arrays_of(operators.conduction, operators.loads, operators.outputs, operators.output_inputs)
+    arrays["load"][:, [load.startswith(SOURCE_PREFIX) or load == CONSTANT for load in loads]] = (
+        modes.T @ warmed
+    )
     arrays["uniform"] = modes.T @ storage @ fast.model.one
     sensors = {item.name for item in spec.displacement_sensor}
     outputs = {channel: "um" if channel in sensors else CELSIUS for channel in fast.channels}
     header = header_of(name, TR_BDF2, LARGEST_STEP, inputs, outputs, loads)
+    header["notes"] += sources.notes
 
     def add_table(key: str, kind: str, axes: tuple[Array, ...], numbers: list[int], values: Array) -> None:
         header[kind].append(key)
@@ -141,6 +156,10 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
     if by_table:
         heat_inputs, heat_axes, heat = _heat_table(fast, inputs)
         add_table("heat", "load_tables", heat_axes, [position[item] for item in heat_inputs], heat)
+    for table in sources.tables:
+        add_table(
+            table.key, "load_tables", table.axes, [position[item] for item in table.inputs], table.values
+        )
     for key, table in tables.items():
         parts = arrays_of(*(table.parts[part] for part in PARTS))
         arrays |= {f"{key}.{part}": value for part, value in parts.items()}
@@ -185,12 +204,6 @@ def require_exportable(spec: MachineSpec) -> None:
     ------
     SpecError
     """
-    if spec.source:
-        raise SpecError(
-            f"source.{spec.source[0].name}",
-            "exported models take no heat beside friction.",
-            "Export the machine without its [[source]] tables.",
-        )
     if spec.coolant is not None and spec.coolant.properties_at == "bulk":
         raise SpecError(
             "coolant.properties_at",

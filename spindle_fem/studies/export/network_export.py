@@ -107,16 +107,16 @@ def _source_input(network: ThermalNetwork, name: str) -> ModelInput:
     """Input that only sources follow: its unit is what makes their gain a heat."""
     followed = [number for number, driven in enumerate(network.source_input) if driven == name]
     gain, exponent = network.source_gain_unit[followed[0]], float(network.source_exponent[followed[0]])
-    unit = _unit_of(gain, exponent)
+    unit = unit_of_input(gain, exponent)
     whole = all(float(network.source_exponent[number]).is_integer() for number in followed)
     turning = unit == "rad/s"
     return ModelInput(name, unit or "1", 0.0, None if whole and not turning else 0.0, magnitude=turning)
 
 
-def _unit_of(gain_unit: str, exponent: float) -> str:
-    """SI unit of an input whose power times a gain is a heat.
+def unit_of_input(gain_unit: str, exponent: float) -> str:
+    """SI unit of an input whose power times a gain is a heat; empty for a pure number.
 
-    >>> _unit_of("W/(rad/s)**1.5", 1.5)
+    >>> unit_of_input("W/(rad/s)**1.5", 1.5)
     'rad/s'
     """
     units = registry()
