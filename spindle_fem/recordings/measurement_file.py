@@ -9,7 +9,7 @@ import io
 import itertools
 import re
 import zlib
-from collections.abc import Container
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -24,12 +24,18 @@ TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".asc", ".dat")
 EXCEL_SUFFIXES = (".xlsx", ".xlsm")
 HDF5_SUFFIXES = (".h5", ".hdf5")
 MEASUREMENT_SUFFIXES = (*TEXT_SUFFIXES, ".csv.gz", *EXCEL_SUFFIXES, ".parquet", *HDF5_SUFFIXES, ".tdms")
-SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar"}
+BLANKS = " "
+SEPARATORS = {";": "a semicolon", "\t": "a tab", ",": "a comma", "|": "a bar", BLANKS: "blanks"}
 # Lines by which a file's form is judged: beyond any preamble, and still quick.
 LINES_JUDGED = 400
+# Blanks stand in stamps and names too: they must fit that much better than signs.
+BLANKS_COUNT = 0.7
 _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 _NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)*|[.,]\d+)(?:[eE][+-]?\d+)?"
 _VALUE = re.compile(rf"{_NUMBER}|[+-]?(?:nan|inf)")
+# Between cells that blanks part, a date and its clock stay one, and so do their names.
+_DATE = r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?= \d{1,2}:\d)"
+_DATE_OR_NAME = re.compile(rf"(?<!\S)({_DATE}|(?:date|datum)(?= (?:time|uhrzeit|zeit)\b)) ", re.IGNORECASE)
 _STAMP = re.compile(r"(?=.*\d)\d{1,4}[-./:]\d{1,2}[-./:T ]?[\d:.,TZ +\-/APMapm]*")
 
 
@@ -192,13 +198,25 @@ def _read_text(path: Path) -> MeasurementTable:
     lines = text.splitlines()
     separator = max(SEPARATORS, key=lambda sign: _fit(lines[:LINES_JUDGED], sign))
     try:
-        rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=separator)]
+        rows = list(_cut(lines, separator) if separator == BLANKS else _cut(io.StringIO(text), separator))
     except csv.Error as error:
         raise RecordingError(str(path), f"is not a readable table ({error}).") from error
     if len(rows) != len(lines):
         unsure.append("quoted cells run over several lines: numbers of lines count rows of the table")
-    found = [f"{encoding} text, cells apart by a {SEPARATORS[separator]}"]
-    return _table(path, rows, found, unsure, word="line")
+    found = [f"{encoding} text, cells apart by {SEPARATORS[separator]}"]
+    return _table(path, rows, found, unsure, word="line", needs_all_names=separator == BLANKS)
+
+
+def _cut(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
+    """Cells of every line, without the blanks around them.
+
+    >>> list(_cut(["# Date  Time   T 1", " 2026-03-11 07:58:12   20.5"], " "))
+    [['Date Time', 'T', '1'], ['2026-03-11 07:58:12', '20.5']]
+    """
+    if separator == BLANKS:
+        kept = (_DATE_OR_NAME.sub("\\1\u00a0", " ".join(line.lstrip("#% \t").split())) for line in lines)
+        return ([cell.replace("\u00a0", " ") for cell in row] for row in csv.reader(kept, delimiter=BLANKS))
+    return ([cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator))
 
 
 def _decoded(content: bytes, path: Path) -> tuple[str, str, list[str]]:
@@ -231,14 +249,15 @@ def _decode(content: bytes, encoding: str, path: Path) -> str:
 
 def _fit(lines: list[str], separator: str) -> float:
     """How much of some lines reads as numbers and stamps when they are cut at a separator."""
-    rows = [row for row in csv.reader(lines, delimiter=separator) if len(row) > 1]
+    rows = [row for row in _cut(lines, separator) if len(row) > 1]
     if not rows:
         return 0.0
     widths = [len(row) for row in rows]
     usual = max(set(widths), key=widths.count)
-    cells = [cell.strip() for row in rows if len(row) == usual for cell in row]
+    cells = [cell for row in rows if len(row) == usual for cell in row]
     # of rows of one width, by the share of lines that have it
-    return sum(map(_is_value, cells)) / len(cells) * widths.count(usual) / len(lines)
+    fit = sum(map(_is_value, cells)) / len(cells) * widths.count(usual) / len(lines)
+    return fit * BLANKS_COUNT if separator == BLANKS else fit
 
 
 def _is_value(cell: str) -> bool:
@@ -246,7 +265,13 @@ def _is_value(cell: str) -> bool:
 
 
 def _table(
-    path: Path, rows: list[list[str]], found: list[str], unsure: list[str], *, word: str
+    path: Path,
+    rows: list[list[str]],
+    found: list[str],
+    unsure: list[str],
+    *,
+    word: str,
+    needs_all_names: bool = False,
 ) -> MeasurementTable:
     """Preamble, names, units and cells of rows of text."""
     body = _first_of_body(rows)
@@ -261,6 +286,12 @@ def _table(
     named = [number for number in heading if number not in unit_rows]
     if not named:  # letters such as t, n, T are units too, and names where nothing else is
         named, unit_rows = unit_rows[:1], unit_rows[1:]
+    if needs_all_names and named and len(rows[named[-1]]) != width:
+        raise RecordingError(
+            f"{path}: {word} {named[-1] + 1}",
+            f"names {len(rows[named[-1]])} columns, rows have {width} cells apart by blanks.",
+            "Write names without blanks or in quotes, or part cells by tabs or semicolons.",
+        )
     names = (rows[named[-1]] if named else []) + [""] * width
     units = (rows[unit_rows[-1]] if unit_rows else []) + [""] * width
     if not named:

@@ -16,6 +16,10 @@ def test_a_public_name_is_listed_and_is_no_module(name):
         assert not inspect.ismodule(getattr(spindle_fem, name))
 
 
+def test_nothing_else_is_listed():
+    assert dir(spindle_fem) == sorted(spindle_fem.__all__)
+
+
 def test_unknown_names_are_attribute_errors():
     with pytest.raises(AttributeError, match="nothing_like_it"):
         _ = spindle_fem.nothing_like_it

@@ -68,6 +68,26 @@ def test_encodings_read_alike(tmp_path, encoding):
     assert roles(drafted)["Umgebung"] == "ambient"
 
 
+@pytest.mark.parametrize(
+    ("head", "stamp"),
+    [
+        ("# Logger 3\n# t[s]   SP01[°C]  n[1/min]", "{second:8.1f}"),
+        ("Date       Time      SP01  n[1/min]", "{time:%d.%m.%Y %H:%M:%S}"),
+        ('"Time stamp"  SP01\tn[1/min]', "{time:%Y-%m-%dT%H:%M:%S}"),
+    ],
+)
+def test_columns_apart_by_blanks(tmp_path, head, stamp):
+    rows = [
+        f"{stamp.format(second=10.0 * i, time=TIMES[i])}  {warm:8.3f}   {speed:7.1f} "
+        for i, (warm, speed) in enumerate(zip(WARM, SPEED, strict=True))
+    ]
+    drafted = draft(tmp_path, "\n".join([head, *rows]), name="device.asc")
+    assert [g.channel.probe or g.channel.drives for g in drafted.channels] == ["SP01", "speed"]
+    assert np.abs(drafted.data.iloc[:, 1] - WARM).max() < 1e-3
+    steps = np.diff(drafted.data["time"]) / (1.0 if drafted.time_unit else np.timedelta64(1, "s"))
+    assert (steps == 10.0).all()
+
+
 def test_american_dates_and_groups_of_thousands(tmp_path):
     rows = [
         f'{stamp:%m/%d/%Y %I:%M:%S %p},{warm:.2f},"{speed:,}"'
@@ -136,6 +156,10 @@ def test_hostile_names_stay_within_their_comments(tmp_path):
         ("SP01,SP02\n" + "".join(f"{20 + i % 3},21\n" for i in range(9)), "no column of times"),
         ("time,SP01\n" + "".join(f"5,{20 + i}\n" for i in range(9)), "the same time in all 9 rows"),
         ("time_s,load\n" + "".join(f"{i},{900 + i}\n" for i in range(9)), "no column could be told"),
+        (
+            "time SP01 room air\n" + "".join(f"{i}  {20 + i}  21\n" for i in range(9)),
+            "names 4 columns, rows have 3",
+        ),
         ("", "is empty"),
     ],
 )
