@@ -34,6 +34,26 @@ _USUAL_UNITS = {
     "W": ("power", "leistung", "heat"),
 }
 _UNITS = {"speed": "rpm", "ambient": "degC", "coolant_inlet": "degC", "coolant_flow": "l/min", "thrust": "N"}
+# German words of places on machines, for probes that are named in English.
+_ENGLISH = {
+    "front": ("vorn", "vorne", "vorderes", "vorderer", "vordere"),
+    "rear": ("hinten", "hinteres", "hinterer", "hintere"),
+    "bearing": ("lager", "wälzlager"),
+    "housing": ("gehäuse",),
+    "casing": ("gehäuse",),
+    "flange": ("flansch",),
+    "shaft": ("welle",),
+    "spindle": ("spindel",),
+    "nose": ("nase", "spindelnase"),
+    "headstock": ("spindelstock", "spindelkasten"),
+    "stator": ("ständer",),
+    "winding": ("wicklung",),
+    "drive": ("antrieb",),
+    "oil": ("öl",),
+    "cover": ("deckel",),
+    "bed": ("bett",),
+    "body": ("körper",),
+}
 _CLOSE = 0.72
 # Readings of sensors on machines, degC.
 _PLAUSIBLE = (-40.0, 250.0)
@@ -112,10 +132,12 @@ def guess_channel(
     if not named:
         doubt = "; ".join(filter(None, [doubt, "no machine given: probe named after the column"]))
         return _read(name, unit, name, "a temperature", doubt, machine, taken)
+    meant = _by_meaning(name, tuple(item for item in machine.probes if item not in taken))
     near = [item for item in _near(name, machine.probes) if item not in taken]
-    if near:
-        doubt = "; ".join(filter(None, [doubt, f'probe "{near[0]}" only resembles the name']))
-        return _read(name, unit, near[0], "a temperature", doubt, machine, taken)
+    if meant or near:
+        reason = f'"{meant}" by what the name means' if meant else f'"{near[0]}" only resembles the name'
+        doubt = "; ".join(filter(None, [doubt, f"probe {reason}"]))
+        return _read(name, unit, meant or near[0], "a temperature", doubt, machine, taken)
     doubt = f"a temperature that no probe of the machine is named after (probes: {', '.join(machine.probes)})"
     return GuessedChannel(Channel(column=name, role="covariate", unit=unit or "degC"), "a temperature", doubt)
 
@@ -173,6 +195,19 @@ def _within(name: str, allowed: tuple[str, ...]) -> str:
         if parts and any(words[at : at + len(parts)] == parts for at in places):
             found.setdefault(len(parts), []).append(item)
     longest = found[max(found)] if found else []
+    return longest[0] if len(longest) == 1 else ""
+
+
+def _by_meaning(name: str, allowed: tuple[str, ...]) -> str:
+    """The allowed name with the most words, all of which a German name has, where it is the only one."""
+    said = set(_words(name))
+
+    def is_said(word: str) -> bool:
+        return word in said or not said.isdisjoint(_ENGLISH.get(word, ()))
+
+    found = [item for item in allowed if _words(item) and all(is_said(word) for word in _words(item))]
+    most = max((len(_words(item)) for item in found), default=0)
+    longest = [item for item in found if len(_words(item)) == most]
     return longest[0] if len(longest) == 1 else ""
 
 

@@ -199,6 +199,23 @@ def test_the_outlet_is_told_by_its_name(column, probe):
     assert guess_channel("Rücklauf 2", "degC", WARM, names, taken | {"COOLANT_OUT"}).channel.probe is None
 
 
+@pytest.mark.parametrize(
+    ("column", "probe"),
+    [
+        ("T vorne", "FRONT"),
+        ("Lager vorne", "front_bearing"),
+        ("Hinteres Lager", None),
+        ("Wellenende", None),
+        ("Spindel Gehäuse", "housing"),
+    ],
+)
+def test_german_names_of_places(column, probe):
+    names = MachineNames(("FRONT", "front_bearing", "REAR_LEFT", "housing"), (), MACHINE.inputs)
+    guess = guess_channel(column, "degC", WARM, names, set())
+    assert guess.channel.probe == probe
+    assert guess.unsure
+
+
 @pytest.mark.parametrize(("source", "unit"), [("x_load", "percent"), ("main_speed", "rpm"), ("pump", "W")])
 def test_units_of_network_inputs_by_their_names(source, unit):
     machine = MachineNames(("SP01",), (), {source: ""})
