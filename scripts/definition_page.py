@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from spindle_fem.definition.bearing_catalogue import RULE
 from spindle_fem.definition.field_types import MARKS, NAME_RULE
 from spindle_fem.definition.machine_spec import MACHINE_SCHEMA, MachineSpec
 from spindle_fem.definition.schema import (
@@ -23,6 +24,7 @@ from spindle_fem.definition.schema import (
     shape_of,
     value_text,
 )
+from spindle_fem.definition.standard_materials import GREASES, MATERIALS
 from spindle_fem.definition.tolerances import DIAMETER_SHARE, PLACE
 from spindle_fem.registry import Registry
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
@@ -76,6 +78,16 @@ A changed value takes the mark that this file gives it, else U.
 `--set path=value` on the command line changes one value: `channel.depth=19mm`,
 `bearing_set.front.preload=900N`, `part.shaft.segment.nose.outer_diameter=178mm`,
 `heat.table.heat.F1[7]=160W` (positions count from 1), `channel.ports=none`. Such values carry the mark U.
+
+## What ships
+
+`bearing_type = "7014 C"` names a bearing that ships: 719xx, 70xx and 72xx with C (15°), E or AC (25°), bores
+of 20 to 200 mm, with HC at the end for balls of silicon nitride. Boundary dimensions are those of ISO 15;
+the rest is estimated ({RULE}); makers'
+balls differ by up to a tenth in diameter and two in number. `[bearing_types.front]` with `catalogue =
+"7014 C"` and further keys replaces some of it. Materials that need no table: {", ".join(MATERIALS)}.
+Greases for `grease = {{catalogue = NAME}}`: {", ".join(GREASES)}. `spindle-fem check` lists what
+was taken (`assumed`).
 
 ## Contacts and surfaces
 

@@ -93,13 +93,16 @@ def print_check(content: dict[str, Any]) -> None:
     """What a valid machine is made of."""
     console = _console()
     console.print(f"[bold]{content['machine']}[/] is valid.")
-    for key in (key for key, rows in content.items() if isinstance(rows, list) and key != "warnings"):
+    lists = [key for key, rows in content.items() if isinstance(rows, list)]
+    for key in (key for key in lists if key not in ("assumed", "warnings")):
         if not content[key]:
             continue
         table = _table(key, "name", "")
         for row in content[key]:
             table.add_row(row["name"], row.get("detail", ""))
         console.print(table)
+    for row in content.get("assumed", ()):
+        console.print(f"[bold]assumed[/] {row['name']}: {row['detail']}")
     for warning in content["warnings"]:
         console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
 
@@ -155,6 +158,8 @@ def print_heat(content: dict[str, Any]) -> None:
             values = [row["heat_W"][level][name] for row in content["models"]]
             table.add_row(f"by {level} W", *(_number(value, 1) for value in values), style="dim")
         console.print(table)
+    for row in content.get("assumed", ()):
+        console.print(f"[bold]assumed[/] {row['name']}: {row['detail']}")
     for warning in content["warnings"]:
         console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
 

@@ -96,7 +96,8 @@ def check_machine(
     -------
     dict
         ``machine``, ``parts``, ``surfaces``, ``contacts``, ``probes``,
-        ``sources``, ``effects``, ``warnings``; of a ``[network]`` machine ``machine``,
+        ``sources``, ``effects``, ``assumed`` (what rules gave that the file leaves out),
+        ``warnings``; of a ``[network]`` machine ``machine``,
         ``nodes``, ``boundaries``, ``links``, ``sources``, ``effects``,
         ``warnings``.
 
@@ -104,7 +105,7 @@ def check_machine(
     ------
     FaultsError
     """
-    from spindle_fem.definition.load import find_machine, read_definition
+    from spindle_fem.definition.load import examine_machine, find_machine, read_definition
     from spindle_fem.definition.network_load import is_network_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
@@ -148,6 +149,9 @@ def check_machine(
         ],
         "sources": [{"name": source.name, "detail": _source_detail(source)} for source in spec.source],
         "effects": _effect_rows(spec.effects),
+        "assumed": [
+            {"name": item.where, "detail": item.rule} for item in examine_machine(machine, overrides).assumed
+        ],
         "warnings": [{"code": "geometry_note", "text": note} for note in assembly.notes],
     }
 

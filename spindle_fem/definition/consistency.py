@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
+from spindle_fem.definition.bearing_catalogue import SHIPPED, is_roller_bearing
 from spindle_fem.definition.bearing_seats import followed_joint_faults, seat_faults
 from spindle_fem.definition.displacement_faults import displacement_faults
 from spindle_fem.definition.machine_spec import BearingType, MachineSpec, Probe
@@ -192,12 +193,13 @@ def _materials(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemErro
 def _bearings(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
     for group in spec.bearing_set:
         if group.bearing_type not in declared.names["bearing_types"]:
-            yield _unknown(
-                f"bearing_set.{group.name}.bearing_type",
-                group.bearing_type,
-                "bearing type",
-                declared.names["bearing_types"],
-            )
+            where, allowed = f"bearing_set.{group.name}.bearing_type", declared.names["bearing_types"]
+            if is_roller_bearing(group.bearing_type):
+                what = f'"{group.bearing_type}" is a roller bearing, which cannot be computed.'
+                yield SpecError(where, what, SHIPPED)
+            else:
+                fault = _unknown(where, group.bearing_type, "bearing type", allowed)
+                yield SpecError(where, fault.what, f"{fault.how_to_fix} {SHIPPED}".strip())
         kind = spec.bearing_types.get(group.bearing_type)
         if kind is None:
             continue

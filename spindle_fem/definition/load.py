@@ -11,6 +11,7 @@ from typing import Any
 import tomli_w
 from pydantic import TypeAdapter, ValidationError
 
+from spindle_fem.definition.completion import Assumption, complete
 from spindle_fem.definition.consistency import Declared, find_faults
 from spindle_fem.definition.faults import validation_faults
 from spindle_fem.definition.inherit import (
@@ -155,12 +156,15 @@ class Examination:
         Top-level keys with a fault inside, whose entries ``spec`` may lack.
     can_be_built : bool
         Whether all that the geometry needs is sound, whatever else is not.
+    assumed : tuple of Assumption
+        What the file leaves out and rules gave.
     """
 
     spec: MachineSpec | None
     faults: tuple[SpindleFemError, ...]
     unsound: frozenset[str] = frozenset()
     can_be_built: bool = False
+    assumed: tuple[Assumption, ...] = ()
 
 
 def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine") -> Examination:
@@ -178,6 +182,7 @@ def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine
     fault = _schema_fault(content)
     if fault is not None:
         return Examination(None, (relabelled(fault, layers),))
+    content, assumed = complete(content)
     try:
         spec, faults = MachineSpec.model_validate(content), []
     except ValidationError as error:
@@ -190,7 +195,7 @@ def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine
         _concerns_geometry(fault.where) for fault in between
     )
     located = tuple(relabelled(fault, layers) for fault in (*faults, *between))
-    return Examination(spec, located, unsound, can_be_built)
+    return Examination(spec, located, unsound, can_be_built, assumed)
 
 
 _GEOMETRY_KEYS = frozenset(

@@ -259,8 +259,8 @@ class MachineSpec(SpecModel):
     """Factor on every heat capacity."""
     operation: Operation
     """Operating point."""
-    materials: dict[str, Material]
-    """Solids by name."""
+    materials: dict[str, Material] = Field(default_factory=dict)
+    """Solids by name; those that ship need not be given."""
     part: Annotated[tuple[Part, ...], Field(min_length=1)]
     """Solids of revolution."""
     bearing_types: dict[str, BearingType] = Field(default_factory=dict)

@@ -102,7 +102,7 @@ class Part(SpecModel):
     name: Name
     """Joints, surfaces and probes use it."""
     material: Name
-    """A key of ``[materials]``."""
+    """A key of ``[materials]``, or one that ships."""
     rotating: Flag = False
     """Whether it turns with the shaft."""
     segment: Annotated[tuple[AnnulusSegment, ...], Field(min_length=1)]
@@ -110,8 +110,14 @@ class Part(SpecModel):
 
 
 class BearingType(SpecModel):
-    """Catalogue dimensions of a ball bearing."""
+    """Catalogue dimensions of a ball bearing.
 
+    With ``catalogue``, and of a bearing that ships and that a set names
+    directly, what is given here replaces the catalogue's.
+    """
+
+    catalogue: str = ""
+    """Designation of a bearing that ships, such as ``7014 C``, which gives what is missing."""
     kind: BearingKind = "angular_contact_ball"
     """Kind of bearing, for the empirical friction models."""
     bore_diameter: PositiveLength
@@ -227,7 +233,7 @@ class SetBearing(SpecModel):
     name: Name
     """Its rings are the parts `NAME.inner_ring` and `NAME.outer_ring`."""
     z: Range
-    """From and to of its rings; as long as the type is wide."""
+    """From and to of its rings, as long as the type is wide; or where they begin."""
     takes_thrust: Literal["towards_rear", "towards_nose"]
     """Direction of the force on the shaft that this bearing carries."""
 
@@ -284,7 +290,7 @@ class BearingSet(SpecModel):
     name: Name
     """Shared factors and overrides use it."""
     bearing_type: Name
-    """A key of ``[bearing_types]``."""
+    """A key of ``[bearing_types]``, or a bearing that ships, such as ``7014 C``."""
     preload: Preload
     """Force through the set; bearings in tandem share it."""
     preload_kind: Literal["rigid", "spring"] = "rigid"
@@ -322,6 +328,8 @@ class BearingSet(SpecModel):
 class Grease(SpecModel):
     """Lubricating grease by its base oil."""
 
+    catalogue: str = ""
+    """A grease that ships, which gives what is missing: ``high_speed_grease``, ``general_grease``."""
     name: str
     """For reports."""
     kinematic_viscosity_40: KinematicViscosity

@@ -187,7 +187,7 @@ TOGETHER = {
     # names of other tables
     "unknown material": ('name = "housing"\nmaterial = "steel"', 'name = "housing"\nmaterial = "stell"', SpecError, "part.housing.material", '"stell"', 'Did you mean "steel"'),
     "unknown ring material": ('ring_material = "steel"', 'ring_material = "bronze"', SpecError, "bearing_types.7010_C.ring_material", '"bronze"', "Allowed: steel"),
-    "unknown bearing type": ('bearing_type = "7010_C"', 'bearing_type = "7011_C"', SpecError, "bearing_set.pair.bearing_type", '"7011_C"', 'Did you mean "7010_C"'),
+    "unknown bearing type": ('bearing_type = "7010_C"', 'bearing_type = "7010_D"', SpecError, "bearing_set.pair.bearing_type", '"7010_D"', 'Did you mean "7010_C"'),
     "unknown part of a channel": ('[channel]\npart = "housing"', '[channel]\npart = "hosing"', SpecError, "channel.part", '"hosing"', 'Did you mean "housing"'),
     "channel in the shaft": ('[channel]\npart = "housing"', '[channel]\npart = "shaft"', SpecError, "channel.part", '"shaft" is no standing part', "outer_spacer, housing"),
     "unknown part of a surface": ('part = "shaft"\nwhere', 'part = "shft"\nwhere', SpecError, "surface.shaft.nose.part", '"shft"', 'Did you mean "shaft"', "B1.inner_ring"),
@@ -391,7 +391,7 @@ def test_faults_of_the_geometry_come_together_with_those_of_other_tables(tmp_pat
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ('bearing_type = "7010_C"', 'bearing_type = "7011_C"'),
+        ('bearing_type = "7010_C"', 'bearing_type = "7010_D"'),
         ('part = "shaft"\nwhere', 'part = "shft"\nwhere'),
         ('[channel]\npart = "housing"', '[channel]\npart = "hosing"'),
         ('z = ["76 mm", "92 mm"], takes', 'z = ["76 mm", 92], takes'),

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from spindle_fem.definition.bearing_catalogue import SHIPPED, catalogue_bearing
+from spindle_fem.definition.standard_materials import MATERIALS
 from spindle_fem.errors import (
     BadInputError,
     FaultsError,
@@ -119,6 +121,7 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     except tomllib.TOMLDecodeError as error:
         raise SpecError(str(file), f"is not TOML ({error}).", "Correct the syntax.") from error
     faults: list[SpindleFemError] = []
+    document = _with_catalogue(document, str(file), faults)
     tables = _read_tables(document, str(file), faults)
     case = None
     if not faults:
@@ -128,6 +131,24 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     if faults or case is None:
         raise FaultsError(str(file), faults)
     return case
+
+
+def _with_catalogue(document: dict[str, Any], file: str, faults: list[SpindleFemError]) -> dict[str, Any]:
+    """A file whose ``bearing.catalogue`` names a bearing that ships, with what that gives."""
+    table = document.get("bearing")
+    if not isinstance(table, dict) or "catalogue" not in table:
+        return document
+    designation = table["catalogue"]
+    found = catalogue_bearing(designation) if isinstance(designation, str) else None
+    own = {key: value for key, value in table.items() if key != "catalogue"}
+    if found is None:
+        faults.append(SpecError(f"{file}: bearing.catalogue", f"{designation!r} does not ship.", SHIPPED))
+        return {**document, "bearing": own}
+    if found["ball_material"] == "silicon_nitride":
+        ball = MATERIALS["silicon_nitride"]
+        found |= {f"ball_{key}": ball[key] for key in ("young_modulus", "poisson_ratio")}
+        found["density"] = ball["density"]
+    return {**document, "bearing": {key: found[key] for key in found if key in GEOMETRY} | own}
 
 
 def _read_tables(

@@ -1,0 +1,165 @@
+"""What a definition leaves out and a named rule gives: catalogue bearings, standard materials, surroundings.
+
+Works on raw tables before they are validated, so that whatever reads a machine
+sees a complete one. What is malformed stays as it is, for validation to name.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from spindle_fem.definition import bearing_catalogue, standard_materials
+from spindle_fem.errors import SpindleFemError
+from spindle_fem.units import to_si
+
+_UNKNOWN_WIDTH = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """A value that the file does not give.
+
+    Attributes
+    ----------
+    where : str
+        Key path of what was filled in.
+    rule : str
+        What was taken, and by which rule.
+    """
+
+    where: str
+    rule: str
+
+
+def complete(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Assumption, ...]]:
+    """Raw tables of a machine with what rules give laid under what the file gives.
+
+    Returns
+    -------
+    dict
+        The completed tables; completing them again changes nothing.
+    tuple of Assumption
+        In the order of the tables.
+    """
+    result, assumed = dict(content), []
+    _bearing_types(result, assumed)
+    _bearing_places(result, assumed)
+    _grease(result, assumed)
+    _materials(result, assumed)
+    return result, tuple(assumed)
+
+
+def tables_of(value: Any) -> list[dict[str, Any]]:
+    """The entries of a list that are tables."""
+    return [item for item in value if isinstance(item, Mapping)] if isinstance(value, list) else []
+
+
+def length_of(value: Any) -> float | None:
+    """A raw length in m, that of its value where it has a tolerance; None where it cannot be read."""
+    value = value.get("value") if isinstance(value, Mapping) else value
+    with contextlib.suppress(SpindleFemError):
+        return to_si(value, "m", where="")
+    return None
+
+
+def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
+    given = content.get("bearing_types", {})
+    if not isinstance(given, Mapping):
+        return
+    types, groups = dict(given), []
+    for group in content.get("bearing_set") if isinstance(content.get("bearing_set"), list) else ():
+        if isinstance(group, Mapping) and isinstance(group.get("bearing_type"), str):
+            designation = group["bearing_type"]
+            name = designation.replace(" ", "_").replace("/", "_")
+            if name not in types and bearing_catalogue.catalogue_bearing(designation):
+                types[name] = {"catalogue": designation}
+            group = {**group, "bearing_type": name} if name in types else group
+        groups.append(group)
+    for name, table in types.items():
+        designation = table.get("catalogue") if isinstance(table, Mapping) else None
+        found = bearing_catalogue.catalogue_bearing(designation) if isinstance(designation, str) else None
+        if found is None:
+            continue
+        taken = [key for key in found if key not in table and key != "marks"]
+        types[name] = _under(found, table)
+        if taken:
+            balls = f"{types[name]['ball_count']} balls of {types[name]['ball_diameter']}"
+            assumed.append(
+                Assumption(f"bearing_types.{name}", f"{designation}: {balls}; {bearing_catalogue.RULE}")
+            )
+    if groups:
+        content["bearing_set"] = groups
+    if types:
+        content["bearing_types"] = types
+
+
+def _under(found: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table laid over what a catalogue gives, each value with its own mark."""
+    own = table.get("marks", {})
+    own = {"default": own} if isinstance(own, str) else own
+    if not isinstance(own, Mapping):
+        return {**found, **table}
+    taken = {key: found["marks"].get(key, found["marks"]["default"]) for key in found if key not in table}
+    taken.pop("marks", None)
+    return {**found, **table, "marks": {**taken, **own}}
+
+
+def _bearing_places(content: dict[str, Any], assumed: list[Assumption]) -> None:
+    """Bearings whose place says where they begin span the width of their type."""
+    groups = []
+    for group in content.get("bearing_set") if isinstance(content.get("bearing_set"), list) else ():
+        if isinstance(group, Mapping) and isinstance(group.get("bearing"), list):
+            types = content.get("bearing_types")
+            kind = types.get(group.get("bearing_type")) if isinstance(types, Mapping) else None
+            width = length_of(kind.get("width")) if isinstance(kind, Mapping) else None
+            # An unknown type is the one fault: its bearings have some width.
+            width = _UNKNOWN_WIDTH if width is None else width
+            rows = []
+            for row in group["bearing"]:
+                start = length_of(row.get("z")) if isinstance(row, Mapping) else None
+                if start is not None:
+                    row = {**row, "z": [f"{1e3 * start:.12g} mm", f"{1e3 * (start + width):.12g} mm"]}
+                    assumed.append(
+                        Assumption(
+                            f"bearing_set.{group.get('name')}.bearing.{row.get('name')}.z",
+                            f"{row['z'][0]} to {row['z'][1]}: from where it begins, the width of its type",
+                        )
+                    )
+                rows.append(row)
+            group = {**group, "bearing": rows}
+        groups.append(group)
+    if groups:
+        content["bearing_set"] = groups
+
+
+def _grease(content: dict[str, Any], assumed: list[Assumption]) -> None:
+    table = content.get("grease")
+    name = table.get("catalogue") if isinstance(table, Mapping) else None
+    found = standard_materials.GREASES.get(name) if isinstance(name, str) else None
+    if found is not None and set(found) - set(table):
+        content["grease"] = _under(found, table)
+        values = f"{found['kinematic_viscosity_40']} at 40 °C, {found['kinematic_viscosity_100']} at 100 °C"
+        assumed.append(Assumption("grease", f"{name}: {found['name']}, {values}"))
+
+
+def _materials(content: dict[str, Any], assumed: list[Assumption]) -> None:
+    given = content.get("materials", {})
+    types = content.get("bearing_types", {})
+    if not isinstance(given, Mapping) or not isinstance(types, Mapping):
+        return
+    kinds = [kind for kind in types.values() if isinstance(kind, Mapping)]
+    named = [part.get("material") for part in tables_of(content.get("part"))]
+    named += [kind.get(key) for kind in kinds for key in ("ring_material", "ball_material")]
+    materials = dict(given)
+    for name in named:
+        if isinstance(name, str) and name not in materials and name in standard_materials.MATERIALS:
+            values = standard_materials.MATERIALS[name]
+            materials[name] = values
+            shown = ", ".join(
+                values[key] for key in ("thermal_conductivity", "density", "specific_heat_capacity")
+            )
+            assumed.append(Assumption(f"materials.{name}", f"usual values: {shown}"))
+    content["materials"] = materials
