@@ -41,7 +41,7 @@ _SHOULDER = 0.6
 _BALL = re.compile(r"(719|70|72)(\d\d)[ _]?(C|E|AC)([ _/]?HC)?", re.ASCII)
 _ROLLER = re.compile(r"(NN30|N10)(\d\d)(?:[ _]?K)?", re.ASCII)
 RULE = (
-    "boundary dimensions of ISO 15; the largest ball of whole 1/32 in that fills 0.60 (719) or 0.635 (70, 72) "
+    "boundary dimensions of ISO 15; the largest ball of whole 1/32 in within 0.60 (719) or 0.635 (70, 72) "
     "of the section, on 0.85 of the pitch circle; shoulders 0.6 ball diameters from it; grooves of 0.52"
 )
 
