@@ -97,6 +97,10 @@ def export(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help=".npz, .json, .py, .c or .fmu")
     ],
+    recording: Annotated[
+        list[Path] | None,
+        typer.Option("--recording", help="Recording whose speeds and thrusts the model holds; repeatable."),
+    ] = None,
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
@@ -105,7 +109,7 @@ def export(
     from spindle_fem.commands.export_command import export_machine
 
     with stages(not as_json) as tell:
-        content = export_machine(machine, output, overrides=set_ or (), progress=tell)
+        content = export_machine(machine, output, set_ or (), recording or (), progress=tell)
     print_json(content) if as_json else print_export(content)
 
 

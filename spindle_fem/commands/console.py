@@ -122,10 +122,16 @@ def print_export(content: dict[str, Any]) -> None:
         f"wrote {', '.join(content['files'])}: {content['states']} states, {content['scheme']} steps"
     )
     for key in ("inputs", "outputs"):
-        named = (f"{item['name']} ({item['unit']})" for item in content[key])
+        named = (f"{item['name']} ({item['unit']}{_range_of(item)})" for item in content[key])
         console.print(f"  {key}: {', '.join(named)}")
     for note in content["notes"]:
         console.print(f"  {note}")
+
+
+def _range_of(item: dict[str, Any]) -> str:
+    """Range of an input that has one."""
+    ends = item.get("low"), item.get("high")
+    return "" if None in ends else f", {ends[0]:.4g} to {ends[1]:.4g}"
 
 
 _HEAT_ROWS = (

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from spindle_fem.commands.checked_machine import recording_of
+from spindle_fem.recordings.align import Recording
 from spindle_fem.studies.export.export_machine import machine_state_space
 from spindle_fem.studies.export.exported_files import file_writer
 
@@ -15,6 +17,7 @@ def export_machine(
     machine: str | Path,
     output: str | Path,
     overrides: Iterable[str] = (),
+    recordings: Iterable[str | Path | Recording] = (),
     progress: Callable[[str], None] = lambda stage: None,
 ) -> dict[str, Any]:
     """Write the fast model of a machine to a file of the kind that its suffix says.
@@ -25,6 +28,8 @@ def export_machine(
         A definition file or the name of a machine that ships.
     output : str or Path
         ``.npz``, ``.json``, ``.py``, ``.c`` (with a ``.h`` beside it) or ``.fmu``; its folder is made.
+    recordings : iterable of str, Path or Recording
+        Their speeds and thrusts are within the range of the model, beside the definition's.
 
     Returns
     -------
@@ -37,7 +42,8 @@ def export_machine(
     """
     path = Path(output)
     write = file_writer(path)
-    space = machine_state_space(machine, tuple(overrides), progress)
+    read = [recording_of(item) for item in recordings]
+    space = machine_state_space(machine, tuple(overrides), read, progress)
     progress("writing")
     path.parent.mkdir(parents=True, exist_ok=True)
     header = space.header

@@ -9,14 +9,18 @@ from spindle_fem.commands.export_command import export_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import HeatSource
 from spindle_fem.errors import BadInputError, SpecError
+from spindle_fem.machine.view.defined_point import at_the_defined_point
 from spindle_fem.model.reduced.film_heat import FilmHeat, tabulated_machine
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.friction_map import tabulate_friction
+from spindle_fem.studies.export import export_machine as exported
 from spindle_fem.studies.export.exported_files import file_writer
 from spindle_fem.studies.export.geometry_export import geometry_state_space
 from spindle_fem.studies.export.interpolation_axes import refined_axis
 from spindle_fem.studies.export.portable_model import PortableModel
+from spindle_fem.studies.export.source_export import source_loads
+from spindle_fem.studies.export.state_space import ModelInput
 from spindle_fem.units import ZERO_CELSIUS_K
 from tests.support.lumped_spindle import RPM, drive_of, lumped_model, with_natural_film
 from tests.support.stepped_model import c_readings_along, needs_compiler, readings_along
@@ -121,6 +125,21 @@ def test_natural_films_follow_their_walls(fast, drive, tmp_path):
     assert not path.exists()
 
 
+def test_the_range_holds_a_recording(fast, spec, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        exported, "fast_model_for", lambda spec, recordings, **options: asked.append(recordings)
+    )
+    monkeypatch.setattr(exported, "geometry_state_space", lambda fast, name, highest: highest)
+    plain = exported.machine_state_space("recorded_spindle")
+    faster = spec.operation.model_copy(update={"speed": 2.0 * plain})
+    recording = at_the_defined_point(spec.model_copy(update={"operation": faster}))
+    highest = exported.machine_state_space("recorded_spindle", (), [recording])
+    assert asked == [(), [recording]]
+    assert highest == pytest.approx(np.abs(recording.inputs[:, recording.input_names.index("speed")]).max())
+    assert highest > 1.9 * plain
+
+
 def with_sources(fast, *sources):
     changed = fast.spec.model_copy(update={"source": tuple(HeatSource(**source) for source in sources)})
     return fast_spindle(fast.model, changed)
@@ -146,30 +165,29 @@ def test_sources_are_inputs_or_tables(fast, drive, tmp_path):
         {"name": "belt", "part": "shaft", "heat": table},
     )
     power = with_input(drive, "motor_power", np.linspace(400.0, 900.0, drive.steps.size))
-    model = geometry_state_space(heated, "lumped", 4500.0 * RPM).model()
+    space, path = geometry_state_space(heated, "lumped", 4500.0 * RPM), tmp_path / "model.c"
+    model = space.model()
     told = simulate_fast(heated, power, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
     named = {item["name"]: (item["unit"], item["default"]) for item in model.header["inputs"]}
     assert (named["motor_power"], named["heat.seal"]) == (("W", pytest.approx(120.0)), ("W", 20.0))
     every = with_input(power, "heat.seal", np.full(drive.steps.size, 20.0))
     found = readings_along(model, every, {0: START})
     assert np.abs(found - told).max() < AGREEMENT
-    space, path = geometry_state_space(heated, "lumped", 4500.0 * RPM), tmp_path / "model.c"
     file_writer(path)(space, path)
-    in_c = c_readings_along(tmp_path, "lumped", space.model(), every, START)
+    in_c = c_readings_along(tmp_path, "lumped", model, every, START)
     np.testing.assert_allclose(in_c, found, rtol=0.0, atol=1e-9)
 
 
-def test_a_source_without_its_quantity_gives_what_the_definition_says(fast, drive):
+def test_a_source_without_its_quantity_gives_what_the_definition_says(fast):
+    standard = [ModelInput("speed", "rad/s", 1.0, 0.0, 9.0), ModelInput("thrust", "N", 1.0, 0.0, 9.0)]
     source = {"name": "rotor", "part": "shaft", "input": "motor_power", "gain": "0.1 W/W", "heat": "12 W"}
-    heated = with_sources(fast, source, {**source, "name": "stator", "heat": None})
-    model = geometry_state_space(heated, "lumped", 4500.0 * RPM).model()
-    assert model.inputs.count("motor_power") == 1
-    loads = dict(
-        zip([load["name"] for load in model.header["loads"]], model.loads(model.vector({})), strict=True)
-    )
-    assert (loads["source.rotor"], loads["source.stator"]) == pytest.approx((12.0, 12.0))
-    alone = with_sources(fast, {**source, "heat": {"speed": ["0 rpm", "1 rpm"], "heat": ["0 W", "1 W"]}})
-    (note,) = geometry_state_space(alone, "lumped", 4500.0 * RPM).header["notes"]
+    heated = with_sources(fast, {**source, "name": "stator", "heat": None}, source)
+    found = source_loads(heated.spec, standard)
+    (power,) = found.inputs
+    assert (power.name, power.unit, power.default) == ("motor_power", "W", pytest.approx(120.0))
+    assert [(load.input, load.gain) for load in found.powers] == [(2, 0.1), (2, 0.1)]
+    table = {"speed": ["0 rpm", "1 rpm"], "heat": ["0 W", "1 W"]}
+    (note,) = source_loads(with_sources(fast, {**source, "heat": table}).spec, standard).notes
     assert "its table" in note
 
 

@@ -9,9 +9,9 @@ from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.load import find_machine, load_machine, read_definition
 from spindle_fem.errors import SpecError
 from spindle_fem.model.lumped.written_network import build_network
-from spindle_fem.model.reduced.build_reduced import ReductionOptions
 from spindle_fem.model.reduced.network_inputs import fast_network
-from spindle_fem.model.reduced.recorded_model import fast_model_for
+from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for
+from spindle_fem.recordings.align import Recording
 from spindle_fem.studies.export.geometry_export import geometry_state_space, require_exportable
 from spindle_fem.studies.export.network_export import network_state_space
 from spindle_fem.studies.export.state_space import StateSpace
@@ -20,7 +20,10 @@ Progress = Callable[[str], None]
 
 
 def machine_state_space(
-    machine: str | Path, overrides: Sequence[str] = (), progress: Progress = lambda stage: None
+    machine: str | Path,
+    overrides: Sequence[str] = (),
+    recordings: Sequence[Recording] = (),
+    progress: Progress = lambda stage: None,
 ) -> StateSpace:
     """What :func:`spindle_fem.studies.simulate.simulate_recordings` marches, for other programs.
 
@@ -30,6 +33,8 @@ def machine_state_space(
         A definition file or the name of a machine that ships; with geometry or a ``[network]``.
     overrides : sequence of str
         ``path=value`` texts.
+    recordings : sequence of Recording
+        The range of a machine with geometry holds their speeds and thrusts; a network has no range.
 
     Raises
     ------
@@ -47,6 +52,6 @@ def machine_state_space(
     if is_network:
         return network_state_space(fast_network(build_network(spec.network), spec), spec.name)
     require_exportable(spec)
-    fast = fast_model_for(spec, (), as_given=True, progress=progress)
+    fast = fast_model_for(spec, recordings, as_given=True, progress=progress)
     progress("tables over speed and coolant")
-    return geometry_state_space(fast, spec.name, ReductionOptions().highest_speed_of(spec))
+    return geometry_state_space(fast, spec.name, options_for(spec, recordings).highest_speed_of(spec))
