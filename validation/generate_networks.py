@@ -273,10 +273,10 @@ def make_case(folder: Path, seed: int, number: int) -> dict[str, Any]:
         try:
             case = draw_machine(rng, family, calibrated)
             drawn = draw_effects(case, wanted, rng)
+            if drawn is not None:
+                return _write(folder, f"case_{number:04d}", case, drawn, "+".join(wanted) or "consistent", rng)
         except ArithmeticError:
             continue
-        if drawn is not None:
-            return _write(folder, f"case_{number:04d}", case, drawn, "+".join(wanted) or "consistent", rng)
     raise ArithmeticError(f"case {number}: no machine shows {wanted}")
 
 
