@@ -357,7 +357,9 @@ def _refit(
 ) -> list[Hypothesis]:
     """The most probable hypotheses, what reads nearly as the first, and the empty one, on the whole basis."""
     score = {id(h): value for h, value in zip(found, tempered(found, coarseness), strict=True)}
-    ranked = sorted(found, key=lambda h: -score[id(h)])
+    everything = sorted(found, key=lambda h: -score[id(h)])
+    # Whether anything is missing is asked for itself (the p-value): sets are held against each other.
+    ranked = [h for h in everything if h.keys] or everything
     best = score[id(ranked[0])]
     chosen = [
         item
@@ -369,7 +371,7 @@ def _refit(
     smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
     chosen += [h for h in smaller if h not in chosen]
     for size in range(len(members)):
-        chosen += [h for h in ranked if len(h.fit.candidates) == size and h not in chosen][:1]
+        chosen += [h for h in everything if len(h.fit.candidates) == size and h not in chosen][:1]
     first = ranked[0].fit
     rivals = [
         h

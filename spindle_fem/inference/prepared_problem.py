@@ -229,10 +229,21 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
     rows = [index for index, c in enumerate(shared) if c.name in place]
     fitted = [place[shared[index].name] for index in rows]
     covariance = np.linalg.inv(belief.root.T @ belief.root)
+    before = np.linalg.inv(prior.root.T @ prior.root)[np.ix_(fitted, fitted)]
     covariance[rows, :] = covariance[:, rows] = 0.0
-    covariance[np.ix_(rows, rows)] = fit.covariance[np.ix_(fitted, fitted)]
+    covariance[np.ix_(rows, rows)] = _as_stated(before, fit.covariance[np.ix_(fitted, fitted)])
     precision = np.linalg.inv(covariance)
     mean = belief.mean.copy()
     mean[rows] = fit.position[fitted]
     root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
     return Calibrated(Belief((*shared, *begun), mean, root), slow, fit)
+
+
+def _as_stated(before: Array, after: Array) -> Array:
+    """Covariance of what a calibration told, as wide as intervals are stated.
+
+    What the calibration added to what was known before counts less, since a model that is not exact has other
+    best parameters in another duty.
+    """
+    known, learned = np.linalg.inv(before), np.linalg.inv(after)
+    return np.linalg.inv(known + (learned - known) / tuned.INTERVAL_WIDENING**2)

@@ -91,12 +91,15 @@ def _beside(search: Search) -> None:
 def _what_changes(search: Search, fit: Fit) -> None:
     """Add what changed its level at unknown moments, and what switches, to what a fit holds.
 
-    What fits well with heat in intervals may fit better with a cooling that changed at the same moments.
+    What fits well, a sensor that came loose or heat in intervals, may fit better with a cooling that changed
+    at the same moments.
     """
     best = search.ranked()[0]
+    if not best.keys and search.is_explained(best):
+        return
+    search.progress("diagnosis: changes and states that switch")
+    add_steps(search, fit)
     if not search.is_explained(best) or any(search.in_intervals(c) for c in best.fit.candidates):
-        search.progress("diagnosis: changes and states that switch")
-        add_steps(search, fit)
         add_states(search, fit)
 
 

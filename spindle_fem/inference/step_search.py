@@ -19,7 +19,7 @@ from spindle_fem.effects.framework.unrecorded import PULSES, STEPS
 from spindle_fem.effects.registry import fixed
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
-from spindle_fem.inference.change_points import NOTHING, choice, find_changes, levels_over_lowest
+from spindle_fem.inference.change_points import NOTHING, SHORTEST, choice, find_changes, levels_over_lowest
 from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import Fit, Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
@@ -110,7 +110,9 @@ def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) ->
     if last is not None:
         known = search.found.get(identity(last.fit.candidates))
         if known is None or known.score < last.score:
-            search.remember_cost(last.fit.candidates[-1], _paid(place, _spans(effect, last.fit)[0]))
+            search.remember_cost(
+                last.fit.candidates[-1], _paid(search.problem, place, _spans(effect, last.fit)[0])
+            )
             search.keep(last)
 
 
@@ -248,12 +250,15 @@ def _fitted(
         fitted = problem.fit(candidates, start | {amplitude_name(candidate): size}, hopeless=hopeless)
     except (ConvergenceError, OutOfValidityError, SpecError):
         return None
-    return Hypothesis(fitted, search.log_prior(candidates) - _paid(place, intervals))
+    return Hypothesis(fitted, search.log_prior(candidates) - _paid(problem, place, intervals))
 
 
-def _paid(place: StepPlace, intervals: Sequence[tuple[float, float]]) -> float:
-    """What the choice of the changes costs, as a logarithm."""
-    return choice(place.instants, len({edge for pair in intervals for edge in pair}))
+def _paid(problem: Problem, place: StepPlace, intervals: Sequence[tuple[float, float]]) -> float:
+    """What the choice of the changes costs, as a logarithm; levels from the start or to the end are none."""
+    begin, *_, end = problem.predictor.drives[place.recording].grid
+    near = SHORTEST * (end - begin)
+    edges = {edge for pair in intervals for edge in pair if begin + near < edge < end - near}
+    return choice(place.instants, len(edges))
 
 
 def _spans(effect: IntervalEffect, fit: Fit) -> tuple[list[tuple[float, float]], list[float]]:

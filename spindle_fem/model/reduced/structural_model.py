@@ -315,7 +315,7 @@ def _projected_change(full: MeshModel, difference: Difference, basis: Array) -> 
     for name, own in difference.fields.items():
         array = own @ basis if name == WARMTH else np.asarray(getattr(projected, name))
         array = array.reshape(-1, 1) if name == "cell_area" else array
-        size = np.abs(array).reshape(len(array), -1).max(axis=1, initial=0.0)
+        size = np.abs(array).max(axis=tuple(range(1, array.ndim)), initial=0.0)
         kept = np.flatnonzero(size > ROUND_OFF * size.max(initial=np.finfo(float).tiny))
         if kept.size:
             rows[name], values[name] = kept, array[kept]
