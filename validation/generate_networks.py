@@ -274,7 +274,9 @@ def make_case(folder: Path, seed: int, number: int) -> dict[str, Any]:
             case = draw_machine(rng, family, calibrated)
             drawn = draw_effects(case, wanted, rng)
             if drawn is not None:
-                return _write(folder, f"case_{number:04d}", case, drawn, "+".join(wanted) or "consistent", rng)
+                return _write(
+                    folder, f"case_{number:04d}", case, drawn, "+".join(wanted) or "consistent", rng
+                )
         except ArithmeticError:
             continue
     raise ArithmeticError(f"case {number}: no machine shows {wanted}")

@@ -18,6 +18,7 @@ from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.gap_misdescriptions import gap_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.mounting_misdescriptions import mounting_misdescriptions
 from spindle_fem.inference.network_misdescriptions import network_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.structural_misdescriptions import structural_misdescriptions
@@ -28,6 +29,7 @@ Provider = Callable[[Predictor], Iterable[Misdescription]]
 PROVIDERS: tuple[Provider, ...] = (
     heat_misdescriptions,
     structural_misdescriptions,
+    mounting_misdescriptions,
     network_misdescriptions,
     gap_misdescriptions,
 )

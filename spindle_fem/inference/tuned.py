@@ -36,6 +36,8 @@ GAP_SIGMA = 0.3
 HEAT_SHAPE_SIGMA, HEAT_SHAPE_LENGTH = 0.05, 0.3
 BALL_SPEED_SIGMA = 0.15
 CLOCK_SIGMA = 30.0
+# What bridges a housing from outside, W/K: a bracket of 60 x 40 mm steel, 0.2 m long, conducts 0.5.
+BRIDGE_SIGMA = 0.5
 # Share by which the conductivity of a steel or an iron of one name varies with composition and temperature.
 CONDUCTIVITY_SIGMA = 0.05
 # Time by which a sensor in its hole, or in the stream, answers later than what it touches, s.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import load_machine, write_machine
+from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX
 from spindle_fem.inference.heat_misdescriptions import (
     Conductivity,
@@ -22,6 +23,7 @@ from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.misdescription_content import misdescription_content
+from spindle_fem.inference.mounting_misdescriptions import Bridge, mounting_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
 from spindle_fem.inference.verdict import Judgement, Ranked
@@ -71,6 +73,31 @@ def test_balls_that_conduct_better_at_full_speed_are_another_conductance(predict
     )
     expected = (more - plain) / 0.001
     np.testing.assert_allclose(column, expected, atol=0.01 * np.abs(expected).max())
+
+
+def test_a_bridge_is_a_contact_beside_the_contact(predictor):
+    column = column_of(predictor, Bridge("cover", "housing"))
+    (contact,) = (c for c in predictor.fast.model.coefficient_names if c.startswith("joint.cover|housing"))
+    conducts = 0.01 * float(np.mean(BaseRun(predictor, 0, {}).strength(contact)))  # its area, m2
+    plain, more = (predictor.predict(0, {contact: factor}).temperature for factor in (1.0, 1.001))
+    expected = (more - plain) / (0.001 * conducts)
+    # Heat of a bridge is linear within a step, which a stiff contact's is not at the very start.
+    np.testing.assert_allclose(column[5:], expected[5:], atol=2e-3 * np.abs(expected).max())
+
+
+def test_bridges_end_at_every_segment_beside_the_flange_and_on_its_sides():
+    spec = load_machine("recorded_spindle")
+    segments = [segment.name for part in spec.part if part.name == "housing" for segment in part.segment]
+    places = [f"{side}housing.{name}" for name in segments for side in ("", "up.", "across.")]
+    machine = SimpleNamespace(spec=spec, model=SimpleNamespace(place_names=tuple(places)))
+    found = [
+        item.change for item in mounting_misdescriptions(SimpleNamespace(is_network=False, fast=machine))
+    ]
+    (flange,) = {item.start for item in found}
+    ends = {(item.end, item.side) for item in found}
+    assert len(found) == 3 * (len(segments) - 1)
+    assert (flange, "") not in ends
+    assert ("housing.rear_body", "up.housing.rear_body") in ends
 
 
 def test_a_clock_moves_readings_along_their_own_slope(predictor):
