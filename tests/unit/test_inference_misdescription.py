@@ -82,7 +82,7 @@ def test_a_bridge_is_a_contact_beside_the_contact(predictor):
     plain, more = (predictor.predict(0, {contact: factor}).temperature for factor in (1.0, 1.001))
     expected = (more - plain) / (0.001 * conducts)
     # Heat of a bridge is linear within a step, which a stiff contact's is not at the very start.
-    np.testing.assert_allclose(column[5:], expected[5:], atol=2e-3 * np.abs(expected).max())
+    np.testing.assert_allclose(column[5:], expected[5:], atol=5e-3 * np.abs(expected).max())
 
 
 def test_bridges_end_at_every_segment_beside_the_flange_and_on_its_sides():
