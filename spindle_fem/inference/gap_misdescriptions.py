@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 LEAST_VARIANCE, MOST_MODES = 0.02, 6
 # A gap of more steps is followed at as many points.
 MOST_POINTS = 200
+# Instants of change that are open for one source.
+MOST_CHANGES = 150
 # What moves no node by this share of the least noise, were it to keep all its heat, is left out.
 LEAST_RISE = 0.2
 
@@ -66,8 +68,8 @@ def gap_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
     for number, recording in enumerate(predictor.recordings):
         held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
         rows = [i for i, name in enumerate(network.source_input) if name is not None and held.get(name)]
-        spans = long_spacings(recording)
-        if not rows or not spans:
+        spans, changes = long_spacings(recording), recording.unseen_changes
+        if not rows or not (spans or changes):
             continue
         run = predictor.transient(number, {})
         heat = 0.5 * (run.friction_start + run.friction_end)
@@ -87,6 +89,48 @@ def gap_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
                     HeatWithinGap(source, first, tuple(course.tolist())),
                     number,
                 )
+            for begin, end, first, size, course in _changes_in(
+                heat[:, row],
+                run.drive.grid,
+                [span for name, *span in changes if name == network.source_input[row]],
+                spans,
+                least,
+            ):
+                yield Misdescription(
+                    f"change.{source}.{begin:.0f}",
+                    f"instant at which heat of {source} changed",
+                    "W",
+                    size,
+                    f"heat of {source} between {begin:.0f} s and {end:.0f} s, readings of its input between "
+                    "which it changed, beside a change amid them",
+                    HeatWithinGap(source, first, tuple(course.tolist())),
+                    number,
+                )
+
+
+def _changes_in(
+    heat: Array,
+    grid: Array,
+    changes: Sequence[Sequence[float]],
+    gaps: Sequence[tuple[float, float]],
+    least: float,
+) -> Iterator[tuple[float, float, int, float, Array]]:
+    """Span, first step, standard deviation [W] and course of each change that may bring ``least`` J.
+
+    The instant is anywhere between the two readings with the same probability: a uniform distribution's
+    spread. Gaps have courses of their own. Of an input that changes with every reading the largest.
+    """
+    middle = 0.5 * (grid[:-1] + grid[1:])
+    found = []
+    for begin, end in changes:
+        own = np.flatnonzero((middle > begin) & (middle < end))
+        if not own.size or any(a < end and b > begin for a, b in gaps):
+            continue
+        beside = heat[[max(own[0] - 1, 0), min(own[-1] + 1, len(heat) - 1)]]
+        size = float(abs(np.diff(beside)[0])) / np.sqrt(12.0)
+        if size * (end - begin) >= least:
+            found.append((begin, end, int(own[0]), size, np.ones(own.size)))
+    yield from sorted(found, key=lambda item: -item[3] * (item[1] - item[0]))[:MOST_CHANGES]
 
 
 def _modes_in(

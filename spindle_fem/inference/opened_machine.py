@@ -17,6 +17,7 @@ from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.errors import RecordingError
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.input_sampling import unseen_power
+from spindle_fem.inference.recording_gaps import with_changes_amid
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.machine.view.usual_sizes import common_quantities
 from spindle_fem.model.lumped.network_view import view_of_network
@@ -141,8 +142,8 @@ def _open_network(
 
     smooth, notes = _denoised(recordings)
     smooth_earlier, more = _denoised(calibration)
-    own = tuple(thinned(item) for item in smooth)
-    earlier = tuple(thinned(item) for item in smooth_earlier)
+    own = tuple(thinned(with_changes_amid(item)) for item in smooth)
+    earlier = tuple(thinned(with_changes_amid(item)) for item in smooth_earlier)
     averaged = [
         f"{item.name}: {item.times.size} rows averaged to {short.times.size}"
         for item, short in zip((*smooth, *smooth_earlier), (*own, *earlier), strict=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,29 @@ def long_spacings(recording: Recording) -> tuple[tuple[float, float], ...]:
     return tuple(
         (float(recording.times[i]), float(recording.times[i + 1])) for i in rows if i + 1 not in begins
     )
+
+
+def with_changes_amid(recording: Recording) -> Recording:
+    """A recording whose rarely read held inputs change amid the readings between which they did.
+
+    An input may be read more rarely than the temperatures beside it: held until its next reading every change
+    would come late. Between which readings each was is kept in ``unseen_changes``.
+    """
+    usual = float(np.median(np.diff(recording.times)))
+    begins = recording.times[recording.segments[1:, 0]]
+    inputs, found = recording.inputs.copy(), []
+    for column in np.flatnonzero(recording.held):
+        rows = np.flatnonzero(np.isfinite(inputs[:, column]))
+        times, read = recording.times[rows], inputs[rows, column]
+        for i in np.flatnonzero((np.diff(read) != 0.0) & (np.diff(times) > GAP_STEPS * usual)):
+            # in a gap of all rows there is nothing to be put
+            unread = slice(rows[i] + 1, rows[i + 1])
+            if unread.stop == unread.start or np.any((begins > times[i]) & (begins <= times[i + 1])):
+                continue
+            late = recording.times[unread] >= 0.5 * (times[i] + times[i + 1])
+            inputs[unread, column] = np.where(late, read[i + 1], read[i])
+            found.append((recording.input_names[column], float(times[i]), float(times[i + 1])))
+    return replace(recording, inputs=inputs, unseen_changes=tuple(found)) if found else recording
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,6 +74,9 @@ class Recording:
         SI base units.
     segments : (S, 2) int64 ndarray
         Start and stop of the stretches between long gaps.
+    unseen_changes : tuple of (input, float, float), [s]
+        Between which of its own readings a held input changed, where others were read between them; told by
+        a diagnosis.
     displacement_names, displacement_sensors : tuple of str
         Columns, and the sensor of the machine of each.
     displacements : (N, d) float64 ndarray, [m]
@@ -103,6 +106,7 @@ class Recording:
     displacement_names: tuple[str, ...] = ()
     displacement_sensors: tuple[str, ...] = ()
     displacements: Array = field(default_factory=lambda: np.empty((0, 0)))
+    unseen_changes: tuple[tuple[str, float, float], ...] = ()
 
     @property
     def usable(self) -> NDArray[np.bool_]:
