@@ -11,6 +11,7 @@ from spindle_fem.inference.drive_steps import even_drive
 from spindle_fem.inference.gap_misdescriptions import autocovariance, bridge_modes, gap_misdescriptions
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.recording_gaps import with_changes_amid
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.recordings.align import read_recording
@@ -53,12 +54,13 @@ unit = "W"
 STEP, GAP = 10.0, (3010.0, 3400.0)
 
 
-def run_with_gap(folder, plate=None, *, held=True):
-    """A load that switches now and then; the stamps within a gap are missing."""
+def run_with_gap(folder, plate=None, *, held=True, load_every=1):
+    """A load that switches now and then; the stamps within a gap are missing, and of the load most."""
     times = np.arange(0.0, 9000.0, STEP)
     on = np.random.default_rng(3).exponential(200.0, 400).cumsum()
     load = 100.0 * (np.searchsorted(on, times) % 2)
     table = pd.DataFrame({"time_s": times, "plate": 20.0 if plate is None else plate, "load": load})
+    table.loc[np.arange(len(times)) % load_every > 0, "load"] = np.nan
     if held:
         table = table[(times <= GAP[0]) | (times >= GAP[1])]
     table.to_csv(folder / "run.csv", index=False)
@@ -131,3 +133,36 @@ def test_what_a_source_did_within_a_gap_is_within_what_is_open(tmp_path):
 def test_nothing_is_open_without_gaps_or_where_inputs_are_not_held(tmp_path):
     whole, _ = run_with_gap(tmp_path, held=False)
     assert not list(gap_misdescriptions(Predictor(network(), [whole])))
+
+
+def test_an_input_read_rarely_changes_amid_its_readings_and_when_is_open(tmp_path):
+    every = 9
+    (tmp_path / "whole").mkdir()
+    whole, load = run_with_gap(tmp_path / "whole", held=False)
+    truth = Predictor(network(), [whole], at_stamps=True).predict(0, {}).temperature[:, 0]
+    rare, _ = run_with_gap(tmp_path, truth - 273.15, held=False, load_every=every)
+    recording = with_changes_amid(rare)
+    read = load[::every]
+    at = np.flatnonzero(np.diff(read))
+    assert recording.unseen_changes == tuple(
+        ("load", STEP * every * i, STEP * every * (i + 1)) for i in at.tolist()
+    )
+    inside = recording.inputs[every * at[0] : every * (at[0] + 1) + 1, 0].tolist()
+    assert inside == [*[read[at[0]]] * 5, *[read[at[0] + 1]] * 5]
+
+    predictor = Predictor(network(), [recording])
+    directions = list(gap_misdescriptions(predictor))
+    assert {item.name.split(".")[0] for item in directions} == {"change"}
+    np.testing.assert_allclose([item.sigma for item in directions], 100.0 / np.sqrt(12.0))
+    names = [item.coordinate for item in directions]
+    told = with_misdescriptions(predictor, directions).predict(0, {}, (), names)
+    left = np.interp(predictor.drives[0].grid, whole.times, truth) - told.temperature[:, 0]
+    columns = told.sensitivity[:, 0] * [item.sigma for item in directions]
+    size = np.linalg.lstsq(np.vstack((columns, 0.1 * np.eye(len(names)))), np.pad(left, (0, len(names))))[0]
+    assert np.sqrt(np.mean((left - columns @ size) ** 2)) < 0.35 * np.sqrt(np.mean(left**2))
+    assert np.all(np.abs(size) < 2.0)
+
+
+def test_an_input_read_with_the_temperatures_stays_as_it_is(tmp_path):
+    whole, _ = run_with_gap(tmp_path)
+    assert with_changes_amid(whole) is whole
