@@ -25,6 +25,7 @@ from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates, slow_error_of
 from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.inference.tuned import INTERVAL_WIDENING
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_inputs import fast_network
@@ -382,7 +383,10 @@ def test_what_calibration_told_is_the_belief_of_the_diagnosis(fast, blank, tmp_p
     count = len(machine_coordinates(blank))
     assert [c.name for c in belief.coordinates[:count]] == [c.name for c in fit.coordinates[:count]]
     covariance = np.linalg.inv(belief.root.T @ belief.root)
-    assert covariance[:count, :count] == pytest.approx(fit.covariance[:count, :count], rel=1e-6, abs=1e-12)
+    # What was learned beyond the prior, of unit variance, counts as widely as intervals are stated.
+    learned = np.linalg.inv(fit.covariance[:count, :count]) - np.eye(count)
+    expected = np.linalg.inv(np.eye(count) + learned / INTERVAL_WIDENING**2)
+    assert covariance[:count, :count] == pytest.approx(expected, rel=1e-6, abs=1e-12)
     assert belief.mean[:count] == pytest.approx(fit.position[:count])
     for coordinate, position in zip(belief.coordinates[:count], belief.mean, strict=False):
         assert coordinate.at(position) == pytest.approx(TRUTH[coordinate.name], rel=0.1)
