@@ -251,6 +251,27 @@ def simulate(
 
 
 @app.command()
+def view(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of run, transient, sweep, simulate or diagnose.")
+    ],
+    open_page: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    design: Annotated[
+        int | None, typer.Option("--design", metavar="N", help="Design of a sweep; default its optimum.")
+    ] = None,
+) -> None:
+    """Write DIR/view.html: field in 3-D with a movable cut, times, growth, histories."""
+    from spindle_fem.commands.console import stages
+    from spindle_fem.commands.view_command import view_folder
+
+    with stages(True) as tell:
+        page = view_folder(folder, design=design, progress=tell)
+    say(f"wrote {page}")
+    if open_page:
+        typer.launch(page.resolve().as_uri())
+
+
+@app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier command.")],
 ) -> None:

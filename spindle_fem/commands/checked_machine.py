@@ -128,3 +128,17 @@ def load_network(machine: str | Path, overrides: Iterable[str]) -> NetworkMachin
     if faults or spec is None:
         raise FaultsError(path.name, faults)
     return spec
+
+
+def resolved_text(machine: str | Path, overrides: Iterable[str]) -> str:
+    """A definition of either kind with everything that was left to the program, as a folder keeps it."""
+    from spindle_fem.definition.load import find_machine, read_definition, write_machine
+    from spindle_fem.definition.network_load import (
+        is_network_machine,
+        load_network_machine,
+        write_network_machine,
+    )
+
+    if is_network_machine(read_definition(find_machine(machine))):
+        return write_network_machine(load_network_machine(machine, overrides))
+    return write_machine(load_machine(machine, overrides))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from spindle_fem.commands.checked_machine import recording_of
+from spindle_fem.commands.checked_machine import recording_of, resolved_text
 from spindle_fem.inference.coarse_machine import refined
 from spindle_fem.inference.diagnosis import MOST_WORKERS, Diagnosis, diagnose_recordings
 from spindle_fem.inference.diagnosis_content import diagnosis_content, plain_data, unexplained_content
@@ -71,7 +71,7 @@ def diagnose(
         Gets ``diagnosis.json``, ``improved_machine.toml``, ``states.csv``,
         ``before.csv`` and ``after.csv`` (predictions), the same of the full
         model as ``before_full_model.csv`` and ``after_full_model.csv``,
-        ``diagnosis.nc``, ``figures/*.png`` and ``report.html``.
+        ``machine.toml``, ``diagnosis.nc``, ``figures/*.png`` and ``report.html``.
     calibrate : iterable of str, Path or Recording
         Recordings of the same machine with nothing missing.
     overrides : iterable of str
@@ -109,15 +109,15 @@ def diagnose_without_report(
 def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
     started = time.perf_counter()
     require_choice(asked.full_model)
+    overrides = tuple(asked.overrides)
     tell = asked.progress or LOGGER.info
     tell("reading")
     read = [recording_of(item) for item in asked.recordings]
     earlier = [recording_of(item) for item in asked.calibrate]
-    opened = open_machine(
-        asked.machine, tuple(asked.overrides), read, earlier, heldout=asked.heldout, progress=tell
-    )
+    opened = open_machine(asked.machine, overrides, read, earlier, heldout=asked.heldout, progress=tell)
     opened = refined(opened)
     with output_folder(asked.folder) as place:
+        replace_text(place / "machine.toml", resolved_text(asked.machine, overrides))
         drawn = None
         reason = says_too_little(opened)
         if reason:

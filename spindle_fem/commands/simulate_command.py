@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from spindle_fem.commands.checked_machine import recording_of
+from spindle_fem.commands.checked_machine import recording_of, resolved_text
 from spindle_fem.inference.calibration import LEVEL, Calibration
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import (
@@ -23,6 +23,7 @@ from spindle_fem.recordings.compare import (
     write_simulated,
 )
 from spindle_fem.report.read_against_predicted import draw_channels
+from spindle_fem.report.simulation_data import simulation_dataset
 from spindle_fem.report.simulation_report import write_simulation_report
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
@@ -51,8 +52,8 @@ def simulate_machine(
     recording : str, Path or Recording
         Folder or manifest, or what was read from it.
     folder : str or Path
-        Gets ``simulated.csv``, ``simulation.json``, ``error_table.csv``,
-        ``figures/residual_<channel>.png``, ``report.html`` and, when
+        Gets ``simulated.csv``, ``simulation.json``, ``simulation.nc``, ``error_table.csv``,
+        ``machine.toml``, ``figures/residual_<channel>.png``, ``report.html`` and, when
         calibrated, ``calibrated_machine.toml``.
     calibrate : iterable of str, Path or Recording
         Recordings that may move the uncertain parameters first.
@@ -73,13 +74,15 @@ def simulate_machine(
     SpindleFemError
     """
     started = time.perf_counter()
+    overrides = tuple(overrides)
     tell = progress or LOGGER.info
     tell("reading")
     read = recording_of(recording)
     others = [recording_of(item) for item in calibrate]
     with output_folder(folder) as place:
-        simulation = simulate_recordings(machine, read, others, overrides=tuple(overrides), progress=tell)
+        simulation = simulate_recordings(machine, read, others, overrides=overrides, progress=tell)
         keep(simulation)
+        replace_text(place / "machine.toml", resolved_text(machine, overrides))
         tell("writing")
         return write_simulation(simulation, place, started=started)
 
@@ -94,6 +97,7 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
     """
     recording, comparison = simulation.recording, simulation.comparison
     write_simulated(folder / "simulated.csv", recording, simulation.predicted, simulation.displacements)
+    simulation_dataset(simulation).to_netcdf(folder / "simulation.nc", engine="h5netcdf")
     figures = draw_channels(folder / "figures", recording, simulation.predicted, simulation.half_width)
     _write_error_table(folder / "error_table.csv", comparison)
     summary = simulation_summary(comparison)

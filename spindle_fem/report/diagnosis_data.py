@@ -49,6 +49,8 @@ def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequ
     variables: dict[str, Any] = {}
     variables |= _readings(diagnosis, before, after)
     variables |= _inputs(recordings)
+    probes = {n: p for item in recordings for n, p in zip(item.temperature_names, item.probes, strict=True)}
+    variables["channel_probe"] = ("channel", [probes[name] for name in _channels(recordings)])
     variables |= _conditions(recordings)
     variables |= _heat(diagnosis)
     variables |= _sets(diagnosis)
@@ -145,8 +147,17 @@ def _inputs(recordings: Sequence[Recording]) -> dict[str, Any]:
     return {
         "input": (("stamp", "input_name"), np.concatenate(found), {"long_name": "inputs, SI"}),
         "input_name": list(names),
+        "input_held": (
+            "input_name",
+            np.array([_is_held(recordings, name) for name in names]).astype(np.int8),
+            {"long_name": "1 where a value holds until the next"},
+        ),
         "input_unit": ("input_name", [units[name] for name in names]),
     }
+
+
+def _is_held(recordings: Sequence[Recording], name: str) -> bool:
+    return any(item.held[item.input_names.index(name)] for item in recordings if name in item.input_names)
 
 
 def _conditions(recordings: Sequence[Recording]) -> dict[str, Any]:

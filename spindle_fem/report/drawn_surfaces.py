@@ -156,11 +156,17 @@ def facet_edges(points: NDArray[np.float64], facets: NDArray[np.int64]) -> Segme
 
 def element_faces(mesh: TaggedMesh, chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Outer faces (n, 6) of the chosen elements, and the part of each."""
-    tetrahedra = mesh.tetrahedra[chosen]
+    return outer_faces(mesh.tetrahedra[chosen], mesh.part_of_element[chosen])
+
+
+def outer_faces(
+    tetrahedra: NDArray[np.int64], part_of_element: NDArray[np.int32]
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Faces (n, 6) of quadratic tetrahedra (e, 10) that belong to one of them alone, and the part of each."""
     faces = np.concatenate([tetrahedra[:, face] for face in _TETRAHEDRON_FACES])
-    part = np.tile(mesh.part_of_element[chosen], len(_TETRAHEDRON_FACES))
+    part = np.tile(part_of_element, len(_TETRAHEDRON_FACES))
     # The three edge middles name a face as well as its corners do.
-    key = np.sort(faces[:, 3:], axis=1) @ np.array([1, len(mesh.points), 0], dtype=np.int64)
+    key = np.sort(faces[:, 3:], axis=1) @ np.array([1, int(tetrahedra.max()) + 1, 0], dtype=np.int64)
     order = np.argsort(key, kind="stable")
     same = key[order][1:] == key[order][:-1]
     single = np.ones(len(key), dtype=bool)

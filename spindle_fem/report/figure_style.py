@@ -34,6 +34,7 @@ def _lightened(name: str, share: float) -> LinearSegmentedColormap:
 
 TEMPERATURE_MAP = _lightened("plasma", 0.16)
 FILM_MAP = _lightened("viridis", 0.12)
+DIFFERENCE_MAP = mpl.colormaps["RdBu_r"]
 TEMPERATURE_LABEL = "temperature / °C"
 
 INK = "#1d2733"

@@ -8,17 +8,15 @@ the temperature under the pointer, hides parts and opens the machine.
 
 from __future__ import annotations
 
-import base64
 import json
-import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.report.drawn_surfaces import TRIANGLE_SPLIT, facet_normals
-from spindle_fem.report.figure_style import TEMPERATURE_MAP
 from spindle_fem.report.plane_sections import section_of_volume
+from spindle_fem.report.viewed_scene import Layer, Scene, Sphere
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -26,6 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SURFACE_GROUP = "display_surface"
+TEMPERATURE = "temperature"
 TRIANGLE_BUDGET = 60_000
 BULGE = 4.0e-4  # m; more than this off its chord shows as a corner
 
@@ -53,7 +52,8 @@ def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGE
     facets = np.concatenate([np.zeros((0, 6), np.int64), *(mesh.surfaces[name] for name in names)])
     counts = [len(mesh.surfaces[name]) for name in names]
     part = np.repeat([part_index[mesh.part_of_surface[name]] for name in names], counts).astype(np.int64)
-    points, triangles, normals, values, part = _welded(mesh.points, facets, part, result.temperature)
+    node, triangles, normals, part = welded(mesh.points, facets, part)
+    points, values = mesh.points[node], result.temperature[node]
     if len(triangles) > triangle_budget:
         points, triangles, normals, values, part = _clustered(
             points, triangles, normals, values, part, triangle_budget
@@ -108,75 +108,48 @@ def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGE
 
 
 def viewer_payload(surface: xr.Dataset) -> dict[str, Any]:
-    """What the page's viewer reads: a small header and one deflated block in base64."""
-    position = surface["position"].values.astype(np.float64)
-    low, high = position.min(axis=0), position.max(axis=0)
-    span = float((high - low).max())
-    temperature = surface["temperature"].values.astype(np.float64)
-    every = np.concatenate([temperature, surface["ball_temperature"].values.astype(np.float64)])
-    coldest, warmest = float(every.min()), float(every.max())
-    width = max(warmest - coldest, 1.0e-6)
-    part = surface["triangle_part"].values
-    is_section = surface["triangle_is_section"].values
-    order = np.lexsort((is_section, part))
-    triangles = surface["triangle"].values[order]
-    names = json.loads(surface.attrs["part_names"])
-    ranges = []
-    for index, name in enumerate(names):
-        own = part[order] == index
-        solid, cap = own & (is_section[order] == 0), own & (is_section[order] == 1)
-        ranges.append(
-            {
-                "name": name,
-                "first": int(np.argmax(solid)) if solid.any() else 0,
-                "count": int(solid.sum()),
-                "cap_first": int(np.argmax(cap)) if cap.any() else 0,
-                "cap_count": int(cap.sum()),
-            }
-        )
-    quantised = np.round((position - low) / span * 65535.0).astype("<u2")
-    normals = np.round(surface["normal"].values * 127.0).astype(np.int8)
-    values = np.round((temperature - coldest) / width * 65535.0).astype("<u2")
-    # Column by column, and triangles as differences, so that deflating finds the pattern.
-    block = b"".join(
-        [
-            np.ascontiguousarray(quantised.T).tobytes(),
-            np.ascontiguousarray(normals.T).tobytes(),
-            values.tobytes(),
-            np.diff(triangles.ravel().astype("<i4"), prepend=np.int32(0)).astype("<i4").tobytes(),
-        ]
+    """What the page's viewer reads of a surface for drawing."""
+    is_section = surface["triangle_is_section"].values == 1
+    triangles, part = (surface[name].values.astype(np.int64) for name in ("triangle", "triangle_part"))
+    balls = zip(
+        *(surface[f"ball_{name}"].values.astype(np.float64) for name in ("centre", "radius", "temperature")),
+        strict=True,
     )
-    colours = (TEMPERATURE_MAP(np.linspace(0.0, 1.0, 256))[:, :3] * 255.0).round().astype(np.uint8)
-    balls = np.column_stack(
-        [surface["ball_centre"].values, surface["ball_radius"].values, surface["ball_temperature"].values]
-    )
-    return {
-        "vertices": len(position),
-        "triangles": len(triangles),
-        "low": low.tolist(),
-        "span": span,
-        "size": (high - low).tolist(),
-        "coldest": coldest,
-        "warmest": warmest,
-        "parts": ranges,
-        "balls": np.round(balls, 5).tolist(),
-        "colours": base64.b64encode(colours.tobytes()).decode(),
-        "block": base64.b64encode(zlib.compress(block, 6)).decode(),
-    }
+    return Scene(
+        points=surface["position"].values.astype(np.float64),
+        layers=(Layer(TEMPERATURE, "°C", surface["temperature"].values.astype(np.float64)[None]),),
+        part_names=tuple(json.loads(surface.attrs["part_names"])),
+        vertex_point=np.arange(surface.sizes["vertex"]),
+        normals=surface["normal"].values,
+        triangles=triangles[~is_section],
+        triangle_part=part[~is_section],
+        caps=triangles[is_section],
+        cap_part=part[is_section],
+        balls=tuple(
+            Sphere(centre, round(float(radius), 5), {TEMPERATURE: np.array([value])})
+            for centre, radius, value in balls
+        ),
+    ).payload()
 
 
-def _welded(
-    points: NDArray[np.float64],
-    facets: NDArray[np.int64],
-    part: NDArray[np.int64],
-    temperature: NDArray[np.float64],
-) -> tuple[
-    NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]
-]:
-    """Straight triangles; points shared where the surface is smooth, doubled at sharp edges.
+def welded(
+    points: NDArray[np.float64], facets: NDArray[np.int64], part: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Straight triangles of six-node facets; corners shared where the surface is smooth, doubled at sharp edges.
 
     Facets with an edge that bulges visibly become four. Both facets of an edge
     see the same bulge, so no gap opens.
+
+    Parameters
+    ----------
+    points : (n_nodes, 3) ndarray, [m]
+    facets : (n, 6) ndarray of int
+    part : (n,) ndarray of int
+
+    Returns
+    -------
+    node, triangles, normals, part
+        Mesh node and normal of every corner, (v,) and (v, 3); triangles (m, 3) of corners, the part of each.
     """
     chord_middles = 0.5 * (points[facets[:, [0, 1, 2]]] + points[facets[:, [1, 2, 0]]])
     bulge = np.linalg.norm(points[facets[:, 3:]] - chord_middles, axis=2).max(axis=1)
@@ -191,7 +164,7 @@ def _welded(
     key = ((nodes.ravel() * 5 + coarse[:, 0]) * 5 + coarse[:, 1]) * 5 + coarse[:, 2]
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     kept = nodes.ravel()[first]
-    return points[kept], inverse.reshape(-1, 3), at_nodes[first], temperature[kept], owner
+    return kept, inverse.reshape(-1, 3), at_nodes[first], owner
 
 
 def _clustered(

@@ -275,10 +275,14 @@ class _ChartWorker:
         return time.perf_counter() - began
 
     def write_growth(self, shapes: Mapping[str, BodyShape]) -> float:
-        """Write the picture of the deformed machine; seconds."""
+        """Write the growth of the bodies and the picture of the deformed machine; seconds."""
         from spindle_fem.report.growth_chart import deformed_machine
+        from spindle_fem.results.dataset import write_dataset
+        from spindle_fem.results.growth_file import GROWTH_GROUP, growth_dataset
 
         began = time.perf_counter()
+        if shapes:
+            write_dataset(growth_dataset(shapes), self._folder / "result.nc", group=GROWTH_GROUP)
         self._write_all({"deformed_machine": lambda: deformed_machine(shapes)})
         return time.perf_counter() - began
 

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.errors import BadInputError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -89,3 +90,38 @@ class FieldSeries:
             self._steps[name].resize(number + 1, axis=0)
             self._steps[name][number] = value
         self._steps.attrs["NSteps"] = number + 1
+
+
+def read_series(path: Path) -> tuple[dict[str, NDArray], tuple[str, ...]]:
+    """Mesh, times and temperatures of a file that :class:`FieldSeries` wrote.
+
+    Returns
+    -------
+    arrays : dict
+        ``points`` (n, 3) m, ``tetrahedra`` (e, 10), ``part`` (e,), ``times`` (t,) s, ``temperature`` (t, n) °C.
+    part_names : tuple of str
+
+    Raises
+    ------
+    BadInputError
+        There is no such file, or it is no time series of fields.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            root = file["VTKHDF"]
+            points = root["Points"][()].astype(np.float64)
+            cells = int(root["NumberOfCells"][0])
+            part = root[f"CellData/{PART}"]
+            times = root["Steps/Values"][()]
+            arrays = {
+                "points": points,
+                "tetrahedra": root["Connectivity"][()].reshape(cells, -1).astype(np.int64),
+                "part": part[()].astype(np.int64),
+                "times": times,
+                "temperature": root[f"PointData/{TEMPERATURE}"][()].reshape(len(times), len(points)),
+            }
+            return arrays, tuple(str(name) for name in part.attrs["names"])
+    except (OSError, KeyError, ValueError) as error:
+        raise BadInputError(
+            str(path), f"cannot be read as fields over time ({error}).", "Run the command again."
+        ) from error

@@ -43,6 +43,7 @@ _OWN = frozenset(
         "state_space.npz",
         "state_space.json",
         "recording.toml",
+        "simulation.nc",
     }
 )
 

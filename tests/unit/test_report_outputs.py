@@ -29,6 +29,7 @@ from spindle_fem.results.thermal_result import (
 )
 from spindle_fem.validity import CodedWarning
 from tests.support.made_result import make_result
+from tests.support.unpacked_view import unpacked
 
 
 @pytest.fixture(scope="module")
@@ -166,29 +167,27 @@ def test_reports_of_other_commands_are_put_together_from_blocks():
 
 # ------------------------------------------------------------------ the viewer
 def test_viewer_data_restore_the_surface(result):
-    import base64
-    import zlib
-
     surface = display_surface(result)
     payload = viewer_payload(surface)
-    block = zlib.decompress(base64.b64decode(payload["block"]))
-    n, m = payload["vertices"], payload["triangles"]
-    assert len(block) == 6 * n + 3 * n + 2 * n + 12 * m
-    place = np.frombuffer(block, "<u2", 3 * n).reshape(3, n).T / 65535.0 * payload["span"] + payload["low"]
+    columns = unpacked(payload)
+    place = columns["points"].reshape(3, -1).T / 65535.0 * payload["span"] + payload["low"]
     assert np.allclose(place, surface["position"].values, atol=payload["span"] / 65535.0)
-    index = np.cumsum(np.frombuffer(block[11 * n :], "<i4"))
-    assert (index.min(), index.max()) == (0, n - 1)
-    shown = sum(part["count"] + part["cap_count"] for part in payload["parts"])
-    assert shown == m
-    kelvin = np.frombuffer(block[9 * n : 11 * n], "<u2") / 65535.0 * (payload["warmest"] - payload["coldest"])
-    assert np.allclose(kelvin + payload["coldest"], surface["temperature"].values, atol=1.0e-3)
+    index = np.cumsum(columns["triangles"])
+    caps = np.cumsum(columns["caps"])
+    assert (min(index.min(), caps.min()), max(index.max(), caps.max())) == (0, len(place) - 1)
+    shown = sum(part["triangles"][1] + part["caps"][1] for part in payload["parts"])
+    assert shown == surface.sizes["triangle_number"]
+    (layer,) = payload["layers"]
+    celsius = layer["low"] + columns["layer0"] / 65535.0 * (layer["high"] - layer["low"])
+    assert np.allclose(celsius, surface["temperature"].values, atol=1.0e-3)
 
 
 def test_viewer_balls_follow_the_definition(result):
-    balls = np.array(viewer_payload(display_surface(result))["balls"])
+    balls = viewer_payload(display_surface(result))["balls"]
     assert len(balls) == 3 * 30 + 2 * 27
-    assert np.allclose(np.hypot(balls[:90, 0], balls[:90, 1]), 0.0825, atol=1.0e-5)
-    assert np.allclose(balls[:, 4], 41.85, atol=1.0e-2)
+    places = np.array([ball["place"] for ball in balls])
+    assert np.allclose(np.hypot(places[:90, 0], places[:90, 1]), 0.0825, atol=1.0e-5)
+    assert np.allclose([ball["values"][0] for ball in balls], 41.85, atol=1.0e-2)
 
 
 def test_a_large_surface_is_thinned_to_its_budget(result):

@@ -1,0 +1,37 @@
+"""``simulation.nc``: inputs, readings and predictions of a simulation, as one xarray Dataset with units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from spindle_fem.studies.simulate import Simulation
+from spindle_fem.units import ZERO_CELSIUS_K
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SIMULATION_SCHEMA = "spindle-fem/simulation-data/1"
+
+
+def simulation_dataset(simulation: Simulation) -> xr.Dataset:
+    """What a simulation rests on; temperatures in °C, inputs in SI, named as in ``diagnosis.nc``."""
+    import xarray as xr
+
+    recording = simulation.recording
+    along = ("stamp", "channel")
+    return xr.Dataset(
+        {
+            "time": ("stamp", recording.times, {"units": "s", "long_name": "time from the first stamp"}),
+            "measured": (along, recording.temperature - ZERO_CELSIUS_K, {"units": "degC"}),
+            "usable": (along, recording.usable.astype(np.int8)),
+            "predicted": (along, simulation.predicted - ZERO_CELSIUS_K, {"units": "degC"}),
+            "input": (("stamp", "input_name"), recording.input_history().values, {"long_name": "inputs, SI"}),
+            "input_unit": ("input_name", list(recording.input_units)),
+            "input_held": ("input_name", recording.held.astype(np.int8)),
+            "channel_probe": ("channel", list(recording.probes)),
+        },
+        {"channel": list(recording.temperature_names), "input_name": list(recording.input_names)},
+        {"schema": SIMULATION_SCHEMA, "machine": simulation.machine, "recording": recording.name},
+    )
