@@ -129,8 +129,8 @@ def _steady_scene(spec: MachineSpec, solid: Solid, temperature: Array, growth: A
     if shift is None:
         return scene
     note = (
-        "Growth is the mean round the axis against the back of the flange, bending left out; spacers and covers "
-        "move with the nearest body, balls and probes stay where they are drawn."
+        "Growth is the mean round the axis against the back of the flange, bending left out; spacers and "
+        "covers move with the nearest body, balls and probes stay where they are drawn."
     )
     return replace(scene, notes=(note,))
 
@@ -191,8 +191,7 @@ def _transient(place: Path, _design: int | None, progress: Progress) -> tuple[st
         solid, fields, time = _last_state(place, spec, progress)
         shown = np.array([time])
         notes = (
-            'Only the last field was kept; with fields_every = "10 min" in its [study] a transient keeps them over '
-            "time.",
+            'Only the last field was kept; with fields_every = "10 min" a study keeps fields over time.',
         )
     scene = solid_scene(solid, {TEMPERATURE: fields}, shown)
     at_shown = {name: np.interp(shown, times, values) for name, values in columns.items()}
@@ -261,7 +260,7 @@ def _diagnosis(place: Path, _design: int | None, progress: Progress) -> tuple[st
 
 
 def _recorded(course: Course, machines: dict[str, Path], progress: Progress) -> Scene:
-    """Scene of a recording: the field of every machine along it, and what its probes read and should have read.
+    """Scene of a recording: the field of every machine along it, what probes read and should have read.
 
     Parameters
     ----------
@@ -324,19 +323,18 @@ def _fields_along(
     from spindle_fem.solvers.prepared_machine import prepare_machine
     from spindle_fem.studies.recorded_fields import fields_of_recording
 
+    specs = {name: load_machine(path) for name, path in machines.items()}
     fields: dict[str, Array] = {}
     mesh = None
     try:
-        for name, path in machines.items():
+        for name, spec in specs.items():
             progress(f"fields: {name}")
-            run = fields_of_recording(
-                load_machine(path), course.inputs, course.first_reading, times, progress
-            )
+            run = fields_of_recording(spec, course.inputs, course.first_reading, times, progress)
             if mesh is not None and mesh.digest != run.mesh.digest:
-                raise BadInputError(str(path), "is of another geometry than before.", "")
+                raise BadInputError(name, "has another geometry.", "Views compare machines of one mesh.")
             mesh, fields[name] = run.mesh, run.temperature
     except SpindleFemError as error:
-        prepared = prepare_machine(spec_on(load_machine(next(reversed(machines.values()))), COARSE))
+        prepared = prepare_machine(spec_on(next(reversed(specs.values())), COARSE))
         none = np.zeros((len(times), 0))
         layers = tuple(Layer(name, "°C", none) for name in (READ, *course.predictions.values()))
         scene = replace(solid_scene(Solid.of(prepared.mesh), {}, times), layers=layers)
@@ -346,7 +344,7 @@ def _fields_along(
     changes = {CHANGE: fields[AFTER] - fields[BEFORE]} if AFTER in fields else {}
     scene = solid_scene(Solid.of(mesh), fields, times, differences=changes)
     note = (
-        "Fields are of the full model on the coarse mesh under the recorded inputs; probes show what the recording "
-        "has. What belongs to a sensor alone changes no field."
+        "Fields are of the full model on the coarse mesh under the recorded inputs; probes show what the "
+        "recording has. What belongs to a sensor alone changes no field."
     )
     return scene, (note,)

@@ -135,7 +135,7 @@ def viewer_payload(surface: xr.Dataset) -> dict[str, Any]:
 def welded(
     points: NDArray[np.float64], facets: NDArray[np.int64], part: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
-    """Straight triangles of six-node facets; corners shared where the surface is smooth, doubled at sharp edges.
+    """Straight triangles of six-node facets; corners shared where it is smooth, doubled at sharp edges.
 
     Facets with an edge that bulges visibly become four. Both facets of an edge
     see the same bulge, so no gap opens.

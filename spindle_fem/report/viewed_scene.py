@@ -1,8 +1,8 @@
 """What the interactive view shows, and the data that it travels as.
 
-A scene is a surface to draw and, where a cut can be moved, the tetrahedra behind it; layers of values at its
-points, each with a colour scale of its own, at one time or several; balls and named places with their histories.
-Everything goes into a page as one deflated block of columns, quantised to 16 bits, and a small header.
+A scene is a surface to draw and, where a cut can be moved, the tetrahedra behind it; layers of values at
+its points, at one time or several; balls and named places with their histories. Everything goes into a page
+as one deflated block of columns, quantised to 16 bits, and a small header.
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ class Scene:
         return {**header, "block": base64.b64encode(packed).decode()}
 
     def _scale(self, layer: Layer) -> tuple[float, float]:
-        """Ends of a layer's colour scale, over all times, balls and places: one for all of its kind, to compare."""
+        """Ends of the colour scale over all times, balls and places: one for all of a kind, to compare."""
         alike = [item for item in self.layers if item.difference == layer.difference]
         spheres = [
             values

@@ -98,7 +98,8 @@ def read_series(path: Path) -> tuple[dict[str, NDArray], tuple[str, ...]]:
     Returns
     -------
     arrays : dict
-        ``points`` (n, 3) m, ``tetrahedra`` (e, 10), ``part`` (e,), ``times`` (t,) s, ``temperature`` (t, n) °C.
+        ``points`` (n, 3) m, ``tetrahedra`` (e, 10), ``part`` (e,), ``times`` (t,) s,
+        ``temperature`` (t, n) °C.
     part_names : tuple of str
 
     Raises

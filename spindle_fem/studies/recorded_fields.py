@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import RecordingError
-from spindle_fem.inference.full_model_check import COARSE, MOST_STEPS, spec_on
+from spindle_fem.inference import tuned
+from spindle_fem.inference.full_model_check import (
+    COARSE,
+    COEFFICIENT_TOLERANCE,
+    FIRST_STEP,
+    MOST_STEPS,
+    spec_on,
+)
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.evaluate import temperature_at_nodes
 from spindle_fem.model.mesh.thermal_state import ThermalState
@@ -24,13 +31,14 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
-# Views are read to a tenth of a kelvin.
+# Views are read to a tenth of a kelvin: as closely as a diagnosis follows channels of that noise.
+READ_TO = 0.1
 OPTIONS = TransientOptions(
-    error=0.1,
-    coupling_tolerance=1.0e-6,
-    input_resolution=0.2,
-    coefficient_tolerance=5.0e-3,
-    first_step=30.0,
+    error=tuned.STEP_ERROR * READ_TO,
+    coupling_tolerance=tuned.COUPLING_ERROR * READ_TO,
+    input_resolution=tuned.INPUT_RESOLUTION * READ_TO,
+    coefficient_tolerance=COEFFICIENT_TOLERANCE,
+    first_step=FIRST_STEP,
     trust_contraction=True,
     method="multigrid",
 )

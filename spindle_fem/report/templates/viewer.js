@@ -305,10 +305,16 @@
   }
   function label() {
     names.textContent = "";
+    picked.forEach(function (entry) {
+      if (!entry.at) return;
+      const mark = document.createElement("i"), where = onScreen(entry.at);
+      mark.style.left = where[0] + "px"; mark.style.top = where[1] + "px"; mark.style.borderColor = entry.colour;
+      names.append(mark);
+    });
     if (!state.places) return;
     data.places.forEach(function (s, i) {
-      const tag = document.createElement("span"), where = onScreen(s.place), value = valueOf(s);
-      tag.textContent = s.name + (value === null ? "" : " " + value.toFixed(1));
+      const tag = document.createElement("span"), where = onScreen(s.place), value = valueOf(s), digits = data.layers[state.layer].difference ? 2 : 1;
+      tag.textContent = s.name + (value === null ? "" : " " + value.toFixed(digits));
       tag.className = picked.has("place " + s.name) ? "chosen" : "";
       tag.style.left = where[0] + "px"; tag.style.top = where[1] + "px";
       names.append(tag);
@@ -377,7 +383,7 @@
       if (data.times.length > 1) data.layers.forEach(function (layer, l) {
         if (mesh.layers[l] && !layer.difference) curves.push({ name: layer.name, times: data.times, values: mesh.layers[l].map(function (f) { return restored(layer, f[node] / 65535); }) });
       });
-      entry = { title: "r " + (1000 * Math.hypot(p[0], p[1])).toFixed(0) + ", z " + (1000 * p[2]).toFixed(0) + " mm", curves: curves, value: restored(data.layers[state.layer], current()[node] / 65535) };
+      entry = { title: "r " + (1000 * Math.hypot(p[0], p[1])).toFixed(0) + ", z " + (1000 * p[2]).toFixed(0) + " mm", curves: curves, value: restored(data.layers[state.layer], current()[node] / 65535), at: p };
     }
     if (picked.has(key)) picked.delete(key); else picked.set(key, entry);
     plot(); redraw();
@@ -405,7 +411,7 @@
     const curves = [];
     let n = 0;
     picked.forEach(function (entry, key) {
-      const item = document.createElement("li"), colour = CYCLE[n++ % CYCLE.length];
+      const item = document.createElement("li"), colour = entry.colour = CYCLE[n++ % CYCLE.length];
       item.textContent = entry.title + (entry.value === null || entry.value === undefined || data.times.length > 1 ? "" : ": " + entry.value.toFixed(2) + " " + data.layers[state.layer].unit);
       item.style.color = colour;
       list.append(item);
