@@ -347,4 +347,6 @@ def _fields_along(
         "Fields are of the full model on the coarse mesh under the recorded inputs; probes show what the "
         "recording has. What belongs to a sensor alone changes no field."
     )
+    if AFTER in fields:
+        note += " Before is the machine as defined, after has what was found and the parameters as they were fitted."
     return scene, (note,)

@@ -115,6 +115,7 @@
       mesh.layers.push(frames);
     });
   }
+  function told(value, digits) { const text = value.toFixed(digits); return (parseFloat(text) === 0 ? text.replace("-", "") : text).replace("-", "−"); }
   function scaled(layer, value) { return (value - layer.low) / (layer.high - layer.low); }
   function restored(layer, share) { return layer.low + share * (layer.high - layer.low); }
 
@@ -312,9 +313,19 @@
       names.append(mark);
     });
     if (!state.places) return;
-    data.places.forEach(function (s, i) {
-      const tag = document.createElement("span"), where = onScreen(s.place), value = valueOf(s), digits = data.layers[state.layer].difference ? 2 : 1;
-      tag.textContent = s.name + (value === null ? "" : " " + value.toFixed(digits));
+    const taken = [];
+    data.places.map(function (s) { return [s, onScreen(s.place)]; }).sort(function (a, b) { return b[1][1] - a[1][1]; }).forEach(function (pair) {
+      const s = pair[0], where = pair[1].slice(), value = valueOf(s), digits = data.layers[state.layer].difference ? 2 : 1;
+      const tag = document.createElement("span");
+      tag.textContent = s.name + (value === null ? "" : " " + told(value, digits));
+      // Names that would cover one another stand above one another.
+      const wide = 7 * tag.textContent.length + 10, tall = 18;
+      let free = false;
+      while (!free) {
+        free = taken.every(function (t) { return where[0] + wide < t[0] || where[0] > t[1] || Math.abs(where[1] - t[2]) >= tall; });
+        if (!free) where[1] -= 4;
+      }
+      taken.push([where[0], where[0] + wide, where[1]]);
       tag.className = picked.has("place " + s.name) ? "chosen" : "";
       tag.style.left = where[0] + "px"; tag.style.top = where[1] + "px";
       names.append(tag);
@@ -336,11 +347,11 @@
   const TOLD = readout.textContent;
   function readAt(event) {
     const near = placeNear(event), layer = data.layers[state.layer];
-    if (near) { const v = valueOf(near); readout.textContent = near.name + (v === null ? "" : ": " + v.toFixed(2) + " " + layer.unit); return; }
+    if (near) { const v = valueOf(near); readout.textContent = near.name + (v === null ? "" : ": " + told(v, 2) + " " + layer.unit); return; }
     const pixel = pixelAt(event, 1).pixel;
     if (!pixel[3] || (current() === null && pixel[2] < 252)) { readout.textContent = TOLD; return; }
     const name = pixel[2] === 254 ? "balls" : (data.parts[pixel[2]] || { name: "" }).name;
-    readout.textContent = name + ": " + restored(layer, (pixel[0] * 256 + pixel[1]) / 65535).toFixed(layer.difference ? 2 : 1) + " " + layer.unit;
+    readout.textContent = name + ": " + told(restored(layer, (pixel[0] * 256 + pixel[1]) / 65535), layer.difference ? 2 : 1) + " " + layer.unit;
   }
   function placeNear(event) {
     if (!state.places) return null;
@@ -412,7 +423,7 @@
     let n = 0;
     picked.forEach(function (entry, key) {
       const item = document.createElement("li"), colour = entry.colour = CYCLE[n++ % CYCLE.length];
-      item.textContent = entry.title + (entry.value === null || entry.value === undefined || data.times.length > 1 ? "" : ": " + entry.value.toFixed(2) + " " + data.layers[state.layer].unit);
+      item.textContent = entry.title + (entry.value === null || entry.value === undefined || data.times.length > 1 ? "" : ": " + told(entry.value, 2) + " " + data.layers[state.layer].unit);
       item.style.color = colour;
       list.append(item);
       entry.curves.forEach(function (c, k) { curves.push({ name: entry.title + ", " + c.name, colour: colour, dash: DASHES[k % DASHES.length], times: c.times, values: c.values, several: entry.curves.length > 1 }); });
@@ -579,7 +590,7 @@
     bar.style.background = "linear-gradient(to right," + stops.join(",") + ")";
     const ticks = find(".view3d-ticks"), digits = layer.high - layer.low < 2 ? 2 : 1;
     ticks.textContent = "";
-    for (let i = 0; i <= 5; i++) { const s = document.createElement("span"); s.textContent = restored(layer, i / 5).toFixed(digits) + (i === 5 ? " " + layer.unit : ""); ticks.append(s); }
+    for (let i = 0; i <= 5; i++) { const s = document.createElement("span"); s.textContent = told(restored(layer, i / 5), digits) + (i === 5 ? " " + layer.unit : ""); ticks.append(s); }
     find(".view3d-scale").textContent = layer.name + " / " + layer.unit;
   }
   data.notes.forEach(function (text) { const line = document.createElement("p"); line.className = "view3d-note"; line.textContent = text; host.append(line); });
