@@ -294,12 +294,15 @@ def _recorded(course: Course, machines: dict[str, Path], progress: Progress) -> 
     scene, said = _fields_along(course, machines, times, progress)
     notes = (*notes, *said)
     none = np.zeros((len(times), 0))
-    offsets = tuple(Layer(name, "K", none, difference=True) for name in kept)
+    beside = (
+        *([] if READ in {layer.name for layer in scene.layers} else [Layer(READ, "°C", none)]),
+        *(Layer(name, "K", none, difference=True) for name in kept),
+    )
     spec = load_machine(last)
     if CHANGE in {layer.name for layer in scene.layers}:
         for layers in values.values():
             layers[CHANGE] = layers[AFTER] - layers[BEFORE]
-    scene = replace(scene, layers=(*scene.layers, *offsets), histories=course.histories(), notes=notes)
+    scene = replace(scene, layers=(*scene.layers, *beside), histories=course.histories(), notes=notes)
     return replace(scene, places=probes_of(spec, scene, values))
 
 

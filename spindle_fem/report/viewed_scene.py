@@ -197,7 +197,13 @@ class Scene:
 
     def _scale(self, layer: Layer) -> tuple[float, float]:
         """Ends of the colour scale over all times, balls and places: one for all of a kind, to compare."""
-        alike = [item for item in self.layers if item.difference == layer.difference]
+        # What fields differ by says nothing of what is left at the probes.
+        alike = [
+            item
+            for item in self.layers
+            if item.difference == layer.difference
+            and (not item.difference or bool(item.values.size) == bool(layer.values.size))
+        ]
         spheres = [
             values
             for item in (*self.balls, *self.places)
