@@ -351,5 +351,5 @@ def _fields_along(
         "recording has. What belongs to a sensor alone changes no field."
     )
     if AFTER in fields:
-        note += " Before is the machine as defined, after has what was found and the parameters as they were fitted."
+        note += " Before is the machine as defined; after has what was found and parameters as fitted."
     return scene, (note,)
