@@ -49,6 +49,11 @@ def complete(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Assumpti
     _bearing_places(result, assumed)
     _grease(result, assumed)
     _materials(result, assumed)
+    if result.get("surroundings") == "workshop":
+        # Loads numpy, which reading other definitions does without.
+        from spindle_fem.definition.default_surroundings import add_surroundings
+
+        assumed += [Assumption(where, rule) for where, rule in add_surroundings(result)]
     return result, tuple(assumed)
 
 

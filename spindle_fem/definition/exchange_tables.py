@@ -172,6 +172,20 @@ class Surface(SpecModel):
     """The union of these faces."""
 
 
+def raceway_surfaces(bearing: str) -> tuple[Surface, Surface]:
+    """Surfaces that a bearing names itself: inner and outer raceway."""
+    sides = (("inner", "outward"), ("outer", "inward"))
+    inner, outer = (
+        Surface(
+            name=f"{bearing}.{ring}_raceway",
+            part=f"{bearing}.{ring}_ring",
+            where=(FaceSelector(facing=facing),),
+        )
+        for ring, facing in sides
+    )
+    return inner, outer
+
+
 class ConstantFilm(SpecModel):
     """Fixed heat-transfer coefficient."""
 

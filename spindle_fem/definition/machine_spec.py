@@ -26,6 +26,7 @@ from spindle_fem.definition.exchange_tables import (
     Ports,
     RotatingFilm,
     Surface,
+    raceway_surfaces,
 )
 from spindle_fem.definition.field_types import (
     Angle,
@@ -257,6 +258,8 @@ class MachineSpec(SpecModel):
     """What becomes of exposed faces that no surface names."""
     heat_capacity_factor: UncertainNumber = Uncertain(1.0)
     """Factor on every heat capacity."""
+    surroundings: Literal["workshop"] | None = None
+    """Rules that give joints, outer surfaces and air gaps where the file gives none."""
     operation: Operation
     """Operating point."""
     materials: dict[str, Material] = Field(default_factory=dict)
@@ -313,16 +316,7 @@ class MachineSpec(SpecModel):
         ``F1.inner_raceway`` is the outer cylinder of ``F1.inner_ring``,
         ``F1.outer_raceway`` the inner cylinder of ``F1.outer_ring``.
         """
-        raceways = []
-        for _, bearing in self.bearings:
-            for ring, facing in (("inner", "outward"), ("outer", "inward")):
-                raceways.append(
-                    Surface(
-                        name=f"{bearing.name}.{ring}_raceway",
-                        part=f"{bearing.name}.{ring}_ring",
-                        where=(FaceSelector(facing=facing),),
-                    )
-                )
+        raceways = (surface for _, bearing in self.bearings for surface in raceway_surfaces(bearing.name))
         return self.surface + tuple(raceways)
 
     def part_material(self, part_name: str) -> Material:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
+from spindle_fem.definition.drawn_tables import part_geometry, ring_geometries, surface_definition
 from spindle_fem.errors import FaultsError, GeometryError
 from spindle_fem.machine.geometry.channel_geometry import (
     ChannelDefinition,
@@ -21,13 +22,7 @@ from spindle_fem.machine.geometry.channel_geometry import (
 )
 from spindle_fem.machine.geometry.faces import MeridianEdge
 from spindle_fem.machine.geometry.meridian import MeridianMap
-from spindle_fem.machine.geometry.part_shapes import (
-    AnnularSegment,
-    BallRowGeometry,
-    FaceBox,
-    PartGeometry,
-    SurfaceDefinition,
-)
+from spindle_fem.machine.geometry.part_shapes import BallRowGeometry, PartGeometry, SurfaceDefinition
 
 if TYPE_CHECKING:
     from spindle_fem.definition.machine_spec import MachineSpec
@@ -96,37 +91,17 @@ def build_assembly(spec: MachineSpec, *, where: str | None = None) -> AssemblyGe
     FaultsError
         Every geometric fault at once.
     """
-    parts = [
-        PartGeometry(
-            part.name,
-            tuple(
-                AnnularSegment(*segment.z, 0.5 * segment.inner_diameter, 0.5 * segment.outer_diameter)
-                for segment in part.segment
-            ),
-            part.rotating,
-        )
-        for part in spec.part
-    ]
+    parts = [part_geometry(part) for part in spec.part]
     balls = []
     for group, bearing in spec.bearings:
         kind = spec.bearing_types[group.bearing_type]
-        for ring, inner, outer in (
-            ("inner", kind.bore_diameter, kind.inner_ring_outer_diameter),
-            ("outer", kind.outer_ring_inner_diameter, kind.outer_diameter),
-        ):
-            segment = AnnularSegment(*bearing.z, 0.5 * inner, 0.5 * outer)
-            parts.append(PartGeometry(f"{bearing.name}.{ring}_ring", (segment,), ring == "inner"))
+        parts += ring_geometries(bearing, kind)
         balls.append(
             BallRowGeometry(
                 bearing.name, 0.5 * sum(bearing.z), 0.5 * kind.pitch, kind.ball_diameter, kind.ball_count
             )
         )
-    surfaces = [
-        SurfaceDefinition(
-            surface.name, surface.part, tuple(FaceBox(box.facing, box.z, box.r) for box in surface.where)
-        )
-        for surface in spec.all_surfaces
-    ]
+    surfaces = [surface_definition(surface) for surface in spec.all_surfaces]
     channel = None
     if spec.channel is not None:
         values = {
@@ -165,6 +140,7 @@ def assemble(
     FaultsError
         Every fault at once, each a GeometryError.
 
+    >>> from spindle_fem.machine.geometry.part_shapes import AnnularSegment
     >>> ring = PartGeometry("ring", (AnnularSegment(0.0, 0.02, 0.05, 0.06),))
     >>> assemble([ring]).surface_names
     ('ring.adiabatic',)

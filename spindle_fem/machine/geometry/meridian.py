@@ -102,7 +102,7 @@ class MeridianMap:
         Parts that float, come apart or pinch, selectors that match nothing and
         faces claimed twice go to ``faults``.
         """
-        pieces = self._boundary_pieces()
+        pieces = self.boundary_pieces()
         self._check_connection(pieces, faults)
         labels = self._label(pieces, surfaces, remaining, faults)
         return merge_pieces(pieces, labels, self.part_names)
@@ -123,7 +123,8 @@ class MeridianMap:
         inside = (r_index > 0).ravel()
         return boxes.reshape(-1, 4)[inside], self.owner.ravel()[inside]
 
-    def _boundary_pieces(self) -> list[Piece]:
+    def boundary_pieces(self) -> list[Piece]:
+        """Faces and contacts, cut wherever a line of the drawing crosses them."""
         pieces = []
         owner = self.owner
         for low, high in zip(*np.nonzero(owner[:, 1:] != owner[:, :-1]), strict=True):

@@ -1,0 +1,37 @@
+"""What tables of a definition draw in the meridian plane: parts, rings of bearings, named surfaces."""
+
+from __future__ import annotations
+
+from spindle_fem.definition.exchange_tables import Surface
+from spindle_fem.definition.solid_tables import BearingType, Part, SetBearing
+from spindle_fem.machine.geometry.part_shapes import (
+    AnnularSegment,
+    FaceBox,
+    PartGeometry,
+    SurfaceDefinition,
+)
+
+
+def part_geometry(part: Part) -> PartGeometry:
+    """What a ``[[part]]`` draws."""
+    segments = tuple(
+        AnnularSegment(*segment.z, 0.5 * segment.inner_diameter, 0.5 * segment.outer_diameter)
+        for segment in part.segment
+    )
+    return PartGeometry(part.name, segments, part.rotating)
+
+
+def ring_geometries(bearing: SetBearing, kind: BearingType) -> tuple[PartGeometry, PartGeometry]:
+    """Inner and outer ring of a bearing."""
+    inner = AnnularSegment(*bearing.z, 0.5 * kind.bore_diameter, 0.5 * kind.inner_ring_outer_diameter)
+    outer = AnnularSegment(*bearing.z, 0.5 * kind.outer_ring_inner_diameter, 0.5 * kind.outer_diameter)
+    return (
+        PartGeometry(f"{bearing.name}.inner_ring", (inner,), True),
+        PartGeometry(f"{bearing.name}.outer_ring", (outer,), False),
+    )
+
+
+def surface_definition(surface: Surface) -> SurfaceDefinition:
+    """What a ``[[surface]]`` picks."""
+    boxes = tuple(FaceBox(box.facing, box.z, box.r) for box in surface.where)
+    return SurfaceDefinition(surface.name, surface.part, boxes)

@@ -1,0 +1,110 @@
+"""A machine in a page: joints, air and gaps by named rules, what the file gives instead, ten mistakes at once."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+
+from spindle_fem.commands.checked_machine import load_buildable
+from spindle_fem.commands.machine_commands import check_machine
+from spindle_fem.definition.load import examine, find_machine, read_definition, write_machine
+from spindle_fem.errors import FaultsError
+from spindle_fem.machine.geometry.assembly import build_assembly
+from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+
+PAGE = find_machine("motor_spindle")
+
+
+@pytest.fixture(scope="module")
+def page():
+    return read_definition(PAGE)
+
+
+def test_the_page_is_short_and_everything_assumed_is_listed() -> None:
+    assert len(PAGE.read_text(encoding="utf-8").splitlines()) <= 70
+    content = check_machine(PAGE)
+    assumed = {row["name"] for row in content["assumed"]}
+    assert assumed >= {"bearing_types.7014_C", "grease", "joint.workshop_inner_seats", "gap.workshop_gap_1"}
+    assert {row["detail"].partition(":")[0] for row in content["contacts"]} == {
+        name.removeprefix("joint.") for name in assumed if name.startswith("joint.")
+    }
+
+
+def test_a_completed_machine_written_out_stays_as_it_is(page) -> None:
+    spec = examine(page).spec
+    again = examine(tomllib.loads(write_machine(spec)))
+    assert (again.spec, again.assumed) == (spec, ())
+
+
+def test_outer_faces_lose_heat_and_inner_ones_do_not(page) -> None:
+    spec = examine(page).spec
+    films = {name for film in spec.film for name in film.surface}
+    assert {name.split("_")[1].split(".")[0] for name in films} == {"shaft", "housing", "F1", "R2"}
+    area = {}
+    for edge in build_assembly(spec).edges:
+        area[edge.name] = area.get(edge.name, 0.0) + edge.area
+    assert area["workshop_housing_cylinder"] == pytest.approx(
+        3.14159 * (0.28 * 0.02 + 0.23 * 0.326), rel=1e-4
+    )
+    assert area["workshop_gap_1.turning"] == pytest.approx(3.14159 * 0.098 * 0.15, rel=1e-4)
+
+
+def test_what_the_file_gives_is_kept(page) -> None:
+    own = {
+        "joint": [
+            {"name": "rotor_seat", "conductance": "5000 W/m**2/K", "contacts": ["rotor|shaft"]},
+            {"name": "workshop_clamped_faces", "conductance": "3000 W/m**2/K"},
+        ],
+        "surface": [
+            {"name": "mount", "part": "housing", "where": [{"facing": "rear", "z": "60 mm"}]},
+        ],
+        "film": [{"kind": "constant", "surface": ["mount"], "coefficient": "200 W/m**2/K"}],
+    }
+    result = examine({**page, **own})
+    assert not result.faults
+    groups = group_of_contacts(result.spec, build_assembly(result.spec).joint_names)
+    assert groups["rotor|shaft"].name == "rotor_seat"
+    assert groups["inner_spacer|shaft"].name == "workshop_turning_seats"
+    faces = groups["F1.inner_ring|shaft:face"]
+    assert (faces.name, faces.conductance.value) == ("workshop_clamped_faces", 3000.0)
+
+
+MISTAKES = {
+    "a bearing that there is none of": ('"7014 C"', '"7014 Q"'),
+    "a material that there is none of": ('"case_hardening_steel"', '"case_hardened_steel"'),
+    "no unit": ('speed = "9000 rpm"', "speed = 9000"),
+    "a unit of something else": ('preload = "200 N"', 'preload = "200 mm"'),
+    "a key that there is none of": ('thrust = "300 N"', 'thrust = "300 N", radial = "10 N"'),
+    "a coolant that there is none of": ('"ethylene_glycol_30"', '"ethylene_glycol_35"'),
+    "a source in no part": ('part = "rotor", heat', 'part = "motor", heat'),
+    "a probe outside its part": ('z = "50 mm", r = "57 mm"', 'z = "50 mm", r = "157 mm"'),
+    "a channel without land": ('width = "12 mm"', 'width = "19 mm"'),
+    "a heat model that there is none of": ('model = "skf"', 'model = "skv"'),
+}
+
+
+def _faults(tmp_path, mistakes):
+    text = PAGE.read_text(encoding="utf-8")
+    for old, new in mistakes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    file = tmp_path / "draft.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(FaultsError) as refused:
+        load_buildable(file, ())
+    return refused.value.faults
+
+
+def test_ten_mistakes_are_ten_faults_at_once(tmp_path) -> None:
+    faults = _faults(tmp_path, MISTAKES.values())
+    assert len(faults) == len(MISTAKES), "\n".join(map(str, faults))
+
+
+@pytest.mark.slow
+def test_the_page_solves_and_its_heat_balances() -> None:
+    import spindle_fem
+
+    result = spindle_fem.solve(spindle_fem.load_machine(str(PAGE), ["mesh.preset=coarse"]))
+    celsius = {name: value - 273.15 for name, value in result.probes.items()}
+    assert 20.0 < celsius["COOLANT_OUT"] < celsius["FRONT_SEAT"] < celsius["STATOR"] < 120.0
