@@ -94,15 +94,15 @@ was taken (`assumed`).
 `surroundings = "workshop"` gives joints, outer surfaces and air gaps where the file gives none:
 
 - contacts that no `[[joint]]` covers join `workshop_inner_seats` (10000 W/(m²·K)), `workshop_outer_seats`
-  (4000), `workshop_turning_seats` (8000), `workshop_standing_seats` (4000) or `workshop_clamped_faces` (8000),
-  each with 30 or 40 %;
+  (4000), `workshop_turning_seats` (8000), `workshop_standing_seats` (4000) or `workshop_clamped_faces`
+  (8000), each with 30 or 40 %;
 - faces that no `[[surface]]` names and that see the room from outside lose heat by natural convection and
   radiation (emissivity 0.6) where they stand, by `becker` and `disc` where they turn;
 - a turning cylinder within 5 mm of a standing one is a gap by `becker_kaye`;
 - what is left is adiabatic.
 
-An entry of the file with the name of such a one replaces the values that it gives. `check` lists every one; a
-part that touches a standing and a turning one has no rule. `geometry/motor_spindle.toml` is written this way.
+An entry of the file with the name of such a one replaces the values that it gives. `check` lists every
+one; contacts of what turns with what stands have no rule. `geometry/motor_spindle.toml` is written this way.
 
 ## Contacts and surfaces
 

@@ -80,7 +80,7 @@ def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
             designation = group["bearing_type"]
             name = designation.replace(" ", "_").replace("/", "_")
             if name not in types and bearing_catalogue.catalogue_bearing(designation):
-                types[name] = {"catalogue": designation}
+                types[name] = {"catalogue": designation, "marks": {"catalogue": "C"}}
             group = {**group, "bearing_type": name} if name in types else group
         groups.append(group)
     for name, table in types.items():

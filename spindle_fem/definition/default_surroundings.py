@@ -40,8 +40,9 @@ class _Drawn:
     unnamed: tuple[Piece, ...]
 
     def seen(self, piece: Piece) -> tuple[int, int]:
-        """What an exposed face looks at: part, ``_RIM`` for the room, ``VOID`` where it looks out of
-        the machine through an opening only; and the distance of a part in nm.
+        """What an exposed face looks at, and the distance of a part in nm.
+
+        ``_RIM`` stands for the room, ``VOID`` for faces that see it through an opening only.
         """
         z_lines, r_lines, owner = self.meridian.z_lines, self.meridian.r_lines, self.meridian.owner
         forward = piece.above == VOID
@@ -144,7 +145,11 @@ def _joints(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]
         if name in groups:
             contacts = sorted(groups[name])
             conductance = {"value": value, "sigma_rel": sigma}
-            _add(content, "joint", {"name": name, "conductance": conductance, "contacts": contacts})
+            _add(
+                content,
+                "joint",
+                {"name": name, "conductance": conductance, "contacts": contacts, "marks": "A"},
+            )
             yield f"joint.{name}", f"{value} ± {100 * sigma:.0f} %, {why}: {', '.join(contacts)}"
 
 
@@ -219,7 +224,7 @@ def _films(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]:
 
 def _factor(content: dict[str, Any], name: str, coefficients: list[str]) -> Iterator[tuple[str, str]]:
     if coefficients:
-        _add(content, "factor", {"name": name, "sigma_rel": 0.3, "applies_to": coefficients})
+        _add(content, "factor", {"name": name, "sigma_rel": 0.3, "applies_to": coefficients, "marks": "A"})
         yield f"factor.{name}", "± 30 % on all of these together"
 
 

@@ -1,4 +1,4 @@
-"""A machine in a page: joints, air and gaps by named rules, what the file gives instead, ten mistakes at once."""
+"""A machine in a page: joints, air and gaps by named rules, what the file gives, ten mistakes at once."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ MISTAKES = {
     "a source in no part": ('part = "rotor", heat', 'part = "motor", heat'),
     "a probe outside its part": ('z = "50 mm", r = "57 mm"', 'z = "50 mm", r = "157 mm"'),
     "a channel without land": ('width = "12 mm"', 'width = "19 mm"'),
-    "a heat model that there is none of": ('model = "skf"', 'model = "skv"'),
+    "a heat model that there is none of": ('"palmgren"', '"palmgreen"'),
 }
 
 
@@ -107,4 +107,5 @@ def test_the_page_solves_and_its_heat_balances() -> None:
 
     result = spindle_fem.solve(spindle_fem.load_machine(str(PAGE), ["mesh.preset=coarse"]))
     celsius = {name: value - 273.15 for name, value in result.probes.items()}
-    assert 20.0 < celsius["COOLANT_OUT"] < celsius["FRONT_SEAT"] < celsius["STATOR"] < 120.0
+    assert all(check.passed for check in result.checks)
+    assert 21.0 < celsius["COOLANT_OUT"] < celsius["STATOR"] < celsius["FRONT_SEAT"] < 60.0
