@@ -8,7 +8,7 @@ function of that form, entered in :func:`heat_model_of`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -220,12 +220,9 @@ class BearingMechanics:
         """
         found: dict[str, BearingState] = {}
         for group in self.spec.bearing_set:
-            around = [temperatures[bearing.name] for bearing in group.bearing]
-            mounted = self.sets[group.name]
-            if expand:
-                set_temperatures = self._expanded(around, group.assembly_temperature)
-            else:
-                set_temperatures, mounted = self._as_assembled(around), mounted.with_rigid_rings()
+            mounted, (set_temperatures,) = self._mounted(
+                group, [[temperatures[bearing.name] for bearing in group.bearing]], expand
+            )
             states = solve_bearing_set(
                 mounted,
                 point.speed,
@@ -258,15 +255,40 @@ class BearingMechanics:
         NoEquilibriumError, OutOfValidityError
         """
         kelvin = np.asarray(temperatures, dtype=float)
-        factors = {bearing.name: group.heat_factor.value for group, bearing in self.spec.bearings}
-        curves: dict[str, FilmCurves] = {}
+        names = [bearing.name for _, bearing in self.spec.bearings]
+        around = [dict.fromkeys(names, BearingTemperatures(*(value,) * 5)) for value in kelvin.tolist()]
+        heat, conductance = self.heat_and_conductance(point, around, expand=False)
+        return {
+            name: FilmCurves(kelvin, heat[:, index], *conductance[:, index].T)
+            for index, name in enumerate(names)
+        }
+
+    def heat_and_conductance(
+        self,
+        point: OperatingPoint,
+        temperatures: Sequence[Mapping[str, BearingTemperatures]],
+        *,
+        expand: bool,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Heat (n, n_bearings) [W] and ball conductances (n, n_bearings, 2) [W/K] at n states at once.
+
+        Parameters
+        ----------
+        expand : bool
+            As of :meth:`states`.
+
+        Raises
+        ------
+        NoEquilibriumError, OutOfValidityError
+            One of the states does not exist.
+        """
+        heat, conductance = [], []
         for group in self.spec.bearing_set:
-            around = [
-                self._as_assembled([BearingTemperatures(*(value,) * 5)] * len(group.bearing))
-                for value in kelvin.tolist()
-            ]
+            mounted, around = self._mounted(
+                group, [[state[bearing.name] for bearing in group.bearing] for state in temperatures], expand
+            )
             found = solve_states(
-                self.sets[group.name].with_rigid_rings(),
+                mounted,
                 point.speed,
                 mounting.ExternalLoad(point.thrust if group.carries_thrust else 0.0),
                 around,
@@ -276,14 +298,18 @@ class BearingMechanics:
             )
             for states in zip(*found, strict=True):
                 paths = [self._ball_path(group, state) for state in states]
-                name = states[0].name
-                curves[name] = FilmCurves(
-                    kelvin,
-                    factors[name] * np.array([state.heat.total for state in states]),
-                    np.array([path.inner for path in paths]),
-                    np.array([path.outer for path in paths]),
-                )
-        return curves
+                heat.append([group.heat_factor.value * state.heat.total for state in states])
+                conductance.append([(path.inner, path.outer) for path in paths])
+        return np.array(heat).T, np.array(conductance).swapaxes(0, 1)
+
+    def _mounted(
+        self, group: BearingSet, around: list[list[BearingTemperatures]], expand: bool
+    ) -> tuple[mounting.BearingSet, list[mounting.SetTemperatures]]:
+        """A set and its temperatures at several states, as the mechanics takes them."""
+        mounted = self.sets[group.name]
+        if expand:
+            return mounted, [self._expanded(state, group.assembly_temperature) for state in around]
+        return mounted.with_rigid_rings(), [self._as_assembled(state) for state in around]
 
     def _ball_path(self, group: BearingSet, state: BearingState) -> BallConductance:
         kind, grease = self.spec.bearing_types[group.bearing_type], self.spec.grease

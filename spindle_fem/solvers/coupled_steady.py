@@ -36,6 +36,8 @@ ANDERSON_DEPTH = 6
 # Greases and seals are gone long before; a field beyond this is running away.
 RUNAWAY_TEMPERATURE = 600.0
 MIXING_BELOW = 0.5
+# K; expansion moves a state without it by more, so that knowing it nearer saves nothing.
+FIRST_STATE = 1.0
 MAXIMUM_RETREATS = 10
 # Of the speed asked for: where films are taken first when the fold is looked for below it.
 SLOW_RUNNING = 0.3
@@ -105,17 +107,19 @@ def _settle(
     point: OperatingPoint,
     start: NDArray[np.float64] | None,
     beyond: Beyond | None,
+    enough: float = 0.0,
 ) -> CoupledState:
+    """The fixed point, or with ``enough`` a field that its own loads move by less than that, K."""
     first = None
     if follows_preload(machine.spec) and start is None:
         # Cold grease makes heat that would carry the loop past the fixed point.
-        first = solve_coupled(without_expansion(machine), point, beyond=beyond)
+        first = _settle(without_expansion(machine), point, None, beyond, enough=FIRST_STATE)
         if beyond is None:
             # Quick where there is an equilibrium; what fails here may still be crept up to.
             quick = Iteration(RELAXATION, np.inf, ANDERSON_DEPTH, QUICK_ITERATIONS)
             with contextlib.suppress(ConvergenceError, NoSteadyStateError, *REFUSED):
                 return _iterate(_Operation(machine, point, beyond), None, first, quick)
-    operation = _Operation(machine, point, beyond)
+    operation = _Operation(machine, point, beyond, enough)
     far = operation.follows_preload or beyond is not None
     iteration = Iteration(
         relaxation=RELAXATION,
@@ -150,8 +154,10 @@ def _iterate(
 class _Operation:
     """Loads and field of a machine at one point; a state is the field, then the lumped nodes."""
 
-    def __init__(self, machine: PreparedMachine, point: OperatingPoint, beyond: Beyond | None) -> None:
-        self.machine, self.point, self.beyond = machine, point, beyond
+    def __init__(
+        self, machine: PreparedMachine, point: OperatingPoint, beyond: Beyond | None, enough: float = 0.0
+    ) -> None:
+        self.machine, self.point, self.beyond, self.enough = machine, point, beyond, enough
         self.follows_preload = follows_preload(machine.spec)
         self.names = machine.builder.lumped_names
         # Before a first solve nothing is known of the lumped nodes.
@@ -200,7 +206,9 @@ class _Operation:
             raise no_equilibrium(self.machine.spec.name, self.point, heat)
 
     def settled(self, state: NDArray[np.float64], found: NDArray[np.float64]) -> bool:
-        """Whether field, heat and coolant agree."""
+        """Whether field, heat and coolant agree, or the field changes little enough."""
+        if self.change < self.enough:
+            return True
         heat, before = self.loads.total_heat, self.heat_before
         self.heat_before = heat
         hottest = float(self.solution.temperature.max())
@@ -249,7 +257,8 @@ def _beyond_the_fold(
         for approach in FOLD_APPROACHES:
             below = replace(point, speed=approach * branch.limit)
             state = _settle(machine, below, None, beyond)
-            before, branch = branch.limit, equilibria_above(machine, below, point.speed, state.loads)
+            before = branch.limit
+            branch = equilibria_above(machine, below, point.speed, state.loads, state.solution)
             if abs(branch.limit - before) < FOLD_TOLERANCE * before:
                 break
     except SpindleFemError:

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import NoSteadyStateError
-from spindle_fem.model.mesh.steady_conduction import solve_steady
-from spindle_fem.operation.bearing_heat import (
-    BearingTemperatures,
-)
+from spindle_fem.model.mesh.equations import assemble_system
+from spindle_fem.model.mesh.linear_solvers import solve_many
+from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady, split_unknowns
+from spindle_fem.operation.bearing_heat import BearingTemperatures
 from spindle_fem.operation.coefficients import ball_conductances
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat, Loads
@@ -31,6 +31,8 @@ LARGEST_PRELOAD_RATIO = 5.0
 # Of the end of a search: where a branch of equilibria begins.
 SLOWEST = 0.05
 SPEED_TOLERANCE = 0.01
+# Of what a watt does to the machine, in the energy norm; means over surfaces err by less.
+RESPONSE_TOLERANCE = 1.0e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,52 +83,76 @@ def highest_settling_speed(highest: float, settles: Callable[[float], bool]) -> 
 class HeatResponse:
     """Bearing temperatures and shifts as a linear function of what enters rings and balls of each bearing.
 
-    Films, oil and joints stay as they are in given loads, so one solve for each ring and ball row
-    describes the machine near them. What the balls conduct is followed: a change of it moves heat
+    Films, oil and joints stay as they are in given loads, so one solution for each ring and ball row, all of
+    one matrix, describes the machine near them. What the balls conduct is followed: a change of it moves heat
     between balls and rings.
 
     Parameters
     ----------
     loads : Loads, optional
         Those at ambient temperature by default.
+    like : ConductionSolution, optional
+        Of the same machine, to begin from.
     """
 
-    def __init__(self, machine: PreparedMachine, point: OperatingPoint, loads: Loads | None = None) -> None:
+    def __init__(
+        self,
+        machine: PreparedMachine,
+        point: OperatingPoint,
+        loads: Loads | None = None,
+        like: ConductionSolution | None = None,
+    ) -> None:
         self.machine = machine
         self.point = point
         self.names = [bearing.name for _, bearing in machine.spec.bearings]
         if loads is None:
             unknowns = np.full(machine.operators.n_unknowns, point.ambient_temperature)
             loads, _ = machine.builder.at(point, machine.field_state(unknowns, {}))
-        self._groups = {bearing.name: group for group, bearing in machine.spec.bearings}
-        self._base = self._conductances(loads.bearing_heat)
+        self._base = np.array(
+            [ball_conductances(group, loads.bearing_heat[b.name]) for group, b in machine.spec.bearings]
+        )
+        self._constant = np.array([group.ball_row.kind == "constant" for group, _ in machine.spec.bearings])
         shares = heat_shares(machine.spec.heat)
         self._shares = np.array([shares["inner"], shares["outer"], shares["balls"]])
-        solution = None
-        columns = []
-        for active in (None, *((name, body) for name in self.names for body in ("inner", "outer", "balls"))):
-            heat = dict.fromkeys(loads.surface_heat, 0.0)
-            balls: tuple[str, ...] = ()
-            if active is not None and active[1] == "balls":
-                balls = machine.builder.ball_nodes(active[0])
-            elif active is not None:
-                heat[f"{active[0]}.{active[1]}_raceway"] = 1.0
-            lumped = tuple(
-                replace(node, heat=1.0 / len(balls) if node.name in balls else 0.0) for node in loads.lumped
+        builder, operators = machine.builder, machine.operators
+        unheated = machine.problem(
+            replace(
+                loads,
+                surface_heat=dict.fromkeys(loads.surface_heat, 0.0),
+                lumped=tuple(replace(node, heat=0.0) for node in loads.lumped),
             )
-            problem = machine.problem(replace(loads, surface_heat=heat, lumped=lumped))
-            solution = solve_steady(
-                problem, guess=solution, preconditioner=None if solution is None else solution.preconditioner
-            )
-            nodes = dict(zip(problem.lumped_names, solution.lumped_temperature.tolist(), strict=True))
-            found = machine.builder.bearing_temperatures(machine.field_state(solution.temperature, nodes))
-            columns.append(_as_array(found, self.names))
-        self.unheated = columns[0]
-        self.per_watt = np.stack([column - columns[0] for column in columns[1:]], axis=-1)
+        )
+        solution = solve_steady(
+            unheated, guess=like, preconditioner=None if like is None else like.preconditioner
+        )
+        system = assemble_system(unheated)
+        tied = system.tied()
+        entering = np.zeros((len(tied.full_load()), 3 * len(self.names)))
+        nodes = len(tied.load)
+        for index, name in enumerate(self.names):
+            for body, ring in enumerate(("inner", "outer")):
+                surface = f"{name}.{ring}_raceway"
+                rows = operators.surface_rows[surface]
+                areas = operators.facet_areas(surface)
+                watt = operators.facet_vector(np.full(len(areas), 1.0 / areas.sum()), rows)
+                entering[:nodes, 3 * index + body] = watt if system.tie is None else system.tie.T @ watt
+            balls = [unheated.lumped_names.index(node) for node in builder.ball_nodes(name)]
+            entering[[nodes + ball for ball in balls], 3 * index + 2] = 1.0 / len(balls)
+        warmed = solve_many(
+            tied.full_matrix(), entering, solution.preconditioner, relative_tolerance=RESPONSE_TOLERANCE
+        )
 
-    def _conductances(self, heats: Mapping[str, BearingHeat]) -> NDArray[np.float64]:
-        """From the balls to the inner and the outer raceway, (n_bearings, 2) W/K."""
-        return np.array([ball_conductances(self._groups[name], heats[name]) for name in self.names])
+        def around(field: NDArray[np.float64], lumped: NDArray[np.float64]) -> NDArray[np.float64]:
+            known = dict(zip(unheated.lumped_names, lumped.tolist(), strict=True))
+            found = builder.bearing_temperatures(machine.field_state(field, known))
+            return np.array([found[name].state for name in self.names])
+
+        own = solution.temperature, solution.lumped_temperature
+        self.unheated = around(*own)
+        rises = [split_unknowns(column, system.n_lumped, system.tie) for column in warmed.T]
+        self.per_watt = np.stack(
+            [around(own[0] + field, own[1] + lumped) - self.unheated for field, lumped in rises], axis=-1
+        )
 
     def temperatures(
         self, heat: NDArray[np.float64], conductance: NDArray[np.float64]
@@ -152,14 +178,20 @@ class HeatResponse:
 
     def state(self, heats: Mapping[str, BearingHeat]) -> NDArray[np.float64]:
         """Heats and conductances of the balls, as one state (3 n_bearings,)."""
-        return np.append([heats[name].total for name in self.names], self._conductances(heats))
+        conductances = [
+            ball_conductances(group, heats[bearing.name]) for group, bearing in self.machine.spec.bearings
+        ]
+        return np.append([heats[name].total for name in self.names], conductances)
 
-    def respond(self, state: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
-        """The state that the temperatures of a state make at a speed (rad/s)."""
+    def respond(self, states: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
+        """The states (n, 3 n_bearings) that the temperatures of states make at a speed (rad/s)."""
         count = len(self.names)
-        around = self.temperatures(state[:count], state[count:].reshape(count, 2))
-        found, _ = self.machine.builder.heat_model(replace(self.point, speed=speed), around)
-        return self.state(found)
+        around = [self.temperatures(state[:count], state[count:].reshape(count, 2)) for state in states]
+        heat, conductance = self.machine.builder.heat_model.heat_and_conductance(
+            replace(self.point, speed=speed), around, expand=True
+        )
+        conductance[:, self._constant] = self._base[self._constant]
+        return np.hstack([heat, conductance.reshape(len(states), -1)])
 
     def follow(self, state: NDArray[np.float64], start: float, end: float) -> Branch:
         """The branch from a state at a speed ``start`` (rad/s)."""
@@ -175,20 +207,18 @@ class HeatResponse:
         """
         start = SLOWEST * end
         cold = np.append(np.zeros(len(self.names)), self._base)
-        return self.follow(self.respond(cold, start), start, end)
+        return self.follow(self.respond(cold[None], start)[0], start, end)
 
 
-def equilibria_above(machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads) -> Branch:
+def equilibria_above(
+    machine: PreparedMachine, point: OperatingPoint, end: float, loads: Loads, solution: ConductionSolution
+) -> Branch:
     """The branch of equilibria from a solved state to a higher speed ``end`` (rad/s), or to its fold before.
 
     Parameters
     ----------
-    loads : Loads
+    loads, solution
         Of the solved state: films, oil and joints stay as they are there.
     """
-    response = HeatResponse(machine, point, loads)
+    response = HeatResponse(machine, point, loads, solution)
     return response.follow(response.state(loads.bearing_heat), point.speed, end)
-
-
-def _as_array(found: dict[str, BearingTemperatures], names: list[str]) -> NDArray[np.float64]:
-    return np.array([found[name].state for name in names])

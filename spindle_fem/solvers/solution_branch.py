@@ -62,7 +62,8 @@ def follow_branch(respond: Respond, state: Array, start: float, end: float, *, w
     Parameters
     ----------
     respond : callable
-        G(x (k,), p) -> (k,), positive; a ``SpindleFemError`` says that there is no response.
+        G(x (n, k), p) -> (n, k), positive, n states at once; a ``SpindleFemError`` says that there is no
+        response.
     state : (k,) ndarray
         Near the fixed point at ``start``.
     weak : int
@@ -93,18 +94,22 @@ class _Walk:
 
     def residual(self, point: Array) -> Array:
         """What is left of ln x = ln G, (k,)."""
-        found = self.respond(np.exp(point[:-1]), float(point[-1]) * self.end)
-        return point[:-1] - np.log(found)
+        return self.residuals(point[None, :-1], point[-1])[0]
+
+    def residuals(self, states: Array, parameter: float) -> Array:
+        """The same of several states ln x (n, k) at one parameter."""
+        return states - np.log(self.respond(np.exp(states), float(parameter) * self.end))
 
     def differentiate(self, point: Array, residual: Array) -> None:
         """Take the derivatives (k, k + 1) anew."""
         size = len(residual)
         if self.jacobian is None:
             self.jacobian = np.eye(size, size + 1)
-        for column in (*range(size - self.weak), size):
-            moved = point.copy()
-            moved[column] += DIFFERENCE
-            self.jacobian[:, column] = (self.residual(moved) - residual) / DIFFERENCE
+        strong = size - self.weak
+        moved = point[:-1] + DIFFERENCE * np.eye(strong, size)
+        self.jacobian[:, :strong] = (self.residuals(moved, point[-1]) - residual).T / DIFFERENCE
+        further = np.append(point[:-1], point[-1] + DIFFERENCE)
+        self.jacobian[:, size] = (self.residual(further) - residual) / DIFFERENCE
 
     def correct(self, guess: Array, across: Array) -> tuple[Array, int]:
         """The point of the branch in the plane through a guess, and how many corrections it took."""

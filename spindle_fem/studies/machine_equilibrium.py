@@ -40,7 +40,9 @@ def equilibrium_of(
     fold = searched = None
     limits = _limits(spec, coupled, bearings)
     if search and follows_preload(spec) and point.speed > 0.0:
-        branch = equilibria_above(machine, point, SEARCHED_RANGE * point.speed, coupled.loads)
+        branch = equilibria_above(
+            machine, point, SEARCHED_RANGE * point.speed, coupled.loads, coupled.solution
+        )
         searched = branch.limit
         if branch.end == "fold":
             fold = branch.limit

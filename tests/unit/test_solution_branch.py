@@ -21,7 +21,7 @@ def test_ignition_in_two_coupled_quantities() -> None:
     """Semenov: x = p exp(x) in each of two that share their heat turns at p = 1/e."""
 
     def respond(x: np.ndarray, p: float) -> np.ndarray:
-        shared = 0.5 * (x[0] + x[1] / 2.0)
+        shared = 0.5 * (x[:, :1] + x[:, 1:] / 2.0)
         return p * np.exp(shared) * np.array([1.0, 2.0])
 
     branch = follow_branch(respond, np.array([0.1, 0.2]), 0.05, 1.0)
@@ -33,7 +33,8 @@ def test_a_quantity_that_moves_little_needs_no_differences() -> None:
     """The same fold, with a second quantity that follows the first and acts back a little."""
 
     def respond(x: np.ndarray, p: float) -> np.ndarray:
-        return np.array([1.0 + p * x[0] ** 2 * x[1] ** 0.1, x[0] ** 0.2])
+        first, second = x.T
+        return np.stack([1.0 + p * first**2 * second**0.1, first**0.2], axis=-1)
 
     found = []
     for weak in (0, 1):
@@ -61,7 +62,7 @@ def test_a_fold_just_ahead_of_the_start_is_found() -> None:
 
 def test_a_refusal_is_no_fold() -> None:
     def respond(x: np.ndarray, p: float) -> np.ndarray:
-        if x[0] > 1.5:
+        if x.max() > 1.5:
             raise NoEquilibriumError("grease", "too hot.", "Cool it.")
         return 1.0 + p * x**2
 

@@ -10,7 +10,14 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpecError, UnitError
 from spindle_fem.studies.sweep.designs import Axis
 from spindle_fem.studies.sweep.judge_designs import Limit, certainly_beaten, dominated, judged, rank
-from spindle_fem.studies.sweep.outputs import limit_of, output_fault, output_paths, unit_of, value_of
+from spindle_fem.studies.sweep.outputs import (
+    limit_of,
+    only_full,
+    output_fault,
+    output_paths,
+    unit_of,
+    value_of,
+)
 from spindle_fem.studies.sweep.sensitivity import neighbours, sensitivities
 from spindle_fem.studies.sweep.study_file import Study
 
@@ -145,3 +152,14 @@ def test_limits_take_their_unit():
         limit_of(5, "coolant.pressure_drop_Pa", "constraint[1].max")
     with pytest.raises(SpecError, match="is no output of this design"):
         value_of({"bearings": {"F1": {"terms_W": {}}}}, "bearings.F1.terms_W.cage")
+
+
+def test_growth_and_preload_are_outputs_of_full_solves():
+    paths = output_paths(load_machine("wu_tan_2016"))
+    assert {"growth.nose_axial_um", "growth.nose_tilt_up_urad", "equilibrium.preload_ratio.F3"} <= set(paths)
+    assert limit_of("50 um", "growth.nose_axial_um", "constraint[1].max") == pytest.approx(50.0)
+    assert limit_of("0.1 mrad", "growth.nose_tilt_up_urad", "constraint[1].max") == pytest.approx(100.0)
+    assert only_full("growth.nose_axial_um")
+    assert not only_full("bearings.F3.preload_N")
+    # without a flange nothing holds the nose
+    assert "growth.nose_axial_um" not in output_paths(load_machine("small_two_start"))

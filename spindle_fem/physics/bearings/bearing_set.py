@@ -83,10 +83,21 @@ def solve_bearing_set(
     """
     external = load if isinstance(load, ExternalLoad) else ExternalLoad(float(load))
     options, heat = options or TractionOptions(), heat or HeatOptions()
-    (states,) = solve_states(
-        bearing_set, speed, external, (temperatures,), lubricant=lubricant, control=control, heat=heat,
-        options=options,
-    )  # fmt: skip
+    wanted = (external,)
+    if bearing_set.has_counter_bearings and external != ExternalLoad() and bearing_set.preload != 0.0:
+        wanted = (external, ExternalLoad())
+    try:
+        found = solve_states(
+            bearing_set, speed, wanted, (temperatures,) * len(wanted), lubricant=lubricant, control=control,
+            heat=heat, options=options,
+        )  # fmt: skip
+    except NoEquilibriumError:
+        # Either may have none; the loaded one says why.
+        found = solve_states(
+            bearing_set, speed, external, (temperatures,), lubricant=lubricant, control=control, heat=heat,
+            options=options,
+        )  # fmt: skip
+    states = found[0]
     if control == "equilibrium" and any(state.cage_slip > _GROSS_SLIP for state in states):
         onset = gross_sliding_onset(
             bearing_set, abs(speed), external, temperatures, lubricant, options=options
@@ -94,8 +105,10 @@ def solve_bearing_set(
         states = tuple(_with_sliding_note(state, onset) for state in states)
     if not bearing_set.has_counter_bearings:
         return states
-    if external == ExternalLoad():
-        return tuple(replace(state, preload=state.axial_force) for state in states)
+    if external == ExternalLoad() or len(found) == 2:
+        return tuple(
+            replace(state, preload=idle.axial_force) for state, idle in zip(states, found[-1], strict=True)
+        )
     return _with_preloads(
         states, bearing_set, speed, temperatures, lubricant=lubricant, control=control, options=options
     )
@@ -104,7 +117,7 @@ def solve_bearing_set(
 def solve_states(
     bearing_set: BearingSet,
     speed: float,
-    load: ExternalLoad,
+    load: ExternalLoad | Sequence[ExternalLoad],
     temperatures: Sequence[SetTemperatures],
     *,
     lubricant: Lubricant | None = None,
@@ -115,7 +128,7 @@ def solve_states(
     """States of a set at several temperatures in one solution, without the preload that would remain.
 
     Parameters as of :func:`solve_bearing_set`; one set of states for each of
-    ``temperatures``.
+    ``temperatures``, under one load or each under its own.
 
     Raises
     ------
@@ -127,7 +140,10 @@ def solve_states(
     for entry in temperatures:
         _require_consistent(bearing_set, entry, control, lubricant)
     speed = abs(speed)
-    problems = [build_problem(bearing_set, speed, load, entry) for entry in temperatures]
+    loads = (load,) * len(temperatures) if isinstance(load, ExternalLoad) else load
+    problems = [
+        build_problem(bearing_set, speed, own, entry) for own, entry in zip(loads, temperatures, strict=True)
+    ]
     films = [entry.film for state in temperatures for entry in state.bearings]
     rows = [row for problem in problems for row in problem.rows]
     film = None
@@ -298,7 +314,7 @@ def _solve(
     options: TractionOptions,
 ) -> Equilibrium:
     where = " ".join(bearing.name for bearing in problems[0].bearing_set.bearings)
-    ball_load = problems[0].ball_load
+    ball_load = max(problem.ball_load for problem in problems)
     if speed > 0.0 and ball_load == 0.0:
         raise NoEquilibriumError(
             where, "a turning bearing without load or preload has no equilibrium: nothing seats its balls.",

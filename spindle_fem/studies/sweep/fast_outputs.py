@@ -22,8 +22,6 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
-# What only a solve of the whole field has.
-ONLY_FULL = frozenset({"energy.imbalance_relative"})
 REGIMES = ("laminar", "transition", "turbulent")
 # Designs whose whole field is made at a time.
 FIELDS_AT_ONCE = 64

@@ -10,6 +10,8 @@ from typing import Any
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.schema import split_name
 from spindle_fem.errors import SpecError, UnknownKeyError, did_you_mean
+from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.model.elastic.machine_bodies import carries_rings
 from spindle_fem.units import ZERO_CELSIUS_K, to_si
 
 
@@ -43,6 +45,7 @@ _ENDINGS: dict[str, OutputUnit] = {
     "_m_s": OutputUnit("m/s", "m/s"),
     "_degC": _CELSIUS,
     "_deg": OutputUnit("°", "rad", from_si=math.degrees),
+    "_urad": OutputUnit("µrad", "rad", from_si=lambda radian: 1e6 * radian),
     "_um": OutputUnit("µm", "m", from_si=lambda metre: 1e6 * metre),
     "_m2": OutputUnit("m²", "m**2"),
     "_Pa": OutputUnit("Pa", "Pa"),
@@ -73,6 +76,10 @@ _OF_BEARINGS = (
     "derived.axial_gradient_K_per_m",
 )
 COOLER_HEAT = "derived.cooler_heat_W"
+# How the nose bends aside, where a machine has two sets of bearings.
+_NOSE_ASIDE = ("radial_up_um", "radial_across_um", "tilt_up_urad", "tilt_across_urad")
+# Summary blocks, and one number, that only a solve of the whole field has.
+_ONLY_FULL = ("growth.", "displacements.", "equilibrium.", "energy.imbalance_relative")
 # Outputs that are words, which no limit or objective can use.
 WORDS = frozenset({"coolant.regime"})
 
@@ -84,6 +91,20 @@ def output_paths(spec: MachineSpec) -> tuple[str, ...]:
     model; those are accepted by :func:`require_outputs` for any term name.
     """
     return tuple(_paths(spec))
+
+
+def only_full(path: str) -> bool:
+    """Whether only full solves have an output.
+
+    >>> only_full("growth.nose_axial_um"), only_full("probes.SP01")
+    (True, False)
+    """
+    return path.startswith(_ONLY_FULL)
+
+
+def of_shape(path: str) -> bool:
+    """Whether an output needs the elastic bodies of a solved machine."""
+    return path.startswith(("growth.", "displacements."))
 
 
 def _paths(spec: MachineSpec) -> Iterator[str]:
@@ -101,6 +122,18 @@ def _paths(spec: MachineSpec) -> Iterator[str]:
     if spec.channel is not None:
         cooled.append(f"{spec.channel.part}.channel_wall")
     yield from (f"energy.heat_out_W.{surface}" for surface in cooled)
+    if carries_rings(spec):
+        if Layout(spec, set()).flange_ends() is not None:
+            yield "growth.nose_axial_um"
+            if len(spec.bearing_set) > 1:
+                yield from (f"growth.nose_{key}" for key in _NOSE_ASIDE)
+        for name in names:
+            yield from (f"growth.raceways.{name}.{ring}_um" for ring in ("inner", "outer"))
+            yield from (f"growth.seats.{name}.{side}_um" for side in ("shaft", "housing"))
+    yield from (f"displacements.{sensor.name}" for sensor in spec.displacement_sensor)
+    for group in spec.bearing_set:
+        if group.preload > 0.0 and spec.heat.model != "table":
+            yield from (f"equilibrium.preload_ratio.{bearing.name}" for bearing in group.bearing)
 
 
 def output_fault(path: str, spec: MachineSpec, where: str) -> UnknownKeyError | None:
@@ -123,6 +156,8 @@ def unit_of(path: str) -> OutputUnit:
     """
     if path.startswith("probes."):
         return _CELSIUS
+    if path.startswith("displacements."):
+        return _ENDINGS["_um"]
     if path.startswith("energy.heat_out_W."):
         return _ENDINGS["_W"]
     for key in reversed(path.split(".")[-2:]):

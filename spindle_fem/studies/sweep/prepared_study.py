@@ -17,9 +17,8 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import FaultsError, SpecError, SpindleFemError
 from spindle_fem.studies.sweep.designs import Axis, build_axes, plan_designs, reference_designs
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, TaskBuilder
-from spindle_fem.studies.sweep.fast_outputs import ONLY_FULL
 from spindle_fem.studies.sweep.judge_designs import Limit, limits_of
-from spindle_fem.studies.sweep.outputs import WORDS, output_fault
+from spindle_fem.studies.sweep.outputs import WORDS, only_full, output_fault
 from spindle_fem.studies.sweep.study_file import Study, load_study
 
 # Rows that stand in the table for designs of a study, besides parameters and outputs.
@@ -120,12 +119,12 @@ def _output_faults(study: Study, spec: MachineSpec, where: str) -> list[SpindleF
         for key, path in numeric
         if path in WORDS
     ]
-    only_full = sorted(ONLY_FULL & set(study.judged))
-    if study.study.backend == "reduced" and only_full:
+    whole = sorted(filter(only_full, set(study.judged)))
+    if study.study.backend == "reduced" and whole:
         faults.append(
             SpecError(
                 f"{where}: study.backend",
-                f'is "reduced", but only full solves have {", ".join(only_full)}.',
+                f'is "reduced", but only full solves have {", ".join(whole)}.',
                 'Allowed: "auto" or "full" with it.',
             )
         )

@@ -9,7 +9,7 @@ from functools import partial
 from spindle_fem.parallel import WorkerPool
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, evaluate_tasks
 from spindle_fem.studies.sweep.fast_backend import GroupTask, answer_group
-from spindle_fem.studies.sweep.fast_outputs import ONLY_FULL
+from spindle_fem.studies.sweep.outputs import only_full
 from spindle_fem.studies.sweep.results_table import Row
 
 # Rows that a worker holds before they land in the table: few are lost when it dies,
@@ -76,7 +76,7 @@ def groups_of(
     plan: Sequence[DesignTask], wanted: Sequence[DesignTask], question: Question
 ) -> list[GroupTask]:
     """Groups of planned designs for projected models, with those of them and others that need rows."""
-    if question.backend == "full" or ONLY_FULL & set(question.outputs):
+    if question.backend == "full" or any(map(only_full, question.outputs)):
         return []
     planned: dict[str, dict[str, DesignTask]] = {}
     for task in plan:
