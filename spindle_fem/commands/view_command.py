@@ -156,7 +156,8 @@ def _sweep(place: Path, design: int | None, progress: Progress) -> tuple[str, Sc
         )
         raise BadInputError(str(place), what, f"Give --design, one of: {', '.join(map(str, sorted(rows)))}.")
     row = rows[number]
-    values = {item["path"]: f"{row[item['path']]} {item['unit']}".strip() for item in summary["parameters"]}
+    parameters = summary["parameters"]
+    values = {item["path"]: f"{row[item['path']]} {item['unit']}".strip() for item in parameters}
     progress(f"design {number}")
     result = solve(load_machine(place / "machine.toml", [f"{path}={text}" for path, text in values.items()]))
     growth = growth_dataset(result.shapes) if result.shapes else None
@@ -167,9 +168,13 @@ def _sweep(place: Path, design: int | None, progress: Progress) -> tuple[str, Sc
     )
     probes = _named(result.probes, [value - ZERO_CELSIUS_K for value in result.probes.values()])
     scene = _with_readings(scene, result.spec, balls, probes)
-    said = ", ".join(f"{path} {text}" for path, text in values.items())
+    said = ", ".join(f"{item['path']} {_short(row[item['path']])} {item['unit']}" for item in parameters)
     which = "the optimum" if number == optimum else "as asked"
     return summary["study"], replace(scene, notes=(f"Design {number}, {which}: {said}.", *scene.notes))
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _transient(place: Path, _design: int | None, progress: Progress) -> tuple[str, Scene]:
