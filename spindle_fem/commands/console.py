@@ -171,19 +171,21 @@ def print_heat(content: dict[str, Any]) -> None:
 
 
 def print_bearing(content: dict[str, Any]) -> None:
-    """Deflections and a table of balls for one bearing or each of a set."""
+    """Deflections and a table of balls or rollers for one bearing or each of a set."""
     console = _console()
     for index, bearing in enumerate(content.get("bearings", [content])):
         scalars = {key: value for key, value in bearing.items() if not isinstance(value, (list, dict))}
         console.print(
             ", ".join(f"{key} {value:.5g}" for key, value in scalars.items() if isinstance(value, float))
         )
-        balls = bearing["balls"]
+        balls = bearing["balls"] if "balls" in bearing else bearing["rollers"]
         keys = [key for key in balls[0] if any(ball[key] is not None for ball in balls)]
         table = _table(f"bearing {index + 1}", *keys)
         for ball in balls:
             table.add_row(*("–" if ball[key] is None else f"{ball[key]:.4g}" for key in keys))
         console.print(table)
+    for warning in content["warnings"]:
+        console.print(warning["text"], style="dim", markup=False)
 
 
 def print_crosscheck(content: dict[str, Any], folder: Path) -> None:

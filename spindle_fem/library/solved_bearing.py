@@ -25,10 +25,11 @@ class SolvedBearing(Presented, dict[str, Any]):
     """What ``spindle-fem bearing --json`` prints, by key."""
 
     def to_pandas(self) -> pd.DataFrame:
-        """The balls, by bearing and number: angles, loads, pressures, films; units in the names."""
+        """The balls or rollers, by bearing and number: angles, loads, pressures, films; units in the names."""
         import pandas as pd
 
-        sets = {item["name"]: item["balls"] for item in self.get("bearings", ())} or {ONE: self["balls"]}
+        alone = self["balls"] if "balls" in self else self.get("rollers")
+        sets = {item["name"]: item["balls"] for item in self.get("bearings", ())} or {ONE: alone}
         tables = {name: pd.DataFrame(balls) for name, balls in sets.items()}
         return pd.concat(tables, names=["bearing", "ball"])
 
@@ -44,7 +45,11 @@ class SolvedBearing(Presented, dict[str, Any]):
         return ", ".join(f"{name} {text}" for name, text in self._rows().items())
 
     def _rows(self) -> Mapping[str, str]:
-        found = {"axial stiffness": f"{self['axial_stiffness_N_um']:.4g} N/µm"}
+        found = {
+            f"{direction} stiffness": f"{self[key]:.4g} N/µm"
+            for direction in ("axial", "radial")
+            if (key := f"{direction}_stiffness_N_um") in self
+        }
         return found | ({} if self["heat_W"] is None else {"heat": f"{self['heat_W']:.4g} W"})
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,13 +11,10 @@ from typing import Any
 from spindle_fem.definition.bearing_catalogue import SHIPPED, catalogue_bearing
 from spindle_fem.definition.standard_materials import MATERIALS
 from spindle_fem.errors import (
-    BadInputError,
     FaultsError,
     OutOfValidityError,
     SpecError,
     SpindleFemError,
-    UnknownKeyError,
-    did_you_mean,
 )
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry, bearing_faults
 from spindle_fem.physics.bearings.bearing_keys import (
@@ -31,6 +27,7 @@ from spindle_fem.physics.bearings.bearing_keys import (
 )
 from spindle_fem.physics.bearings.bearing_report import report_of_states
 from spindle_fem.physics.bearings.bearing_set import solve_bearing_set
+from spindle_fem.physics.bearings.bearing_tables import read_document, read_tables
 from spindle_fem.physics.bearings.fits import RingFits, fit_faults
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
@@ -43,9 +40,9 @@ from spindle_fem.physics.bearings.mounting import (
     uniform_temperatures,
 )
 from spindle_fem.physics.bearings.rings import STEEL
+from spindle_fem.physics.bearings.roller_file import is_roller_document, roller_report
 from spindle_fem.validity import CodedWarning
 
-SCHEMA = "spindle-fem/bearing/1"
 _SPACING_OVER_BALL = 1.7
 
 
@@ -90,6 +87,8 @@ def bearing_report(path: str | Path) -> dict[str, Any]:
     NoEquilibriumError
         The state does not exist.
     """
+    if is_roller_document(read_document(path)):
+        return roller_report(path)
     case = read_bearing_file(path)
     try:
         states = solve_bearing_set(
@@ -113,16 +112,10 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     ------
     BadInputError
     """
-    file = Path(path)
-    try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpecError(str(file), f"cannot be read ({error}).", "Give a TOML file.") from error
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(str(file), f"is not TOML ({error}).", "Correct the syntax.") from error
+    file, document = Path(path), read_document(path)
     faults: list[SpindleFemError] = []
     document = _with_catalogue(document, str(file), faults)
-    tables = _read_tables(document, str(file), faults)
+    tables = read_tables(document, str(file), faults, TABLES, REQUIRED)
     case = None
     if not faults:
         case = _build_case(tables, str(file), faults)
@@ -149,42 +142,6 @@ def _with_catalogue(document: dict[str, Any], file: str, faults: list[SpindleFem
         found |= {f"ball_{key}": ball[key] for key in ("young_modulus", "poisson_ratio")}
         found["density"] = ball["density"]
     return {**document, "bearing": {key: found[key] for key in found if key in GEOMETRY} | own}
-
-
-def _read_tables(
-    document: Mapping[str, Any], file: str, faults: list[SpindleFemError]
-) -> dict[str, dict[str, Any]]:
-    schema = document.get("schema", SCHEMA)
-    if schema != SCHEMA:
-        faults.append(SpecError(f"{file}: schema", f"{schema!r} is unknown.", f'Allowed: "{SCHEMA}".'))
-    tables: dict[str, dict[str, Any]] = {}
-    for name in document:
-        if name != "schema" and name not in TABLES:
-            faults.append(UnknownKeyError(f"{file}: {name}", "unknown table.", did_you_mean(name, TABLES)))
-    for name, readers in TABLES.items():
-        table = document.get(name)
-        if table is None:
-            if name in ("bearing", "operation"):
-                faults.append(SpecError(f"{file}: {name}", "the table is missing.", f"Write [{name}]."))
-            continue
-        if not isinstance(table, dict):
-            faults.append(SpecError(f"{file}: {name}", f"{table!r} is no table.", f"Write [{name}]."))
-            continue
-        values: dict[str, Any] = {}
-        for key, value in table.items():
-            where = f"{file}: {name}.{key}"
-            if key not in readers:
-                faults.append(UnknownKeyError(where, "unknown key.", did_you_mean(key, readers)))
-                continue
-            try:
-                values[key] = readers[key](value, where)
-            except BadInputError as error:
-                faults.append(error)
-        for key in REQUIRED[name]:
-            if key not in table:
-                faults.append(SpecError(f"{file}: {name}.{key}", "the key is missing.", "It is required."))
-        tables[name] = values
-    return tables
 
 
 def _build_case(

@@ -1,0 +1,77 @@
+"""A bearing file as tables of values in SI, whatever kind of bearing it describes."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.errors import BadInputError, SpecError, SpindleFemError, UnknownKeyError, did_you_mean
+from spindle_fem.physics.bearings.bearing_keys import Reader
+
+SCHEMA = "spindle-fem/bearing/1"
+
+
+def read_document(path: str | Path) -> dict[str, Any]:
+    """The TOML document of a file.
+
+    Raises
+    ------
+    SpecError
+        The file cannot be read or is not TOML.
+    """
+    file = Path(path)
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpecError(str(file), f"cannot be read ({error}).", "Give a TOML file.") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(str(file), f"is not TOML ({error}).", "Correct the syntax.") from error
+
+
+def read_tables(
+    document: Mapping[str, Any],
+    file: str,
+    faults: list[SpindleFemError],
+    allowed: Mapping[str, Mapping[str, Reader]],
+    required: Mapping[str, Sequence[str]],
+) -> dict[str, dict[str, Any]]:
+    """Tables of a bearing file in SI; what is unknown, wrong or missing goes to ``faults``.
+
+    Parameters
+    ----------
+    allowed : mapping of table to mapping of key to reader
+    required : mapping of table to keys
+    """
+    schema = document.get("schema", SCHEMA)
+    if schema != SCHEMA:
+        faults.append(SpecError(f"{file}: schema", f"{schema!r} is unknown.", f'Allowed: "{SCHEMA}".'))
+    tables: dict[str, dict[str, Any]] = {}
+    for name in document:
+        if name != "schema" and name not in allowed:
+            faults.append(UnknownKeyError(f"{file}: {name}", "unknown table.", did_you_mean(name, allowed)))
+    for name, readers in allowed.items():
+        table = document.get(name)
+        if table is None:
+            if name in ("bearing", "operation"):
+                faults.append(SpecError(f"{file}: {name}", "the table is missing.", f"Write [{name}]."))
+            continue
+        if not isinstance(table, dict):
+            faults.append(SpecError(f"{file}: {name}", f"{table!r} is no table.", f"Write [{name}]."))
+            continue
+        values: dict[str, Any] = {}
+        for key, value in table.items():
+            where = f"{file}: {name}.{key}"
+            if key not in readers:
+                faults.append(UnknownKeyError(where, "unknown key.", did_you_mean(key, readers)))
+                continue
+            try:
+                values[key] = readers[key](value, where)
+            except BadInputError as error:
+                faults.append(error)
+        for key in required[name]:
+            if key not in table:
+                faults.append(SpecError(f"{file}: {name}.{key}", "the key is missing.", "It is required."))
+        tables[name] = values
+    return tables
