@@ -25,7 +25,7 @@ class SolvedBearing(Presented, dict[str, Any]):
     """What ``spindle-fem bearing --json`` prints, by key."""
 
     def to_pandas(self) -> pd.DataFrame:
-        """The balls or rollers, by bearing and number: angles, loads, pressures, films; units in the names."""
+        """Balls or rollers, by bearing and number: angles, loads, pressures, films; units in the names."""
         import pandas as pd
 
         alone = self["balls"] if "balls" in self else self.get("rollers")
