@@ -67,7 +67,8 @@ class Coordinate:
         """Value at a coordinate."""
         if self.logarithmic:
             return self.value * float(np.exp(self.sigma * coordinate))
-        return self.value + self.sigma * coordinate
+        # of a row of an array: values are written into definitions
+        return float(self.value + self.sigma * coordinate)
 
     def of(self, value: float) -> float:
         """Coordinate of a value, within the bounds."""

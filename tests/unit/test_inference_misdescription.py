@@ -19,7 +19,7 @@ from spindle_fem.inference.heat_misdescriptions import (
     shape_modes,
 )
 from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.hypothesis_fit import Coordinate, Problem
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.misdescription_content import misdescription_content
@@ -137,7 +137,9 @@ def test_a_channel_without_calibration_is_known_as_before(case, predictor):
 
 def test_a_corrected_machine_can_be_written_and_read(case, tmp_path):
     changed = SpeedShape(FRONT, (0.0, 1000.0), (0.0, 1.0)).corrected(case.spec, 0.1)
-    changed = Conductivity("cast_iron").corrected(changed, 0.05)
+    # As a fit has it: a place in an array of positions.
+    share = Coordinate("conductivity.cast_iron", 0.0, 0.05, False, -3.0, 3.0).at(np.ones(1)[0])
+    changed = Conductivity("cast_iron").corrected(changed, share)
     (tmp_path / "machine.toml").write_text(write_machine(changed), encoding="utf-8")
     again = load_machine(tmp_path / "machine.toml")
     np.testing.assert_allclose(again.heat.table.heat["F1"], changed.heat.table.heat["F1"])
