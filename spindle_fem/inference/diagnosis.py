@@ -293,7 +293,7 @@ class _Readings:
         """Likewise of held-out readings; what switches is on there as all readings tell it."""
         plant = self._plant
         if not plant.heldout:
-            return 1.0
+            return 0.0
         return left_over_noise(plant, plant.heldout, self._heldout(fit), fit.values, self._unseen)
 
     def _heldout(self, fit: Fit) -> list[Array]:

@@ -232,7 +232,7 @@ def judge(
     overlapping: Mapping[str, frozenset[str]] | None = None,
     apart: Callable[[Fit, Fit], float] = lambda one, other: np.inf,
     left: Callable[[Fit], float] = lambda fit: 1.0,
-    beyond: Callable[[Fit], float] = lambda fit: 1.0,
+    beyond: Callable[[Fit], float] = lambda fit: 0.0,
     coarseness: float = 1.0,
 ) -> Judgement:
     """Conclude from fitted hypotheses.
@@ -252,8 +252,9 @@ def judge(
     left : callable, optional
         What a fit leaves of the readings over their noise; no more than the noise by default.
     beyond : callable, optional
-        Likewise of readings that no fit has seen: a set that leaves more there than where it
-        was fitted is not the whole truth.
+        Likewise of readings that no fit has seen; 0 where there are none. A set that leaves more there
+        than where it was fitted is not the whole truth; one that lowers nothing there is not named: it
+        moves parameters nearer to what was believed of them, no reading.
     coarseness : float
         As :func:`tempered` has it.
     """
@@ -265,7 +266,12 @@ def judge(
         nothing = min(empty.probability, tuned.STILL_POSSIBLE) if p_value >= tuned.RULED_OUT else 0.0
         ranked = _without(ranked, empty)
     chosen = ranked[0]
-    if p_value > tuned.SIGNIFICANT or not chosen.fit.candidates or within_prior(chosen.fit, calibrated):
+    improved = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
+    if (
+        p_value > tuned.SIGNIFICANT
+        or not (chosen.fit.candidates and improved)
+        or within_prior(chosen.fit, calibrated)
+    ):
         nothing_left = left(empty.fit)
         much_left = (
             np.sqrt(empty.fit.reduced_misfit) > tuned.UNEXPLAINED_MISFIT or nothing_left > tuned.MOST_LEFT

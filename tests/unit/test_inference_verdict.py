@@ -213,13 +213,31 @@ def test_the_p_value_is_that_of_the_most_significant_set_not_of_the_largest_gain
 
 def test_a_set_that_does_not_predict_what_was_held_out_is_stated_no_higher_than_that_permits():
     sets = hypothesis(PRELOAD, misfit=400.0), hypothesis(misfit=2000.0)
-    well, badly = verdict(*sets, beyond=lambda fit: 1.1), verdict(*sets, beyond=lambda fit: 4.0)
+    well, badly = (
+        verdict(*sets, beyond=lambda fit, rest=rest: rest if fit.candidates else 8.0) for rest in (1.1, 4.0)
+    )
     assert well.chosen.probability > 0.9 > 0.11 > badly.chosen.probability
     assert badly.other == pytest.approx(1.0 - badly.chosen.probability)
     assert badly.verdict == "missing_physics"
     # as much as in what was fitted: no more than that says
-    evenly, fitted = ({"left": lambda fit: 1.9, "beyond": lambda fit, r=r: r} for r in (1.9, 1.0))
+    evenly, fitted = (
+        {"left": lambda fit: 1.9, "beyond": lambda fit, r=r: r if fit.candidates else 8.0} for r in (1.9, 1.0)
+    )
     assert verdict(*sets, **evenly).chosen.probability == verdict(*sets, **fitted).chosen.probability
+
+
+def test_a_set_that_does_not_lower_what_is_left_of_held_out_readings_is_not_named():
+    sets = hypothesis(PRELOAD, misfit=400.0), hypothesis(misfit=2000.0)
+    least = 1.0 - tuned.LEAST_IMPROVEMENT
+    better, same = (
+        verdict(*sets, beyond=lambda fit, rest=rest: rest if fit.candidates else 1.0)
+        for rest in (least - 0.001, least + 0.001)
+    )
+    assert better.verdict == "missing_physics"
+    assert same.verdict == "consistent"
+    assert not same.chosen.fit.candidates
+    # where readings leave far more than noise, nothing that is known explains it
+    assert verdict(*sets, beyond=lambda fit: 1.0, left=lambda fit: 3.0).verdict == "unexplained"
 
 
 def test_what_nothing_could_do_by_chance_has_no_probability_left():
