@@ -118,7 +118,7 @@ def heat(
     machine: Machine,
     speed: Annotated[
         list[str] | None,
-        typer.Option("--speed", help='Speeds, repeatable: "3000 rpm"; default 500 to 4500 rpm.'),
+        typer.Option("--speed", help='Speeds, repeatable: "3000 rpm"; default: up to 1.5 times its own.'),
     ] = None,
     temperature: Annotated[str, typer.Option(help="Of rings, balls and grease.")] = "40 degC",
     coupled: Annotated[

@@ -95,6 +95,31 @@ def range_text(lowest: float, highest: float) -> str:
     return f"above 0, at most {highest:.6g}" if above_zero else f"{lowest:.6g} to {highest:.6g}"
 
 
+# What makes a machine behave otherwise than computed, then what harms it; other warnings follow.
+CHANGES_RESULT = ("no_equilibrium", "thermal_preload_omitted", "coolant_pressure", "balls_unloaded")
+_HARMS = (
+    "grease_temperature",
+    "counter_bearing_unloaded",
+    "gross_sliding",
+    "contact_pressure",
+    "film_not_separating",
+    "boundary_lubrication",
+)
+_NOTES = ("mesh_note", "geometry_note")
+
+
+def by_consequence(warnings: Iterable[CodedWarning]) -> tuple[CodedWarning, ...]:
+    """Warnings that change the result first, notes last, otherwise in the order given.
+
+    >>> given = [CodedWarning("mesh_note", ""), CodedWarning("no_equilibrium", "")]
+    >>> [item.code for item in by_consequence(given)]
+    ['no_equilibrium', 'mesh_note']
+    """
+    first = (*CHANGES_RESULT, *_HARMS)
+    rank = {code: place for place, code in enumerate(first)} | dict.fromkeys(_NOTES, len(first) + 1)
+    return tuple(sorted(warnings, key=lambda item: rank.get(item.code, len(first))))
+
+
 def fold_warnings(warnings: Iterable[CodedWarning], names: Collection[str]) -> tuple[CodedWarning, ...]:
     """Each warning once; what several named things say alike is said by the first for all.
 

@@ -15,7 +15,7 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     from spindle_fem.definition.effect_entries import EffectEntry
-    from spindle_fem.definition.machine_spec import HeatSource
+    from spindle_fem.definition.machine_spec import HeatSource, MachineSpec
     from spindle_fem.units import Uncertain
 
 
@@ -152,7 +152,10 @@ def check_machine(
         "assumed": [
             {"name": item.where, "detail": item.rule} for item in examine_machine(machine, overrides).assumed
         ],
-        "warnings": [{"code": "geometry_note", "text": note} for note in assembly.notes],
+        "warnings": [
+            *_lost_to_air(spec),
+            *({"code": "geometry_note", "text": note} for note in assembly.notes),
+        ],
     }
 
 
@@ -229,6 +232,19 @@ def _draw_faults(picture: Path, machine: str | Path, overrides: Iterable[str], e
     with contextlib.suppress(FaultsError):  # of overrides, which are among the faults
         spec = examine_machine(machine, overrides).spec
     draw_definition(picture, spec, error.faults)
+
+
+def _lost_to_air(spec: MachineSpec) -> list[dict[str, str]]:
+    """Warning of a machine of which nothing that stands loses heat to its surroundings."""
+    standing = {part.name for part in spec.part if not part.rotating}
+    cooled = {name for film in spec.film for name in film.surface}
+    if any(surface.name in cooled and surface.part in standing for surface in spec.surface):
+        return []
+    text = (
+        "No surface of a standing part has a [[film]]: its heat leaves by the coolant only. "
+        'surroundings = "workshop" gives the outer surfaces one.'
+    )
+    return [{"code": "no_heat_to_air", "text": text}]
 
 
 def _source_detail(source: HeatSource) -> str:

@@ -202,7 +202,7 @@ def _large_terms(rows: list[Mapping[str, float]], share: float = 0.03) -> list[d
 
 @styled
 def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Figure:
-    """Oil and wall temperature, and the film coefficient with its range, along the channel.
+    """Coolant and wall temperature, and the film coefficient with its range, along the channel.
 
     Parameters
     ----------
@@ -216,8 +216,8 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
     turns = coolant.angle[order] / (2.0 * math.pi)
     left = pixel_axes(figure, 90.0, 130.0, 680.0, 400.0)
     left.plot(place, coolant.wall_temperature[order] - ZERO_CELSIUS_K, color=CYCLE[1], label="wall")
-    left.plot(place, coolant.bulk_temperature[order] - ZERO_CELSIUS_K, color=CYCLE[0], label="oil (bulk)")
-    left.set(xlabel="length along the channel / m", ylabel=TEMPERATURE_LABEL, title="Oil and wall")
+    left.plot(place, coolant.bulk_temperature[order] - ZERO_CELSIUS_K, color=CYCLE[0], label="coolant (bulk)")
+    left.set(xlabel="length along the channel / m", ylabel=TEMPERATURE_LABEL, title="Coolant and wall")
     left.legend(loc="best")
     right = pixel_axes(figure, 890.0, 130.0, 680.0, 400.0)
     inside = np.ones(place.size, dtype=bool)

@@ -226,7 +226,7 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
     if result.coolant is not None:
         inlet = result.coolant.inlet_temperature - ZERO_CELSIUS_K
         handles.append(axes.axhline(inlet, color=CYCLE[5], linewidth=1.0, linestyle=(0, (4, 3))))
-        texts.append("oil inlet")
+        texts.append("coolant inlet")
     axes.set_xlabel("z / mm")
     axes.set_ylabel(TEMPERATURE_LABEL)
     axes.margins(x=0.01)

@@ -194,7 +194,7 @@ def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | No
     shape = facet_triangles(mesh.points, facets, values, np.zeros(len(facets), dtype=np.int32))
     bars = (
         _film_scale(helix, film),
-        scale_of(oil, TEMPERATURE_MAP, "oil temperature / °C"),
+        scale_of(oil, TEMPERATURE_MAP, "coolant temperature / °C"),
     )
     view = View((-1.0, 0.55, -0.75), UP, shape.points)
     lines = sharp_edges_of_facets(mesh.points, facets)
@@ -212,13 +212,13 @@ def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | No
     )
     return pictures_side_by_side(
         pictures,
-        "Walls of the oil channel",
+        "Walls of the channel",
         bars,
         [labels[0] + labels[1]] * 2,
         notes=f"{coolant.flow * 6.0e4:.3g} L/min, Re = {coolant.reynolds:.0f}, {coolant.regime}; film "
         f"{helix.min():.0f} to {helix.max():.0f} along the helix"
         + (f", {film.max():.0f} in the ports" if film.max() > helix.max() else "")
-        + f"; {coolant.heat:.0f} W to the oil.",
+        + f"; {coolant.heat:.0f} W to the coolant.",
     )
 
 

@@ -30,6 +30,7 @@ from spindle_fem.report.block_page import (
 from spindle_fem.report.definition_tables import input_groups
 from spindle_fem.results.output_folder import read_content, replace_text, require_complete
 from spindle_fem.results.run_summary import SUMMARY_SCHEMA
+from spindle_fem.validity import CHANGES_RESULT
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -203,6 +204,8 @@ def _headline(summary: Mapping[str, Any]) -> list[Any]:
     failed = [item["name"] for item in checks if not item["passed"]]
     if failed:
         first = Notice("The numbers below must not be used.", "bad", f"Failed: {', '.join(failed)}.")
+    elif changed := [item["text"] for item in summary["warnings"] if item["code"] in CHANGES_RESULT]:
+        first = Notice(changed[0], "", "The machine would not behave as computed.")
     else:
         imbalance = tables.significant(abs(summary["energy"]["imbalance_relative"]), 2)
         to = imbalance if imbalance != "0" else "round-off"

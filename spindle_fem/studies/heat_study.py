@@ -19,7 +19,7 @@ from spindle_fem.validity import CodedWarning, fold_warnings
 
 HEAT_SCHEMA = "spindle-fem/heat/1"
 RPM = np.pi / 30.0
-DEFAULT_SPEEDS = tuple(rpm * RPM for rpm in range(500, 4501, 500))
+STEPS_TO_OPERATION, STEPS = 6, 9
 THRUST_STEPS = 11
 
 
@@ -36,7 +36,7 @@ def heat_study(
     Parameters
     ----------
     speeds : sequence of float, [rad/s]
-        500 to 4500 rpm in steps of 500 when empty.
+        Nine up to one and a half times the machine's operating speed when empty.
     temperature : float, [K]
         Of rings, balls and grease; the uncoupled sweep has one for all.
     coupled : bool
@@ -62,7 +62,7 @@ def heat_study(
         raise SpecError(spec.name, "has no [[bearing_set]].", "There is no bearing heat to study.")
     if spec.grease is None:
         raise SpecError(f"{spec.name}: grease", "is missing.", "Films and friction need it.")
-    chosen = tuple(speeds) or DEFAULT_SPEEDS
+    chosen = tuple(speeds) or usual_speeds(spec)
     point = OperatingPoint.of(spec)
     mechanics = BearingMechanics(spec)
     names = [bearing.name for _, bearing in spec.bearings]
@@ -96,6 +96,15 @@ def heat_study(
             {"code": item.code, "text": item.text} for item in fold_warnings(warnings, tuple(names))
         ],
     }
+
+
+def usual_speeds(spec: MachineSpec) -> tuple[float, ...]:
+    """Nine speeds in steps of a sixth of the operating speed (of 3000 rpm where it is 0), rad/s.
+
+    The step has two digits in rpm.
+    """
+    step = float(f"{(spec.operation.speed / RPM or 3000.0) / STEPS_TO_OPERATION:.2g}")
+    return tuple(step * number * RPM for number in range(1, STEPS + 1))
 
 
 def _solved_temperatures(

@@ -31,10 +31,12 @@ from spindle_fem.solvers.prepared_machine import Clock, PreparedMachine, Progres
 from spindle_fem.studies import run_checks as checks
 from spindle_fem.studies.heat_study import heat_study
 from spindle_fem.studies.machine_equilibrium import equilibrium_of
-from spindle_fem.validity import CodedWarning
+from spindle_fem.validity import CodedWarning, by_consequence
 
 # Between the element sizes of the two meshes of an estimate.
 REFINEMENT_RATIO = 1.5
+# Of the circulation pumps in spindle coolers, which give 3 to 6 bar.
+PUMP_PRESSURE = 6.0e5
 
 
 def solve(
@@ -129,7 +131,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     ]
     if coupled.coolant is not None:
         done.append(checks.check_coolant(coolant_mismatch(machine, solution, coupled.coolant)))
-    warnings += _omitted_preload(machine, point, coupled, lumped)
+    warnings += [*_pump_pressure(coolant), *_omitted_preload(machine, point, coupled, lumped)]
     if spec.grease is not None and bearings:
         grease = checks.check_grease(
             {name: max(item.temperature_inner, item.temperature_outer) for name, item in bearings.items()},
@@ -161,7 +163,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         temperature_maximum=float(nodes[hottest]),
         temperature_maximum_at=machine.mesh.points[hottest].copy(),
         checks=tuple(done),
-        warnings=tuple(warnings),
+        warnings=by_consequence(warnings),
         iterations={"coupling": coupled.iterations, "linear": solution.iterations},
         timings={},
     )
@@ -220,6 +222,17 @@ def _omitted_preload(
         f"{states[name].heat.total:.0f} W instead of {cold[name].total:.0f} W. {hint}"
     )
     return [CodedWarning("thermal_preload_omitted", text)]
+
+
+def _pump_pressure(coolant: CoolantResult | None) -> list[CodedWarning]:
+    """A flow that the pump of a cooler does not drive through this channel."""
+    if coolant is None or coolant.pressure_drop <= PUMP_PRESSURE:
+        return []
+    text = (
+        f"The channel takes {1e-5 * coolant.pressure_drop:.0f} bar at {6e4 * coolant.flow:.3g} L/min; pumps "
+        f"of coolers give up to {1e-5 * PUMP_PRESSURE:.0f} bar, so less will flow."
+    )
+    return [CodedWarning("coolant_pressure", text)]
 
 
 def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState) -> CoolantResult | None:

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import tomllib
+from types import SimpleNamespace
 
 import pytest
 
 from spindle_fem.commands.checked_machine import load_buildable
 from spindle_fem.commands.machine_commands import check_machine
-from spindle_fem.definition.load import examine, find_machine, read_definition, write_machine
+from spindle_fem.definition.load import examine, find_machine, load_machine, read_definition, write_machine
 from spindle_fem.errors import FaultsError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+from spindle_fem.report import run_report
+from spindle_fem.studies.heat_study import RPM, usual_speeds
+from spindle_fem.studies.solve_machine import _pump_pressure
+from spindle_fem.validity import CodedWarning, by_consequence
 
 PAGE = find_machine("motor_spindle")
 
@@ -99,6 +104,43 @@ def _faults(tmp_path, mistakes):
 def test_ten_mistakes_are_ten_faults_at_once(tmp_path) -> None:
     faults = _faults(tmp_path, MISTAKES.values())
     assert len(faults) == len(MISTAKES), "\n".join(map(str, faults))
+
+
+def test_a_machine_that_loses_no_heat_to_air_is_warned_of() -> None:
+    codes = [
+        item["code"] for item in check_machine(PAGE, overrides=["remaining_surfaces=adiabatic"])["warnings"]
+    ]
+    assert "no_heat_to_air" not in codes
+    removed = ["surface.housing.outside=none", "surface.cover.outside=none", "surface.housing.mount=none"]
+    removed += ["film.outside=none", "film.mount=none"]
+    codes = [item["code"] for item in check_machine("small_two_start", overrides=removed)["warnings"]]
+    assert "no_heat_to_air" in codes
+
+
+def test_speeds_follow_the_machine() -> None:
+    rpm = [speed / RPM for speed in usual_speeds(load_machine("wu_tan_2016"))]
+    assert rpm == pytest.approx(range(500, 4501, 500))
+    assert max(usual_speeds(load_machine(PAGE))) / RPM == pytest.approx(13500.0)
+
+
+def test_a_load_that_was_left_out_stands_above_the_checks() -> None:
+    warning = {"code": "thermal_preload_omitted", "text": "3727 N instead of 733 N."}
+    assert "733 N" in _first_notice([warning])
+    assert "checks" in _first_notice([])
+
+
+def test_a_flow_that_no_pump_drives_is_warned_of() -> None:
+    assert not _pump_pressure(SimpleNamespace(pressure_drop=4e5, flow=1e-3))
+    (warning,) = _pump_pressure(SimpleNamespace(pressure_drop=23e5, flow=1e-3))
+    assert "23 bar at 60 L/min" in warning.text
+    assert by_consequence([CodedWarning("race_control_doubtful", ""), warning])[0] is warning
+
+
+def _first_notice(warnings) -> str:
+    values = {"checks": [{"name": "a", "passed": True}], "energy": {"imbalance_relative": 0.0}}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_report.tables, "headline", lambda summary: [])
+        return run_report._headline({**values, "warnings": warnings})[0].text
 
 
 @pytest.mark.slow
