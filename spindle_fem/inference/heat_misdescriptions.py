@@ -188,6 +188,7 @@ def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             tuned.RESPONSE_SIGMA,
             f"time by which {channel} answers later than the machine",
             Response(channel),
+            of_sensor=True,
         )
     for number in range(len(predictor.recordings)):
         yield Misdescription(

@@ -58,6 +58,8 @@ class Misdescription:
         May have a method ``corrected(spec, value)``: the machine with the definition put right.
     recording : int or None
         The only recording that it concerns; None for the machine itself.
+    of_sensor : bool
+        Whether it is a sensor that differs: far off it is an effect of the catalogue, no wrong definition.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Misdescription:
     statement: str
     change: Callable[[Any], Change]
     recording: int | None = None
+    of_sensor: bool = False
 
     @property
     def coordinate(self) -> str:

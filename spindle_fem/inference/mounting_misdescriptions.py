@@ -62,15 +62,16 @@ def mounting_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
         place = f"{layout.housing.name}.{segment.name}"
         if place == flange or not {place, flange} <= places:
             continue
+        key = f"mounting of {place}"
         what = f"conductance of what bridges {flange} and {place} from outside (bracket, hoses, cables)"
         yield Misdescription(
-            f"bridge.{segment.name}", "", "W/K", tuned.BRIDGE_SIGMA, what, Bridge(flange, place)
+            f"bridge.{segment.name}", key, "W/K", tuned.BRIDGE_SIGMA, what, Bridge(flange, place)
         )
         for name, prefix, where in (("up", UP, "above"), ("across", ACROSS, "to the side")):
             if prefix + place in places:
                 yield Misdescription(
                     f"bridge.{segment.name}.{name}",
-                    "",
+                    key,
                     "W/K",
                     # the mean square of a cosine
                     tuned.BRIDGE_SIGMA * np.sqrt(0.5),

@@ -58,7 +58,11 @@ def wrong_direction(
         Candidates that might explain the recording instead: each as likely beforehand as one direction.
     """
     names = [c.name for c in belief.coordinates]
-    owned = [item for item in directions if item.recording is None and item.coordinate in names]
+    owned = [
+        item
+        for item in directions
+        if item.recording is None and not item.of_sensor and item.coordinate in names
+    ]
     if not owned:
         return None
     rows = [names.index(item.coordinate) for item in owned]

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -207,6 +208,9 @@ def test_a_definition_far_off_in_one_direction_is_found_there(off_at):
     wrong = wrong_direction(problem.belief, null, problem.predictor.misdescribed, 100)
     assert wrong.direction.name == "F1"
     assert wrong.log_gain > 0.0
+    # were it a sensor that differs, the definition would be right in it
+    sensors = [replace(item, of_sensor=item.name == "F1") for item in problem.predictor.misdescribed]
+    assert wrong_direction(problem.belief, null, sensors, 100).direction.name == "R1"
     refitted = Problem(problem.predictor, wrong.belief, EXPECTED_SLOW, problem.observations).fit()
     low, high = refitted.interval(wrong.direction.coordinate, 2.0)
     assert low < 0.6 < high
