@@ -170,6 +170,20 @@ def print_heat(content: dict[str, Any]) -> None:
         console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
 
 
+_ROLLING_ELEMENT = {
+    "row": "row",
+    "azimuth_deg": "azimuth °",
+    "contact_angle_inner_deg": "inner °",
+    "contact_angle_outer_deg": "outer °",
+    "load_inner_N": "inner N",
+    "load_outer_N": "outer N",
+    "pressure_inner_GPa": "inner GPa",
+    "pressure_outer_GPa": "outer GPa",
+    "film_central_um": "film µm",
+    "lambda": "Λ",
+}
+
+
 def print_bearing(content: dict[str, Any]) -> None:
     """Deflections and a table of balls or rollers for one bearing or each of a set."""
     console = _console()
@@ -179,8 +193,9 @@ def print_bearing(content: dict[str, Any]) -> None:
             ", ".join(f"{key} {value:.5g}" for key, value in scalars.items() if isinstance(value, float))
         )
         balls = bearing["balls"] if "balls" in bearing else bearing["rollers"]
-        keys = [key for key in balls[0] if any(ball[key] is not None for ball in balls)]
-        table = _table(f"bearing {index + 1}", *keys)
+        shown = (key for key in _ROLLING_ELEMENT if key in balls[0])
+        keys = [key for key in shown if any(ball[key] is not None for ball in balls)]
+        table = _table(f"bearing {index + 1}", *(_ROLLING_ELEMENT[key] for key in keys))
         for ball in balls:
             table.add_row(*("–" if ball[key] is None else f"{ball[key]:.4g}" for key in keys))
         console.print(table)

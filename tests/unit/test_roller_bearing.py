@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import spindle_fem
+from spindle_fem.commands.console import print_bearing
 from spindle_fem.errors import FaultsError, GeometryError
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
 from spindle_fem.physics.bearings.line_contact import half_width, line_approach, line_pressure
@@ -115,3 +116,15 @@ def test_faults_of_a_roller_bearing_file_all_at_once(tmp_path: Path) -> None:
     with pytest.raises(FaultsError) as caught:
         spindle_fem.bearing(file)
     assert all(key in str(caught.value) for key in ("bearing.rows", "bearing.pitch_diameter", "axial_load"))
+
+
+def test_terminal_shows_every_roller_and_what_is_missing(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    file = tmp_path / "rollers.toml"
+    file.write_text(FILE, encoding="utf-8")
+    print_bearing(spindle_fem.bearing(file))
+    shown = capsys.readouterr().out
+    assert "347.1" in shown
+    assert "…" not in shown
+    assert "heat is unknown" in " ".join(shown.split())
+    assert max(map(len, shown.splitlines())) <= 80
