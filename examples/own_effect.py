@@ -34,8 +34,8 @@ class ColdFloor(Effect):
     check = "What the machine stands on: feet, pads, grouting; the temperature of the floor."
 
     def forms(self, machine):
-        """Every node of a network may stand on the floor."""
-        terms = ((key, FloorTerm(self.term_name(key), machine.heat[key])) for key in machine.spots)
+        """Every place of a machine, or node of a network, may stand on the floor."""
+        terms = ((key, FloorTerm(self.term_name(key), places)) for key, places in machine.spots.items())
         return tuple(self.candidate(key, t, amplitude="conductance", reference=2.0) for key, t in terms)
 
     def statement(self, candidate, reported):
