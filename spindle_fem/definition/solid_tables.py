@@ -116,7 +116,7 @@ class BearingType(SpecModel):
     directly, what is given here replaces the catalogue's.
     """
 
-    catalogue: str = ""
+    catalogue: str | None = None
     """Designation of a bearing that ships, such as ``7014 C``, which gives what is missing."""
     kind: BearingKind = "angular_contact_ball"
     """Kind of bearing, for the empirical friction models."""
@@ -271,7 +271,7 @@ class Fit(SpecModel):
     """Seats of a set's rings, cold and at rest.
 
     With `heat.thermal_preload` they change with temperature and speed, rings
-    and seats give way as thick-walled cylinders do, and `contact_angle` is that
+    and seats give way as the parts around them do, and `contact_angle` is that
     of the unmounted bearing. Without it, or without a fit, rings are rigid and
     `contact_angle` is that of the mounted one.
     """
@@ -328,7 +328,7 @@ class BearingSet(SpecModel):
 class Grease(SpecModel):
     """Lubricating grease by its base oil."""
 
-    catalogue: str = ""
+    catalogue: str | None = None
     """A grease that ships, which gives what is missing: ``high_speed_grease``, ``general_grease``."""
     name: str
     """For reports."""
