@@ -172,7 +172,7 @@ def split_override(override: str) -> tuple[str, str]:
 def _typed(text: str, shape: Shape) -> Any:
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return text
     return (
         text if shape.kind == "value" and is_text(shape.annotation) and not isinstance(value, str) else value

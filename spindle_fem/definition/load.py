@@ -84,7 +84,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     SpecError
-        The file is missing, not UTF-8, or not TOML (with line and column).
+        The file is missing, not UTF-8, not TOML (with line and column), or nested without end.
     """
     try:
         with path.open("rb") as file:
@@ -99,6 +99,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise SpecError(
             str(path), f"is not valid TOML: {error}.", "See https://toml.io for the format."
         ) from error
+    except RecursionError as error:
+        raise SpecError(str(path), "has lists or tables that are nested too deeply.") from error
 
 
 def read_layers(path: Path, visited: tuple[Path, ...] = ()) -> list[Layer]:

@@ -15,8 +15,8 @@ from spindle_fem.definition.field_types import (
     Flag,
     Fraction,
     HeatCapacity,
-    KinematicViscosity,
     Name,
+    OilViscosity,
     PositiveForce,
     PositiveLength,
     Preload,
@@ -332,9 +332,9 @@ class Grease(SpecModel):
     """A grease that ships, which gives what is missing: ``high_speed_grease``, ``general_grease``."""
     name: str
     """For reports."""
-    kinematic_viscosity_40: KinematicViscosity
+    kinematic_viscosity_40: OilViscosity
     """Base oil at 40 °C."""
-    kinematic_viscosity_100: KinematicViscosity
+    kinematic_viscosity_100: OilViscosity
     """Base oil at 100 °C."""
     base_oil_density: Density = 890.0
     """Density of the oil, lighter than the grease."""

@@ -26,7 +26,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise SpecError(str(file), f"cannot be read ({error}).", "Give a TOML file.") from error
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise SpecError(str(file), f"is not TOML ({error}).", "Correct the syntax.") from error
 
 

@@ -75,12 +75,13 @@ class Lubricant:
     temperature_limit: float = 393.15
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.kinematic_viscosity_100 < self.kinematic_viscosity_40:
+        lowest = _WALTHER_LOWEST_MM2_S * 1e-6
+        if not lowest <= self.kinematic_viscosity_100 < self.kinematic_viscosity_40 < math.inf:
             raise SpecError(
                 "kinematic_viscosity_100",
                 f"{self.kinematic_viscosity_100 * 1e6:g} mm²/s at 100 °C against "
                 f"{self.kinematic_viscosity_40 * 1e6:g} mm²/s at 40 °C.",
-                "Viscosity must fall with temperature and stay above 0.",
+                f"Viscosity must fall with temperature and stay above {_WALTHER_LOWEST_MM2_S:g} mm²/s.",
             )
         if self.viscosity_law not in ("walther", "roelands"):
             raise SpecError(

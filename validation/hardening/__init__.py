@@ -1,0 +1,1 @@
+"""Hardening: spoilt inputs, kills, full disks; every case accepted, or refused with a reason."""
