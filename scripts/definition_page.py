@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from spindle_fem.definition.bearing_catalogue import RULE
 from spindle_fem.definition.field_types import MARKS, NAME_RULE
 from spindle_fem.definition.machine_spec import MACHINE_SCHEMA, MachineSpec
+from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.definition.schema import (
     Shape,
     annotation_of,
@@ -116,11 +117,24 @@ Every other face is exposed. A `[[surface]]` names some of a part's faces, and e
 `remaining_surfaces = "adiabatic"` says so, else a fault.
 """
 
+_NETWORK = """\
+## A machine without drawings
+
+A machine may be a thermal network instead: lumps with one temperature each, and what they exchange heat with.
+`simulate`, `diagnose`, `watch` and `export` take it as they take one with geometry; `geometry/bench_motor.toml` and
+`examples/pump.toml` are written this way. A node that no chain of links joins to a boundary and a name that is
+nobody's are faults. Besides `[network]` and what is in it, the file has only the keys of the first table.
+"""
+
 
 def reference_page() -> str:
     """Markdown text that lists every table and key of a machine definition."""
     sections = [_INTRODUCTION, "## Tables\n"]
     sections += list(key_sections("", Shape("table", (MachineSpec,)), in_list=False))
+    sections.append(_NETWORK)
+    sections.append(_key_table(NetworkMachineSpec))
+    network = Shape("table", (NetworkMachineSpec.model_fields["network"].annotation,))
+    sections += list(key_sections("network", network, in_list=False))
     sections += list(_choices())
     return "\n".join(sections).rstrip() + "\n"
 

@@ -345,6 +345,13 @@ class FreeQuantityRule:
     """Metadata of a field that takes a quantity of any dimension, kept as it is written."""
 
 
+@dataclass(frozen=True, slots=True)
+class AllowedText:
+    """Metadata of a field of a kind of its own: what it takes, in words."""
+
+    text: str
+
+
 def _write_range(ends: tuple[float, float]) -> list[str]:
     return [_LENGTH_RULE.write(end) for end in ends]
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainSerializer
 
 from spindle_fem.definition.effect_entries import EffectEntry
-from spindle_fem.definition.field_types import Name, SpecModel, uncertain_field
+from spindle_fem.definition.field_types import AllowedText, Name, SpecModel, uncertain_field
 from spindle_fem.errors import (
     SpindleFemError,
     UnitError,
@@ -104,50 +104,61 @@ def _read_reference(value: Any) -> Any:
         raise ValueError(f"{error.what} {error.how_to_fix}".strip()) from error
 
 
-GainField = Annotated[Gain, BeforeValidator(_read_gain), PlainSerializer(_write_gain)]
+HIGHEST_EXPONENT = 6.0
+
+GainField = Annotated[
+    Gain,
+    BeforeValidator(_read_gain),
+    PlainSerializer(_write_gain),
+    AllowedText('uncertain: a quantity in W per unit of the input, such as "0.9 W/W", or in W'),
+]
 ReferenceField = Annotated[
     Gain | None,
     BeforeValidator(_read_reference),
     PlainSerializer(lambda value: None if value is None else _write_gain(value)),
+    AllowedText('a quantity of the input\'s kind, such as "3000 rpm"'),
 ]
 BoundaryTemperature = Annotated[
     Uncertain | str,
     BeforeValidator(_read_boundary_temperature),
     PlainSerializer(_write_boundary_temperature),
+    AllowedText("an input's name (a channel's `drives`), or uncertain: a temperature such as \"20 degC\""),
 ]
+Exponent = Annotated[
+    float,
+    Field(gt=0.0, le=HIGHEST_EXPONENT, allow_inf_nan=False),
+    AllowedText(f"a number above 0, at most {HIGHEST_EXPONENT:g}"),
+]
+Ends = Annotated[tuple[Name, Name], AllowedText("two names of nodes or boundaries, one of them a node")]
 
 
 class NodeSpec(SpecModel):
-    """A lump with one temperature.
-
-    ``capacity`` is its mass times specific heat, J/K.
-    """
+    """A lump with one temperature."""
 
     name: Name
+    """Its name, which a channel's `probe` may read."""
     capacity: uncertain_field("J/K")  # type: ignore[valid-type]
+    """Mass times specific heat."""
 
 
 class BoundarySpec(SpecModel):
-    """Something whose temperature does not answer to the machine: room, coolant, frame.
-
-    ``temperature`` is the name of an input (a channel's ``drives``), a
-    quantity, or a prior. ``sigma_rel`` counts on the absolute temperature;
-    ``{low, high}`` is the plain way.
-    """
+    """Something whose temperature does not answer to the machine: room, coolant, frame."""
 
     name: Name
+    """Its name."""
     temperature: BoundaryTemperature
+    """Of a prior, `sigma_rel` counts on the absolute temperature; `{low, high}` is the plain way."""
 
 
 class LinkSpec(SpecModel):
-    """Heat conducted between two nodes, or a node and a boundary.
+    """Heat conducted between two nodes, or a node and a boundary."""
 
-    ``name`` is needed only for a second link between the same two.
-    """
-
-    between: tuple[Name, Name]
+    between: Ends
+    """The names of both ends."""
     conductance: uncertain_field("W/K")  # type: ignore[valid-type]
+    """Heat per kelvin between them."""
     name: Name | None = None
+    """Needed only for a second link between the same two."""
 
     @property
     def label(self) -> str:
@@ -162,10 +173,15 @@ class SourceSpec(SpecModel):
     """
 
     node: Name
+    """Where the heat enters."""
     input: Name | None = None
+    """An input of the recording (a channel's `drives`) that the heat follows."""
     gain: GainField
-    exponent: Annotated[float, Field(gt=0.0, le=6.0, allow_inf_nan=False)] = 1.0
+    """In the unit that makes W of it: "0.9 W/W" of a power, "0.02 W/rpm" of a speed; in W with a reference."""
+    exponent: Exponent = 1.0
+    """Power of the input."""
     reference: ReferenceField = None
+    """Input at which the heat is the gain itself."""
 
     @property
     def label(self) -> str:
@@ -177,17 +193,27 @@ class NetworkSpec(SpecModel):
     """Nodes, boundaries, links and sources."""
 
     node: Annotated[tuple[NodeSpec, ...], Field(min_length=1)]
+    """At least one."""
     boundary: tuple[BoundarySpec, ...] = ()
+    """What the nodes lose heat to."""
     link: tuple[LinkSpec, ...] = ()
+    """How heat gets from one to another."""
     source: tuple[SourceSpec, ...] = ()
+    """Where heat comes from."""
 
 
 class NetworkMachineSpec(SpecModel):
     """A whole ``[network]`` machine file."""
 
     schema_: Annotated[Literal["spindle-fem/machine/1"], Field(alias="schema")]
+    """The version of this format."""
     name: str
+    """Name of the machine, in reports."""
     description: str = ""
+    """What it is and where its values come from."""
     initial: Literal["first_reading", "ambient", "steady"] = "first_reading"
+    """Temperatures at the start; nodes that nobody reads are estimated."""
     network: NetworkSpec
+    """Nodes, boundaries, links and sources."""
     effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
+    """Physics that the network does not hold, switched on; see `[[effect]]` above."""

@@ -10,7 +10,14 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from spindle_fem.definition.field_types import ChoiceRule, FreeQuantityRule, Name, QuantityRule, RangeRule
+from spindle_fem.definition.field_types import (
+    AllowedText,
+    ChoiceRule,
+    FreeQuantityRule,
+    Name,
+    QuantityRule,
+    RangeRule,
+)
 from spindle_fem.registry import Registry
 from spindle_fem.units import quantity_example
 
@@ -71,6 +78,9 @@ def shape_of(annotation: Any) -> Shape:
 def value_text(annotation: Any) -> str:
     """What a plain value may be, in words."""
     alternatives, metadata = _peeled(annotation)
+    told = next((item.text for item in metadata if isinstance(item, AllowedText)), None)
+    if told is not None:
+        return told
     rule = quantity_rule(annotation)
     if rule is not None:
         text = f"a quantity such as {quantity_example(rule.unit, rule.kind)}" if rule.unit else "a number"

@@ -9,6 +9,7 @@ import pytest
 import spindle_fem
 from scripts.definition_page import options, reference_page
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.definition.schema import annotation_of, fields_of, shape_of
 
 PAGE = Path(spindle_fem.__file__).parents[1] / "docs" / "machine_definition.md"
@@ -24,7 +25,7 @@ def models_below(model):
             yield from models_below(inner)
 
 
-MODELS = list(dict.fromkeys(models_below(MachineSpec)))
+MODELS = list(dict.fromkeys([*models_below(MachineSpec), *models_below(NetworkMachineSpec)]))
 
 
 @pytest.mark.skipif(not PAGE.parent.is_dir(), reason="the page lies in the source tree, not in the wheel")
@@ -52,6 +53,8 @@ def test_limits_units_and_defaults_stand_in_the_page():
         "### `[[bearing_set.bearing]]`",
         "### `[[film]]` with kind rotating",
         "### `[materials.NAME]`",
+        "### `[[network.link]]`",
+        "| `exponent` | Power of the input. | a number above 0, at most 6 | `1.0` |",
     ):
         assert line in page
 
