@@ -120,10 +120,11 @@ Every other face is exposed. A `[[surface]]` names some of a part's faces, and e
 _NETWORK = """\
 ## A machine without drawings
 
-A machine may be a thermal network instead: lumps with one temperature each, and what they exchange heat with.
-`simulate`, `diagnose`, `watch` and `export` take it as they take one with geometry; `geometry/bench_motor.toml` and
-`examples/pump.toml` are written this way. A node that no chain of links joins to a boundary and a name that is
-nobody's are faults. Besides `[network]` and what is in it, the file has only the keys of the first table.
+A machine may be a thermal network instead: lumps with one temperature each, and what they exchange heat
+with. `simulate`, `diagnose`, `watch` and `export` take it as they take one with geometry;
+`geometry/bench_motor.toml` and `examples/pump.toml` are written this way. A node that no chain of links
+joins to a boundary and a name that is nobody's are faults. Besides `[network]` and what is in it, the file
+has only the keys of the first table.
 """
 
 

@@ -110,6 +110,7 @@ def write_gallery(folder: Path) -> list[tuple[str, str]]:
 
 def write_site(folder: Path, *, gallery: bool = True) -> None:
     """Write everything to a folder, in place of what is there."""
+    folder = folder.resolve()  # examples run in a folder of their own
     for name in ("reference", "gallery"):
         shutil.rmtree(folder / name, ignore_errors=True)
     folder.mkdir(parents=True, exist_ok=True)

@@ -142,7 +142,7 @@ def heat(
         folder=output,
         overrides=set_ or (),
     )
-    print_json(content) if as_json else print_heat(content)
+    print_json(content) if as_json else print_heat(content, output)
 
 
 @app.command()

@@ -10,6 +10,7 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from spindle_fem.commands.verbosity import Verbosity
 from spindle_fem.results.run_log import LOGGER
@@ -19,9 +20,25 @@ MOST_LINES = 12
 
 
 def _console() -> Console:
-    """The terminal's width, or a wide page where the output goes to a file or a pipe."""
-    console = Console(quiet=Verbosity.quiet)
-    return console if console.is_terminal else Console(width=120, quiet=Verbosity.quiet)
+    """The terminal's width, or a wide page where the output goes to a file or a pipe.
+
+    Brackets stay as they are: texts hold names of tables and of the user's own.
+    """
+    console = Console(quiet=Verbosity.quiet, markup=False)
+    return console if console.is_terminal else Console(width=120, quiet=Verbosity.quiet, markup=False)
+
+
+def _print_marked(console: Console, mark: str, text: str, style: str) -> None:
+    """A line that begins with a word in a style of its own."""
+    console.print(Text.assemble((mark, style), text))
+
+
+def _print_warnings(console: Console, content: dict[str, Any]) -> None:
+    """What was completed by rule, and what there is to be warned of."""
+    for row in content.get("assumed", ()):
+        _print_marked(console, "assumed", f" {row['name']}: {row['detail']}", "bold")
+    for warning in content["warnings"]:
+        _print_marked(console, warning["code"], f": {warning['text']}", "yellow")
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -80,19 +97,21 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
     console.print(f"{summary['wall_time_s']:.1f} s ({split}), peak {summary['peak_rss_MB']:.0f} MB")
     for check in summary["checks"]:
         if not check["passed"]:
-            console.print(
-                f"[bold red]FAILED[/] {check['name']}: {check['value']:.4g} {check['unit']}, "
-                f"limit {check['limit']:.4g}. {check['explanation']}"
+            _print_marked(
+                console,
+                "FAILED",
+                f" {check['name']}: {check['value']:.4g} {check['unit']}, "
+                f"limit {check['limit']:.4g}. {check['explanation']}",
+                "bold red",
             )
-    for warning in summary["warnings"]:
-        console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
+    _print_warnings(console, {"warnings": summary["warnings"]})
     console.print(f"Report: {folder / 'report.html'}")
 
 
 def print_check(content: dict[str, Any]) -> None:
     """What a valid machine is made of."""
     console = _console()
-    console.print(f"[bold]{content['machine']}[/] is valid.")
+    _print_marked(console, content["machine"], " is valid.", "bold")
     lists = [key for key, rows in content.items() if isinstance(rows, list)]
     for key in (key for key in lists if key not in ("assumed", "warnings")):
         if not content[key]:
@@ -101,10 +120,7 @@ def print_check(content: dict[str, Any]) -> None:
         for row in content[key]:
             table.add_row(row["name"], row.get("detail", ""))
         console.print(table)
-    for row in content.get("assumed", ()):
-        console.print(f"[bold]assumed[/] {row['name']}: {row['detail']}")
-    for warning in content["warnings"]:
-        console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
+    _print_warnings(console, content)
 
 
 def print_pairs(title: str, content: dict[str, Any]) -> None:
@@ -146,8 +162,8 @@ _HEAT_ROWS = (
 )
 
 
-def print_heat(content: dict[str, Any]) -> None:
-    """Heat term by term, one table a bearing, one column a speed."""
+def print_heat(content: dict[str, Any], folder: Path | None) -> None:
+    """Heat term by term, one table a bearing, one column a speed; where the report is, if there is one."""
     console = _console()
     for name, rows in content["bearings"].items():
         table = _table(
@@ -164,10 +180,9 @@ def print_heat(content: dict[str, Any]) -> None:
             values = [row["heat_W"][level][name] for row in content["models"]]
             table.add_row(f"by {level} W", *(_number(value, 1) for value in values), style="dim")
         console.print(table)
-    for row in content.get("assumed", ()):
-        console.print(f"[bold]assumed[/] {row['name']}: {row['detail']}")
-    for warning in content["warnings"]:
-        console.print(f"[yellow]{warning['code']}[/]: {warning['text']}")
+    _print_warnings(console, content)
+    if folder is not None:
+        console.print(f"Report: {folder / 'report.html'}")
 
 
 _ROLLING_ELEMENT = {
@@ -200,7 +215,7 @@ def print_bearing(content: dict[str, Any]) -> None:
             table.add_row(*("–" if ball[key] is None else f"{ball[key]:.4g}" for key in keys))
         console.print(table)
     for warning in content["warnings"]:
-        console.print(warning["text"], style="dim", markup=False)
+        console.print(warning["text"], style="dim")
 
 
 def print_crosscheck(content: dict[str, Any], folder: Path) -> None:
@@ -228,7 +243,7 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
         table.add_row(channel["channel"], _number(channel["rmse_K"], 3), _number(channel["noise_K"], 3))
     console.print(table)
     for line in (*content["defects_text"], *content["notes"]):
-        console.print(line, style="dim", markup=False)
+        console.print(line, style="dim")
     console.print(f"Report: {folder / 'report.html'}")
 
 
@@ -238,7 +253,7 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
 
     console = _console()
     mismatch, fit = content["mismatch"], content["fit"]
-    console.print(f"[bold]{content['verdict']}[/bold]  (p {level(mismatch['p_value'])})")
+    _print_marked(console, content["verdict"], f"  (p {level(mismatch['p_value'])})", "bold")
     if content["reason"]:
         console.print(content["reason"])
     for finding in content["findings"]:
@@ -274,7 +289,7 @@ def print_plan(content: dict[str, Any], folder: Path) -> None:
     """What a planned test tells, the best further sensors and tests."""
     console = _console()
     for sentence in content["summary"]:
-        console.print(sentence, markup=False)
+        console.print(sentence)
     hours = f"Tests of {content['best_test']['length_s'] / 3600.0:.3g} h" if content["best_test"] else ""
     for key, title in (("sensors_in_turn", "Further sensors, one after another"), ("tests", hours)):
         table = _table(title, "", "information bit", "seen", "told from all")
@@ -289,7 +304,7 @@ def print_plan(content: dict[str, Any], folder: Path) -> None:
         if content[key]:
             console.print(table)
     for note in content["notes"]:
-        console.print(note, style="dim", markup=False)
+        console.print(note, style="dim")
     console.print(f"Report: {folder / 'report.html'}")
 
 
@@ -309,17 +324,49 @@ def print_diagnoses(content: dict[str, Any], folder: Path) -> None:
     console.print(table)
     for row in content["rows"]:
         if row["status"] != "ok":
-            console.print(f"{row['recording']}: {row['reason']}", markup=False)
+            console.print(f"{row['recording']}: {row['reason']}")
     console.print(f"{content['diagnosed']} of {content['recordings']} diagnosed; {folder / 'report.html'}")
 
 
 def print_sweep(content: dict[str, Any], folder: Path) -> None:
-    """How many designs were solved, and where the table is."""
+    """How many designs were solved, which is best, and where the table is."""
     console = _console()
     for key, value in content.items():
         if isinstance(value, (str, int, float)) and key != "schema":
             console.print(f"{key.replace('_', ' ')}: {value}")
+    for line in _best_designs(content):
+        console.print(line)
     console.print(f"Table: {folder / 'results.csv'}; report: {folder / 'report.html'}")
+
+
+def _best_designs(content: dict[str, Any]) -> list[str]:
+    """The best design with what it is and reaches, or the designs of the front."""
+    from spindle_fem.report.sweep_scales import scale_of_column
+
+    if not content["objectives"]:
+        return []
+    wanted = ", ".join(f"{item['direction']} {item['output']}" for item in content["objectives"])
+    optimum = content["optimum"]
+    if optimum is None:
+        return [f"best ({wanted}): none of the solved designs keeps every limit"]
+    if optimum["best"] is None:
+        return [f"front ({wanted}): designs {', '.join(map(str, optimum['front']))}"]
+    best = optimum["best"]
+    scales = {
+        item["path"]: scale_of_column(item["path"], item["unit"], ())
+        for item in (*content["parameters"], *content["outputs"])
+    }
+
+    def told(values: dict[str, Any]) -> str:
+        shown = ((path, scales[path], value) for path, value in values.items() if path in scales)
+        return ", ".join(
+            f"{path} = {scale.text(value)} {scale.unit}".rstrip() for path, scale, value in shown
+        )
+
+    return [
+        f"best ({wanted}): design {best['design']}, {told(best['parameters'])}",
+        f"  there {told(best['outputs'])}",
+    ]
 
 
 def print_transient(content: dict[str, Any], folder: Path) -> None:
@@ -409,8 +456,8 @@ def print_draft(content: dict[str, Any], folder: Path) -> None:
     console.print(table)
     for heading, key in (("found", "found"), ("unsure", "unsure"), ("cells without a number", "lost_cells")):
         for text in content[key][:MOST_LINES]:
-            console.print(f"{heading}: {text}", markup=False, highlight=False)
+            console.print(f"{heading}: {text}", highlight=False)
         if len(content[key]) > MOST_LINES:
-            console.print(f"{heading}: and {len(content[key]) - MOST_LINES} more", markup=False)
-    console.print(*content["defects_text"], sep="\n", markup=False, highlight=False)
-    console.print(f"wrote {folder}; check what recording.toml marks UNSURE", markup=False, highlight=False)
+            console.print(f"{heading}: and {len(content[key]) - MOST_LINES} more")
+    console.print(*content["defects_text"], sep="\n", highlight=False)
+    console.print(f"wrote {folder}; check what recording.toml marks UNSURE", highlight=False)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from spindle_fem.definition.load import load_machine
+from spindle_fem.errors import NoEquilibriumError
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.studies.heat_study import heat_study
 from spindle_fem.units import to_si
@@ -33,12 +34,20 @@ def heat_table(
     coupled : bool
         Solve the machine at every speed and take its temperatures.
     folder : Path, optional
-        For ``heat.json``, ``heat.csv`` and charts.
+        For ``heat.json``, ``heat.csv``, charts and ``report.html``.
+
+    Raises
+    ------
+    NoEquilibriumError
+        At no speed do the bearings have an equilibrium.
     """
     spec = load_machine(machine, overrides)
     chosen = [to_si(text, "rad/s", where="--speed") for text in speeds]
     kelvin = to_si(temperature, "K", where="--temperature", kind="temperature")
     content = heat_study(spec, chosen, kelvin, coupled=coupled)
+    if not content["models"]:
+        reasons = (item["text"] for item in content["warnings"] if item["code"] == "no_equilibrium")
+        raise NoEquilibriumError(spec.name, next(reasons), "Ask for lower speeds.")
     if folder is not None:
         with output_folder(folder) as place:
             _write(content, place)
@@ -46,10 +55,11 @@ def heat_table(
 
 
 def _write(content: dict[str, Any], place: Path) -> None:
-    """Write ``heat.json``, ``heat.csv`` (a row for each bearing and speed) and the charts."""
+    """Write ``heat.json``, ``heat.csv`` (a row for each bearing and speed), the charts and the report."""
     import pandas
 
     from spindle_fem.report.heat_charts import write_heat_charts
+    from spindle_fem.report.heat_report import write_heat_report
 
     rows = []
     for name, entries in content["bearings"].items():
@@ -62,3 +72,4 @@ def _write(content: dict[str, Any], place: Path) -> None:
     replace_text(place / "heat.json", json.dumps(content, indent=2, ensure_ascii=False))
     pandas.DataFrame(rows).to_csv(place / "heat.csv", index=False)
     write_heat_charts(content, place / "figures")
+    write_heat_report(place)

@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
+from spindle_fem.errors import BadInputError
 from spindle_fem.results.output_folder import require_complete
+
+# What tells a command's folder, and the function that writes its page again: module and name.
+_WRITERS = {
+    "crosscheck.json": ("crosscheck_report", "write_crosscheck_report"),
+    "diagnosis.json": ("diagnosis_report", "write_diagnosis_report"),
+    "diagnoses.json": ("diagnoses_report", "write_diagnoses_report"),
+    "plan.json": ("plan_report", "write_plan_report"),
+    "simulation.json": ("simulation_report", "write_simulation_report"),
+    "sweep.json": ("sweep_report", "rebuild_sweep_report"),
+    "transient.json": ("transient_report", "write_transient_report"),
+    "heat.json": ("heat_report", "write_heat_report"),
+    "summary.json": ("run_report", "rebuild_report"),
+}
 
 
 def rebuild(folder: Path) -> Path:
@@ -16,30 +31,11 @@ def rebuild(folder: Path) -> Path:
         The folder holds no results, or is marked incomplete.
     """
     place = require_complete(folder)
-    if (place / "crosscheck.json").is_file():
-        from spindle_fem.report.crosscheck_report import write_crosscheck_report
-
-        return write_crosscheck_report(place)
-    if (place / "diagnosis.json").is_file():
-        from spindle_fem.report.diagnosis_report import write_diagnosis_report
-
-        return write_diagnosis_report(place)
-    if (place / "diagnoses.json").is_file():
-        from spindle_fem.report.diagnoses_report import write_diagnoses_report
-
-        return write_diagnoses_report(place)
-    if (place / "plan.json").is_file():
-        from spindle_fem.report.plan_report import write_plan_report
-
-        return write_plan_report(place)
-    if (place / "simulation.json").is_file():
-        from spindle_fem.report.simulation_report import write_simulation_report
-
-        return write_simulation_report(place)
-    if (place / "sweep.json").is_file():
-        from spindle_fem.report.sweep_report import rebuild_sweep_report
-
-        return rebuild_sweep_report(place)
-    from spindle_fem.report.run_report import rebuild_report
-
-    return rebuild_report(place)
+    for file, (module, write) in _WRITERS.items():
+        if (place / file).is_file():
+            return getattr(import_module(f"spindle_fem.report.{module}"), write)(place)
+    raise BadInputError(
+        str(folder),
+        f"holds no results: none of {', '.join(_WRITERS)}.",
+        "Give the folder of a finished command.",
+    )

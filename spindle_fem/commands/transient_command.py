@@ -15,7 +15,7 @@ from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.model.mesh.evaluate import temperature_at_nodes
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.model.reduced.defined_effects import physics_of
-from spindle_fem.report.transient_report import write_transient_report
+from spindle_fem.report.transient_report import write_transient_figures, write_transient_report
 from spindle_fem.results.field_series import FieldSeries
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
@@ -87,7 +87,8 @@ def run_transient_study(
         save_state(place / "state.npz", result.state, result.memory)
         replace_text(place / "machine.toml", write_machine(prepared.spec))
         replace_text(place / "transient.json", json.dumps(summary, indent=1) + "\n")
-        write_transient_report(summary, result, place)
+        write_transient_figures(summary, result, place)
+        write_transient_report(place)
         return summary
 
 

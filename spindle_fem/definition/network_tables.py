@@ -177,7 +177,7 @@ class SourceSpec(SpecModel):
     input: Name | None = None
     """An input of the recording (a channel's `drives`) that the heat follows."""
     gain: GainField
-    """In the unit that makes W of it: "0.9 W/W" of a power, "0.02 W/rpm" of a speed; in W with a reference."""
+    """In the unit that makes W: "0.9 W/W" of a power, "0.02 W/rpm" of a speed; in W with a reference."""
     exponent: Exponent = 1.0
     """Power of the input."""
     reference: ReferenceField = None

@@ -9,6 +9,9 @@ from spindle_fem.effects.framework.effect import capital, place_words
 from spindle_fem.effects.registry import catalogue
 from spindle_fem.report.table_rows import significant
 
+# P-values below are too small for the models behind them to mean their digits.
+LEAST_LEVEL = 0.001
+
 VERDICTS = {
     "consistent": "nothing is missing",
     "parameter": "a parameter is off",
@@ -100,9 +103,9 @@ def level(p_value: float) -> str:
     """A p-value with its sign of relation.
 
     >>> level(0.0312), level(0.0)
-    ('= 0.031', '< 10⁻¹⁰')
+    ('= 0.031', '< 0.001')
     """
-    return f"= {significant(p_value, 2)}" if p_value >= 1.0e-10 else "< 10⁻¹⁰"
+    return f"= {significant(p_value, 2)}" if p_value >= LEAST_LEVEL else f"< {LEAST_LEVEL:g}"
 
 
 def kelvin(value: float | None) -> str:

@@ -183,7 +183,7 @@ def film_ratio(content: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _merged_terms(terms: Mapping[str, float]) -> dict[str, float]:
+def merged_terms(terms: Mapping[str, float]) -> dict[str, float]:
     """Terms with those of both raceways added up."""
     merged: dict[str, float] = {}
     for key, value in terms.items():
@@ -197,7 +197,7 @@ def heat_terms(content: Mapping[str, Any]) -> Figure:
     """Friction heat of each bearing, stacked by term."""
     groups = _groups(content)
     figure, axes = _panels(len(groups))
-    terms = {name: [_merged_terms(row["terms_W"]) for row in rows] for name, rows in groups.items()}
+    terms = {name: [merged_terms(row["terms_W"]) for row in rows] for name, rows in groups.items()}
     keys = list(dict.fromkeys(key for rows in terms.values() for row in rows for key in row))
     keys = [key for key in keys if any(row.get(key) for rows in terms.values() for row in rows)]
     top = max(row["heat_W"] for rows in groups.values() for row in rows)

@@ -38,16 +38,18 @@ if TYPE_CHECKING:
 FIGURE_FOLDER = "figures"
 
 OVER_SPEED = "over_speed_"
+# Charts of bearings over speed, also of the command ``heat``.
+HEAT_CAPTIONS = {
+    "heat_terms": "Friction heat over speed, stacked by term.",
+    "heat_models": "The same bearings by every heat model: the spread a designer should expect.",
+    "film_thickness": "Central film: flooded and isothermal (dashed), and as it is at these temperatures.",
+    "film_ratio": "Film thickness over composite roughness; from 3 on the film carries alone.",
+    "thrust": "Axial load and displacement of the set that carries the thrust.",
+    "contacts": "Deformation, contact angle and ellipse: inner contact solid, outer dashed.",
+    "ball_speeds": "Orbit and spin of the balls, centrifugal force and gyroscopic moment.",
+}
 CAPTIONS = {
-    f"{OVER_SPEED}heat_terms": "Friction heat over speed, stacked by term.",
-    f"{OVER_SPEED}heat_models": "The same bearings by every heat model: the spread a designer should expect.",
-    f"{OVER_SPEED}film_thickness": (
-        "Central film: flooded and isothermal (dashed), and as it is at this run's temperatures."
-    ),
-    f"{OVER_SPEED}film_ratio": "Film thickness over composite roughness; from 3 on the film carries alone.",
-    f"{OVER_SPEED}thrust": "Axial load and displacement of the set that carries the thrust.",
-    f"{OVER_SPEED}contacts": "Deformation, contact angle and ellipse: inner contact solid, outer dashed.",
-    f"{OVER_SPEED}ball_speeds": "Orbit and spin of the balls, centrifugal force and gyroscopic moment.",
+    **{f"{OVER_SPEED}{name}": caption for name, caption in HEAT_CAPTIONS.items()},
     "machine_definition": (
         "The machine as defined: parts by colour, contact lines of the bearings in red, oil in yellow, "
         "surfaces with a film as thick lines, probes as dots."
@@ -73,7 +75,7 @@ _ANSWERS = (
     ),
     Text(
         Markup(
-            "It does not answer how the machine warms up (that is <code>spindle-fem simulate</code>) "
+            "It does not answer how the machine warms up (that is <code>spindle-fem transient</code>) "
             "or how long grease and bearings last."
         )
     ),

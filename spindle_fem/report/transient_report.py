@@ -19,12 +19,22 @@ from spindle_fem.report.table_rows import (
     words,
 )
 from spindle_fem.report.transient_charts import bearing_history, heat_history, probe_history, step_history
-from spindle_fem.results.output_folder import replace_text
+from spindle_fem.results.output_folder import read_content, replace_text
 from spindle_fem.studies.transient_study import StudyResult
+from spindle_fem.studies.transient_summary import SCHEMA
+
+# Every figure in the order of the page.
+CAPTIONS = {
+    "probes": "Every probe, and the speed; dotted, where the last phase tends to.",
+    "bearings": "Raceway means of every bearing and how much hotter the inner ring is.",
+    "heat": "Friction heat follows speed and grease temperature; "
+    "the difference to the coolant is stored or lost to the air.",
+    "steps": "Steps grow as the temperatures come to rest; the dashed line is the error asked for.",
+}
 
 
-def write_transient_report(summary: Mapping[str, Any], result: StudyResult, folder: Path) -> None:
-    """Write ``figures/*.png`` and ``report.html`` of a transient study.
+def write_transient_figures(summary: Mapping[str, Any], result: StudyResult, folder: Path) -> None:
+    """Write ``figures/*.png`` of a transient study.
 
     Parameters
     ----------
@@ -34,32 +44,31 @@ def write_transient_report(summary: Mapping[str, Any], result: StudyResult, fold
         An existing folder.
     """
     figures = {
-        "probes": (
-            probe_history(result, summary["equilibrium"].get("steady_degC")),
-            "Every probe, and the speed; dotted, where the last phase tends to.",
-        ),
-        "bearings": (
-            bearing_history(result),
-            "Raceway means of every bearing and how much hotter the inner ring is.",
-        ),
-        "heat": (
-            heat_history(result),
-            "Friction heat follows speed and grease temperature; "
-            "the difference to the coolant is stored or lost to the air.",
-        ),
-        "steps": (
-            step_history(result),
-            "Steps grow as the temperatures come to rest; the dashed line is the error asked for.",
-        ),
+        "probes": probe_history(result, summary["equilibrium"].get("steady_degC")),
+        "bearings": bearing_history(result),
+        "heat": heat_history(result),
+        "steps": step_history(result),
     }
     place = folder / "figures"
     place.mkdir(exist_ok=True)
-    pictures = []
-    for name, (figure, caption) in figures.items():
+    for name, figure in figures.items():
+        (place / f"{name}.png").unlink(missing_ok=True)  # of an earlier run, with bearings
         if figure is not None:
             save_png(figure, place / f"{name}.png")
-            pictures.append(illustration_of(figure, caption))
-    replace_text(folder / "report.html", _report(summary, pictures))
+
+
+def write_transient_report(folder: Path) -> Path:
+    """Write ``report.html`` of a folder that holds ``transient.json`` and ``figures``.
+
+    Raises
+    ------
+    BadInputError
+        The file is missing or of a version that this program does not know.
+    """
+    summary = read_content(folder / "transient.json", SCHEMA, "transient")
+    drawn = {name: folder / "figures" / f"{name}.png" for name in CAPTIONS}
+    pictures = [illustration_of(path, CAPTIONS[name]) for name, path in drawn.items() if path.is_file()]
+    return replace_text(folder / "report.html", _report(summary, pictures))
 
 
 def _report(summary: Mapping[str, Any], pictures: Sequence[Any]) -> str:

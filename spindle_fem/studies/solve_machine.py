@@ -303,7 +303,7 @@ def _probes(
 def with_heat_study(result: ThermalResult) -> ThermalResult:
     """The same result with bearing loads, films and heat over speed, at its own temperatures.
 
-    Left as it is where the heat comes from a table.
+    Left as it is where the heat comes from a table, or no speed looked at has an equilibrium.
     """
     spec = result.spec
     if spec.heat.model == "table" or not result.bearings:
@@ -318,7 +318,8 @@ def with_heat_study(result: ThermalResult) -> ThermalResult:
         )
         for name, bearing in result.bearings.items()
     }
-    return replace(result, heat_study=heat_study(spec, temperatures=temperatures))
+    study = heat_study(spec, temperatures=temperatures)
+    return replace(result, heat_study=study) if study["models"] else result
 
 
 def estimate_refinement(result: ThermalResult, spec: MachineSpec) -> ThermalResult:

@@ -2,17 +2,74 @@
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from spindle_fem.cli import app
+from spindle_fem.commands.console import print_check, print_sweep
 from spindle_fem.commands.machine_commands import mesh_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError
 from spindle_fem.results.output_folder import output_folder
 from spindle_fem.studies.heat_study import heat_study
+
+
+def test_heat_at_speeds_without_equilibrium_is_refused_with_the_reason(command, tmp_path):
+    done = command("heat", "wu_tan_2016", "--speed", "200000 rpm", "-o", tmp_path / "out")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "gross sliding" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_heat_leaves_a_report_that_can_be_rebuilt(command, tmp_path):
+    done = command("heat", "small_two_start", "--speed", "3000 rpm", "--speed", "6000 rpm", "-o", tmp_path)
+    assert str(tmp_path / "report.html") in done.stdout
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for text in ("all bearings at 6000 rpm", "Heat by every model", "data:image/"):
+        assert text in page
+    (tmp_path / "report.html").unlink()
+    assert command("report", tmp_path).returncode == 0
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == page
+
+
+def test_a_folder_without_results_has_no_report(command, tmp_path):
+    done = command("report", tmp_path)
+    assert done.returncode == 2
+    assert "transient.json" in done.stderr
+
+
+def test_brackets_of_texts_reach_the_terminal(capsys):
+    row = {"name": "[[film]]", "detail": "[/] of [bold]"}
+    warning = {"code": "no_heat_to_air", "text": "No surface has a [[film]]."}
+    print_check({"machine": "[x]", "parts": [row], "assumed": [row], "warnings": [warning]})
+    shown = capsys.readouterr().out
+    for text in ("[x] is valid", "[[film]]  [/] of [bold]", "[[film]]: [/] of", "has a [[film]]."):
+        assert text in shown
+
+
+def test_a_sweep_names_its_best_design_in_customary_units(capsys):
+    content = {
+        "parameters": [{"path": "channel.depth", "unit": "m"}],
+        "outputs": [{"path": "coolant.pressure_drop_Pa", "unit": "Pa"}],
+        "objectives": [{"output": "coolant.pressure_drop_Pa", "direction": "minimize"}],
+        "optimum": {
+            "best": {
+                "design": 3,
+                "parameters": {"channel.depth": 0.019},
+                "outputs": {"coolant.pressure_drop_Pa": 1.5e5, "coolant.pressure_drop_Pa_low": 1.0},
+            },
+            "front": [3],
+        },
+    }
+    print_sweep(content, Path("out"))
+    shown = capsys.readouterr().out
+    assert "best (minimize coolant.pressure_drop_Pa): design 3, channel.depth = 19 mm" in shown
+    assert "there coolant.pressure_drop_Pa = 1.5 bar\n" in shown
+    print_sweep({**content, "optimum": None}, Path("out"))
+    assert "none of the solved designs keeps every limit" in capsys.readouterr().out
 
 
 @pytest.mark.filterwarnings("ignore:invalid value")

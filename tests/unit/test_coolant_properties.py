@@ -86,7 +86,7 @@ def test_oil_refuses_outside_its_range(celsius):
         OilIsoVg32().properties([300.0, celsius + 273.15])
     assert caught.value.where == "coolant iso_vg_32"
     assert "allowed 10 to 50" in caught.value.what
-    assert "define a coolant of your own" in caught.value.how_to_fix
+    assert "docs/python.md" in caught.value.how_to_fix
 
 
 @pytest.mark.parametrize(("celsius", "warns"), [(14.9, True), (15.0, False), (45.0, False), (45.1, True)])

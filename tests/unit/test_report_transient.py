@@ -1,8 +1,10 @@
 """What is told of a transient: approach to equilibrium in words, phases on the terminal."""
 
+import json
 from pathlib import Path
 
 from spindle_fem.commands.console import print_transient
+from spindle_fem.commands.report_command import rebuild
 from spindle_fem.report.transient_report import equilibrium_text
 
 EQUILIBRIUM = {
@@ -21,7 +23,13 @@ def phase(name, settled, end):
         "heat_W": 621.04,
         "hottest_degC": 48.126,
         "probes_degC": {"SP01": 25.498, "SP05": 39.581},
-        "energy": {"imbalance_relative": 3e-10},
+        "start_s": 0.0,
+        "energy": {
+            "heat_in_J": 6e5,
+            "stored_J": 2e5,
+            "heat_out_J": {"coolant": 4e5},
+            "imbalance_relative": 3e-10,
+        },
         "steps": 37,
         "cpu_seconds": 41.0,
     }
@@ -58,3 +66,19 @@ def test_the_terminal_shows_the_end_of_every_phase(capsys):
         "out/report.html",
     ):
         assert text in shown, text
+
+
+def test_the_page_is_rebuilt_from_the_folder(tmp_path):
+    content = {
+        "schema": "spindle-fem/transient-result/1",
+        "study": "Heat-up",
+        "machine": "m",
+        "mesh_preset": "coarse",
+        "unknowns": 1234,
+        "phases": [phase("3000 rpm", True, 7200.0)],
+        "equilibrium": EQUILIBRIUM,
+    }
+    (tmp_path / "transient.json").write_text(json.dumps(content), encoding="utf-8")
+    page = rebuild(tmp_path).read_text(encoding="utf-8")
+    for text in ("Heat-up", "2.00 h", "39.58", "within 0.21 K of the steady state"):
+        assert text in page

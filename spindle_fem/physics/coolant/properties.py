@@ -133,7 +133,7 @@ class Coolant(ABC):
                 self.lowest_temperature - ZERO_CELSIUS_K - _TEMPERATURE_ROUNDING_K,
                 self.highest_temperature - ZERO_CELSIUS_K + _TEMPERATURE_ROUNDING_K,
             ),
-            how_to_fix="Keep the coolant in this range, or define a coolant of your own with a wider one.",
+            how_to_fix="Keep the coolant in this range, or register one known further (docs/python.md).",
         )
         return kelvin
 
