@@ -96,7 +96,13 @@ def range_text(lowest: float, highest: float) -> str:
 
 
 # What makes a machine behave otherwise than computed, then what harms it; other warnings follow.
-CHANGES_RESULT = ("no_equilibrium", "thermal_preload_omitted", "coolant_pressure", "balls_unloaded")
+CHANGES_RESULT = (
+    "no_equilibrium",
+    "thermal_preload_omitted",
+    "coolant_pressure",
+    "coolant_flow_limited",
+    "balls_unloaded",
+)
 _HARMS = (
     "grease_temperature",
     "counter_bearing_unloaded",

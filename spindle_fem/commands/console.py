@@ -81,7 +81,8 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
     if coolant:
         film = coolant["film_coefficient_W_m2K"]
         console.print(
-            f"Coolant {coolant['inlet_degC']:.2f} → {coolant['outlet_degC']:.2f} °C, {coolant['regime']}, "
+            f"Coolant {coolant['flow_m3_s'] * 6e4:.3g} L/min, "
+            f"{coolant['inlet_degC']:.2f} → {coolant['outlet_degC']:.2f} °C, {coolant['regime']}, "
             f"Re {coolant['reynolds']:.0f}, "
             f"film {film['value']:.0f} ({film['low']:.0f}–{film['high']:.0f}) W/(m²·K), "
             f"pressure drop {coolant['pressure_drop_Pa'] / 1e5:.2f} bar"

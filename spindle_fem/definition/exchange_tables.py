@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -40,6 +41,8 @@ Orientation = choice_field("spindle_fem.physics.surroundings.natural_films")
 RotatingCorrelation = choice_field("spindle_fem.physics.surroundings.rotating_films")
 GapLaw = choice_field("spindle_fem.physics.surroundings.gap_laws")
 ReferenceSpeed = quantity_field("rad/s", above=0.0)
+CurveFlow = quantity_field("m**3/s", at_least=0.0)
+CurvePressure = quantity_field("Pa", at_least=0.0)
 
 
 class Ports(SpecModel):
@@ -94,6 +97,31 @@ class Channel(SpecModel):
         return self
 
 
+class PumpCurve(SpecModel):
+    """Pressure of a pump over its flow, linear between entries.
+
+    Before the first entry it is level; beyond the last one the last stretch goes on.
+    """
+
+    flow: Annotated[tuple[CurveFlow, ...], Field(min_length=2)]
+    """At least two entries that grow."""
+    pressure: Annotated[tuple[CurvePressure, ...], Field(min_length=2)]
+    """As many entries, each below the one before."""
+
+    @model_validator(mode="after")
+    def _check(self) -> PumpCurve:
+        faults = []
+        if any(b <= a for a, b in pairwise(self.flow)):
+            faults.append(Fault("flow", "its entries do not all grow.", "Allowed: growing entries."))
+        if any(b >= a for a, b in pairwise(self.pressure)):
+            faults.append(Fault("pressure", "its entries do not all fall.", "Allowed: falling entries."))
+        if len(self.flow) != len(self.pressure):
+            fault = f"has {len(self.pressure)} entries."
+            faults.append(Fault("pressure", fault, f"Allowed: {len(self.flow)}, as many as flow."))
+        raise_faults(faults)
+        return self
+
+
 class Coolant(SpecModel):
     """Oil in the channel."""
 
@@ -102,7 +130,11 @@ class Coolant(SpecModel):
     inlet_temperature: Temperature
     """Mixed, where the oil enters."""
     flow: VolumeFlow
-    """Volume flow of all starts together."""
+    """Volume flow of all starts together; less flows where the pump's pressure does not suffice."""
+    pressure_limit: Pressure | None = None
+    """Of the pump's relief valve: the flow through channel and drillings takes no more."""
+    pump_curve: PumpCurve | None = None
+    """What the pump gives: no more flows than channel and drillings take at its pressure."""
     film_model: FilmModel = "helical"
     """Which correlation of the channel's film."""
     film_factor: UncertainNumber = Uncertain(1.0)

@@ -305,6 +305,12 @@ class MachineSpec(SpecModel):
         return tuple((group, bearing) for group in self.bearing_set for bearing in group.bearing)
 
     @property
+    def has_pump_limit(self) -> bool:
+        """Whether the pump's pressure can keep the coolant's flow below what is asked for."""
+        coolant = self.coolant
+        return coolant is not None and (coolant.pressure_limit, coolant.pump_curve) != (None, None)
+
+    @property
     def source_inputs(self) -> tuple[str, ...]:
         """Recorded quantities that heat sources follow."""
         return tuple(dict.fromkeys(source.input for source in self.source if source.input is not None))

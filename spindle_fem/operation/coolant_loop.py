@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.geometry.coolant_path import CoolantPath
 from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.physics.coolant.channel_section import ChannelSection
-from spindle_fem.physics.coolant.duct_friction import PressureDrop, channel_pressure_drop
+from spindle_fem.physics.coolant.duct_friction import PressureDrop
 from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
 from spindle_fem.physics.coolant.march import ChannelMarch, DrivenChannel, FilmChoice
-from spindle_fem.physics.coolant.properties import coolant_by_name
-from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
+from spindle_fem.physics.coolant.regimes import ChannelState, select_film
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,24 +46,16 @@ class CoolantLoop:
     def __init__(
         self, spec: MachineSpec, cells: ChannelCells, cell_factor: NDArray[np.float64] | None = None
     ) -> None:
-        channel = spec.channel
         self.cell_factor = np.ones(cells.is_port.shape) if cell_factor is None else cell_factor
         self.spec = spec
         self.cells = cells
-        self.coolant = coolant_by_name(spec.coolant.fluid)
-        self.section = ChannelSection(
-            inner_radius=channel.inner_radius,
-            depth=channel.depth,
-            width=channel.width,
-            pitch=channel.pitch,
-            turns=channel.turns,
-            starts=channel.starts,
-        )
-        self.port_diameter = channel.ports.diameter if cells.is_port.any() else None
-        port_area = cells.cell_area[:, cells.is_port].sum() / max(
-            1, cells.n_starts * int(cells.is_port.sum())
-        )
-        self.port_length = port_area / (np.pi * self.port_diameter) if self.port_diameter else 0.0
+        self.path = CoolantPath.of(spec)
+        self.coolant, self.section = self.path.coolant, self.path.section
+        # Of the film: what the first and last cells wet, the ends of the channel among it.
+        self.port_length = 0.0
+        if cells.is_port.any():
+            wetted = cells.cell_area[:, cells.is_port].mean()
+            self.port_length = float(wetted / (np.pi * self.path.port_diameter))
 
     def at(
         self, point: OperatingPoint, wall_temperature: NDArray[np.float64], *, film_factor: float = 1.0
@@ -105,14 +96,7 @@ class CoolantLoop:
 
     def pressure_drop(self, flow: float, inlet: float) -> PressureDrop:
         """Pressure drop of the channel at a flow (m³/s), properties at the inlet temperature (K)."""
-        return channel_pressure_drop(
-            self.section,
-            flow,
-            self.coolant.properties(inlet),
-            float(critical_reynolds_schmidt(self.section.curvature_ratio)),
-            port_diameter=self.port_diameter,
-            port_length=self.port_length,
-        )
+        return self.path.pressure_drop(flow, inlet)
 
     def pumping_power(self, flow: float, inlet: float) -> float:
         """Friction heat that the definition gives to the coolant, W."""
@@ -130,17 +114,14 @@ class CoolantLoop:
         """
         flow, inlet = np.broadcast_arrays(np.asarray(flow, dtype=float), np.asarray(inlet, dtype=float))
         factor = np.tile(self.cell_factor, (*flow.shape, 1))
-        if self.port_diameter is None:
+        if not self.cells.is_port.any():
             return factor
+        diameter, length = self.path.port_diameter, self.port_length
         properties = self.coolant.properties(inlet)
-        velocity = flow / self.section.starts / (0.25 * np.pi * self.port_diameter**2)
-        reynolds = velocity * self.port_diameter / properties.kinematic_viscosity
-        graetz = reynolds * properties.prandtl * self.port_diameter / self.port_length
-        port = (
-            nusselt_sieder_tate(graetz, extrapolate=True)
-            * properties.thermal_conductivity
-            / self.port_diameter
-        )
+        velocity = flow / self.section.starts / (0.25 * np.pi * diameter**2)
+        reynolds = velocity * diameter / properties.kinematic_viscosity
+        graetz = reynolds * properties.prandtl * diameter / length
+        port = nusselt_sieder_tate(graetz, extrapolate=True) * properties.thermal_conductivity / diameter
         state = ChannelState(self.coolant, flow, inlet)
         ratio = np.asarray(port / select_film(self.spec.coolant.film_model, self.section, state).value)
         factor[..., self.cells.is_port] *= ratio[..., None]

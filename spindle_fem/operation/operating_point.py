@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.recordings.standard_inputs import standard_inputs
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +19,7 @@ class OperatingPoint:
     thrust : float, [N]
     ambient_temperature, coolant_inlet_temperature : float, [K]
     coolant_flow : float, [m³/s]
+        What flows, not what a pump is asked for.
     extra_heat : mapping of source name to float, [W]
     beside : mapping of str to float
         What was recorded beside the inputs and only terms follow, ``covariate.<column>``, or what
@@ -35,14 +37,7 @@ class OperatingPoint:
     @classmethod
     def of(cls, spec: MachineSpec) -> OperatingPoint:
         """The steady operating point that the definition asks for."""
-        operation, coolant = spec.operation, spec.coolant
-        return cls(
-            speed=operation.speed,
-            thrust=operation.thrust,
-            ambient_temperature=operation.ambient_temperature,
-            coolant_inlet_temperature=coolant.inlet_temperature if coolant else operation.ambient_temperature,
-            coolant_flow=coolant.flow if coolant else 0.0,
-        )
+        return cls(*standard_inputs(spec).values())
 
     @property
     def inputs(self) -> dict[str, float]:

@@ -165,7 +165,10 @@ def regime_words(coolant: Mapping[str, Any]) -> str:
 def coolant_table(coolant: Mapping[str, Any]) -> Table:
     """Channel flow with the range of its film coefficient."""
     film = coolant["film_coefficient_W_m2K"]
+    # Folders of earlier versions do not tell.
+    asked = coolant.get("asked_flow_m3_s", coolant["flow_m3_s"])
     entries = (
+        ("flow asked for", significant(asked * 6.0e4), "L/min"),
         ("flow", significant(coolant["flow_m3_s"] * 6.0e4), "L/min"),
         ("inlet", number(coolant["inlet_degC"], 2), "°C"),
         ("outlet, mixed", number(coolant["outlet_degC"], 2), "°C"),

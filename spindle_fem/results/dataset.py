@@ -266,6 +266,7 @@ def _add_coolant(result: ThermalResult, variables: dict[str, Any], coordinates: 
         variables[name] = _variable("cell", values, unit, long_name)
     for name, value, unit, long_name in (
         ("coolant_flow", coolant.flow, "m3/s", "coolant flow"),
+        ("coolant_asked_flow", coolant.asked_flow, "m3/s", "coolant flow asked of the pump"),
         ("coolant_inlet_temperature", coolant.inlet_temperature - ZERO_CELSIUS_K, "degC", "coolant inlet"),
         (
             "coolant_outlet_temperature",

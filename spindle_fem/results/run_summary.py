@@ -128,6 +128,7 @@ def _bearing(bearing: BearingResult) -> dict[str, Any]:
 def _coolant(coolant: CoolantResult) -> dict[str, Any]:
     return {
         "flow_m3_s": coolant.flow,
+        "asked_flow_m3_s": coolant.asked_flow,
         "inlet_degC": coolant.inlet_temperature - ZERO_CELSIUS_K,
         "outlet_degC": coolant.outlet_temperature - ZERO_CELSIUS_K,
         "heat_W": coolant.heat,

@@ -58,6 +58,8 @@ class CoolantResult:
 
     Attributes
     ----------
+    flow, asked_flow : float, [m³/s]
+        What flows, and what the definition asks of the pump.
     position : (n,) ndarray, [m]
         Developed length from the inlet to the cell centre.
     angle : (n,) ndarray, [rad]
@@ -69,6 +71,7 @@ class CoolantResult:
     """
 
     flow: float
+    asked_flow: float
     inlet_temperature: float
     outlet_temperature: float
     heat: float

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import COVARIATE, RecordedHeat
 from spindle_fem.errors import RecordingError, did_you_mean
+from spindle_fem.machine.geometry.coolant_path import CoolantPath
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.source_terms import heated_places
 from spindle_fem.recordings.input_samples import InputHistory
@@ -52,12 +53,15 @@ class OperatingHistory:
         Inputs that the machine's heat sources follow.
     heated : tuple of str
         Inputs ``heat.<place>`` that no heat source takes.
+    path : CoolantPath or None
+        Where the flow is what the pump drives at the inlet temperature of the moment.
     """
 
     inputs: InputHistory
     defined: OperatingPoint
     followed: tuple[str, ...] = ()
     heated: tuple[str, ...] = ()
+    path: CoolantPath | None = None
 
     @classmethod
     def of(cls, spec: MachineSpec, inputs: InputHistory) -> OperatingHistory:
@@ -76,7 +80,9 @@ class OperatingHistory:
                     f'"{name}" drives nothing in this machine.',
                     did_you_mean(name, (*FIELD_OF, *followed)),
                 )
-        return cls(inputs, OperatingPoint.of(spec), followed, heated_places(spec, inputs.names))
+        pumped = spec.has_pump_limit and "coolant_flow" not in inputs.names
+        path = CoolantPath.of(spec) if pumped and "coolant_inlet" in inputs.names else None
+        return cls(inputs, OperatingPoint.of(spec), followed, heated_places(spec, inputs.names), path)
 
     def at(self, time: float) -> OperatingPoint:
         """Operating point just after a time [s]; friction does not know which way a spindle turns."""
@@ -95,6 +101,8 @@ class OperatingHistory:
             else:
                 extra_heat[name.removeprefix(HEAT)] = value
         values["speed"] = abs(values["speed"])
+        if self.path is not None:
+            values["coolant_flow"] = float(self.path.delivered(values["coolant_inlet_temperature"]))
         return OperatingPoint(**values, extra_heat=extra_heat, beside=beside)
 
     def given_heat(self) -> tuple[RecordedHeat, ...]:

@@ -131,7 +131,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     ]
     if coupled.coolant is not None:
         done.append(checks.check_coolant(coolant_mismatch(machine, solution, coupled.coolant)))
-    warnings += [*_pump_pressure(coolant), *_omitted_preload(machine, point, coupled, lumped)]
+    warnings += [*_pump_pressure(spec, coolant), *_omitted_preload(machine, point, coupled, lumped)]
     if spec.grease is not None and bearings:
         grease = checks.check_grease(
             {name: max(item.temperature_inner, item.temperature_outer) for name, item in bearings.items()},
@@ -224,13 +224,24 @@ def _omitted_preload(
     return [CodedWarning("thermal_preload_omitted", text)]
 
 
-def _pump_pressure(coolant: CoolantResult | None) -> list[CodedWarning]:
-    """A flow that the pump of a cooler does not drive through this channel."""
-    if coolant is None or coolant.pressure_drop <= PUMP_PRESSURE:
+def _pump_pressure(spec: MachineSpec, coolant: CoolantResult | None) -> list[CodedWarning]:
+    """A flow that the machine's pump does not give, or that of no cooler drives through this channel."""
+    if coolant is None:
+        return []
+    if spec.has_pump_limit:
+        if coolant.flow >= coolant.asked_flow:
+            return []
+        text = (
+            f"The pump drives {6e4 * coolant.flow:.3g} L/min instead of {6e4 * coolant.asked_flow:.3g}: the "
+            f"channel takes {1e-5 * coolant.pressure_drop:.3g} bar, all that is given at that flow."
+        )
+        return [CodedWarning("coolant_flow_limited", text)]
+    if coolant.pressure_drop <= PUMP_PRESSURE:
         return []
     text = (
         f"The channel takes {1e-5 * coolant.pressure_drop:.0f} bar at {6e4 * coolant.flow:.3g} L/min; pumps "
-        f"of coolers give up to {1e-5 * PUMP_PRESSURE:.0f} bar, so less will flow."
+        f"of coolers give up to {1e-5 * PUMP_PRESSURE:.0f} bar, so less will flow: coolant.pressure_limit or "
+        "coolant.pump_curve says how much."
     )
     return [CodedWarning("coolant_pressure", text)]
 
@@ -255,6 +266,7 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
 
     return CoolantResult(
         flow=point.coolant_flow,
+        asked_flow=machine.spec.coolant.flow,
         inlet_temperature=point.coolant_inlet_temperature,
         outlet_temperature=march.march.mixed_outlet_temperature,
         heat=march.march.enthalpy_rise,

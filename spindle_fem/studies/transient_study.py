@@ -24,6 +24,7 @@ from spindle_fem.definition.field_types import (
 )
 from spindle_fem.definition.load import read_toml
 from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.machine.geometry.coolant_path import delivered_flow
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
@@ -92,7 +93,7 @@ class Phase(SpecModel):
     coolant_inlet_temperature: Temperature | None = None
     """Mixed, where the coolant enters."""
     coolant_flow: VolumeFlow | None = None
-    """Of all starts together."""
+    """Of all starts together; less flows where the pump's pressure does not suffice."""
     duration: Duration | None = None
     """Fixed length; else the phase ends as ``until`` says."""
     until: Until | None = None
@@ -275,10 +276,14 @@ def run_study(
         require_state(machine, start)
     options = TransientOptions(error=study.error)
     values = {name: getattr(point, field) for name, field in FIELD_OF.items()}
+    asked = machine.spec.coolant.flow if machine.spec.coolant else None
     state, results = start, []
     for phase in study.phase:
         given = {name: getattr(phase, field) for name, field in FIELD_OF.items()}
         values |= {name: value for name, value in given.items() if value is not None}
+        asked = asked if phase.coolant_flow is None else phase.coolant_flow
+        if asked is not None and machine.spec.has_pump_limit:
+            values["coolant_flow"] = float(delivered_flow(machine.spec, values["coolant_inlet"], asked))
         beyond = (physics, memory)
         watch = _StudyWatch(progress, keep, study.fields_every)
         result = _run_phase(machine, study, phase, values, state, options, beyond, watch)

@@ -55,6 +55,7 @@ def make_result(machine: str = "wu_tan_2016", **changes) -> ThermalResult:
     coolant = None
     if spec.coolant is not None:
         coolant = CoolantResult(
+            asked_flow=3.5e-4,
             **{"flow": 3.3e-4, "inlet_temperature": 288.15, "outlet_temperature": 289.0, "heat": 400.0},
             **{
                 "reynolds": 292.0,

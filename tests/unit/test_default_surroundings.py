@@ -130,8 +130,9 @@ def test_a_load_that_was_left_out_stands_above_the_checks() -> None:
 
 
 def test_a_flow_that_no_pump_drives_is_warned_of() -> None:
-    assert not _pump_pressure(SimpleNamespace(pressure_drop=4e5, flow=1e-3))
-    (warning,) = _pump_pressure(SimpleNamespace(pressure_drop=23e5, flow=1e-3))
+    spec = SimpleNamespace(has_pump_limit=False)
+    assert not _pump_pressure(spec, SimpleNamespace(pressure_drop=4e5, flow=1e-3))
+    (warning,) = _pump_pressure(spec, SimpleNamespace(pressure_drop=23e5, flow=1e-3))
     assert "23 bar at 60 L/min" in warning.text
     assert by_consequence([CodedWarning("race_control_doubtful", ""), warning])[0] is warning
 

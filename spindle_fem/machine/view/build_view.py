@@ -11,6 +11,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.effects.framework.machine_view import ChannelFlow, MachineView
 from spindle_fem.effects.registry import effects_in_definition
+from spindle_fem.machine.geometry.coolant_path import delivered_flow, section_of
 from spindle_fem.machine.view.contact_groups import seats_of
 from spindle_fem.machine.view.friction_tables import friction_tables
 from spindle_fem.machine.view.machine_names import MachineNames
@@ -30,7 +31,6 @@ from spindle_fem.machine.view.usual_sizes import (
     quantities_of,
     usual_rise,
 )
-from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.standard_inputs import standard_inputs
@@ -60,6 +60,8 @@ def view_of(names: MachineNames, recording: Recording) -> MachineView:
     spots, reported = _spots(layout, heat, sets)
     known = standard_inputs(spec)
     inputs = {name: input_series(recording, name, known[name]) for name in known}
+    if spec.has_pump_limit and "coolant_flow" not in recording.input_names:
+        inputs["coolant_flow"] = delivered_flow(spec, inputs["coolant_inlet"])
     channel = _channel(spec)
     speed = np.abs(inputs["speed"])
     tables = friction_tables(spec)
@@ -238,7 +240,7 @@ def _capacities(spec: MachineSpec, layout: Layout) -> dict[str, float]:
 
 def _wetted_volume(spec: MachineSpec) -> float:
     """Coolant in the channel, m³."""
-    section = _section(spec)
+    section = section_of(spec.channel)
     return spec.channel.depth * spec.channel.width * section.length * spec.channel.starts
 
 
@@ -253,14 +255,7 @@ def _channel(spec: MachineSpec) -> ChannelFlow | None:
     if channel is None:
         return None
     area = channel.depth * channel.width * channel.starts
-    return ChannelFlow(spec.coolant.fluid, _section(spec).hydraulic_diameter, area)
-
-
-def _section(spec: MachineSpec) -> ChannelSection:
-    channel = spec.channel
-    return ChannelSection(
-        channel.inner_radius, channel.depth, channel.width, channel.pitch, channel.turns, channel.starts
-    )
+    return ChannelFlow(spec.coolant.fluid, section_of(channel).hydraulic_diameter, area)
 
 
 def _reynolds(channel: ChannelFlow | None, flow: Array, inlet: Array) -> tuple[float, float]:

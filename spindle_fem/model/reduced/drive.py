@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.errors import RecordingError
+from spindle_fem.machine.geometry.coolant_path import delivered_flow
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.input_limits import require_possible_inputs
@@ -109,6 +110,7 @@ def drive_of_recording(
     known = standard_inputs(spec)
     notes = [
         f'"{name}" is not recorded: the definition\'s value is used'
+        + (", as far as the pump drives it" if name == "coolant_flow" and spec.has_pump_limit else "")
         for name in known
         if name not in recording.input_names
     ]
@@ -122,6 +124,10 @@ def drive_of_recording(
             # Friction does not know which way a spindle turns.
             columns.append(np.abs(values) if name == "speed" else values)
             held.append(bool(history.held[position]))
+        elif name == "coolant_flow" and spec.has_pump_limit:
+            inlet = names.index("coolant_inlet")
+            columns.append(delivered_flow(spec, columns[inlet]))
+            held.append(held[inlet])
         else:
             columns.append(np.full(recording.times.size, known[name]))
             held.append(True)

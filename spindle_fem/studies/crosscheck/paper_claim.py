@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.geometry.coolant_path import section_of
 from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.solvers.coupled_steady import CoupledState, solve_coupled
 from spindle_fem.solvers.machine_network_steady import MachineNetworkState, solve_machine_network
@@ -122,10 +122,9 @@ def with_perfect_film(spec: MachineSpec) -> MachineSpec:
 
 def reynolds_number(spec: MachineSpec) -> float:
     """Of the channel flow at inlet temperature, on the hydraulic diameter."""
-    c = spec.channel
-    section = ChannelSection(c.inner_radius, c.depth, c.width, c.pitch, c.turns, c.starts)
+    section = section_of(spec.channel)
     properties = coolant_by_name(spec.coolant.fluid).properties(spec.coolant.inlet_temperature)
-    velocity = section.velocity(spec.coolant.flow)
+    velocity = section.velocity(OperatingPoint.of(spec).coolant_flow)
     return velocity * section.hydraulic_diameter / float(properties.kinematic_viscosity)
 
 
@@ -214,7 +213,7 @@ def _explanation(spec: MachineSpec, network: dict[str, ClaimCase], verdict: dict
     change = perfect.ring_difference[hottest] - base.ring_difference[hottest]
     sentences.append(
         "The paper's map steps to its turbulent branch at 19 mm and 31 °C. At "
-        f"{6.0e4 * spec.coolant.flow:.0f} L/min "
+        f"{6.0e4 * OperatingPoint.of(spec).coolant_flow:.0f} L/min "
         f"the Reynolds number there is {reynolds_number(optimum):.0f}, and no step comes."
     )
     sentences.append(

@@ -147,6 +147,7 @@ def _coolant(
     for row in range(len(inputs)):
         yield {
             "flow_m3_s": float(inputs.flow[row]),
+            "asked_flow_m3_s": inputs.specs[row].coolant.flow,
             "inlet_degC": float(inputs.inlet[row]) - ZERO_CELSIUS_K,
             "outlet_degC": float(outlet[row]) - ZERO_CELSIUS_K,
             "heat_W": float(field.enthalpy_rise[row]),

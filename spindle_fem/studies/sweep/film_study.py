@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.geometry.coolant_path import section_of
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.duct_friction import channel_pressure_drop
 from spindle_fem.physics.coolant.properties import coolant_by_name
@@ -137,9 +138,7 @@ def film_study(spec: MachineSpec) -> tuple[FilmChart, ...]:
     if spec.channel is None:
         return ()
     channel, coolant = spec.channel, coolant_by_name(spec.coolant.fluid)
-    section = ChannelSection(
-        channel.inner_radius, channel.depth, channel.width, channel.pitch, channel.turns, channel.starts
-    )
+    section = section_of(channel)
     viscosity = float(coolant.properties(PAPER_TEMPERATURE).kinematic_viscosity)
     held = {"velocity": PAPER_CRITICAL_REYNOLDS * viscosity / PAPER_DEPTH, "flow": spec.coolant.flow}
     charts = []

@@ -61,7 +61,8 @@ _BEARING = (
     "contact_angle_outer_deg", "preload_N", "film_um", "lambda",
 )  # fmt: skip
 _COOLANT = (
-    "flow_m3_s", "inlet_degC", "outlet_degC", "heat_W", "reynolds", "prandtl", "velocity_m_s", "regime",
+    "flow_m3_s", "asked_flow_m3_s", "inlet_degC", "outlet_degC", "heat_W", "reynolds", "prandtl",
+    "velocity_m_s", "regime",
     "film_coefficient_W_m2K.value", "film_coefficient_W_m2K.low", "film_coefficient_W_m2K.high",
     "pressure_drop_Pa", "pumping_power_W", "wetted_area_m2", "length_m", "hydraulic_diameter_m",
 )  # fmt: skip
