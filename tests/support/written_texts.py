@@ -44,6 +44,7 @@ INPUTS = {
     "speed": ("rpm", "previous"),
     "thrust": ("N", "previous"),
     "power": ("W", "previous"),
+    "electrical_power": ("W", "previous"),
     "ambient": ("degC", "linear"),
     "coolant_inlet": ("degC", "linear"),
 }
