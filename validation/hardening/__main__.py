@@ -19,6 +19,7 @@ from typing import Any
 from .child import warm
 from .families import FAMILIES, try_case
 from .judged import FAULT
+from .material import make_originals
 
 CASES = "cases.jsonl"
 
@@ -48,6 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ["SPINDLE_FEM_CACHE"] = str(place / "cache")
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    make_originals(place)
     done = {(item["family"], item["number"]) for item in read_cases(place)}
     waiting = [
         (family, number)
@@ -55,6 +57,8 @@ def main(arguments: list[str] | None = None) -> int:
         for number in range(1, min(FAMILIES[family][1], given.cases or 10**9) + 1)
         if (family, number) not in done
     ]
+    # All families side by side: a fault of any shows early.
+    waiting.sort(key=lambda case: case[1] / FAMILIES[case[0]][1])
     pool = ProcessPoolExecutor(given.jobs, multiprocessing.get_context("spawn"), initializer=warm)
     with pool, (place / CASES).open("a", encoding="utf-8") as lines:
         running = [pool.submit(try_case, *case, given.seed, place) for case in waiting]

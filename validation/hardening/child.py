@@ -58,15 +58,20 @@ class Surroundings:
         Called in the new process before the command.
     kill_after : float, optional
         Seconds after which the process is killed, [s].
+    patience_s : float, optional
+        In place of the limits of a case.
     """
 
     environment: Mapping[str, str | None] = field(default_factory=dict)
     before: Callable[[], object] = lambda: None
     kill_after: float | None = None
+    patience_s: float | None = None
 
 
 def warm() -> None:
     """Load what commands load, once for all children."""
+    import matplotlib.pyplot  # noqa: F401
+
     import spindle_fem.cli
     import spindle_fem.commands.checked_machine
     import spindle_fem.commands.console
@@ -103,7 +108,7 @@ def run_function(function: Callable[[], int], folder: Path, around: Surroundings
         child = os.fork()
         if child == 0:
             _be_child(function, folder, around, (out, err))
-        return _watch(child, started, folder, around.kill_after)
+        return _watch(child, started, folder, around)
 
 
 def run_process(
@@ -123,7 +128,7 @@ def run_process(
             start_new_session=True,
             preexec_fn=around.before,
         )
-        return _watch(process.pid, started, folder, around.kill_after)
+        return _watch(process.pid, started, folder, around)
 
 
 class _Streams:
@@ -182,7 +187,7 @@ def _be_child(
         os._exit(status)
 
 
-def _watch(child: int, started: float, folder: Path, kill_after: float | None) -> Ended:
+def _watch(child: int, started: float, folder: Path, around: Surroundings) -> Ended:
     """Wait for a process; stop it where it takes more than it may."""
     stopped = ""
     while True:
@@ -191,7 +196,7 @@ def _watch(child: int, started: float, folder: Path, kill_after: float | None) -
         if done:
             break
         if not stopped:
-            stopped = _reason_to_stop(child, wall, kill_after)
+            stopped = _reason_to_stop(child, wall, around)
             if stopped:
                 os.kill(child, signal.SIGKILL)
         time.sleep(LOOK_EVERY_S)
@@ -201,9 +206,11 @@ def _watch(child: int, started: float, folder: Path, kill_after: float | None) -
     return Ended(os.waitstatus_to_exitcode(code), seconds, wall, peak, out, err, stopped)
 
 
-def _reason_to_stop(child: int, wall: float, kill_after: float | None) -> str:
-    if kill_after is not None and wall > kill_after:
+def _reason_to_stop(child: int, wall: float, around: Surroundings) -> str:
+    if around.kill_after is not None and wall > around.kill_after:
         return "killed"
+    if around.patience_s is not None:
+        return "time" if wall > around.patience_s else ""
     if wall > MOST_WALL_SECONDS:
         return "time"
     try:

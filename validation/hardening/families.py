@@ -2,26 +2,55 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 from pathlib import Path
 from typing import Any
 
 from .definitions import try_definition
-from .judged import FAULT
+from .folders import try_folder
+from .judged import FAULT, Record
+from .recordings import try_recording
+from .studies import try_study
 
 # Of each family: what tries one case, and how many cases there are.
-FAMILIES = {"definitions": (try_definition, 2000)}
+FAMILIES = {
+    "definitions": (try_definition, 2000),
+    "recordings": (try_recording, 1000),
+    "studies": (try_study, 300),
+    "folders": (try_folder, 200),
+}
+# Where a command runs, and what it may leave there and beside it.
+HERE = "here"
+WRITTEN = frozenset({"out", "out2", "out.png", ".out.sweep-lock"})
+BESIDE = frozenset({HERE, f"{HERE}.out", f"{HERE}.err"})
+# What hostile texts would write, and how they would stand in a page that runs them.
+OUTSIDE = ("outside", "/tmp/outside")
+LIVE = ("<script>alert(1)", "<img src=x")
 
 
 def try_case(family: str, number: int, seed: int, place: Path) -> dict[str, Any]:
     """One case, in a folder of its own that stays where it shows a fault."""
     folder = place / "work" / f"{family}_{number:04d}"
     shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    record = FAMILIES[family][0](number, random.Random(f"{seed}/{family}/{number}"), folder)
+    here = folder / HERE
+    here.mkdir(parents=True)
+    record = FAMILIES[family][0](number, random.Random(f"{seed}/{family}/{number}"), here)
+    _look_round(record, folder)
     if record.outcome != FAULT:
         shutil.rmtree(folder, ignore_errors=True)
-        for suffix in (".out", ".err"):
-            folder.with_name(folder.name + suffix).unlink(missing_ok=True)
     return record.as_dict()
+
+
+def _look_round(record: Record, folder: Path) -> None:
+    """Nothing was written but what was asked for, and no page runs a text of the input."""
+    beside = {item.name for item in folder.iterdir()} - BESIDE
+    if beside or any(os.path.lexists(name) for name in OUTSIDE if os.path.isabs(name)):
+        record.fault(f"wrote outside its folder: {', '.join(sorted(beside)) or OUTSIDE[1]}")
+    if any((folder / HERE).rglob(OUTSIDE[0])):
+        record.fault("ran a text of its input")
+    for page in (folder / HERE).rglob("*.html"):
+        content = page.read_text(encoding="utf-8", errors="replace") if page.is_file() else ""
+        if any(text in content for text in LIVE):
+            record.fault(f"{page.name} holds a text of the input as it is")

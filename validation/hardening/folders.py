@@ -1,0 +1,193 @@
+"""Spoilt result folders and caches: reports refuse or are rebuilt, caches are made anew."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import random
+import shutil
+import tomllib
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from .child import Surroundings, run_command
+from .judged import ACCEPTED, Record
+from .material import COARSE, ORIGINALS, SPINDLE
+from .mutations import mutated, spoilt_bytes
+
+SHARE_CACHES = 0.35
+COMMANDS = {
+    "run": ("report", "view"),
+    "simulate": ("report", "view"),
+    "simulate_spindle": ("report", "view"),
+    "diagnose": ("report", "view"),
+    "sweep": ("report", "again"),
+    "transient": ("view", "restart"),
+}
+CACHE = "cache"
+
+
+class Poison:
+    """What runs a command when it is unpickled."""
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return os.system, ("touch outside",)
+
+
+def try_folder(number: int, chance: random.Random, folder: Path) -> Record:
+    """One finished folder with a spoilt file, or one spoilt cache."""
+    record = Record("folders", number)
+    originals = folder.parents[2] / ORIGINALS
+    if chance.random() < SHARE_CACHES:
+        _try_cache(record, chance, folder, originals)
+    else:
+        _try_results(record, chance, folder, originals)
+    return record
+
+
+def _try_results(record: Record, chance: random.Random, folder: Path, originals: Path) -> None:
+    name = chance.choice(sorted(COMMANDS))
+    command = chance.choice(COMMANDS[name])
+    shutil.copytree(originals / name, folder / "out")
+    for file in originals.glob("*.toml"):
+        shutil.copy(file, folder)
+    files = [path for path in sorted((folder / "out").rglob("*")) if path.is_file() and path.suffix != ".png"]
+    file = chance.choice(files)
+    record.done = [command, name, file.name, _spoil(chance, file, files)]
+    arguments = {
+        "report": ["report", "out"],
+        "view": ["view", "out"],
+        "again": ["sweep", SPINDLE, "sweep.toml", "-o", "out", *COARSE],
+        "restart": ["transient", "transient.toml", "-o", "out2", "--restart", "out/state.npz", *COARSE],
+    }[command]
+    record.step(command, run_command(arguments, folder))
+
+
+def _spoil(chance: random.Random, file: Path, others: list[Path]) -> str:
+    kind = chance.choice(("deleted", "bytes", "bytes", "tables", "other", "folder", "pickle", "link"))
+    content = file.read_bytes()
+    if kind == "tables" and file.suffix in (".json", ".toml"):
+        return _other_tables(chance, file, content)
+    if kind in ("bytes", "tables"):
+        return _other_bytes(chance, file, content)
+    file.unlink()
+    if kind == "other":
+        shutil.copy(other := chance.choice([path for path in others if path != file]), file)
+        return f"content of {other.name}"
+    if kind == "folder":
+        file.mkdir()
+    elif kind == "pickle":
+        np.savez(file.open("wb"), header=np.array([Poison()], dtype=object))
+    elif kind == "link":
+        file.symlink_to(file.name)
+    return kind
+
+
+def _other_bytes(chance: random.Random, file: Path, content: bytes) -> str:
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        place = chance.randrange(len(content))
+        if chance.random() < 0.5:
+            file.write_bytes(content[:place])
+            return f"cut at byte {place}"
+        changed = bytearray(content)
+        for _ in range(chance.choice((1, 50))):
+            changed[chance.randrange(len(changed))] = chance.randrange(256)
+        file.write_bytes(bytes(changed))
+        return "bytes changed"
+    spoilt, what = spoilt_bytes(chance, content)
+    file.write_bytes(spoilt)
+    return what
+
+
+def _other_tables(chance: random.Random, file: Path, content: bytes) -> str:
+    """The same changes as of definitions, written in the form of the file."""
+    tree = json.loads(content) if file.suffix == ".json" else tomllib.loads(content.decode())
+    tree = tree if isinstance(tree, dict) else {"list": tree}
+    without_null = json.loads(json.dumps(tree), object_hook=_filled)
+    spoilt, done = mutated(chance, without_null)
+    if file.suffix == ".json":
+        with contextlib.suppress(ValueError, RecursionError):
+            spoilt = json.dumps(tomllib.loads(spoilt.decode()), default=str).encode()
+    file.write_bytes(spoilt)
+    return "; ".join(done)
+
+
+def _filled(table: dict[str, object]) -> dict[str, object]:
+    """TOML has no null."""
+    return {key: value for key, value in table.items() if value is not None}
+
+
+def _try_cache(record: Record, chance: random.Random, folder: Path, originals: Path) -> None:
+    cache = folder / CACHE
+    shutil.copytree(originals.parent / CACHE, cache)
+    entries = sorted(path for path in cache.rglob("*.npz"))
+    file = chance.choice([path for path in entries if path.name.startswith("reduced")] or entries)
+    if chance.random() < 0.5:
+        file = chance.choice(entries)
+    record.done = ["cache", file.name[:16], _spoil_entry(chance, file)]
+    for path in originals.glob("spindle.*"):
+        shutil.copy(path, folder)
+    around = Surroundings({"SPINDLE_FEM_CACHE": str(cache)})
+    arguments = ["simulate", SPINDLE, "spindle.toml", "-o", "out", *COARSE]
+    if record.step("simulate", run_command(arguments, folder, around)) == ACCEPTED:
+        told, sound = (
+            np.loadtxt(place / "simulated.csv", delimiter=",", skiprows=1)
+            for place in (folder / "out", originals / "simulate_spindle")
+        )
+        if told.shape != sound.shape or not np.array_equal(told, sound):
+            record.fault(f"another result by {np.abs(told - sound).max():.1e} K")
+
+
+def _spoil_entry(chance: random.Random, file: Path) -> str:
+    kind = chance.choice(
+        ("bytes", "bytes", "poison", "schema", "folder", "empty", "missing array", "garbage")
+    )
+    content = file.read_bytes()
+    if kind == "bytes":
+        return _other_bytes(chance, file, content)
+    if kind == "empty":
+        file.write_bytes(b"")
+    elif kind == "garbage":
+        file.write_bytes(random.Random(1).randbytes(5000))
+    elif kind == "folder":
+        file.unlink()
+        file.mkdir()
+    else:
+        members = _members(content)
+        name = chance.choice(sorted(members))
+        if kind == "missing array":
+            del members[name]
+        elif kind == "poison":
+            stream = io.BytesIO()
+            np.save(stream, np.array([Poison()], dtype=object), allow_pickle=True)
+            members[name] = stream.getvalue()
+        else:
+            members["header.npy"] = _other_header(members["header.npy"])
+            name = "header.npy"
+        with zipfile.ZipFile(file, "w") as archive:
+            for member, data in members.items():
+                archive.writestr(member, data)
+        return f"{kind} {name}"
+    return kind
+
+
+def _members(content: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def _other_header(content: bytes) -> bytes:
+    """The header of an entry with the schema of a version that is not there yet."""
+    old = np.load(io.BytesIO(content), allow_pickle=False)
+    text = old.tobytes().decode() if old.dtype == np.uint8 else str(old)
+    table = json.loads(text) | {"schema": "spindle-fem/none/99"}
+    changed = json.dumps(table)
+    stream = io.BytesIO()
+    np.save(stream, np.frombuffer(changed.encode(), np.uint8) if old.dtype == np.uint8 else np.array(changed))
+    return stream.getvalue()

@@ -1,0 +1,180 @@
+"""Sound inputs that cases spoil, made here: recordings, studies, bearing files, folders, a cache."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import tomli_w
+
+from .child import Surroundings, run_process
+
+ROOT = Path(__file__).parents[2]
+# A machine with geometry that is quick to solve, and a network that shows every kind of its tables.
+SPINDLE, PUMP = "uncooled", ROOT / "examples" / "pump.toml"
+COARSE = ("--set", "mesh.preset=coarse")
+STEP_S, DURATION_S = 60.0, 7200.0
+ORIGINALS = "originals"
+PUMP_CHANNELS = {"T1": "motor", "T2": "casing"}
+SPINDLE_CHANNELS = {"F1": "F1_SEAT", "F2": "F2_SEAT", "M": "HOUSING_MIDDLE", "R": "REAR_SEAT"}
+PUMP_INPUTS = {"room": ("ambient", "degC"), "P": ("power", "W")}
+SPINDLE_INPUTS = {"room": ("ambient", "degC"), "n": ("speed", "rpm")}
+
+
+def table_of(channels: Mapping[str, str], load: str, height: float) -> pd.DataFrame:
+    """Readings that follow a load in steps, with noise: what a machine may have read."""
+    times = np.arange(0.0, DURATION_S + 1.0, STEP_S)
+    on = ((times >= 600.0) & (times < 3000.0)) | (times >= 4800.0)
+    chance, columns = np.random.default_rng(2), {"t": times}
+    for number, column in enumerate(channels, start=1):
+        rise, lag = np.zeros(times.size), 1.0 - np.exp(-STEP_S / (400.0 * number))
+        for i in range(1, times.size):
+            rise[i] = rise[i - 1] + lag * (20.0 / number * on[i - 1] - rise[i - 1])
+        columns[column] = np.round(20.0 + rise + chance.normal(0.0, 0.1, times.size), 3)
+    columns["room"] = np.full(times.size, 20.0)
+    columns[load] = np.where(on, height, 0.0)
+    return pd.DataFrame(columns)
+
+
+def manifest_of(
+    channels: Mapping[str, str], inputs: Mapping[str, tuple[str, str]], data: str = "data.csv"
+) -> dict[str, Any]:
+    """Tables of the manifest of such readings."""
+    read = [
+        {"column": column, "role": "temperature", "probe": probe, "unit": "degC", "sigma": 0.1}
+        for column, probe in channels.items()
+    ]
+    driven = [
+        {"column": column, "role": "input", "drives": drives, "unit": unit, "hold": "previous"}
+        for column, (drives, unit) in inputs.items()
+    ]
+    time = {"column": "t", "unit": "s"}
+    return {
+        "schema": "spindle-fem/recording/1",
+        "name": "made",
+        "data": data,
+        "time": time,
+        "channel": read + driven,
+    }
+
+
+def pump_recording() -> tuple[dict[str, Any], pd.DataFrame]:
+    """Manifest and data that belong to the pump."""
+    return manifest_of(PUMP_CHANNELS, PUMP_INPUTS), table_of(PUMP_CHANNELS, "P", 80.0)
+
+
+def spindle_recording() -> tuple[dict[str, Any], pd.DataFrame]:
+    """Manifest and data that belong to the spindle."""
+    return manifest_of(SPINDLE_CHANNELS, SPINDLE_INPUTS), table_of(SPINDLE_CHANNELS, "n", 2500.0)
+
+
+def write_recording(folder: Path, made: tuple[dict[str, Any], pd.DataFrame], name: str) -> Path:
+    """Manifest ``NAME.toml`` beside its data."""
+    manifest, frame = made
+    frame.to_csv(folder / f"{name}.csv", index=False)
+    file = folder / f"{name}.toml"
+    file.write_text(tomli_w.dumps({**manifest, "data": f"{name}.csv"}), encoding="utf-8")
+    return file
+
+
+SWEEP = """
+schema = "spindle-fem/study/1"
+name = "thrust"
+parameter = [{path = "operation.thrust", values = ["600 N", "800 N"]}]
+study = {design = "grid", outputs = ["temperature.max_degC", "bearings.F2.heat_W"]}
+constraint = [{output = "temperature.max_degC", max = "80 degC"}]
+objective = [{output = "temperature.max_degC", direction = "minimize"}]
+"""
+TRANSIENT = """
+schema = "spindle-fem/transient/1"
+name = "minutes"
+machine = "uncooled"
+start = "ambient"
+sample_every = "1 min"
+error = "1 K"
+phase = [
+    {name = "run", speed = "2500 rpm", thrust = "800 N", duration = "4 min"},
+    {name = "stop", speed = "0 rpm", duration = "3 min"},
+]
+"""
+BALL = """
+[bearing]
+ball_diameter = "11.906 mm"
+ball_count = 19
+pitch_diameter = "90 mm"
+contact_angle = "15 deg"
+groove_curvature_inner = 0.52
+groove_curvature_outer = 0.52
+young_modulus = "206 GPa"
+poisson_ratio = 0.3
+density = "7800 kg/m**3"
+arrangement = "back_to_back"
+preload = "400 N"
+[operation]
+speed = "3000 rpm"
+axial_load = "800 N"
+radial_load = "200 N"
+moment = "1 N m"
+temperature = "40 degC"
+raceway_control = "outer"
+[lubricant]
+kinematic_viscosity_40 = "25 mm**2/s"
+kinematic_viscosity_100 = "5.5 mm**2/s"
+"""
+ROLLER = """
+[bearing]
+kind = "cylindrical_roller"
+roller_diameter = "11 mm"
+roller_length = "11 mm"
+roller_count = 24
+pitch_diameter = "95 mm"
+rows = 2
+radial_clearance = "2 um"
+[operation]
+speed = "3000 rpm"
+radial_load = "2 kN"
+"""
+
+
+def tables(text: str) -> dict[str, Any]:
+    """Tables of one of the texts above."""
+    return tomllib.loads(text)
+
+
+# Finished folders, and the command that makes each.
+FOLDERS = {
+    "run": ("run", SPINDLE, "-o", "run", *COARSE),
+    "simulate_spindle": ("simulate", SPINDLE, "spindle.toml", "-o", "simulate_spindle", *COARSE),
+    "simulate": ("simulate", str(PUMP), "pump.toml", "-o", "simulate"),
+    "diagnose": ("diagnose", str(PUMP), "pump.toml", "-o", "diagnose"),
+    "sweep": ("sweep", SPINDLE, "sweep.toml", "-o", "sweep", *COARSE),
+    "transient": ("transient", "transient.toml", "-o", "transient", *COARSE),
+    "heat": ("heat", SPINDLE, "-o", "heat"),
+}
+
+
+def make_originals(place: Path) -> Path:
+    """Folder with everything that cases start from; what is there already stays.
+
+    Raises
+    ------
+    RuntimeError
+        A command failed on sound input.
+    """
+    folder = place / ORIGINALS
+    folder.mkdir(parents=True, exist_ok=True)
+    write_recording(folder, pump_recording(), "pump")
+    write_recording(folder, spindle_recording(), "spindle")
+    for name, text in (("sweep", SWEEP), ("transient", TRANSIENT)):
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    for name, arguments in FOLDERS.items():
+        if (folder / name).is_dir() and not (folder / name / "INCOMPLETE").exists():
+            continue
+        ended = run_process(arguments, folder, Surroundings(patience_s=600.0))
+        if ended.status != 0:
+            raise RuntimeError(f"{' '.join(arguments)}: {ended.err}")
+    return folder
