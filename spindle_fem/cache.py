@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import logging
 import os
 import re
+import secrets
 import sys
-import tempfile
 import zipfile
-from collections.abc import Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.registry import source_from_outside
 
+LOGGER = logging.getLogger(__name__)
 CACHE_VARIABLE = "SPINDLE_FEM_CACHE"
+# What reading an .npz file raises that is cut, changed, or of something else.
+DAMAGED = (OSError, ValueError, KeyError, EOFError, TypeError, MemoryError, OverflowError, RuntimeError)
+DAMAGED = (*DAMAGED, zipfile.BadZipFile, zlib.error)
 _PACKAGE = Path(__file__).parent
 # Imports at the start of a line or inside a function, on one line or in parentheses.
 _IMPORT = re.compile(
@@ -110,9 +117,56 @@ def _module_file(name: str) -> Path | None:
     return next((file for file in candidates if file.is_file()), None)
 
 
+def keep_entry(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Keep what ``write`` writes; readers never see half a file, all users may read it.
+
+    A cache that is full or cannot be written costs the next run its time, this
+    one nothing: that is logged, not raised.
+    """
+    partial = path.with_name(f"{path.name}.{secrets.token_hex(4)}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with partial.open("xb") as stream:
+                write(stream)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+    except OSError as error:
+        LOGGER.warning("%s is not kept in the cache: %s", path.name, error)
+
+
+@contextlib.contextmanager
+def one_at_a_time(digest: str) -> Iterator[None]:
+    """Keeps two processes from making the same entry; the second finds it in the cache.
+
+    Where no lock can be had, on Windows or in a cache that cannot be written,
+    it is only made twice.
+    """
+    stream = _lock_file(cache_directory() / f"{digest}.lock")
+    if stream is None:
+        yield
+        return
+    import fcntl
+
+    with stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)  # released by the system when a process dies
+        yield
+
+
+def _lock_file(path: Path) -> IO[bytes] | None:
+    if sys.platform == "win32":
+        return None
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("ab")
+    with contextlib.suppress(OSError):
+        return path.open("rb")  # of another user
+    return None
+
+
 def save_record(record: Any, path: Path, schema: str) -> None:
-    """Write the fields of a dataclass, arrays and what JSON holds; readers never see half a file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Keep the fields of a dataclass in the cache, arrays and what JSON holds; see :func:`keep_entry`."""
     arrays: dict[str, NDArray[Any]] = {}
     header: dict[str, Any] = {"schema": schema}
     for item in fields(record):
@@ -121,20 +175,14 @@ def save_record(record: Any, path: Path, schema: str) -> None:
             arrays[item.name] = value
         else:
             header[item.name] = dict(value) if isinstance(value, Mapping) else value
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".partial")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            np.savez(stream, header=json.dumps(header), **arrays)
-        Path(temporary).replace(path)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
+    keep_entry(path, lambda stream: np.savez(stream, header=json.dumps(header), **arrays))
 
 
-def load_record(path: Path, schema: str) -> dict[str, Any] | None:
-    """Fields that :func:`save_record` wrote, lists as tuples.
+def load_record(path: Path, schema: str, kind: type) -> dict[str, Any] | None:
+    """Fields of a dataclass that :func:`save_record` wrote, lists as tuples.
 
-    None where there is no such file, or it is damaged or of another schema:
-    what it held is made again.
+    None where there is no such file, or it is damaged, of another schema or
+    another kind: what it held is made again.
     """
     if not path.is_file():
         return None
@@ -142,9 +190,10 @@ def load_record(path: Path, schema: str) -> dict[str, Any] | None:
         with np.load(path, allow_pickle=False) as data:
             header = json.loads(str(data["header"]))
             arrays = {name: data[name] for name in data.files if name != "header"}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        known = header.pop("schema", None) == schema
+    except (*DAMAGED, AttributeError):
         return None
-    if header.pop("schema", None) != schema:
+    if not known or header.keys() | arrays.keys() != {item.name for item in fields(kind)}:
         return None
     return {
         name: tuple(value) if isinstance(value, list) else value for name, value in header.items()

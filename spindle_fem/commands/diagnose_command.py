@@ -181,8 +181,9 @@ def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, repor
             writer.writerows(rows)
     if report:
         from spindle_fem.report.diagnosis_data import diagnosis_dataset
+        from spindle_fem.results.dataset import write_dataset
 
-        diagnosis_dataset(diagnosis, before, after).to_netcdf(place / "diagnosis.nc")
+        write_dataset(diagnosis_dataset(diagnosis, before, after), place / "diagnosis.nc")
     return content
 
 

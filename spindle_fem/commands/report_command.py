@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from spindle_fem.errors import BadInputError
-from spindle_fem.results.output_folder import require_complete
+from spindle_fem.results.output_folder import reading_results, require_complete
 
 # What tells a command's folder, and the function that writes its page again: module and name.
 _WRITERS = {
@@ -33,7 +33,8 @@ def rebuild(folder: Path) -> Path:
     place = require_complete(folder)
     for file, (module, write) in _WRITERS.items():
         if (place / file).is_file():
-            return getattr(import_module(f"spindle_fem.report.{module}"), write)(place)
+            with reading_results(place):
+                return getattr(import_module(f"spindle_fem.report.{module}"), write)(place)
     raise BadInputError(
         str(folder),
         f"holds no results: none of {', '.join(_WRITERS)}.",

@@ -25,6 +25,7 @@ from spindle_fem.recordings.compare import (
 from spindle_fem.report.read_against_predicted import draw_channels
 from spindle_fem.report.simulation_data import simulation_dataset
 from spindle_fem.report.simulation_report import write_simulation_report
+from spindle_fem.results.dataset import write_dataset
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
 from spindle_fem.results.run_summary import package_versions
@@ -97,7 +98,7 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
     """
     recording, comparison = simulation.recording, simulation.comparison
     write_simulated(folder / "simulated.csv", recording, simulation.predicted, simulation.displacements)
-    simulation_dataset(simulation).to_netcdf(folder / "simulation.nc", engine="h5netcdf")
+    write_dataset(simulation_dataset(simulation), folder / "simulation.nc")
     figures = draw_channels(folder / "figures", recording, simulation.predicted, simulation.half_width)
     _write_error_table(folder / "error_table.csv", comparison)
     summary = simulation_summary(comparison)

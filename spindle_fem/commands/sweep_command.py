@@ -98,7 +98,7 @@ def _pictured(
     picture = place / FIGURE_FOLDER / BEST_PICTURE
     old = place / SUMMARY_FILE
     if not solved_now and picture.is_file() and old.is_file():
-        with contextlib.suppress(ValueError):
+        with contextlib.suppress(ValueError, AttributeError, RecursionError):
             if json.loads(old.read_text(encoding="utf-8")).get("pictured") == summary["pictured"]:
                 return {}
     return {number: solve_task(tasks[number - 1]) for number in summary["pictured"]}

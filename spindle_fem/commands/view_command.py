@@ -31,7 +31,7 @@ from spindle_fem.report.machine_scene import (
 from spindle_fem.report.recorded_scene import MOST_FRAMES, READ, Course, read_course
 from spindle_fem.report.viewed_scene import Curve, Layer, Scene
 from spindle_fem.results.growth_file import GROWTH_GROUP, growth_dataset, has_growth, shift_of_points
-from spindle_fem.results.output_folder import read_content, replace_text, require_complete
+from spindle_fem.results.output_folder import read_content, reading_results, replace_text, require_complete
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
@@ -85,7 +85,8 @@ def view_folder(
     if design is not None and found != "sweep.json":
         raise BadInputError("--design", "the folder is not of a sweep.", "Leave it out.")
     kind, build = kinds[found]
-    title, scene = build(place, design, progress)
+    with reading_results(place):
+        title, scene = build(place, design, progress)
     progress("page")
     view = Interactive("viewer.html.j2", "viewer.js", scene.payload())
     page = render_document(kind, title, [Section("machine", "", [view])])

@@ -157,7 +157,7 @@ class ThermalModel:
     @classmethod
     def load(cls, path: Path) -> ThermalModel | None:
         """What :meth:`save` wrote; None where there is none, or another version, or a damaged file."""
-        found = load_record(path, FORMAT)
+        found = load_record(path, FORMAT, cls)
         if found is None:
             return None
         for name in ("gap_radii", "ranges"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from pydantic import BaseModel
 from spindle_fem.definition.load import write_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import BadInputError
+from spindle_fem.results.output_folder import replace_bytes
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -156,8 +158,11 @@ def write_dataset(dataset: xr.Dataset, path: str | Path, *, group: str | None = 
         for name, item in dataset.data_vars.items()
         if item.dtype.kind in "fiu" and item.ndim and item.size > 1000
     }
-    dataset.to_netcdf(path, mode="a" if group else "w", group=group, engine="h5netcdf", encoding=encoding)
-    return Path(path)
+    # In memory first: HDF5 itself does not survive a full disk.
+    path = Path(path)
+    content = io.BytesIO(path.read_bytes() if group else b"")
+    dataset.to_netcdf(content, mode="a" if group else "w", group=group, engine="h5netcdf", encoding=encoding)
+    return replace_bytes(path, content.getvalue())
 
 
 def read_dataset(path: str | Path, *, group: str | None = None) -> xr.Dataset:

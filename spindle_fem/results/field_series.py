@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import BadInputError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+from spindle_fem.results.output_folder import replace_bytes
 from spindle_fem.units import ZERO_CELSIUS_K
 
 _QUADRATIC_TETRA = 24
@@ -26,11 +27,13 @@ class FieldSeries:
     Parameters
     ----------
     path : Path
-        Replaced where it exists.
+        Replaced where it exists, when the block ends without error.
     """
 
     def __init__(self, path: Path, mesh: TaggedMesh) -> None:
-        self._file = h5py.File(path, "w")
+        # In memory first: HDF5 itself does not survive a full disk.
+        self._path = path
+        self._file = h5py.File(path, "w", driver="core", backing_store=False)
         root = self._file.create_group("VTKHDF")
         root.attrs["Version"] = (2, 0)
         root.attrs.create("Type", np.bytes_(b"UnstructuredGrid"))
@@ -64,8 +67,12 @@ class FieldSeries:
     def __enter__(self) -> FieldSeries:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
+        self._file.flush()
+        content = self._file.id.get_file_image()
         self._file.close()
+        if kind is None:
+            replace_bytes(self._path, content)
 
     def add(self, time: float, temperature: NDArray[np.float64]) -> None:
         """Add a field; one at a time that is there already is left out.

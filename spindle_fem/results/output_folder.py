@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import zipfile
+import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
-from spindle_fem.errors import BadInputError
+from spindle_fem.errors import BadInputError, SpindleFemError
 from spindle_fem.results.run_log import logged_in
 
 MARKER = "INCOMPLETE"
+# How much of a message about a damaged file is told.
+_TOLD = 200
+# Errors of the system that say nothing about what is read.
+_WRITING = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
 # What only commands of this program write: pages and figures may be anybody's, the rest is the user's.
 _OWN = frozenset(
     {
@@ -90,9 +98,12 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
         with logged_in(path):
             yield path
     except BaseException as error:
-        marker.write_text(f"The command did not finish: {type(error).__name__}: {error}\n", encoding="utf-8")
+        # On a full disk the marker stays, without its text.
+        with suppress(OSError):
+            text = f"The command did not finish: {type(error).__name__}: {error}\n"
+            marker.write_text(text, encoding="utf-8", errors="replace")
         raise
-    marker.unlink()
+    marker.unlink(missing_ok=True)
 
 
 def is_complete(folder: str | Path) -> bool:
@@ -113,17 +124,55 @@ def require_complete(folder: str | Path) -> Path:
     if not path.is_dir():
         raise BadInputError(str(path), "there is no such folder.", "Give the folder of a finished run.")
     if not is_complete(path):
-        reason = (path / MARKER).read_text(encoding="utf-8").strip()
+        reason = (path / MARKER).read_text(encoding="utf-8", errors="replace").strip()
         raise BadInputError(str(path), f"is incomplete: {reason}", "Run the command again.")
     return path
 
 
 def replace_text(path: Path, text: str) -> Path:
     """Write a text file by renaming, so that no reader sees half of it."""
+    return replace_bytes(path, text.encode("utf-8"))
+
+
+def replace_bytes(path: Path, content: bytes) -> Path:
+    """Write a file by renaming, so that no reader sees half of it and a full disk leaves nothing behind."""
     partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
+    try:
+        partial.write_bytes(content)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
     return path
+
+
+@contextmanager
+def reading_results(folder: str | Path) -> Iterator[None]:
+    """Tells files of a finished folder that somebody damaged or changed as what they are.
+
+    Raises
+    ------
+    BadInputError
+        Whatever the block raised that is no error of its own kind: the files
+        are this program's, so they hold all that it looks for. That a disk is
+        full or cannot be written is passed on.
+    """
+    try:
+        yield
+    except SpindleFemError:
+        raise
+    except (ArithmeticError, AttributeError, EOFError, LookupError, RuntimeError, TypeError) as error:
+        raise _damaged(folder, error) from error
+    except (OSError, ValueError, zlib.error, zipfile.BadZipFile, ElementTree.ParseError) as error:
+        if isinstance(error, OSError) and error.errno in _WRITING:
+            raise
+        raise _damaged(folder, error) from error
+
+
+def _damaged(folder: str | Path, error: Exception) -> BadInputError:
+    told = " ".join(f"{type(error).__name__}: {error}".split())[:_TOLD]
+    return BadInputError(
+        str(folder), f"holds a file that was damaged or changed ({told}).", "Run the command again."
+    )
 
 
 def read_content(path: Path, schema: str, command: str) -> dict[str, Any]:

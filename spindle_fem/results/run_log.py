@@ -8,7 +8,7 @@ import shlex
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from spindle_fem import __version__
@@ -21,10 +21,17 @@ WARNINGS = logging.getLogger("py.warnings")
 LINE = "%(asctime)s %(levelname)-7s %(message)s"
 
 
+class _LogFile(logging.FileHandler):
+    """A log that a full disk ends in silence: what fails besides has its own message."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - the name that logging calls
+        """Say nothing."""
+
+
 @contextmanager
 def logged_in(folder: Path) -> Iterator[None]:
     """Log to a folder while the block runs; what an earlier run wrote there stays above it."""
-    handler = logging.FileHandler(folder / LOG_FILE, encoding="utf-8")
+    handler = _LogFile(folder / LOG_FILE, encoding="utf-8")
     handler.setFormatter(logging.Formatter(LINE))
     for logger in (LOGGER, WARNINGS):
         logger.addHandler(handler)
@@ -44,4 +51,5 @@ def logged_in(folder: Path) -> Iterator[None]:
     finally:
         for logger in (LOGGER, WARNINGS):
             logger.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):
+            handler.close()

@@ -49,6 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ["SPINDLE_FEM_CACHE"] = str(place / "cache")
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    warm()
     make_originals(place)
     done = {(item["family"], item["number"]) for item in read_cases(place)}
     waiting = [

@@ -18,6 +18,8 @@ MOST_SECONDS, MOST_MB = 30.0, 2048.0
 # A process that waits uses no processor: what it may take in all on a machine that does other work too.
 MOST_WALL_SECONDS = 120.0
 LOOK_EVERY_S = 0.01
+# How long helpers of a killed process may go on.
+MOST_ORPHANED_S = 20.0
 WIDE = "200"
 
 
@@ -57,7 +59,7 @@ class Surroundings:
     before : callable
         Called in the new process before the command.
     kill_after : float, optional
-        Seconds after which the process is killed, [s].
+        Seconds of processor after which the process is killed, [s].
     patience_s : float, optional
         In place of the limits of a case.
     """
@@ -112,14 +114,14 @@ def run_function(function: Callable[[], int], folder: Path, around: Surroundings
 
 
 def run_process(
-    arguments: Sequence[str], folder: Path, around: Surroundings | None = None, *, module: str = "spindle_fem"
+    arguments: Sequence[str], folder: Path, around: Surroundings | None = None, *, prefix: Sequence[str] = ()
 ) -> Ended:
     """The same command in an interpreter of its own."""
     around = around or Surroundings()
     with _Streams(folder) as (out, err):
         started = time.perf_counter()
         process = subprocess.Popen(
-            [sys.executable, "-m", module, *arguments],
+            [*prefix, sys.executable, "-m", "spindle_fem", *arguments],
             cwd=folder,
             env=_environment(around),
             stdin=subprocess.DEVNULL,
@@ -200,6 +202,8 @@ def _watch(child: int, started: float, folder: Path, around: Surroundings) -> En
             if stopped:
                 os.kill(child, signal.SIGKILL)
         time.sleep(LOOK_EVERY_S)
+    if stopped == "killed" and not _vanished(child):
+        stopped = "killed, and left processes behind"
     _end_group(child)
     out, err = (path.read_bytes().decode("utf-8", "replace") for path in _output_files(folder))
     seconds, peak = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0
@@ -207,11 +211,7 @@ def _watch(child: int, started: float, folder: Path, around: Surroundings) -> En
 
 
 def _reason_to_stop(child: int, wall: float, around: Surroundings) -> str:
-    if around.kill_after is not None and wall > around.kill_after:
-        return "killed"
-    if around.patience_s is not None:
-        return "time" if wall > around.patience_s else ""
-    if wall > MOST_WALL_SECONDS:
+    if wall > (around.patience_s or MOST_WALL_SECONDS):
         return "time"
     try:
         fields = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
@@ -219,10 +219,26 @@ def _reason_to_stop(child: int, wall: float, around: Surroundings) -> str:
         return ""
     # Fields 14, 15 and 24 of proc(5): user and system time in ticks, resident pages.
     used = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    if around.kill_after is not None and used > around.kill_after:
+        return "killed"
+    if around.patience_s is not None:
+        return ""
     if used > MOST_SECONDS:
         return "time"
     resident = int(fields[21]) * resource.getpagesize() / 2**20
     return "memory" if resident > MOST_MB else ""
+
+
+def _vanished(child: int) -> bool:
+    """Whether all that a killed process started ends by itself."""
+    until = time.perf_counter() + MOST_ORPHANED_S
+    while time.perf_counter() < until:
+        try:
+            os.killpg(child, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(10 * LOOK_EVERY_S)
+    return False
 
 
 def _end_group(child: int) -> None:

@@ -11,8 +11,10 @@ from typing import Any
 from .definitions import try_definition
 from .folders import try_folder
 from .judged import FAULT, Record
+from .kills import KILLS, try_kill
 from .recordings import try_recording
 from .studies import try_study
+from .surroundings import TRIALS, try_surroundings
 
 # Of each family: what tries one case, and how many cases there are.
 FAMILIES = {
@@ -20,10 +22,11 @@ FAMILIES = {
     "recordings": (try_recording, 1000),
     "studies": (try_study, 300),
     "folders": (try_folder, 200),
+    "kills": (try_kill, sum(KILLS.values())),
+    "surroundings": (try_surroundings, len(TRIALS)),
 }
-# Where a command runs, and what it may leave there and beside it.
+# Where a command runs, and what it may leave beside that.
 HERE = "here"
-WRITTEN = frozenset({"out", "out2", "out.png", ".out.sweep-lock"})
 BESIDE = frozenset({HERE, f"{HERE}.out", f"{HERE}.err"})
 # What hostile texts would write, and how they would stand in a page that runs them.
 OUTSIDE = ("outside", "/tmp/outside")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 import zipfile
 from dataclasses import asdict
 from importlib.metadata import version
@@ -14,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from spindle_fem.cache import cache_directory, source_digest
+from spindle_fem.cache import DAMAGED, cache_directory, keep_entry, source_digest
 from spindle_fem.errors import MeshTagError
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry
 from spindle_fem.machine.meshing.sizes import MeshSizes
@@ -50,7 +48,7 @@ def cached_mesh(digest: str) -> TaggedMesh | None:
         return None
     try:
         mesh = load_npz(path)
-    except (MeshTagError, OSError):
+    except MeshTagError:
         # A damaged file is as good as none: the mesh is made again and replaces it.
         return None
     return mesh if mesh.digest == digest else None
@@ -58,16 +56,8 @@ def cached_mesh(digest: str) -> TaggedMesh | None:
 
 def store_mesh(mesh: TaggedMesh) -> Path:
     """Keep a mesh under its digest; readers never see half a file."""
-    directory = cache_directory()
-    directory.mkdir(parents=True, exist_ok=True)
-    path = directory / f"{mesh.digest}.npz"
-    handle, temporary = tempfile.mkstemp(dir=directory, suffix=".partial")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            _save(mesh, stream, compressed=False)
-        Path(temporary).replace(path)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
+    path = cache_directory() / f"{mesh.digest}.npz"
+    keep_entry(path, lambda stream: _save(mesh, stream, compressed=False))
     return path
 
 
@@ -166,7 +156,7 @@ def load_npz(path: str | Path) -> TaggedMesh:
                 digest=header["digest"],
                 notes=tuple(header["notes"]),
             )
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+    except (*DAMAGED, AttributeError) as error:
         raise MeshTagError(str(path), f"is no mesh of this package ({error}).", "Mesh again.") from error
     freeze(mesh)
     return mesh

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.cache import DAMAGED
 from spindle_fem.errors import BadInputError
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem
 
@@ -65,7 +66,7 @@ class ThermalState:
                 return cls(
                     float(data["time"]), data["temperature"], data["lumped_temperature"], float(data["step"])
                 )
-        except (OSError, ValueError, KeyError) as error:
+        except DAMAGED as error:
             raise BadInputError(str(path), f"no saved thermal state ({error}).") from error
 
 

@@ -400,7 +400,7 @@ _known: dict[Path, Projected] = {}
 def _read_or_made(path: Path, spec: MachineSpec, progress: Progress) -> Projected:
     beside = path.with_suffix(".changes.npz")
     if path not in _known:
-        model, found = ThermalModel.load(path), load_record(beside, FORMAT)
+        model, found = ThermalModel.load(path), load_record(beside, FORMAT, _Record)
         if model is None or found is None:
             machine = prepare_machine(spec, progress=progress)
             made = build_structural_model(machine, progress=progress)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from spindle_fem import __version__
-from spindle_fem.cache import cache_directory, source_digest
+from spindle_fem.cache import one_at_a_time, source_digest
 from spindle_fem.definition.inherit import apply_overrides
 from spindle_fem.definition.load import validate
 from spindle_fem.definition.machine_spec import MachineSpec
@@ -328,7 +327,7 @@ def _mesh_of(task: DesignTask) -> TaggedMesh:
 
 
 def _meshed(spec: MachineSpec, assembly: AssemblyGeometry) -> TaggedMesh:
-    with _one_at_a_time(_mesh_digest(spec, assembly)):
+    with one_at_a_time(_mesh_digest(spec, assembly)):
         return build_mesh(
             assembly,
             preset=spec.mesh.preset,
@@ -336,18 +335,3 @@ def _meshed(spec: MachineSpec, assembly: AssemblyGeometry) -> TaggedMesh:
             sizes=spec.mesh.size,
             threads=1,
         )
-
-
-@contextlib.contextmanager
-def _one_at_a_time(digest: str) -> Iterator[None]:
-    """Keeps two processes from making the same mesh; the second finds it in the cache."""
-    try:
-        import fcntl
-    except ImportError:  # not on Windows: there it is only made twice
-        yield
-        return
-    folder = cache_directory()
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / f"{digest}.lock").open("w") as stream:
-        fcntl.flock(stream, fcntl.LOCK_EX)  # released by the system when a process dies
-        yield
