@@ -124,7 +124,8 @@ class SimulatedRecording(FolderResult):
         """Every channel as read and as predicted, with what is left between them."""
         simulation = self.simulation
         courses = simulated_courses(simulation.recording, simulation.predicted, simulation.half_width)
-        return simulated_figure(courses, f"{simulation.machine}: {simulation.recording.name}")
+        title = f"{simulation.machine}: {simulation.recording.name}"
+        return simulated_figure(courses, title, simulation.recording.start)
 
     def _headline(self) -> str:
         return f"{self['machine']} on {self['recording']}"

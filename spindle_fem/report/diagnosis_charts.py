@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from spindle_fem.report.clock_axis import label_times, time_scale
 from spindle_fem.report.figure_style import (
     CYCLE,
     FILM_MAP,
@@ -23,7 +24,7 @@ from spindle_fem.report.figure_style import (
     set_title,
     styled,
 )
-from spindle_fem.report.read_against_predicted import MOST_CHANNELS, channel_order, of_recording, time_scale
+from spindle_fem.report.read_against_predicted import MOST_CHANNELS, channel_order, of_recording
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,7 +116,7 @@ def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Fi
         return None
     own = of_recording(data, number)
     stop = float(own["time"].values[-1])
-    scale, unit = time_scale(stop)
+    scale, _ = time_scale(stop)
     figure = new_figure(140.0 + 290.0 * len(tracks) + 190.0)
     shown = None
     for position, (component, track) in enumerate(tracks.items()):
@@ -144,7 +145,7 @@ def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Fi
         axes.margins(x=0.01)
     strip = pixel_axes(figure, 110.0, 130.0 + 290.0 * len(tracks), 1440.0, 100.0, sharex=shown)
     _draw_drive(strip, own, scale)
-    strip.set_xlabel(f"time / {unit}")
+    label_times(strip, str(data["start_stamp"].values[number]) or None, stop)
     set_title(
         figure,
         f"{data['recording'].values[number]}: missing heat over time",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,6 +29,11 @@ _BY_NAME = (
 )
 _OTHERS = ("#d9a7a0", "#a9d4cf", "#e3c1d7", "#c7cf9b")
 BALL_COLOUR = "#f2f2f2"
+_NUMBER_SIZE = 8.5
+# Letters of an entry of the legend that fit half the width.
+_MOST_LETTERS = 62
+# Room of "z / mm" at the end of the line of numbers, and from the frame to the numbers.
+_UNIT_WIDTH_PX, _NUMBER_DROP_PX = 90.0, 14.0
 OIL_COLOUR = "#f0c419"
 
 
@@ -63,25 +68,17 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
     z_margin = 0.05 * (z_high - z_low)
     scale = (width_px - 2.0 * margin - 70.0) / (z_high - z_low + 2.0 * z_margin)
     legend = _film_legend(spec)
-    rows = math.ceil(len(legend) / 2)
+    columns = 1 if any(len(text) > _MOST_LETTERS for _, text in legend) else 2
+    rows = math.ceil(len(legend) / columns)
     drawing_height = 2.0 * reach * 1.03 * scale
-    top, foot = 142.0, 138.0 + 30.0 * rows + 24.0
+    top, foot = 154.0, 138.0 + 30.0 * rows + 24.0
     figure = new_figure(top + drawing_height + foot, width_px)
     place = (margin + 70.0, top, width_px - 2.0 * margin - 70.0, drawing_height)
     limit = 1.03 * reach
     axes = meridian_axes(figure, place, (z_low - z_margin, z_high + z_margin), (-limit, limit))
     axes.set_xlabel("")
-    axes.annotate(
-        "z / mm",
-        (1.0, 0.0),
-        xycoords="axes fraction",
-        xytext=(0, -9),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-    )
     axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
-    axes.tick_params(axis="both", labelsize=8.5)
+    axes.tick_params(axis="both", labelsize=_NUMBER_SIZE, labelbottom=False)
     for spine in ("left", "bottom"):
         axes.spines[spine].set_visible(False)
     _draw_parts(axes, assembly)
@@ -112,12 +109,34 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
         (_below(spec, assembly), top + drawing_height + 66.0, 1.0),
     ):
         draw_labels(head, labels, [pixels(*label.at) for label in labels], edge, sign, ends)
+    _draw_places(head, axes, lambda z: pixels(z, -1.03 * reach), ends[1])
     for number, (colour, text) in enumerate(legend):
         column, row = divmod(number, max(rows, 1))
         x, y = margin + 10.0 + column * 0.5 * width_px, total - 24.0 - 30.0 * (rows - 1 - row)
         head.add_line(Line2D([x, x + 44.0], [y, y], color=colour, linewidth=3.6))
         head.text(x + 56.0, y, text, fontsize=8.8, va="center")
     return figure
+
+
+def _draw_places(
+    head: Axes, axes: Axes, pixels: Callable[[float], tuple[float, float]], right: float
+) -> None:
+    """Numbers along the axis and what they are, over the leaders that cross their line."""
+    low, high = axes.get_xlim()
+    texts = [(*pixels(z), f"{z:g}", "center") for z in axes.get_xticks() if low <= z <= high]
+    y = texts[0][1]
+    texts = [item for item in texts if item[0] < right - _UNIT_WIDTH_PX]
+    for x, _, text, side in [*texts, (right, y, "z / mm", "right")]:
+        head.text(
+            x,
+            y + _NUMBER_DROP_PX,
+            text,
+            fontsize=_NUMBER_SIZE,
+            ha=side,
+            va="top",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+            zorder=6,
+        )
 
 
 def _operating_point(spec: MachineSpec) -> str:

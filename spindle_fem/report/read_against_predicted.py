@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from spindle_fem.report.clock_axis import label_times, time_scale
 from spindle_fem.report.figure_style import (
     CYCLE,
     MUTED,
@@ -45,7 +46,6 @@ MOST_POINTS = 1500
 BINS = 240
 # As recordings are divided: a longer pause than so many usual steps.
 LONG_GAP_STEPS = 60.0
-LONG_SECONDS = 3.0 * 86400.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,17 +71,6 @@ class Course:
     predictions: Mapping[str, Array]
     band: float | Array
     held_out: NDArray[np.bool_]
-
-
-def time_scale(seconds: float) -> tuple[float, str]:
-    """Divisor and unit in which a span of time reads well.
-
-    >>> time_scale(5400.0), time_scale(1e7)[1]
-    ((3600.0, 'h'), 'd')
-    """
-    if seconds >= LONG_SECONDS:
-        return 86400.0, "d"
-    return (3600.0, "h") if seconds >= 3600.0 else (60.0, "min")
 
 
 def draw_course(upper: Axes, lower: Axes, course: Course, scale: float) -> None:
@@ -135,7 +124,7 @@ def draw_legend(figure: Figure, predictions: Mapping[str, Array], band: str, *, 
 
 
 @styled
-def courses_figure(courses: list[Course], title: str, notes: str, band: str) -> Figure:
+def courses_figure(courses: list[Course], title: str, notes: str, band: str, start: str | None) -> Figure:
     """Channels two in a row, each with its residual beneath; one alone takes the whole width.
 
     Parameters
@@ -144,9 +133,12 @@ def courses_figure(courses: list[Course], title: str, notes: str, band: str) -> 
         With the same predictions and times.
     band : str
         What the shaded band is.
+    start : str or None
+        ISO stamp of time 0, where it is known.
     """
     first = courses[0]
-    scale, unit = time_scale(float(first.times[-1] - first.times[0]))
+    seconds = float(first.times[-1] - first.times[0])
+    scale, _ = time_scale(seconds)
     columns = min(2, len(courses))
     rows = math.ceil(len(courses) / columns)
     top, cell, foot = (178.0 if columns == 2 else 145.0), 470.0, 50.0
@@ -163,7 +155,7 @@ def courses_figure(courses: list[Course], title: str, notes: str, band: str) -> 
             # Beyond the widest tick label, in every row alike.
             axes.yaxis.set_label_coords(-84.0 / width, 0.5)
         if position + columns >= len(courses):
-            lower.set_xlabel(f"time / {unit}")
+            label_times(lower, start, seconds)
     draw_legend(figure, first.predictions, band, held_out=any(item.held_out.any() for item in courses))
     set_title(figure, title, notes)
     return figure
@@ -183,7 +175,7 @@ def draw_channels(folder: Path, recording: Recording, predicted: Array, half_wid
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for course in simulated_courses(recording, predicted, half_width):
-        figure = simulated_figure([course], f"{recording.name}: {course.name}")
+        figure = simulated_figure([course], f"{recording.name}: {course.name}", recording.start)
         written.append(save_png(figure, folder / f"residual_{_safe(course.name)}.png", colours=128))
     return written
 
@@ -205,10 +197,10 @@ def simulated_courses(recording: Recording, predicted: Array, half_width: Array)
     ]
 
 
-def simulated_figure(courses: list[Course], title: str) -> Figure:
-    """Channels of a simulated recording."""
+def simulated_figure(courses: list[Course], title: str, start: str | None) -> Figure:
+    """Channels of a simulated recording; ``start`` as of :func:`courses_figure`."""
     notes = "Temperature above, residual (read − predicted, means over short times) beneath."
-    return courses_figure(courses, title, notes, "90 % interval of a reading")
+    return courses_figure(courses, title, notes, "90 % interval of a reading", start)
 
 
 def _safe(name: str) -> str:
@@ -245,7 +237,8 @@ def before_after(data: xr.Dataset, number: int) -> Figure:
         )
     title = f"{data['recording'].values[number]}: before and after"
     notes = "Temperature above, residual (read − model, means over short times) beneath."
-    return courses_figure(courses, title, notes, "noise, ± 2 σ of a reading")
+    start = str(data["start_stamp"].values[number]) or None
+    return courses_figure(courses, title, notes, "noise, ± 2 σ of a reading", start)
 
 
 def of_recording(data: xr.Dataset, number: int) -> xr.Dataset:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
+from spindle_fem.report.clock_axis import label_times, time_scale
 from spindle_fem.report.figure_style import CYCLE, new_figure, pixel_axes, save_png, set_title, styled
-from spindle_fem.report.read_against_predicted import runs, time_scale
+from spindle_fem.report.read_against_predicted import runs
 from spindle_fem.units import ZERO_CELSIUS_K, registry
 
 Array = NDArray[np.float64]
@@ -48,7 +49,8 @@ def recording_figure(recording: Recording) -> Figure:
     """A strip a channel on one time axis; shaded where rows or readings are missing."""
     rows = _rows(recording)
     shown = rows[:MOST_CHANNELS]
-    scale, unit = time_scale(float(recording.times[-1]))
+    seconds = float(recording.times[-1])
+    scale, _ = time_scale(seconds)
     times = recording.times / scale
     figure = new_figure(TOP + PITCH * len(shown) + FOOT)
     marked: set[Flag] = set()
@@ -84,7 +86,7 @@ def recording_figure(recording: Recording) -> Figure:
         axes.yaxis.set_label_coords(-105.0 / 1400.0, 0.5)
         axes.locator_params(axis="y", nbins=4)
         axes.tick_params(labelbottom=number == len(shown) - 1)
-    axes.set_xlabel(f"time from {recording.start} / {unit}" if recording.start else f"time / {unit}")
+    label_times(axes, recording.start, seconds)
     _draw_key(figure, {row[1] for row in shown}, marked)
     left = f"; {len(rows) - len(shown)} further channels not drawn" if len(rows) > len(shown) else ""
     set_title(figure, recording.name, recording.defects.lines()[0].partition(": ")[2] + left)

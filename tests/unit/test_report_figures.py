@@ -8,15 +8,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.text import Text
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.report import run_tables as tables
 from spindle_fem.report import table_rows
+from spindle_fem.report.clock_axis import clock_numbers
 from spindle_fem.report.definition_tables import customary, input_groups
 from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of
+from spindle_fem.report.heat_charts import CHARTS
 from spindle_fem.report.leader_labels import spread
 from spindle_fem.report.machine_drawing import channel_sections, machine_drawing, part_colours
+from spindle_fem.studies.heat_study import heat_study
 
 
 @given(st.lists(st.tuples(st.floats(-50, 150), st.floats(1, 9)), min_size=1, max_size=10))
@@ -186,3 +190,69 @@ def test_a_closed_shape_looks_the_same_without_what_faces_away():
     assert (images[0] < 250).any(axis=2).mean() > 0.3
     # silhouettes alone may differ, by what of a far side is seen in a fraction of a pixel
     assert (images[0] != images[1]).any(axis=2).mean() < 1e-3
+
+
+def texts_of(figure):
+    """Every text of a figure that is drawn, with its place in pixels."""
+    figure.canvas.draw()
+    shown = [item for item in figure.findobj(Text) if item.get_visible() and item.get_text().strip()]
+    # numbers of an axis beyond its ends are objects, but not drawn
+    outside = {
+        label
+        for axes in figure.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        for tick in axis.get_major_ticks() + axis.get_minor_ticks()
+        if tick not in axis._update_ticks()
+        for label in (tick.label1, tick.label2)
+    }
+    # of the text alone, without the leader of an annotation
+    return {item: Text.get_window_extent(item) for item in shown if item not in outside}
+
+
+def clipped(figure):
+    """Texts that reach beyond the edge of a figure."""
+    width, height = figure.canvas.get_width_height()
+    return [
+        item.get_text()
+        for item, box in texts_of(figure).items()
+        if box.x0 < 0.0 or box.y0 < 0.0 or box.x1 > width or box.y1 > height
+    ]
+
+
+@pytest.mark.parametrize("name", ["wu_tan_2016", "small_two_start", "motor_spindle", "uncooled"])
+def test_no_label_of_a_machine_is_clipped_or_lies_on_another(name):
+    figure = machine_drawing(load_machine(name))
+    assert not clipped(figure)
+    boxes = list(texts_of(figure).items())
+    for number, (item, box) in enumerate(boxes):
+        for other, its in boxes[number + 1 :]:
+            assert not box.overlaps(its), f"{item.get_text()} on {other.get_text()}"
+
+
+def test_no_label_of_heat_charts_is_clipped_and_lines_under_others_are_wider():
+    content = heat_study(load_machine("wu_tan_2016"), [100.0, 300.0, 470.0])
+    figures = {name: draw(content) for name, draw in CHARTS.items()}
+    assert not {name: found for name, figure in figures.items() if (found := clipped(figure))}
+    for axes in figures["ball_speeds"].axes:
+        widths = [line.get_linewidth() for line in axes.lines]
+        assert widths == sorted(widths, reverse=True)
+        assert len(set(widths)) == len(widths)
+
+
+@pytest.mark.parametrize(
+    ("start", "seconds", "shown"),
+    [
+        ("2026-03-09T07:30:12.250Z", 6 * 3600.0, ["08:00", "09:00", "10:00", "11:00", "12:00", "13:00"]),
+        ("2026-03-09T20:00:00Z", 86400.0, ["21:00", "00:00\n03-10", "03:00", "06:00"]),
+        ("2026-02-27T12:00:00Z", 5 * 86400.0, ["02-28", "03-01", "03-02", "03-03", "03-04"]),
+        ("2026-03-09T07:30:00Z", 0.0, ["07:30"]),
+    ],
+)
+def test_time_goes_by_the_clock_where_it_is_known(start, seconds, shown):
+    places, texts, label = clock_numbers(start, seconds)
+    assert texts[: len(shown)] == shown
+    begin = np.datetime64(start.removesuffix("Z"), "ms")
+    told = [str(begin + np.timedelta64(round(1000 * place), "ms"))[11:16] for place in places]
+    if ":" in texts[0]:
+        assert told == [text[:5] for text in texts]
+    assert label.endswith(f"from {start[:10]}")
