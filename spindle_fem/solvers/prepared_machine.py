@@ -156,7 +156,7 @@ def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOpera
     if follows_preload(spec) and any(group.fit for group in spec.bearing_set):
         growth = GrowthModel(spec, mesh, operators.order)
         seats = {
-            group.name: growth.of_set([bearing.name for bearing in group.bearing])
+            group.name: growth.seating.of_set([bearing.name for bearing in group.bearing])
             for group in spec.bearing_set
             if group.fit is not None
         }

@@ -47,11 +47,11 @@ def deformed_shapes(
     pressing = model.pressures(temperature, speed, forces) - model.assembled_pressures()
     found: dict[str, Array] = {}
     held: dict[str, float] = {}
-    for name, (outputs, _) in reversed(model.carriers.items()):
-        own = [i for i, ring in enumerate(model.rings) if ring.seat.carrier == name]
+    for name, outputs in reversed(model.seating.carriers.items()):
+        own = model.seating.seats_on(name)
         inwards = -1.0 if name == model.bodies.shaft else 1.0
         push = np.array([inwards * model.rings[i].seat.face.area * pressing[0, i] for i in own])
-        shift = _thermal(model, name, temperature) + outputs.solutions[:, : len(own)] @ push
+        shift = _thermal(model, name, temperature) + outputs.solutions @ push
         if name == model.bodies.shaft:
             shift = shift + outputs.body.solve(outputs.body.spin_load()) * speed**2
         seat = model.holding_seat(name)

@@ -7,7 +7,7 @@ temperatures and one small contact problem over all seats.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -16,16 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.definition.solid_tables import Fit
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.displacement_sensors import SensorSight, sensor_sights
 from spindle_fem.model.elastic.elastic_body import Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL, RADIAL, SIDEWAYS, BodyOutputs
-from spindle_fem.model.elastic.machine_bodies import MachineBodies, Seat, machine_bodies
+from spindle_fem.model.elastic.machine_bodies import MachineBodies, machine_bodies
 from spindle_fem.model.elastic.meridian_field import MeridianField
+from spindle_fem.model.elastic.ring_seats import RingSeats
 from spindle_fem.physics.bearings.mounting import ROOM_TEMPERATURE
-from spindle_fem.physics.bearings.seat_contact import SeatBodies
 
 Array = NDArray[np.float64]
 Side = Literal["shaft", "housing"]
@@ -75,28 +74,6 @@ class Growth:
     nose_tilt: tuple[float, float] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class _Ring:
-    """A ring between its seat and its balls: indices of its outputs."""
-
-    seat: Seat
-    outputs: BodyOutputs
-    rows: Array
-
-    @property
-    def areas(self) -> Array:
-        """Areas of seat and raceway, signed: pressure pushes the outside inwards."""
-        outwards = 1.0 if self.seat.is_inner else -1.0
-        return np.array([outwards * self.seat.face.area, -outwards * self.seat.raceway.area])
-
-
-def _clearance(fit: Fit | None, seat: Seat) -> float:
-    """Radial clearance of a ring on its seat as assembled, m; a set without a fit just touches."""
-    if fit is None:
-        return 0.0
-    return 0.5 * (-fit.inner_interference if seat.is_inner else fit.outer_clearance)
-
-
 def flange_back(layout: Layout) -> Face:
     """The plane behind the flange that is bolted to the frame."""
     flange = next(s for s in layout.housing.segment if s.name == layout.flange)
@@ -122,18 +99,20 @@ class GrowthModel:
     ) -> None:
         self.spec = spec
         self.bodies = machine_bodies(spec) if bodies is None else bodies
-        self._mesh, self._order = mesh, order
+
         self._size = mesh.n_corners if order == 1 else len(mesh.points)
         self.sights = sensor_sights(spec, mesh)
-        self.fields: dict[str, MeridianField] = {}
-        self.rings = [self._ring(seat) for seat in self.bodies.seats]
-        self.carriers = {
-            name: self._carrier(name) for name in (self.bodies.shaft, self.bodies.housing) if name
+        self.fields = {
+            name: MeridianField(mesh, order, parts, self.bodies.bodies[name].section)
+            for name, parts in self.bodies.parts.items()
         }
+        self.seating = RingSeats(spec, self.bodies)
+        self.rings, self.bearings = self.seating.rings, self.seating.bearings
+        #: Outputs of shaft and housing beside their seats.
+        self.carriers = {name: found for name in self.seating.carriers if (found := self._carrier(name))}
         self.bending = self._bending()
         sets = spec.bearing_set
         groups = {bearing.name: group for group, bearing in spec.bearings}
-        self.bearings = tuple(dict.fromkeys(ring.seat.bearing for ring in self.rings))
         self._assembled_at = np.array([groups[name].assembly_temperature for name in self.bearings])
         held = [group for group in sets if group.carries_thrust] or list(sets)
         self.assembly_temperature = held[0].assembly_temperature if held else ROOM_TEMPERATURE
@@ -144,47 +123,29 @@ class GrowthModel:
             for share in [group.preload / sum(b.takes_thrust == bearing.takes_thrust for b in group.bearing)]
             for force in [share / math.tan(spec.bearing_types[group.bearing_type].contact_angle)]
         }
-        self._clearance = np.array(
-            [_clearance(groups[ring.seat.bearing].fit, ring.seat) for ring in self.rings]
-        )
-        self.seats = self._seat_bodies()
-        seat_rows = np.stack([self._seat_row(ring) for ring in self.rings])
-        inwards = self._inwards[:, None]
-        rows = np.stack([ring.rows for ring in self.rings])
-        self.seat_rows = seat_rows
-        self.thermal_rows = np.concatenate(
-            [
-                (inwards * (seat_rows - rows[:, 0])).reshape(-1, 2, self._size),
-                rows[:, 1].reshape(-1, 2, self._size),
-            ],
-            axis=1,
+        self.seat_rows = np.zeros((len(self.rings), self._size))
+        for name, outputs in self.seating.carriers.items():
+            self.seat_rows[self.seating.seats_on(name)] = self._rows(outputs)
+        ring_rows = np.array([self._rows(ring.outputs) for ring in self.rings])
+        self.thermal_rows = self.seating.thermal_rows(
+            self.seat_rows, ring_rows.reshape(len(self.rings), 2, self._size)
         )
 
-    def _rows(self, outputs: BodyOutputs, body: str) -> Array:
-        field = MeridianField(self._mesh, self._order, self.bodies.parts[body], outputs.body.section)
-        self.fields[body] = field
-        return field.rows(outputs.by_temperature())
+    def _rows(self, outputs: BodyOutputs) -> Array:
+        return self.fields[outputs.body.name].rows(outputs.by_temperature())
 
-    def _ring(self, seat: Seat) -> _Ring:
-        faces = {"seat": seat.face, "raceway": seat.raceway}
-        body = self.bodies.bodies[seat.ring]
-        outputs = BodyOutputs.of(body, {key: body.mean_shift(face, RADIAL) for key, face in faces.items()})
-        return _Ring(seat, outputs, self._rows(outputs, seat.ring))
-
-    def _carrier(self, name: str) -> tuple[BodyOutputs, Array]:
+    def _carrier(self, name: str) -> tuple[BodyOutputs, Array] | None:
         body = self.bodies.bodies[name]
-        outputs = {
-            seat.ring: body.mean_shift(seat.face, RADIAL)
-            for seat in self.bodies.seats
-            if seat.carrier == name
-        }
+        outputs = {}
         forward = self._forward(name)
         if forward is not None:
             outputs["forward"] = forward
         for sight in self.sights:
             outputs[sight.key] = self._seen(name, sight)
+        if not outputs:
+            return None
         solved = BodyOutputs.of(body, outputs)
-        return solved, self._rows(solved, name)
+        return solved, self._rows(solved)
 
     def _forward(self, name: str) -> Array | None:
         """How far the shaft carries the nose forward of its bearing, or the housing that of its flange."""
@@ -256,8 +217,9 @@ class GrowthModel:
         tilt = (shifts[1] - shifts[0]) / (places[1] - places[0])
         nose = min(segment.z[0] for segment in layout.shaft.segment)
         outputs = BodyOutputs.of(body, {"nose": shifts[0] + tilt * (nose - places[0]), "tilt": tilt})
-        field = MeridianField(self._mesh, self._order, self.bodies.parts[body.name], body.section)
-        up, across = (field.rows(outputs.by_temperature(), around) for around in ("up", "across"))
+        up, across = (
+            self.fields[body.name].rows(outputs.by_temperature(), around) for around in ("up", "across")
+        )
         return np.stack((up, across), axis=1).reshape(4, -1)
 
     def holding_seat(self, carrier: str) -> Face | None:
@@ -269,47 +231,6 @@ class GrowthModel:
         return next((s.face for s in self.bodies.seats if (s.bearing, s.carrier) == (held, carrier)), None)
 
     # ------------------------------------------------------------------ seats
-    @property
-    def _inwards(self) -> Array:
-        """Which way a gap opens by its seat's shift outwards: -1 on the shaft, +1 in the housing."""
-        return np.array([-1.0 if ring.seat.is_inner else 1.0 for ring in self.rings])
-
-    def _seat_row(self, ring: _Ring) -> Array:
-        outputs, rows = self.carriers[ring.seat.carrier]
-        return rows[outputs.names.index(ring.seat.ring)]
-
-    def _seat_bodies(self) -> SeatBodies:
-        """How all seats yield, in the order of the rings: inner and outer of each bearing."""
-        count, inwards = len(self.rings), self._inwards
-        bearing = np.arange(count) // 2
-        areas = np.array([ring.seat.face.area for ring in self.rings])
-        self._by_seats = np.zeros((count, count))
-        spin = self._spin_of_seats = np.zeros(count)
-        for name, (outputs, rows) in self.carriers.items():
-            own = [i for i, ring in enumerate(self.rings) if ring.seat.carrier == name]
-            yields = outputs.compliance(np.append(areas[own], np.zeros(len(rows) - len(own))))
-            self._by_seats[np.ix_(own, own)] = yields[: len(own), : len(own)] * inwards[own][None, :]
-            if name == self.bodies.shaft:
-                spin[own] = outputs.by_spin[: len(own)]
-        own = np.array([ring.outputs.compliance(ring.areas) for ring in self.rings])
-        by_load = own[:, :, 1] / np.array([ring.seat.raceway.area for ring in self.rings])[:, None]
-        turning = np.where(inwards < 0.0, 1.0, 0.0)
-        rings_spin = turning[:, None] * np.array([ring.outputs.by_spin for ring in self.rings])
-        by_force, by_pressure = np.zeros((count, count // 2)), np.zeros((count // 2, count))
-        by_force[np.arange(count), bearing] = -inwards * by_load[:, 0]
-        by_pressure[bearing, np.arange(count)] = -inwards * own[:, 1, 0]
-        return SeatBodies(
-            self._clearance,
-            inwards[:, None] * self._by_seats - np.diag(inwards * own[:, 0, 0]),
-            by_force,
-            areas,
-            by_pressure,
-            (inwards * by_load[:, 1]).reshape(-1, 2),
-            inwards * (spin - rings_spin[:, 0]),
-            rings_spin[::2, 1],
-            np.array([ring.seat.raceway.r[0] for ring in self.rings]).reshape(-1, 2),
-        )
-
     def shifts(self, temperature: Array) -> dict[str, Array]:
         """What temperature alone does to each bearing, (4,) m, as ``SeatBodies.law`` takes it."""
         rises = self.thermal_rows @ temperature - self._unit_shifts * self._assembled_at[:, None]
@@ -319,10 +240,6 @@ class GrowthModel:
     def _unit_shifts(self) -> Array:
         """Shifts (k, 4) of a kelvin everywhere, m/K."""
         return self.thermal_rows.sum(axis=2)
-
-    def of_set(self, names: Sequence[str]) -> SeatBodies:
-        """Seats of a set; what the seats of other sets press on the same bodies is left out."""
-        return self.seats.of([self.bearings.index(name) for name in names])
 
     # ------------------------------------------------------------------ a state
     def at(self, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Growth:
@@ -361,7 +278,7 @@ class GrowthModel:
 
     def _pressures(self, thermal: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Array:
         both = np.array([forces[name] for name in self.bearings])
-        law = self.seats.law(thermal, speed, both[:, 1] - both[:, 0])
+        law = self.seating.bodies.law(thermal, speed, both[:, 1] - both[:, 0])
         area = np.array([ring.seat.raceway.area for ring in self.rings])
         return np.array([law.seats(both[:, 0])[0], both.ravel() / area])
 
@@ -370,10 +287,10 @@ class GrowthModel:
     ) -> Array:
         """Pressure, gap, seat and raceway shift (4, n) of every ring, from no pressure or load."""
         both = np.array([forces[name] for name in self.bearings])
-        bodies = self.seats
+        bodies = self.seating.bodies
         law = bodies.law(thermal, speed, both[:, 1] - both[:, 0])
         pressure, gap = law.seats(both[:, 0])
-        outwards = -self._inwards
+        outwards = -self.seating.inwards
         spin = np.where(outwards > 0.0, np.repeat(bodies.spin_growth, 2), 0.0)
         raceway = (
             thermal[:, 2:].ravel()
@@ -381,13 +298,21 @@ class GrowthModel:
             + outwards * (bodies.by_pressure.sum(axis=0) * pressure - (bodies.by_load * both).ravel())
         )
         return np.array(
-            [pressure, gap, seat + self._spin_of_seats * speed**2 + self._by_seats @ pressure, raceway]
+            [
+                pressure,
+                gap,
+                seat + self.seating.spin_of_seats * speed**2 + self.seating.by_seats @ pressure,
+                raceway,
+            ]
         )
 
     def _nose(self, temperature: Array) -> float | None:
-        if any("forward" not in outputs.names for outputs, _ in self.carriers.values()):
+        forward = [
+            rows[outputs.names.index("forward")]
+            for outputs, rows in self.carriers.values()
+            if "forward" in outputs.names
+        ]
+        if not forward or len(forward) < len(self.seating.carriers):
             return None
         rise = temperature - self.assembly_temperature
-        return float(
-            sum(rows[outputs.names.index("forward")] @ rise for outputs, rows in self.carriers.values())
-        )
+        return float(sum(row @ rise for row in forward))
