@@ -18,7 +18,6 @@ from spindle_fem.errors import RecordingError
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.input_sampling import unseen_power
 from spindle_fem.inference.recording_gaps import with_changes_amid
-from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.machine.view.usual_sizes import common_quantities
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network
@@ -26,6 +25,7 @@ from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for
+from spindle_fem.operation.preload_mechanics import machine_view
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
 from spindle_fem.recordings.smooth_inputs import without_input_noise
@@ -103,7 +103,7 @@ def open_machine(
     fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
     for recording in (*recordings, *calibration):
         fast.require_channels(recording.probes, recording.source)
-    view = _widest([view_of(fast.names, _seen(recording, heldout)) for recording in recordings])
+    view = _widest([machine_view(fast.names, _seen(recording, heldout)) for recording in recordings])
     return DiagnosedMachine(
         spec.name,
         spec,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.effects.catalogue.coolant_film import TransitionTerm
-from spindle_fem.effects.catalogue.thermal_preload import ThermalPreloadTerm
+from spindle_fem.effects.catalogue.thermal_preload import PreloadMechanicsTerm, ThermalPreloadTerm
 from spindle_fem.effects.framework.laws import amplitude
 from spindle_fem.effects.framework.machine_view import ChannelFlow
 from spindle_fem.effects.framework.spread import Spread
@@ -25,6 +25,7 @@ from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
 from spindle_fem.solvers.mesh_terms import Physics, steady_physics, with_capacity, with_factors
 from spindle_fem.solvers.readings import ReadingRows
+from tests.support.set_response import set_response
 
 RPM = np.pi / 30.0
 HOUR = 3600.0
@@ -45,6 +46,12 @@ def preload():
     bearings = ("F1", "F2", "F3")
     sides = (tuple(f"{name}.{side}_ring" for name in bearings) for side in ("inner", "outer"))
     return ThermalPreloadTerm("preload", bearings, *sides)
+
+
+def mechanics():
+    bearings = ("R1", "R2")
+    sides = (tuple(f"{name}.{side}_ring" for name in bearings) for side in ("inner", "outer"))
+    return PreloadMechanicsTerm("mechanics", *sides, set_response(bearings))
 
 
 def of_size(term, size, **others):
@@ -102,6 +109,7 @@ def test_catalogue_terms_agree_with_the_fast_model_at_every_probe(machine, fast)
     source = UnrecordedHeatTerm("source", amplitude("heat", 60.0, "W"), place, on)
     each = {
         "preload": of_size(preload(), 0.4),
+        "mechanics": of_size(mechanics(), 1.0),
         "source": of_size(source, 80.0, lag=60.0, up=0.5, across=-0.3),
         "transition": of_size(transition(machine), 2.0),
     }

@@ -7,10 +7,11 @@ import pytest
 
 from spindle_fem.effects.catalogue.gap_closure import GapClosureTerm
 from spindle_fem.effects.catalogue.starvation import StarvationTerm
-from spindle_fem.effects.catalogue.thermal_preload import ThermalPreloadTerm
+from spindle_fem.effects.catalogue.thermal_preload import PreloadMechanicsTerm, ThermalPreloadTerm
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.operation.effect_terms import Derivatives, EffectTerms, Instants
 from spindle_fem.operation.term_memory import carried, remembered
+from tests.support.set_response import set_response
 
 STEPS = 80
 GAP = 33
@@ -39,6 +40,7 @@ TERMS = {
     "over housing": GapClosureTerm("gap", ("seat",), ("a", "b"), ("c",)),
     "ring by ring": GapClosureTerm("gap", ("seat", "spacer"), ("a", "b"), ("c",), ((0,), (0, 1))),
     "preload": ThermalPreloadTerm("preload", ("A",), ("a",), ("b",)),
+    "mechanics": PreloadMechanicsTerm("mechanics", ("a",), ("b",), set_response(("A",), {"c": 0.9e-6})),
     "starvation": StarvationTerm("dry", ("A",), "speed", 300.0),
     "bent": Bent(),
 }

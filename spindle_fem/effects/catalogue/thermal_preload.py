@@ -4,15 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words
-from spindle_fem.effects.framework.laws import Complex, amplitude, power, relaxed, repeated, shape, softplus
+from spindle_fem.effects.framework.laws import (
+    Complex,
+    amplitude,
+    linear,
+    power,
+    relaxed,
+    repeated,
+    shape,
+    softplus,
+)
 from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.preload_response import PreloadResponse
 from spindle_fem.effects.framework.term import Term, TermContext
 
 NAME = "friction_increase_at_10K"
 REFERENCE_DIFFERENCE = 10.0
+MECHANICS = "bearing mechanics"
+# Of the increase by mechanics: how widely the share of friction that follows the load spreads; about half
+# of it does in greased bearings (Palmgren's load-dependent moment beside the viscous one).
+LOAD_SHARE_SIGMA = 0.5
+# Of the same: friction that follows its load more than this is none of rings.
+MOST_LOAD_SHARE = 3.0
+# Of the standard clearance deviation: a fit looser than ordered is likelier than a tighter one, as rings
+# are made smaller than their size and bores larger.
+CLEARANCES = (-2.0, 4.0)
 
 
 class ThermalPreloadTerm(Term):
@@ -50,8 +71,58 @@ class ThermalPreloadTerm(Term):
         return relaxed(context.state, difference[None], step, context.parameters["lag"])
 
 
+class PreloadMechanicsTerm(Term):
+    """Friction of every bearing of a set as its mechanics answers to rings and fit, ``1 + a (m - 1) / m₁₀``.
+
+    ``m`` is friction over that without temperature differences: by the mean ring difference of the set,
+    and by the gap that outer rings, warmer than the housing, close. ``m₁₀`` is its mean increase at 10 K
+    as assembled, so that ``a / m₁₀`` is the share of the friction that follows the load. A set that goes
+    slack loses that share as a power of its friction, which stays above 0. The lag is that of what
+    lies between the places read and the raceways.
+    """
+
+    n_states = 2
+
+    def __init__(
+        self, name: str, inner: tuple[str, ...], outer: tuple[str, ...], response: PreloadResponse
+    ) -> None:
+        self.name, self.bearings, self.response = name, response.bearings, response
+        self.inner, self.outer = len(inner), len(inner) + len(outer)
+        self.reads = (*inner, *outer, *response.housing)
+        self.increase = response.increase(REFERENCE_DIFFERENCE)
+        nominal, sigma = response.clearance, response.clearance_sigma
+        low, high = (nominal + side * sigma for side in CLEARANCES)
+        self.parameters = (
+            amplitude(NAME, LOAD_SHARE_SIGMA * self.increase, high=MOST_LOAD_SHARE * self.increase),
+            linear("outer_clearance", nominal, sigma, "m", low=low, high=high),
+            shape("lag", 200.0, 0.8, "s", low=1.0, high=20000.0),
+        )
+
+    def friction(self, context: TermContext) -> Complex:
+        """Factor on every bearing, (n, k)."""
+        own = context.parameters
+        ratio = self.response.ratio(
+            context.state[0],
+            context.state[1],
+            own["outer_clearance"],
+            np.abs(context.inputs["speed"]),
+        )
+        share = own[NAME] / self.increase
+        return np.where(ratio.real > 1.0, 1.0 + share * (ratio - 1.0), np.exp(share * np.log(ratio)))
+
+    def advance(self, context: TermContext, step: float) -> Complex:
+        """Ring difference and closing of the fit, lagged, (2, k) K."""
+        read = context.temperatures
+        inner, outer = read[: self.inner].mean(axis=0), read[self.inner : self.outer].mean(axis=0)
+        target = np.array([inner - outer, self.response.closing(outer, read[self.outer :])])
+        return relaxed(context.state, target, step, context.parameters["lag"])
+
+
 class ThermalPreload(Effect):
     """Preload that follows the inner-outer temperature difference.
+
+    Where a definition has fits and preload, the mechanics of its bearings says in which form and by how
+    much each of them; otherwise a power of the difference stands for it.
 
     Source: Hertz (1882), load with deflection^1.5; Bossmanns & Tu (1999), Int.
     J. Mach. Tools Manuf. 39, 1345-1366, thermally induced preload in spindles;
@@ -68,8 +139,14 @@ class ThermalPreload(Effect):
     )
     card = Card(
         group="Bearings",
-        law="friction × 1 + a (w s₊(x/w) / 10 K)^m; x: inner less outer rings of the set, lagged τ",
-        size="a ± 0.25; m 1.45 ×/÷ e^0.12; τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4",
+        law=(
+            "friction × 1 + a (m - 1)/m₁₀, m(x, gap of the outer rings, speed) by bearing mechanics, x: "
+            "inner less outer rings of the set, lagged τ; without fits × 1 + a (w s₊(x/w) / 10 K)^m"
+        ),
+        size=(
+            "a ± m₁₀/2, clearance ± IT6/3, τ 200 s ×/÷ e^0.8; without fits a ± 0.25; m 1.45 ×/÷ e^0.12; "
+            "τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4"
+        ),
         acts_on="each bearing set (its bearings share one preload)",
         source=(
             "Hertz, load with deflection^1.5; Bossmanns & Tu (1999), Int. J. Mach. Tools Manuf. 39, 1345"
@@ -82,34 +159,45 @@ class ThermalPreload(Effect):
         return spec.heat.thermal_preload
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """One a bearing set."""
+        """By the power law and, where there are fits, by mechanics: one each a bearing set."""
         found = []
         for group in machine.groups:
             bearings = tuple(b for b in machine.sets[group] if b in machine.inner and b in machine.outer)
             if not bearings or not machine.speeds(group):
                 continue
-            term = ThermalPreloadTerm(
-                self.term_name(group),
-                bearings,
-                tuple(machine.inner[b] for b in bearings),
-                tuple(machine.outer[b] for b in bearings),
-            )
-            found.append(
+            inner, outer = (tuple(side[b] for b in bearings) for side in (machine.inner, machine.outer))
+            terms: dict[str, Term] = {"": ThermalPreloadTerm(self.term_name(group), bearings, inner, outer)}
+            response = machine.preload(group)
+            if response is not None:
+                name = self.term_name(group, MECHANICS)
+                terms[MECHANICS] = PreloadMechanicsTerm(name, inner, outer, response)
+            found += [
                 self.candidate(
                     machine.component(group),
                     term,
                     amplitude=NAME,
                     reference=0.1,
-                    form=machine.form(group),
+                    form=machine.form(group, form),
+                    constants={}
+                    if response is None
+                    else {"exponent": response.exponent(REFERENCE_DIFFERENCE)},
                 )
-            )
+                for form, term in terms.items()
+            ]
         return tuple(found)
+
+    def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
+        """The power law stands in for mechanics that are not known."""
+        return MECHANICS in candidate.form or machine.preload(candidate.component) is None
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How strongly friction follows."""
+        by_mechanics = "exponent" not in reported
+        exponent = candidate.constants["exponent"] if by_mechanics else reported["exponent"].value
         return (
             f"{capital(place_words(candidate.component))}: the friction heat follows the inner-outer "
             "temperature difference (thermally induced preload); at 10 K it is "
             f"{100.0 * reported[NAME].value:.0f} % higher than modelled, growing with the power "
-            f"{reported['exponent'].value:.1f} of the difference."
+            f"{exponent:.1f} of the difference"
+            + (" there, as the mechanics of bearings and fits has it." if by_mechanics else ".")
         )

@@ -346,6 +346,8 @@ def stated(parameter: TermParameter, value: float) -> Reported:
     """
     if parameter.unit == "rad/s":
         return Reported(float(round(value / RPM, 6)), "rpm")
+    if parameter.unit == "m":
+        return Reported(1.0e6 * value, "um")
     if parameter.unit == "K/s":
         return Reported(value * 3600.0, "K/h")
     if parameter.unit == "K" and parameter.name.endswith("_temperature"):

@@ -7,7 +7,7 @@ bearing set), one bearing, ``shaft``, ``housing``, ``channel``, ``flange``,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.preload_response import PreloadResponse
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.coolant.properties import coolant_by_name
 
@@ -142,6 +143,10 @@ class RecordedQuantity:
     beside: bool = False
 
 
+def no_mechanics(component: str) -> None:
+    """Nothing is known of how the friction of a set follows its rings."""
+
+
 @dataclass(frozen=True, slots=True)
 class MachineView:
     """Names of one machine.
@@ -230,6 +235,9 @@ class MachineView:
         Mean heat of a network's driven sources while they are on.
     surroundings : mapping of component to tuple of str
         Films whose fluid is that of ``ambient``, or of one boundary of a network.
+    preload : callable
+        Component of a bearing set to how its friction follows rings and fits; to None where a
+        definition does not say enough.
     """
 
     kind: Literal["geometry", "network"]
@@ -276,6 +284,7 @@ class MachineView:
     source_inputs: Mapping[str, str] = field(default_factory=dict)
     source_heat: Mapping[str, float] = field(default_factory=dict)
     surroundings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    preload: Callable[[str], PreloadResponse | None] = no_mechanics
 
     @property
     def groups(self) -> tuple[str, ...]:

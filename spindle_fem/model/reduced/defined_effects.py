@@ -13,11 +13,11 @@ from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.effects.registry import build, effect_of
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
-from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.machine.view.defined_point import at_the_defined_point
 from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.model.lumped.network_view import day_of_a_network, view_of_network
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
+from spindle_fem.operation.preload_mechanics import machine_view
 from spindle_fem.recordings.align import Recording
 
 # `check` asks here about definitions and needs no solver, whose compiled loops take a second to load.
@@ -182,7 +182,7 @@ def check_effects(entries: Sequence[EffectEntry | None], spec: MachineSpec) -> N
     """
     if any(entry is not None for entry in entries):
         names = MachineNames.of(spec)
-        view = view_of(names, at_the_defined_point(spec))
+        view = machine_view(names, at_the_defined_point(spec))
         active_effects(entries, view, names.channels, _outlets(spec))
 
 
@@ -241,7 +241,7 @@ def effects_on(entries: Sequence[EffectEntry], fast: FastModel, recording: Recor
         return NO_EFFECTS
     if fast.network is not None:
         return active_effects(entries, view_of_network(fast.network, recording), fast.channels)
-    return active_effects(entries, view_of(fast.names, recording), fast.channels, _outlets(fast.spec))
+    return active_effects(entries, machine_view(fast.names, recording), fast.channels, _outlets(fast.spec))
 
 
 def _outlets(spec: MachineSpec) -> tuple[str, ...]:
@@ -263,7 +263,7 @@ def physics_of(machine: PreparedMachine) -> Physics:
     entries = machine.spec.effects
     if not entries:
         return NO_PHYSICS
-    effects = active_effects(entries, view_of(_names_of(machine), at_the_defined_point(machine.spec)))
+    effects = active_effects(entries, machine_view(_names_of(machine), at_the_defined_point(machine.spec)))
     return Physics(effects.terms, {}, effects.factors)
 
 

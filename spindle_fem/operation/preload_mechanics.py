@@ -1,0 +1,264 @@
+"""Friction of bearing sets over ring difference, fit and speed, by the bearings' own mechanics.
+
+What the effect ``thermal_preload`` interpolates: balls, rings and elastic seats solved once for a
+machine, kept on disk.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from spindle_fem.cache import cache_directory, load_record, save_record, source_digest
+from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
+from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.preload_response import PreloadResponse
+from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
+from spindle_fem.machine.view.build_view import view_of
+from spindle_fem.machine.view.machine_names import MachineNames
+from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.model.elastic.machine_bodies import MachineBodies, carries_rings, machine_bodies
+from spindle_fem.model.elastic.ring_seats import RingSeats
+from spindle_fem.operation.bearing_heat import BearingMechanics
+from spindle_fem.operation.friction_map import NOMINAL_FILM_TEMPERATURE
+from spindle_fem.physics.bearings import mounting
+from spindle_fem.physics.bearings.bearing_set import solve_states
+from spindle_fem.physics.bearings.heat_model import HeatOptions
+from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
+
+FORMAT = "spindle-fem/preload-response/1"
+# K; denser where balls of one side lose their load and where rings meet the housing.
+DIFFERENCES = (-8.0, -3.0, 0.0, 3.0, 7.0, 12.0, 20.0, 30.0, 45.0)
+# m; from a ring that the housing squeezes hard to one that heavy balls hardly spread to it.
+GAPS = (-25e-6, -15e-6, -8e-6, -3e-6, 0.0, 3e-6, 8e-6, 20e-6)
+# Of the highest speed: load decides less of the friction where balls throw outwards.
+SPEED_SHARES = (0.05, 0.22, 0.55, 1.0)
+# Points that shape-preserving pieces put between two solved ones: cubic splines through solved points
+# alone swing by a tenth where rings meet the housing.
+PUT_BETWEEN = 2
+# Over the speed of the definition, where no table of heat says how far the machine goes.
+HIGHEST_SPEED = 1.5
+# Where heat is by table nothing says which law made it; the analytical one knows the load of every contact.
+LEVEL_OF_TABLES = "full"
+# m
+ON_LINE = 1.0e-9
+# Of the whole: parts of the housing that move the seats of a set by less are left out.
+LEAST_SHARE = 0.03
+
+
+_known: dict[str, PreloadResponse] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class PreloadMechanics:
+    """Answers of a machine's bearing sets, each worked out when it is first asked for.
+
+    Attributes
+    ----------
+    places : frozenset of str
+        That the models of the machine have.
+    """
+
+    spec: MachineSpec
+    places: frozenset[str]
+
+    def __call__(self, component: str) -> PreloadResponse | None:
+        """Of one bearing set; None without fits, preload, grease or parts that carry the rings."""
+        sets = {f"{group.name}_bearings": group for group in self.spec.bearing_set}
+        group = sets.get(component)
+        if group is None or group.fit is None or not group.preload > 0.0:
+            return None
+        if self.spec.grease is None or not carries_rings(self.spec):
+            return None
+        digest = _digest(self.spec, group.name, self.places)
+        if digest not in _known:
+            path = cache_directory() / f"preload-{digest}.npz"
+            found = load_record(path, FORMAT)
+            if found is None:
+                _known[digest] = _solved(self.spec, group, self.places)
+                save_record(_known[digest], path, FORMAT)
+            else:
+                _known[digest] = PreloadResponse(**found)
+        return _known[digest]
+
+
+def machine_view(names: MachineNames, recording: Recording) -> MachineView:
+    """A machine with geometry on one recording, with what its bearing sets answer to heat."""
+    return replace(
+        view_of(names, recording), preload=PreloadMechanics(names.spec, frozenset(names.place_names))
+    )
+
+
+def _digest(spec: MachineSpec, group: str, places: Collection[str]) -> str:
+    """Hash of all that the answer of a set depends on."""
+    content = spec.model_dump(mode="json")
+    # not what a calibration moves
+    sets = [
+        {k: v for k, v in own.items() if k not in ("heat_factor", "ball_row")}
+        for own in content["bearing_set"]
+    ]
+    known = [content[key] for key in ("part", "materials", "bearing_types", "grease", "channel", "operation")]
+    heat = {k: v for k, v in content["heat"].items() if k not in ("ball_share", "inner_share")}
+    own = [source_digest(__name__), group, sets, known, heat, sorted(places)]
+    return hashlib.sha256(json.dumps(own, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _solved(spec: MachineSpec, group: BearingSet, places: Collection[str]) -> PreloadResponse:
+    """Solve a set over all differences, gaps and speeds."""
+    bodies = machine_bodies(spec)
+    seating = RingSeats(spec, bodies)
+    names = [bearing.name for bearing in group.bearing]
+    rows, housing = _rows(spec, bodies, seating, places)
+    rows = rows[[seating.bearings.index(name) for name in names]]
+    turning, outer, opening = rows[:, :, 0], rows[:, 1, 1], rows[:, 1, 2:].mean(axis=0)
+    seats = seating.of_set(names)
+    mechanics = BearingMechanics(spec, {group.name: seats})
+    level = LEVEL_OF_TABLES if spec.heat.model == "table" else spec.heat.model
+    set_solver = _SetSolver(
+        mechanics,
+        replace(mechanics.options, level=level),
+        group,
+        turning,
+        spec.operation.thrust if group.carries_thrust else 0.0,
+    )
+    table = spec.heat.table
+    highest = max(HIGHEST_SPEED * spec.operation.speed, 0.0 if table is None else table.speed[-1])
+    speeds = highest * np.array(SPEED_SHARES)
+    friction = [[set_solver.log_friction(gap, speed) for speed in speeds.tolist()] for gap in GAPS]
+    differences, values = _finer(DIFFERENCES, np.array(friction).transpose(2, 0, 1, 3), 0)
+    gaps, values = _finer(GAPS, values, 1)
+    share = np.abs(opening) > LEAST_SHARE * np.abs(opening).sum()
+    kept = opening[share] * (opening.sum() / opening[share].sum())
+    return PreloadResponse(
+        tuple(names),
+        differences,
+        gaps,
+        speeds,
+        values,
+        group.fit.outer_clearance,
+        _fit_sigma(spec.bearing_types[group.bearing_type].outer_diameter),
+        group.assembly_temperature,
+        float(-outer.mean()),
+        dict(zip(np.array(housing)[share].tolist(), kept.tolist(), strict=True)),
+        spec.operation.speed,
+    )
+
+
+def _finer(points: Sequence[float], values: Array, axis: int) -> tuple[Array, Array]:
+    """Points and values along an axis with more points between."""
+    number = len(points)
+    at = np.linspace(0.0, number - 1.0, (number - 1) * (PUT_BETWEEN + 1) + 1)
+    dense = np.interp(at, np.arange(number), points)
+    return dense, PchipInterpolator(np.array(points), values, axis=axis)(dense)
+
+
+def _rows(
+    spec: MachineSpec, bodies: MachineBodies, seating: RingSeats, places: Collection[str]
+) -> tuple[Array, list[str]]:
+    """Shifts by a kelvin of shaft and inner rings, outer rings, each place of the housing; these places."""
+    layout = Layout(spec, set(places))
+    parts = [part for part in spec.part if part.name in bodies.parts[bodies.housing]]
+    found = list(
+        dict.fromkeys(layout.segment_place(part, item.name) for part in parts for item in part.segment)
+    )
+    groups = {}
+    for name, body in bodies.bodies.items():
+        z, r = body.section.mesh.p
+        turning = name == bodies.shaft or name.endswith(".inner_ring")
+        groups[name] = np.full(z.size, 0 if turning else 1)
+        if name == bodies.housing:
+            for part in parts:
+                for item in part.segment:
+                    inside = (z >= item.z[0] - ON_LINE) & (z <= item.z[1] + ON_LINE)
+                    inside &= (r >= 0.5 * item.inner_diameter - ON_LINE) & (
+                        r <= 0.5 * item.outer_diameter + ON_LINE
+                    )
+                    groups[name][inside] = 2 + found.index(layout.segment_place(part, item.name))
+    return seating.thermal_rows(*seating.rows_over(groups)), found
+
+
+def _fit_sigma(diameter: float) -> float:
+    """1 σ of the clearance of a housing seat, m: a third of the bore's tolerance IT6 of ISO 286-1."""
+    millimetres = 1.0e3 * diameter
+    unit = 0.45e-6 * millimetres ** (1.0 / 3.0) + 1.0e-9 * millimetres
+    return 10.0 * unit / 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class _SetSolver:
+    """One set at states of temperature.
+
+    Attributes
+    ----------
+    turning : (n_bearings, 4) ndarray, [m/K]
+        Shifts by a kelvin of shaft and inner rings.
+    thrust : float, [N]
+    """
+
+    mechanics: BearingMechanics
+    options: HeatOptions
+    group: BearingSet
+    turning: Array
+    thrust: float
+
+    def log_friction(self, gap: float, speed: float) -> Array:
+        """Logarithm of the friction at every difference, (n_x, n_bearings).
+
+        Differences at which the balls find no equilibrium have the friction of the nearest that has one.
+        """
+        try:
+            heat = self._heat(DIFFERENCES, gap, speed)
+        except (NoEquilibriumError, OutOfValidityError):
+            heat = np.array([self._alone(difference, gap, speed) for difference in DIFFERENCES])
+            known = np.flatnonzero(np.isfinite(heat[:, 0]))
+            if not len(known):
+                raise
+            nearest = [known[np.argmin(np.abs(known - index))] for index in range(len(heat))]
+            heat = heat[nearest]
+        return np.log(heat)
+
+    def _alone(self, difference: float, gap: float, speed: float) -> Array:
+        try:
+            return self._heat((difference,), gap, speed)[0]
+        except (NoEquilibriumError, OutOfValidityError):
+            return np.full(len(self.group.bearing), np.nan)
+
+    def _heat(self, differences: Sequence[float], gap: float, speed: float) -> Array:
+        mounted = self.mechanics.sets[self.group.name]
+        found = solve_states(
+            mounted,
+            speed,
+            mounting.ExternalLoad(self.thrust),
+            [self._temperatures(mounted, difference, gap) for difference in differences],
+            lubricant=self.mechanics.lubricant,
+            control=HEAT_MODELS[self.options.level].ball_attitude,
+            heat=self.options,
+        )
+        return np.array([[state.heat.total for state in states] for states in found])
+
+    def _temperatures(
+        self, mounted: mounting.BearingSet, difference: float, gap: float
+    ) -> mounting.SetTemperatures:
+        """Outer rings as assembled, inner rings and shaft warmer, balls between; the gap as given."""
+        assembly = self.group.assembly_temperature
+        inner = assembly + difference
+        shifts = self.turning * difference
+        shifts[:, 1] = gap - mounted.seats.clearance[1::2]
+        one = mounting.BearingTemperatures(
+            inner,
+            assembly,
+            assembly + 0.5 * difference,
+            NOMINAL_FILM_TEMPERATURE,
+            shaft_seat=inner,
+            housing_seat=assembly,
+        )
+        return mounting.SetTemperatures((one,) * len(self.group.bearing), inner, assembly, assembly, shifts)

@@ -1,0 +1,101 @@
+"""Friction of a set over rings and fit: interpolation, its derivatives, and the term made of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spindle_fem.effects.catalogue.thermal_preload import (
+    MECHANICS,
+    NAME,
+    PreloadMechanicsTerm,
+    ThermalPreload,
+)
+from spindle_fem.effects.framework.term import TermContext
+from tests.support.effect_machines import _spindle
+from tests.support.set_response import OUTER_RING, log_friction, set_response
+
+STEP = 1e-30
+
+
+def test_between_and_beyond_the_points():
+    response = set_response()
+    difference, gap, speed = np.array([3.3, 12.0]), np.array([2.2e-6, -7e-6]), np.array([150.0, 300.0])
+    found = response.friction(difference, gap, speed)
+    for bearing in range(3):
+        exact = log_friction(difference, gap, speed, bearing)
+        assert found[bearing].real == pytest.approx(exact, abs=2e-4)
+    ends = [response.friction([45.0 + x], [0.0], [300.0]).real for x in (0.0, 1.0, 10.0)]
+    assert ends[2] - ends[0] == pytest.approx(10.0 * (ends[1] - ends[0]))
+    fast, faster = (response.friction([5.0], [0.0], [n]).real for n in (450.0, 900.0))
+    assert fast == pytest.approx(faster)
+
+
+@pytest.mark.parametrize("gap", [-40e-6, -3e-6, 60e-6])
+def test_complex_steps_carry_the_derivatives(gap):
+    response = set_response()
+    at = np.array([4.0, 50.0])
+    exact = response.friction(at + 1j * STEP, np.full(2, gap), np.full(2, 200.0)).imag / STEP
+    near = [response.friction(at + side * 1e-4, np.full(2, gap), np.full(2, 200.0)).real for side in (1, -1)]
+    assert exact == pytest.approx((near[0] - near[1]) / 2e-4, rel=1e-5)
+    by_gap = response.friction(at, np.full(2, gap) + 1j * STEP, np.full(2, 200.0)).imag / STEP
+    near = [response.friction(at, np.full(2, gap + side), np.full(2, 200.0)).real for side in (1e-10, -1e-10)]
+    assert by_gap == pytest.approx((near[0] - near[1]) / 2e-10, rel=1e-4, abs=1e-3)
+
+
+def term_of(response):
+    rings = [tuple(f"{name}.{side}_ring" for name in response.bearings) for side in ("inner", "outer")]
+    return PreloadMechanicsTerm("t", *rings, response)
+
+
+def context(term, temperatures, state, speed=300.0, **own):
+    values = term.values({f"t.{name}": value for name, value in own.items()})
+    parameters = {name: np.array([value], dtype=complex) for name, value in values.items()}
+    read = np.array(temperatures, dtype=complex)[:, None]
+    return TermContext(0.0, {"speed": speed}, read, np.array(state, dtype=complex)[:, None], parameters)
+
+
+def test_the_amplitude_is_the_mean_increase_at_ten_kelvin():
+    term = term_of(set_response())
+    for size in (0.05, term.increase):
+        factor = term.friction(context(term, [293.15] * 7, [10.0, 0.0], **{NAME: size})).real[:, 0]
+        assert factor.mean() == pytest.approx(1.0 + size)
+        assert factor[2] > factor[1] > factor[0]
+    assert term.friction(context(term, [293.15] * 7, [10.0, 0.0])).real == pytest.approx(1.0)
+
+
+def test_a_slack_set_keeps_some_friction():
+    term = term_of(set_response())
+    for size in (0.1, 3.0 * term.increase):
+        factor = term.friction(context(term, [293.15] * 7, [-20.0, 0.0], **{NAME: size})).real
+        assert np.all((factor > 0.0) & (factor < 1.0))
+
+
+def test_outer_rings_close_the_gap_that_the_housing_opens():
+    response = set_response()
+    term = term_of(response)
+    warm = [310.0, 311.0, 312.0, 303.0, 304.0, 305.0, 299.0]
+    moved = term.advance(context(term, warm, [1.0, 0.0], lag=600.0), 600.0)[:, 0].real
+    closing = (304.0 - 293.15) - response.housing["housing"] / OUTER_RING * (299.0 - 293.15)
+    kept = np.exp(-1.0)
+    assert moved == pytest.approx([7.0 - 6.0 * kept, closing * (1.0 - kept)])
+    tight, loose = (
+        term.friction(context(term, warm, [5.0, 8.0], **{NAME: 1.0, "outer_clearance": c})).real
+        for c in (0.0, 40e-6)
+    )
+    assert np.all(tight > loose)
+
+
+def test_mechanics_take_the_place_of_the_power_law(tmp_path):
+    view = _spindle(tmp_path)[2]
+    known = replace(view, preload=lambda group: set_response() if group == "front_bearings" else None)
+    labels = [item.label for item in ThermalPreload().candidates(known)]
+    assert labels == [
+        f"thermal_preload @ front_bearings ({MECHANICS})",
+        "thermal_preload @ rear_bearings",
+    ]
+    # a definition may still say either
+    forms = [item.form for item in ThermalPreload().forms(known) if item.component == "front_bearings"]
+    assert forms == ["", MECHANICS]
