@@ -1,4 +1,4 @@
-"""What bearing sets of the recorded spindle answer to warm rings, against figures worked out independently."""
+"""What bearing sets of the recorded spindle answer to warm rings, against independent figures."""
 
 from __future__ import annotations
 
