@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from spindle_fem.definition.bearing_catalogue import RULE
+from spindle_fem.definition.bearing_catalogue import ROLLER_RULE, RULE
 from spindle_fem.definition.field_types import MARKS, NAME_RULE
 from spindle_fem.definition.machine_spec import MACHINE_SCHEMA, MachineSpec
 from spindle_fem.definition.network_tables import NetworkMachineSpec
@@ -30,6 +30,12 @@ from spindle_fem.definition.tolerances import DIAMETER_SHARE, PLACE
 from spindle_fem.registry import Registry
 from spindle_fem.units import ZERO_CELSIUS_K, Uncertain
 from spindle_fem.validity import range_text
+
+
+def _estimate(rule: str) -> str:
+    """What a rule of the catalogue says beside the standard."""
+    return rule.partition("; ")[2]
+
 
 _MARKS = "; ".join(f"{letter} {meaning}" for letter, meaning in MARKS.items())
 _INTRODUCTION = f"""\
@@ -82,10 +88,11 @@ A changed value takes the mark that this file gives it, else U.
 
 ## What ships
 
-`bearing_type = "7014 C"` names a bearing that ships: 719xx, 70xx and 72xx with C (15°), E or AC (25°), bores
-of 20 to 200 mm, with HC at the end for balls of silicon nitride. Boundary dimensions are those of ISO 15;
-the rest is estimated ({RULE}); makers'
-balls differ by up to a tenth in diameter and two in number. `[bearing_types.front]` with `catalogue =
+`bearing_type = "7014 C"` names a bearing that ships: 719xx, 70xx and 72xx with C (15°), E or AC (25°), N10xx
+and NN30xx with cylindrical rollers (`NN3014 K`), bores of 20 to 200 mm, with HC at the end for balls or
+rollers of silicon nitride. Boundary dimensions are those of ISO 15; the rest is estimated. Balls:
+{_estimate(RULE)}. Rollers: {_estimate(ROLLER_RULE)}. Makers' balls and rollers
+differ by up to a tenth in diameter and two in number. `[bearing_types.front]` with `catalogue =
 "7014 C"` and further keys replaces some of it. Materials that need no table: {", ".join(MATERIALS)}.
 Greases for `grease = {{catalogue = NAME}}`: {", ".join(GREASES)}. `spindle-fem check` lists what
 was taken (`assumed`).
@@ -103,7 +110,8 @@ was taken (`assumed`).
 - what is left is adiabatic.
 
 An entry of the file with the name of such a one replaces the values that it gives. `check` lists every
-one; contacts of what turns with what stands have no rule. `geometry/motor_spindle.toml` is written this way.
+one; contacts of what turns with what stands have no rule. `geometry/motor_spindle.toml` and
+`belt_lathe.toml` are written this way.
 
 ## Contacts and surfaces
 

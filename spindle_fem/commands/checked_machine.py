@@ -30,7 +30,7 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
     from spindle_fem.definition.load import examine_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
-    from spindle_fem.operation.assembled_sets import assembled_set
+    from spindle_fem.operation.assembled_sets import assembled_set, require_known_friction
 
     overrides = tuple(overrides)
 
@@ -62,7 +62,12 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
         else:
             check_effects(entries, spec)
 
-    return load_machine(machine, overrides, checks=(fits_together, has_possible_effects))
+    def rubs_by_a_known_law(spec: MachineSpec) -> None:
+        if spec.heat is not None:
+            require_known_friction(spec)
+
+    checks = (fits_together, rubs_by_a_known_law, has_possible_effects)
+    return load_machine(machine, overrides, checks=checks)
 
 
 _ENTRY = re.compile(r"(?:^|: )effect\[(\d+)\]")

@@ -96,8 +96,8 @@ def check_machine(
     -------
     dict
         ``machine``, ``parts``, ``surfaces``, ``contacts``, ``probes``,
-        ``sources``, ``effects``, ``assumed`` (what rules gave that the file leaves out),
-        ``warnings``; of a ``[network]`` machine ``machine``,
+        ``sources``, ``radial_loads`` (of bearing sets), ``effects``, ``assumed``
+        (what rules gave that the file leaves out), ``warnings``; of a ``[network]`` machine ``machine``,
         ``nodes``, ``boundaries``, ``links``, ``sources``, ``effects``,
         ``warnings``.
 
@@ -148,6 +148,7 @@ def check_machine(
             {"name": probe.name, "detail": probe.part or "mixed coolant outlet"} for probe in spec.probe
         ],
         "sources": [{"name": source.name, "detail": _source_detail(source)} for source in spec.source],
+        "radial_loads": _radial_load_rows(spec),
         "effects": _effect_rows(spec.effects),
         "assumed": [
             {"name": item.where, "detail": item.rule} for item in examine_machine(machine, overrides).assumed
@@ -221,6 +222,13 @@ def _check_network(machine: str | Path, overrides: Iterable[str]) -> dict[str, A
         "effects": _effect_rows(spec.effects),
         "warnings": [],
     }
+
+
+def _radial_load_rows(spec: MachineSpec) -> list[dict[str, str]]:
+    from spindle_fem.operation.radial_loads import radial_loads
+
+    loads = radial_loads(spec) if spec.radial_load else {}
+    return [{"name": name, "detail": f"{force:.0f} N"} for name, force in loads.items()]
 
 
 def _draw_faults(picture: Path, machine: str | Path, overrides: Iterable[str], error: FaultsError) -> None:

@@ -1,4 +1,4 @@
-"""Spindle bearings by designation, such as 7014 C: ISO 15 dimensions, balls by an estimating rule."""
+"""Spindle bearings by designation, such as 7014 C, NN3014 K: ISO 15 dimensions, balls and rollers by rule."""
 
 from __future__ import annotations
 
@@ -32,20 +32,35 @@ _WIDTH = {
 }  # fmt: skip
 # Designation prefix: diameter series, dimension series, most of the section's height that the ball fills.
 _BALL_SERIES = {"719": ("9", "19", 0.60), "70": ("0", "10", 0.635), "72": ("2", "02", 0.635)}
-_ROLLER_SERIES = {"N10": ("0", "10"), "NN30": ("0", "30")}
+# Designation prefix: diameter series, dimension series, rows.
+_ROLLER_SERIES = {"N10": ("0", "10", 1), "NN30": ("0", "30", 2)}
 _ANGLES = {"C": "15 deg", "E": "25 deg", "AC": "25 deg"}
 _BALL_STEP = 25.4 / 32.0
 _PITCH_FILL = 0.85
 _SHOULDER = 0.6
+# Of the section's height: the outer ring, whose raceway has no ribs in N and NN designs, and the rollers.
+_OUTER_WALL = 0.25
+_ROLLER = 0.45
+# Of the rollers' length, which is their diameter: what bears between the relieved edges.
+_BEARING_LENGTH = 0.9
 
 _BALL = re.compile(r"(719|70|72)(\d\d)[ _]?(C|E|AC)([ _/]?HC)?", re.ASCII)
-_ROLLER = re.compile(r"(NN30|N10)(\d\d)(?:[ _]?K)?", re.ASCII)
+_ROLLERS = re.compile(r"(NN30|N10)(\d\d)(?:[ _]?K)?([ _/]?HC)?", re.ASCII)
 RULE = (
     "boundary dimensions of ISO 15; the largest ball of whole 1/32 in within 0.60 (719) or 0.635 (70, 72) "
     "of the section, on 0.85 of the pitch circle; shoulders 0.6 ball diameters from it; grooves of 0.52"
 )
 
-SHIPPED = "Ball bearings that ship: 719xx, 70xx, 72xx with C, E or AC, bores 20 to 200 mm, such as 7014 C."
+ROLLER_RULE = (
+    "boundary dimensions of ISO 15; the outer raceway a quarter of the section's height inside the outside "
+    "diameter; rollers of whole millimetres nearest to 0.45 of the section, as long as thick, 0.9 of it "
+    "bearing, on 0.85 of the pitch circle; no clearance as mounted"
+)
+
+SHIPPED = (
+    "Bearings that ship: 719xx, 70xx, 72xx with C, E or AC, such as 7014 C, N10xx and NN30xx, such as "
+    "NN3014 K, bores 20 to 200 mm."
+)
 
 
 def boundary_dimensions(designation: str) -> tuple[float, float, float] | None:
@@ -57,12 +72,12 @@ def boundary_dimensions(designation: str) -> tuple[float, float, float] | None:
     >>> boundary_dimensions("7014 C")
     (0.07, 0.11, 0.02)
     """
-    ball, roller = _BALL.fullmatch(designation), _ROLLER.fullmatch(designation)
+    ball, roller = _BALL.fullmatch(designation), _ROLLERS.fullmatch(designation)
     if ball:
         diameter_series, dimension_series, _ = _BALL_SERIES[ball[1]]
         code = ball[2]
     elif roller:
-        diameter_series, dimension_series = _ROLLER_SERIES[roller[1]]
+        diameter_series, dimension_series, _ = _ROLLER_SERIES[roller[1]]
         code = roller[2]
     else:
         return None
@@ -73,35 +88,47 @@ def boundary_dimensions(designation: str) -> tuple[float, float, float] | None:
     return bore / 1e3, _OUTER[diameter_series][place] / 1e3, _WIDTH[dimension_series][place] / 1e3
 
 
-def is_roller_bearing(designation: str) -> bool:
-    """Whether a designation is one of N10xx or NN30xx, which are known by their boundary dimensions only."""
-    return bool(_ROLLER.fullmatch(designation)) and boundary_dimensions(designation) is not None
-
-
 def catalogue_bearing(designation: str) -> dict[str, Any] | None:
-    """Raw ``[bearing_types]`` table of a ball bearing; None where it is not in the catalogue.
+    """Raw ``[bearing_types]`` table of a bearing; None where it is not in the catalogue.
 
     Boundary dimensions and contact angle (C 15, E and AC 25 degrees) are the
-    standard's and the series' (marked C). Balls are estimated (marked A): published
+    standard's and the series' (marked C). Balls and rollers are estimated (marked A): published
     ones of single makers differ by up to a tenth in diameter and two in number.
-    ``HC`` at the end: balls of silicon nitride.
+    ``HC`` at the end: balls or rollers of silicon nitride.
 
-    >>> catalogue_bearing("7014 C")["ball_count"]
-    19
+    >>> catalogue_bearing("7014 C")["ball_count"], catalogue_bearing("NN3014 K")["roller_diameter"]
+    (19, '9 mm')
     """
-    match, dimensions = _BALL.fullmatch(designation), boundary_dimensions(designation)
-    if match is None or dimensions is None:
+    dimensions = boundary_dimensions(designation)
+    if dimensions is None:
         return None
+    ball, roller = _BALL.fullmatch(designation), _ROLLERS.fullmatch(designation)
     bore, outer, width = (1e3 * value for value in dimensions)
+    table = _balls(ball, bore, outer) if ball else _rollers(roller, bore, outer)
+    boundary = {"bore_diameter": bore, "outer_diameter": outer, "width": width}
+    given = ("contact_angle",) if ball else ("rows",)
+    return {
+        "marks": {"default": "A", **dict.fromkeys((*boundary, *given), "C")},
+        **{key: _millimetres(value) for key, value in boundary.items()},
+        **table,
+        "ring_material": "bearing_steel",
+    }
+
+
+def estimated(table: dict[str, Any]) -> str:
+    """Balls or rollers of a completed table in words, with the rule of those that were estimated."""
+    if "roller_count" in table:
+        size = f"{table['roller_diameter']} x {table['roller_length']}"
+        return f"{table.get('rows', 1)} x {table['roller_count']} rollers of {size}; {ROLLER_RULE}"
+    return f"{table['ball_count']} balls of {table['ball_diameter']}; {RULE}"
+
+
+def _balls(match: re.Match[str], bore: float, outer: float) -> dict[str, Any]:
+    """What a ball bearing adds to its boundary (mm)."""
     fill = _BALL_SERIES[match[1]][2]
     ball = _BALL_STEP * math.floor(fill * 0.5 * (outer - bore) / _BALL_STEP + 1e-9)
     pitch = 0.5 * (bore + outer)
-    given = ("bore_diameter", "outer_diameter", "width", "contact_angle", "pitch_diameter")
     return {
-        "marks": {"default": "A", **dict.fromkeys(given[:4], "C")},
-        "bore_diameter": _millimetres(bore),
-        "outer_diameter": _millimetres(outer),
-        "width": _millimetres(width),
         "inner_ring_outer_diameter": _millimetres(pitch - _SHOULDER * ball),
         "outer_ring_inner_diameter": _millimetres(pitch + _SHOULDER * ball),
         "ball_diameter": _millimetres(ball),
@@ -110,8 +137,26 @@ def catalogue_bearing(designation: str) -> dict[str, Any] | None:
         "contact_angle": _ANGLES[match[3]],
         "groove_curvature_inner": 0.52,
         "groove_curvature_outer": 0.52,
-        "ring_material": "bearing_steel",
         "ball_material": "silicon_nitride" if match[4] else "bearing_steel",
+    }
+
+
+def _rollers(match: re.Match[str], bore: float, outer: float) -> dict[str, Any]:
+    """What a cylindrical roller bearing adds to its boundary (mm)."""
+    section = 0.5 * (outer - bore)
+    raceway = outer - 2.0 * _OUTER_WALL * section
+    roller = math.floor(_ROLLER * section + 0.5)
+    pitch = raceway - roller
+    return {
+        "kind": "cylindrical_roller",
+        "inner_ring_outer_diameter": _millimetres(pitch - roller),
+        "outer_ring_inner_diameter": _millimetres(raceway),
+        "roller_diameter": _millimetres(roller),
+        "roller_length": _millimetres(_BEARING_LENGTH * roller),
+        "roller_count": round(_PITCH_FILL * math.pi * pitch / roller),
+        "rows": _ROLLER_SERIES[match[1]][2],
+        "pitch_diameter": _millimetres(pitch),
+        "roller_material": "silicon_nitride" if match[3] else "bearing_steel",
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from spindle_fem.definition.machine_spec import BearingSet, BearingType, MachineSpec
+from spindle_fem.definition.machine_spec import BallBearingType, BearingSet, BearingType, MachineSpec
 from spindle_fem.definition.solid_tables import SetBearing
 from spindle_fem.errors import SpecError, SpindleFemError
 
@@ -32,7 +32,7 @@ def seat_diameter(
     return None
 
 
-def seat_faults(spec: MachineSpec, group: BearingSet, kind: BearingType) -> Iterator[SpindleFemError]:
+def seat_faults(spec: MachineSpec, group: BearingSet, kind: BallBearingType) -> Iterator[SpindleFemError]:
     """Rings of a set with a fit that sit on nothing, or looser than their bearing."""
     play = kind.play
     for key, clearance in (

@@ -16,6 +16,7 @@ from spindle_fem.errors import SpindleFemError
 from spindle_fem.units import to_si
 
 _UNKNOWN_WIDTH = 0.01
+_MATERIAL_KEYS = ("ring_material", "ball_material", "roller_material")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +92,8 @@ def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
         taken = [key for key in found if key not in table and key != "marks"]
         types[name] = _under(found, table)
         if taken:
-            balls = f"{types[name]['ball_count']} balls of {types[name]['ball_diameter']}"
-            assumed.append(
-                Assumption(f"bearing_types.{name}", f"{designation}: {balls}; {bearing_catalogue.RULE}")
-            )
+            text = f"{designation}: {bearing_catalogue.estimated(types[name])}"
+            assumed.append(Assumption(f"bearing_types.{name}", text))
     if groups:
         content["bearing_set"] = groups
     if types:
@@ -157,7 +156,7 @@ def _materials(content: dict[str, Any], assumed: list[Assumption]) -> None:
         return
     kinds = [kind for kind in types.values() if isinstance(kind, Mapping)]
     named = [part.get("material") for part in tables_of(content.get("part"))]
-    named += [kind.get(key) for kind in kinds for key in ("ring_material", "ball_material")]
+    named += [kind.get(key) for kind in kinds for key in _MATERIAL_KEYS]
     materials = dict(given)
     for name in named:
         if isinstance(name, str) and name not in materials and name in standard_materials.MATERIALS:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
-from spindle_fem.definition.bearing_catalogue import SHIPPED, is_roller_bearing
-from spindle_fem.definition.bearing_seats import followed_joint_faults, seat_faults
+from spindle_fem.definition.bearing_faults import bearing_faults
+from spindle_fem.definition.bearing_seats import followed_joint_faults
+from spindle_fem.definition.bearing_types import BearingType
 from spindle_fem.definition.displacement_faults import displacement_faults
-from spindle_fem.definition.machine_spec import BearingType, MachineSpec, Probe
+from spindle_fem.definition.machine_spec import MachineSpec, Probe
 from spindle_fem.definition.schema import names_of
 from spindle_fem.errors import SpecError, SpindleFemError, UnknownSurfaceError, did_you_mean
 
@@ -25,6 +26,7 @@ _LISTS = (
     "probe",
     "displacement_sensor",
     "source",
+    "radial_load",
 )
 _TOLERANCE = 1.0e-9
 # Makers of bearing balls give 300 to 315 GPa, 0.24 to 0.27, 2.2e-6 to 3.3e-6 1/K.
@@ -129,7 +131,9 @@ def find_faults(spec: MachineSpec, declared: Declared | None = None) -> list[Spi
     return [
         *_duplicates(declared),
         *_materials(spec, declared),
-        *_bearings(spec, declared),
+        *bearing_faults(
+            spec, declared.names["bearing_types"], all_sound="bearing_set" not in declared.unsound
+        ),
         *_cooling(spec, declared),
         *_heat(spec, declared),
         *_sources(spec, declared),
@@ -171,57 +175,23 @@ def _materials(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemErro
         if part.material not in materials:
             yield _unknown(f"part.{part.name}.material", part.material, "material", materials)
     for name, kind in spec.bearing_types.items():
-        for key in ("ring_material", "ball_material"):
+        for key in ("ring_material", f"{kind.element_word}_material"):
             if getattr(kind, key) not in materials:
                 yield _unknown(f"bearing_types.{name}.{key}", getattr(kind, key), "material", materials)
     # Steel's values, the defaults, are wrong by half for ceramics.
     mixed = {
-        kind.ball_material
+        kind.element_material
         for kind in spec.bearing_types.values()
-        if kind.ball_material != kind.ring_material and kind.ring_material in materials
+        if kind.element_material != kind.ring_material and kind.ring_material in materials
     }
     for name in sorted(mixed):
         balls = spec.materials.get(name)
         for key in ("young_modulus", "poisson_ratio", "thermal_expansion") if balls is not None else ():
             if key not in balls.model_fields_set:
-                what = "is missing, but balls of other material than their rings are made of it."
+                what = "is missing, but balls or rollers of other material than their rings are made of it."
                 yield SpecError(
                     f"materials.{name}.{key}", what, f"Give it; silicon nitride: {SILICON_NITRIDE[key]}."
                 )
-
-
-def _bearings(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
-    for group in spec.bearing_set:
-        if group.bearing_type not in declared.names["bearing_types"]:
-            where, allowed = f"bearing_set.{group.name}.bearing_type", declared.names["bearing_types"]
-            if is_roller_bearing(group.bearing_type):
-                what = f'"{group.bearing_type}" is a roller bearing, which cannot be computed.'
-                yield SpecError(where, what, SHIPPED)
-            else:
-                fault = _unknown(where, group.bearing_type, "bearing type", allowed)
-                yield SpecError(where, fault.what, f"{fault.how_to_fix} {SHIPPED}".strip())
-        kind = spec.bearing_types.get(group.bearing_type)
-        if kind is None:
-            continue
-        for bearing in group.bearing:
-            width = bearing.z[1] - bearing.z[0]
-            if abs(width - kind.width) > _TOLERANCE:
-                yield SpecError(
-                    f"bearing_set.{group.name}.bearing.{bearing.name}.z",
-                    f"spans {width * 1e3:g} mm.",
-                    f'Allowed: {kind.width * 1e3:g} mm, the width of "{group.bearing_type}".',
-                )
-        if group.fit is not None:
-            yield from seat_faults(spec, group, kind)
-    carriers = [group.name for group in spec.bearing_set if group.carries_thrust]
-    if spec.bearing_set and len(carriers) != 1 and "bearing_set" not in declared.unsound:
-        yield SpecError(
-            "bearing_set",
-            f"{', '.join(carriers)} have carries_thrust = true."
-            if carriers
-            else "none has carries_thrust = true.",
-            "Allowed: exactly one set.",
-        )
 
 
 def _cooling(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:

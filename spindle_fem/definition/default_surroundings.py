@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
+from spindle_fem.definition.bearing_types import BearingType
 from spindle_fem.definition.drawn_tables import part_geometry, ring_geometries, surface_definition
 from spindle_fem.definition.exchange_tables import JointGroup, Surface, raceway_surfaces
-from spindle_fem.definition.solid_tables import BearingType, Part, SetBearing
+from spindle_fem.definition.solid_tables import Part, SetBearing
 from spindle_fem.machine.geometry.faces import VOID, Piece, in_millimetres
 from spindle_fem.machine.geometry.meridian import MeridianMap
 from spindle_fem.machine.geometry.part_shapes import PartGeometry, SurfaceDefinition
@@ -117,7 +118,7 @@ def _drawn(content: Mapping[str, Any]) -> _Drawn | None:
 def _sound(model: Any, tables: Any) -> Iterator[Any]:
     for table in tables if isinstance(tables, list) else ():
         with contextlib.suppress(ValidationError):
-            yield model.model_validate(table)
+            yield TypeAdapter(model).validate_python(table)
 
 
 def _joints(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]:

@@ -1,11 +1,15 @@
-"""What tables of a definition draw in the meridian plane: parts, rings of bearings, named surfaces."""
+"""What tables of a definition draw: parts, rings, balls and rollers of bearings, named surfaces."""
 
 from __future__ import annotations
 
+import math
+
+from spindle_fem.definition.bearing_types import BearingType
 from spindle_fem.definition.exchange_tables import Surface
-from spindle_fem.definition.solid_tables import BearingType, Part, SetBearing
+from spindle_fem.definition.solid_tables import Part, SetBearing
 from spindle_fem.machine.geometry.part_shapes import (
     AnnularSegment,
+    BallRowGeometry,
     FaceBox,
     PartGeometry,
     SurfaceDefinition,
@@ -28,6 +32,24 @@ def ring_geometries(bearing: SetBearing, kind: BearingType) -> tuple[PartGeometr
     return (
         PartGeometry(f"{bearing.name}.inner_ring", (inner,), True),
         PartGeometry(f"{bearing.name}.outer_ring", (outer,), False),
+    )
+
+
+def element_rows(bearing: SetBearing, kind: BearingType) -> tuple[BallRowGeometry, ...]:
+    """Rows of balls or rollers of a bearing; two share its width and are staggered by half a pitch."""
+    middle, number = 0.5 * sum(bearing.z), kind.element_count
+    return tuple(
+        BallRowGeometry(
+            bearing.name,
+            middle + kind.width * ((row + 0.5) / kind.rows - 0.5),
+            0.5 * kind.pitch,
+            kind.element_diameter,
+            number,
+            kind.element_length,
+            row * math.pi / number,
+            1 + row * number,
+        )
+        for row in range(kind.rows)
     )
 
 

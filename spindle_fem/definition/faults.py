@@ -39,7 +39,7 @@ def validation_faults(
     """
     faults: dict[tuple[str, str], SpindleFemError] = {}
     for item in error.errors(include_url=False):
-        path = key_path(item["loc"], content)
+        path = key_path(_untagged(item, content), content)
         for fault in _faults_of(item, model, content):
             where = (
                 path + fault.key if fault.key.startswith("[") else ".".join(filter(None, (path, fault.key)))
@@ -48,6 +48,19 @@ def validation_faults(
             made = error_class(f"{source}: {where}" if source else where, fault.what, fault.how_to_fix)
             faults.setdefault((made.where, made.what), made)
     return list(faults.values())
+
+
+def _untagged(item: Any, content: Any) -> Location:
+    """Location without the tag of a union, which ends it where a whole table is at fault."""
+    location, node = item["loc"], content
+    if item["type"] != "faults":
+        return location
+    for step in location[:-1]:
+        known = isinstance(node, Mapping) and step in node
+        listed = isinstance(node, (list, tuple)) and isinstance(step, int) and step < len(node)
+        node = node[step] if known or listed else None
+    tagged = isinstance(node, Mapping) and isinstance(location[-1], str) and location[-1] not in node
+    return location[:-1] if tagged else location
 
 
 def key_path(location: Location, content: Any = None) -> str:

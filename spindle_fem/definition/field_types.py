@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NoReturn
 
@@ -263,13 +263,24 @@ NAME_RULE = "letters, digits, _ and . (first a letter or digit), at most 64 char
 
 
 def _read_name(value: Any) -> str:
-    if not isinstance(value, str) or _NAME.fullmatch(value) is None:
+    if not isinstance(value, str) or not is_name(value):
         shown = f'"{value}"' if isinstance(value, str) else repr(value)
         _refuse(f"{shown} is not a name.", f"Allowed: {NAME_RULE}.")
     return value
 
 
 Name = Annotated[str, BeforeValidator(_read_name)]
+
+
+def is_name(value: str) -> bool:
+    """Whether a text may be a name.
+
+    >>> is_name("F1.inner_ring"), is_name("7014 C")
+    (True, False)
+    """
+    return _NAME.fullmatch(value) is not None
+
+
 Flag = Annotated[bool, Field(strict=True)]
 
 _LENGTH_RULE = QuantityRule("m")
@@ -324,19 +335,31 @@ class ChoiceRule:
     """What a field may be that names a registered thing; also the source of the reference page."""
 
     things: Registry
+    keep: Callable[[str], bool] | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the field may be."""
+        return tuple(name for name in self.things if self.keep is None or self.keep(name))
 
     def read(self, value: Any) -> str:
         """The name, if there is such a thing."""
-        names = tuple(self.things)
+        names = self.names
         if not isinstance(value, str) or value not in names:
             shown = f'"{value}"' if isinstance(value, str) else repr(value)
             _refuse(f"{shown} is not allowed.", did_you_mean(str(value), names))
         return value
 
 
-def choice_field(package: str) -> Any:
-    """Annotated text: the name of a thing that a registry has, one file each in a package."""
-    rule = ChoiceRule(registry(package))
+def choice_field(package: str, keep: Callable[[str], bool] | None = None) -> Any:
+    """Annotated text: the name of a thing that a registry has, one file each in a package.
+
+    Parameters
+    ----------
+    keep : callable, optional
+        Which names count; all where none is given.
+    """
+    rule = ChoiceRule(registry(package), keep)
     return Annotated[str, BeforeValidator(rule.read), rule]
 
 

@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from spindle_fem.definition.bearing_types import BallBearingType, BearingType, RollerBearingType
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.exchange_tables import (
     Channel,
@@ -55,7 +56,6 @@ from spindle_fem.definition.solid_tables import (
     AnnulusSegment,
     BallRow,
     BearingSet,
-    BearingType,
     Grease,
     Material,
     Part,
@@ -80,6 +80,23 @@ class Operation(SpecModel):
     """External axial force on the shaft, positive towards the rear."""
     ambient_temperature: Temperature
     """Temperature of the air around the machine."""
+
+
+class RadialLoad(SpecModel):
+    """A force across the shaft: the pull of a belt, a tool's.
+
+    Sets with `carries_radial` hold it as supports hold a rigid beam; bearings of a set share what
+    reaches it.
+    """
+
+    name: Name
+    """For messages."""
+    force: PositiveForce
+    """Constant."""
+    z: Length
+    """Where it acts along the axis; beside the bearings too."""
+    angle: Angle = 0.0
+    """Where to it pulls; 0 is up."""
 
 
 class HeatTable(SpecModel):
@@ -262,6 +279,8 @@ class MachineSpec(SpecModel):
     """Rules that give joints, outer surfaces and air gaps where the file gives none."""
     operation: Operation
     """Operating point."""
+    radial_load: tuple[RadialLoad, ...] = ()
+    """Forces across the shaft."""
     materials: dict[str, Material] = Field(default_factory=dict)
     """Solids by name; those that ship need not be given."""
     part: Annotated[tuple[Part, ...], Field(min_length=1)]
@@ -340,6 +359,7 @@ class MachineSpec(SpecModel):
 __all__ = [
     "MACHINE_SCHEMA",
     "AnnulusSegment",
+    "BallBearingType",
     "BallRow",
     "BearingSet",
     "BearingType",
@@ -364,6 +384,8 @@ __all__ = [
     "Part",
     "Ports",
     "Probe",
+    "RadialLoad",
+    "RollerBearingType",
     "RotatingFilm",
     "SensorSpot",
     "SetBearing",

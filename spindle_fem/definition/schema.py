@@ -120,7 +120,7 @@ def literal_values(annotation: Any) -> tuple[Any, ...]:
     """The allowed values of a field that takes one of a few."""
     alternatives, metadata = _peeled(annotation)
     listed = [value for item in alternatives if get_origin(item) is Literal for value in get_args(item)]
-    return (*listed, *(name for item in metadata if isinstance(item, ChoiceRule) for name in item.things))
+    return (*listed, *(name for item in metadata if isinstance(item, ChoiceRule) for name in item.names))
 
 
 def registry_of(annotation: Any) -> Registry | None:

@@ -1,14 +1,13 @@
-"""Tables of a machine definition: materials, parts, bearings and their grease."""
+"""Tables of a machine definition: materials, parts, bearing sets and their grease."""
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from spindle_fem.definition.bearing_catalogue import SHIPPED
 from spindle_fem.definition.field_types import (
-    Angle,
     Conductivity,
     Density,
     Fault,
@@ -17,7 +16,6 @@ from spindle_fem.definition.field_types import (
     HeatCapacity,
     Name,
     OilViscosity,
-    PositiveForce,
     PositiveLength,
     Preload,
     Pressure,
@@ -30,19 +28,27 @@ from spindle_fem.definition.field_types import (
     UncertainConductance,
     UncertainLength,
     UncertainNumber,
-    choice_field,
+    is_name,
     quantity_field,
     raise_faults,
 )
 from spindle_fem.units import Uncertain
 
-BearingKind = choice_field("spindle_fem.physics.bearings.bearing_kinds")
-GrooveCurvature = quantity_field("", at_least=0.505, at_most=0.6)
 PoissonRatio = quantity_field("", at_least=0.0, at_most=0.5)
 PathFill = quantity_field("", at_least=0.0, at_most=0.3)
 FilmStarvation = quantity_field("", at_least=0.1, at_most=1.0)
 ThermalExpansion = quantity_field("1/K", at_least=0.0, at_most=1.0e-4)
 FitDiameter = quantity_field("m", at_least=-1.0e-3, at_most=1.0e-3)
+
+
+def _read_bearing_type(value: Any) -> Any:
+    """What may name a type; designations of bearings that ship have become names before."""
+    if isinstance(value, str) and not is_name(value):
+        raise_faults([Fault("", f'"{value}" is no name and no bearing that ships.', SHIPPED)])
+    return value
+
+
+BearingTypeName = Annotated[Name, BeforeValidator(_read_bearing_type)]
 
 
 class Material(SpecModel):
@@ -109,124 +115,6 @@ class Part(SpecModel):
     """Rings that are fused to the solid; they share faces or overlap."""
 
 
-class BearingType(SpecModel):
-    """Catalogue dimensions of a ball bearing.
-
-    With ``catalogue``, and of a bearing that ships and that a set names
-    directly, what is given here replaces the catalogue's.
-    """
-
-    catalogue: str | None = None
-    """Designation of a bearing that ships, such as ``7014 C``, which gives what is missing."""
-    kind: BearingKind = "angular_contact_ball"
-    """Kind of bearing, for the empirical friction models."""
-    bore_diameter: PositiveLength
-    """Bore of the inner ring."""
-    outer_diameter: PositiveLength
-    """Outside of the outer ring."""
-    width: PositiveLength
-    """Width of both rings."""
-    inner_ring_outer_diameter: PositiveLength
-    """Cylinder that stands for the inner ring's outside, where its heat enters."""
-    outer_ring_inner_diameter: PositiveLength
-    """Cylinder that stands for the outer ring's inside, where its heat enters."""
-    ball_diameter: PositiveLength
-    """Between the groove bottoms."""
-    ball_count: Annotated[int, Field(ge=3, le=200, strict=True)]
-    """In one row."""
-    pitch_diameter: PositiveLength | None = None
-    """The middle of bore and outside where none is given."""
-    contact_angle: Angle
-    """Unloaded, above 0 up to 60 degrees."""
-    groove_curvature_inner: GrooveCurvature
-    """Groove radius over ball diameter."""
-    groove_curvature_outer: GrooveCurvature
-    """Groove radius over ball diameter."""
-    basic_static_load: PositiveForce | None = None
-    """C0 of the catalogue, for the empirical friction models."""
-    ring_material: Name
-    """A key of `[materials]`."""
-    ball_material: Name
-    """A key of `[materials]`."""
-    young_modulus: Pressure = 206.0e9
-    """Young's modulus of the rings, and of balls of the same material."""
-    poisson_ratio: PoissonRatio = 0.3
-    """Poisson's ratio of the rings, and of balls of the same material."""
-    roughness_raceway: PositiveLength = 0.05e-6
-    """Root mean square (Rq)."""
-    roughness_ball: PositiveLength = 0.01e-6
-    """Root mean square (Rq)."""
-
-    @model_validator(mode="after")
-    def _check(self) -> BearingType:
-        raise_faults([*self._ring_faults(), *self._ball_faults()])
-        return self
-
-    def _ring_faults(self) -> list[Fault]:
-        names = ("bore_diameter", "inner_ring_outer_diameter", "outer_ring_inner_diameter", "outer_diameter")
-        diameters = [getattr(self, name) for name in names]
-        return [
-            Fault(
-                names[position],
-                f"{diameters[position] * 1e3:g} mm does not exceed "
-                f"{names[position - 1]} {diameters[position - 1] * 1e3:g} mm.",
-                f"Diameters must grow in the order {', '.join(names)}.",
-            )
-            for position in range(1, 4)
-            if diameters[position] <= diameters[position - 1]
-        ]
-
-    def _ball_faults(self) -> list[Fault]:
-        faults = []
-        ball, pitch = f"{self.ball_diameter * 1e3:g}", f"{self.pitch * 1e3:g}"
-        key = "pitch_diameter" if self.pitch_diameter is not None else "ball_diameter"
-        if (
-            not self.bore_diameter
-            < self.pitch - self.ball_diameter
-            < self.pitch + self.ball_diameter
-            < self.outer_diameter
-        ):
-            faults.append(
-                Fault(
-                    key,
-                    f"balls of {ball} mm on {pitch} mm cut through a ring.",
-                    "pitch_diameter ± ball_diameter must lie between the bore "
-                    f"{self.bore_diameter * 1e3:g} mm and the outside {self.outer_diameter * 1e3:g} mm.",
-                )
-            )
-        most = int(math.pi / math.asin(min(1.0, self.ball_diameter / self.pitch)))
-        if self.ball_count > most:
-            faults.append(
-                Fault(
-                    "ball_count",
-                    f"{self.ball_count} balls of {ball} mm do not fit the pitch diameter {pitch} mm.",
-                    f"Allowed: at most {most}.",
-                )
-            )
-        if not 0.0 < self.contact_angle <= math.radians(60.0) + 1e-9:
-            faults.append(
-                Fault(
-                    "contact_angle",
-                    f"{math.degrees(self.contact_angle):g} deg is no angular contact.",
-                    "Allowed: above 0 up to 60 deg.",
-                )
-            )
-        return faults
-
-    @property
-    def pitch(self) -> float:
-        """Pitch diameter in m; the middle of bore and outside where none is given."""
-        if self.pitch_diameter is not None:
-            return self.pitch_diameter
-        return 0.5 * (self.bore_diameter + self.outer_diameter)
-
-    @property
-    def play(self) -> float:
-        """Of the raceways on the diameter before mounting, m."""
-        apart = (self.groove_curvature_inner + self.groove_curvature_outer - 1.0) * self.ball_diameter
-        return 2.0 * apart * (1.0 - math.cos(self.contact_angle))
-
-
 class SetBearing(SpecModel):
     """One bearing of a set."""
 
@@ -234,8 +122,8 @@ class SetBearing(SpecModel):
     """Its rings are the parts `NAME.inner_ring` and `NAME.outer_ring`."""
     z: Range
     """From and to of its rings, as long as the type is wide; or where they begin."""
-    takes_thrust: Literal["towards_rear", "towards_nose"]
-    """Direction of the force on the shaft that this bearing carries."""
+    takes_thrust: Literal["towards_rear", "towards_nose"] | None = None
+    """Direction of the force on the shaft that this ball bearing carries; rollers carry none."""
 
 
 class BallRow(SpecModel):
@@ -289,10 +177,11 @@ class BearingSet(SpecModel):
 
     name: Name
     """Shared factors and overrides use it."""
-    bearing_type: Name
-    """A key of ``[bearing_types]``, or a bearing that ships, such as ``7014 C``."""
-    preload: Preload
-    """Force through the set; bearings in tandem share it."""
+    bearing_type: BearingTypeName
+    """A key of ``[bearing_types]``, or a bearing that ships, such as ``7014 C`` or ``NN3014 K``."""
+    preload: Preload = 0.0
+    """Force through the set, which sets of ball bearings must give; bearings in tandem share it. Rollers
+    have `radial_clearance` instead."""
     preload_kind: Literal["rigid", "spring"] = "rigid"
     """Held by a distance (rings, locknut) or by a force (springs)."""
     fit: Fit | None = None
@@ -300,7 +189,9 @@ class BearingSet(SpecModel):
     assembly_temperature: Temperature = 293.15
     """At which preload and fits are measured."""
     carries_thrust: Flag = False
-    """Exactly one set of a machine takes the external thrust."""
+    """Exactly one set of a machine, of ball bearings, takes the external thrust."""
+    carries_radial: Flag = True
+    """Whether the set holds the shaft against radial loads; false for one with play in its housing."""
     heat_factor: UncertainNumber = Uncertain(1.0)
     """Factor on the friction heat of every bearing of the set."""
     ball_row: BallRow = BallRow()
@@ -311,7 +202,8 @@ class BearingSet(SpecModel):
     @model_validator(mode="after")
     def _check(self) -> BearingSet:
         directions = {bearing.takes_thrust for bearing in self.bearing}
-        if self.preload_kind == "rigid" and self.preload > 0.0 and len(directions) == 1:
+        one_way = len(directions) == 1 and None not in directions
+        if self.preload_kind == "rigid" and self.preload > 0.0 and one_way:
             raise_faults(
                 [
                     Fault(
@@ -373,7 +265,6 @@ __all__ = [
     "AnnulusSegment",
     "BallRow",
     "BearingSet",
-    "BearingType",
     "Fit",
     "Grease",
     "Material",

@@ -6,12 +6,13 @@ import math
 from typing import Literal
 
 from spindle_fem.definition.bearing_seats import seat_diameter
-from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
+from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, RollerBearingType
 from spindle_fem.definition.solid_tables import Material, SetBearing
 from spindle_fem.errors import SpecError
 from spindle_fem.physics.bearings import mounting
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_EXPANSION, BearingGeometry
 from spindle_fem.physics.bearings.fits import FitTemperatures, RingFits, mounted_state, seated_rings
+from spindle_fem.physics.bearings.heat_model import friction_model_names
 from spindle_fem.physics.bearings.hertz import (
     INNER,
     STATIC_PRESSURE,
@@ -19,11 +20,13 @@ from spindle_fem.physics.bearings.hertz import (
     maximum_pressure,
 )
 from spindle_fem.physics.bearings.rings import SeatMaterial
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
+from spindle_fem.physics.bearings.roller_set import RollerSet
 
 _ORIENTATION = {"towards_rear": 1, "towards_nose": -1}
 
 
-def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
+def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet | RollerSet:
     """A set of a machine for the laws of its bearings.
 
     Raises
@@ -32,6 +35,8 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
         A fit that leaves no play for the preload, or a preload that the balls do not bear.
     """
     kind = spec.bearing_types[group.bearing_type]
+    if isinstance(kind, RollerBearingType):
+        return _roller_set(spec, group, kind)
     rings, balls = spec.materials[kind.ring_material], spec.materials[kind.ball_material]
     hybrid = kind.ball_material != kind.ring_material
     geometry = BearingGeometry(
@@ -77,6 +82,53 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet:
     if group.fit is not None:
         _require_holding(group, mounted)
     return mounted
+
+
+def require_known_friction(spec: MachineSpec) -> None:
+    """Refuse a heat model that does not know the kinds of bearing of a machine.
+
+    Raises
+    ------
+    SpecError
+    """
+    types = (spec.bearing_types[group.bearing_type] for group in spec.bearing_set)
+    known = friction_model_names(rollers=True)
+    model = spec.heat.model
+    if model not in (*known, "table") and any(isinstance(kind, RollerBearingType) for kind in types):
+        what = f'"{model}" knows ball bearings only, and this machine has roller bearings.'
+        raise SpecError("heat.model", what, f"Allowed: {', '.join((*known, 'table'))}.")
+
+
+def _roller_set(spec: MachineSpec, group: BearingSet, kind: RollerBearingType) -> RollerSet:
+    rings, rollers = spec.materials[kind.ring_material], spec.materials[kind.roller_material]
+    hybrid = kind.roller_material != kind.ring_material
+    geometry = RollerGeometry(
+        roller_diameter=kind.roller_diameter,
+        roller_length=kind.roller_length,
+        roller_count=kind.roller_count,
+        pitch_diameter=kind.pitch,
+        rows=kind.rows,
+        radial_clearance=kind.radial_clearance,
+        young_modulus=kind.young_modulus,
+        poisson_ratio=kind.poisson_ratio,
+        roller_young_modulus=rollers.young_modulus if hybrid else kind.young_modulus,
+        roller_poisson_ratio=rollers.poisson_ratio if hybrid else kind.poisson_ratio,
+        density=rollers.density,
+        ring_density=rings.density,
+        thermal_expansion=rings.thermal_expansion,
+        roller_thermal_expansion=rollers.thermal_expansion,
+        bore_diameter=kind.bore_diameter,
+        outer_diameter=kind.outer_diameter,
+        palmgren_lubrication_factor=kind.palmgren_f0,
+        kind=kind.kind,
+    )
+    return RollerSet(
+        names=tuple(bearing.name for bearing in group.bearing),
+        geometry=geometry,
+        shaft_bore_diameter=_shaft_bore(spec, group),
+        raceway_roughness=kind.roughness_raceway,
+        roller_roughness=kind.roughness_roller,
+    )
 
 
 def _require_holding(group: BearingSet, mounted: mounting.BearingSet) -> None:

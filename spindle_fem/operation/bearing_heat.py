@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
 from spindle_fem.errors import OutOfValidityError
-from spindle_fem.operation.assembled_sets import assembled_set
+from spindle_fem.operation.assembled_sets import assembled_set, require_known_friction
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.radial_loads import radial_loads
 from spindle_fem.physics.bearings import mounting
 from spindle_fem.physics.bearings.bearing_set import solve_bearing_set, solve_states
 from spindle_fem.physics.bearings.bearing_state import BearingState
@@ -26,6 +27,7 @@ from spindle_fem.physics.bearings.contact_conduction import BallConductance, bal
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
+from spindle_fem.physics.bearings.roller_set import RollerSet, solve_roller_set
 from spindle_fem.physics.bearings.seat_contact import SeatBodies
 from spindle_fem.validity import CodedWarning
 
@@ -190,11 +192,14 @@ class BearingMechanics:
             palmgren_f0=spec.heat.palmgren_f0,
             skf_friction_ehl=spec.heat.skf_mu_ehl,
         )
-        elastic = seats or {}
-        self.sets = {
-            group.name: replace(assembled_set(spec, group), seats=elastic.get(group.name))
-            for group in spec.bearing_set
-        }
+        require_known_friction(spec)
+        elastic, self.sets = seats or {}, {}
+        for group in spec.bearing_set:
+            mounted = assembled_set(spec, group)
+            if group.name in elastic:
+                mounted = replace(mounted, seats=elastic[group.name])
+            self.sets[group.name] = mounted
+        self.radial_loads = radial_loads(spec)
 
     def states(
         self,
@@ -220,18 +225,20 @@ class BearingMechanics:
         """
         found: dict[str, BearingState] = {}
         for group in self.spec.bearing_set:
-            mounted, (set_temperatures,) = self._mounted(
-                group, [[temperatures[bearing.name] for bearing in group.bearing]], expand
-            )
-            states = solve_bearing_set(
-                mounted,
-                point.speed,
-                point.thrust if group.carries_thrust else 0.0,
-                set_temperatures,
-                lubricant=self.lubricant,
-                control=_control(options or self.options),
-                heat=options or self.options,
-            )
+            around = [[temperatures[bearing.name] for bearing in group.bearing]]
+            if isinstance(self.sets[group.name], RollerSet):
+                (states,) = self._roller_states(group, point, around, expand, options)
+            else:
+                mounted, (set_temperatures,) = self._mounted(group, around, expand)
+                states = solve_bearing_set(
+                    mounted,
+                    point.speed,
+                    self._load(group, point),
+                    set_temperatures,
+                    lubricant=self.lubricant,
+                    control=_control(options or self.options),
+                    heat=options or self.options,
+                )
             found |= {state.name: state for state in states}
         return found
 
@@ -284,32 +291,64 @@ class BearingMechanics:
         """
         heat, conductance = [], []
         for group in self.spec.bearing_set:
-            mounted, around = self._mounted(
-                group, [[state[bearing.name] for bearing in group.bearing] for state in temperatures], expand
-            )
-            found = solve_states(
-                mounted,
-                point.speed,
-                mounting.ExternalLoad(point.thrust if group.carries_thrust else 0.0),
-                around,
-                lubricant=self.lubricant,
-                control=_control(self.options),
-                heat=self.options,
-            )
+            around = [[state[bearing.name] for bearing in group.bearing] for state in temperatures]
+            if isinstance(self.sets[group.name], RollerSet):
+                found = self._roller_states(group, point, around, expand)
+            else:
+                mounted, set_temperatures = self._mounted(group, around, expand)
+                found = solve_states(
+                    mounted,
+                    point.speed,
+                    self._load(group, point),
+                    set_temperatures,
+                    lubricant=self.lubricant,
+                    control=_control(self.options),
+                    heat=self.options,
+                )
             for states in zip(*found, strict=True):
                 paths = [self._ball_path(group, state) for state in states]
                 heat.append([group.heat_factor.value * state.heat.total for state in states])
                 conductance.append([(path.inner, path.outer) for path in paths])
         return np.array(heat).T, np.array(conductance).swapaxes(0, 1)
 
+    def _load(self, group: BearingSet, point: OperatingPoint) -> mounting.ExternalLoad:
+        """What a set carries."""
+        return mounting.ExternalLoad(
+            point.thrust if group.carries_thrust else 0.0, self.radial_loads[group.name]
+        )
+
+    def _roller_states(
+        self,
+        group: BearingSet,
+        point: OperatingPoint,
+        around: list[list[BearingTemperatures]],
+        expand: bool,
+        options: HeatOptions | None = None,
+    ) -> tuple[tuple[BearingState, ...], ...]:
+        """Roller bearings of a set at several states."""
+        return solve_roller_set(
+            self.sets[group.name],
+            point.speed,
+            self._load(group, point),
+            self._set_temperatures(group, around, expand),
+            lubricant=self.lubricant,
+            heat=options or self.options,
+        )
+
+    def _set_temperatures(
+        self, group: BearingSet, around: list[list[BearingTemperatures]], expand: bool
+    ) -> list[mounting.SetTemperatures]:
+        if expand:
+            return [self._expanded(state, group.assembly_temperature) for state in around]
+        return [self._as_assembled(state) for state in around]
+
     def _mounted(
         self, group: BearingSet, around: list[list[BearingTemperatures]], expand: bool
     ) -> tuple[mounting.BearingSet, list[mounting.SetTemperatures]]:
         """A set and its temperatures at several states, as the mechanics takes them."""
         mounted = self.sets[group.name]
-        if expand:
-            return mounted, [self._expanded(state, group.assembly_temperature) for state in around]
-        return mounted.with_rigid_rings(), [self._as_assembled(state) for state in around]
+        found = self._set_temperatures(group, around, expand)
+        return (mounted if expand else mounted.with_rigid_rings()), found
 
     def _ball_path(self, group: BearingSet, state: BearingState) -> BallConductance:
         kind, grease = self.spec.bearing_types[group.bearing_type], self.spec.grease
@@ -317,7 +356,7 @@ class BearingMechanics:
             state,
             self.lubricant,
             ring_conductivity=self.spec.materials[kind.ring_material].thermal_conductivity,
-            ball_conductivity=self.spec.materials[kind.ball_material].thermal_conductivity,
+            ball_conductivity=self.spec.materials[kind.element_material].thermal_conductivity,
             wetted_share=grease.free_volume_fill if grease.wetted_share is None else grease.wetted_share,
         )
 
@@ -361,7 +400,6 @@ class BearingMechanics:
         seats = self._seats(point, temperatures, states) if self.spec.heat.thermal_preload else {}
         for name, state in states.items():
             path = self._ball_path(groups[name], state)
-            balls = state.balls
             terms = {term: factors[name] * value for term, value in state.heat.terms.items()}
             heat[name] = BearingHeat(
                 total=factors[name] * state.heat.total,
@@ -370,11 +408,11 @@ class BearingMechanics:
                 contact_angle_outer=state.contact_angle_outer,
                 preload=state.preload,
                 axial_load=state.axial_force,
-                film_thickness=float(np.min(balls.film_central)),
-                film_thickness_ratio=float(np.min(balls.film_thickness_ratio)),
+                film_thickness=state.thinnest_film,
+                film_thickness_ratio=state.smallest_film_ratio,
                 conductance_inner=path.inner,
                 conductance_outer=path.outer,
-                contact_pressure=float(np.max(balls.pressure)),
+                contact_pressure=float(np.max(state.balls.pressure)),
                 **seats.get(name, {}),
             )
             warnings += state.warnings
@@ -389,9 +427,10 @@ class BearingMechanics:
         """Pressures and gaps of the seats of every bearing that elastic bodies carry."""
         found = {}
         for group in self.spec.bearing_set:
-            seats = self.sets[group.name].seats
-            if seats is None:
+            mounted = self.sets[group.name]
+            if isinstance(mounted, RollerSet) or mounted.seats is None:
                 continue
+            seats = mounted.seats
             own = [states[bearing.name] for bearing in group.bearing]
             inner, outer = (
                 np.array([state.axial_force / math.tan(getattr(state, angle)) for state in own])
@@ -411,7 +450,7 @@ class BearingMechanics:
         """Pressure (Pa) and gap (m) of every bearing's inner and outer seat as assembled."""
         found = {}
         for mounted in self.sets.values():
-            if mounted.seats is None:
+            if isinstance(mounted, RollerSet) or mounted.seats is None:
                 continue
             radial = np.array([state.radial_force for state in mounted.mounted_states()])
             pressure, gap = mounted.seats.law().seats(radial)

@@ -134,12 +134,11 @@ def ball_conductances(group: BearingSet, heat: BearingHeat | None = None) -> tup
 
 
 def ball_row_capacity(spec: MachineSpec, group: BearingSet) -> float:
-    """Heat capacity of one row of balls of a set, J/K."""
+    """Heat capacity of the balls or rollers of one bearing of a set, J/K."""
     kind = spec.bearing_types[group.bearing_type]
     capacity = group.ball_row.capacity
     if capacity is None:
-        volume = kind.ball_count * np.pi / 6.0 * kind.ball_diameter**3
-        capacity = volume * spec.materials[kind.ball_material].volumetric_heat_capacity
+        capacity = kind.element_volume * spec.materials[kind.element_material].volumetric_heat_capacity
     return capacity * spec.heat_capacity_factor.value
 
 

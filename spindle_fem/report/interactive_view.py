@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.report.drawn_surfaces import TRIANGLE_SPLIT, facet_normals
 from spindle_fem.report.plane_sections import section_of_volume
 from spindle_fem.report.viewed_scene import Layer, Scene, Sphere
@@ -204,12 +205,9 @@ def _corner_labels(label: NDArray[np.int32]) -> NDArray[np.int32]:
 def _balls(result: ThermalResult) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     centres, radii, values = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0)]
     for group, bearing in result.spec.bearings:
-        kind = result.spec.bearing_types[group.bearing_type]
-        angle = 2.0 * np.pi * np.arange(kind.ball_count) / kind.ball_count
-        z = np.full(angle.size, 0.5 * sum(bearing.z))
-        centres.append(
-            np.column_stack([-0.5 * kind.pitch * np.sin(angle), 0.5 * kind.pitch * np.cos(angle), z])
-        )
-        radii.append(np.full(angle.size, 0.5 * kind.ball_diameter))
-        values.append(np.full(angle.size, result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K))
+        warmth = result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K
+        for row in element_rows(bearing, result.spec.bearing_types[group.bearing_type]):
+            centres.append(np.array(row.centres))
+            radii.append(np.full(row.ball_count, 0.5 * row.ball_diameter))
+            values.append(np.full(row.ball_count, warmth))
     return np.concatenate(centres), np.concatenate(radii), np.concatenate(values)

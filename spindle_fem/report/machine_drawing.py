@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
 
+from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.definition.machine_spec import Channel, MachineSpec
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
 from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, set_title, styled
 from spindle_fem.report.leader_labels import Label, draw_labels
-from spindle_fem.report.meridian_axes import MM, box, draw_edges, extent, meridian_axes
+from spindle_fem.report.meridian_axes import MM, box, draw_edges, draw_elements, extent, meridian_axes
 from spindle_fem.units import ZERO_CELSIUS_K
 
 _BY_NAME = (
@@ -230,18 +230,16 @@ def _outside_radius(spec: MachineSpec, z: float) -> float:
 def _draw_bearings(axes: Axes, spec: MachineSpec) -> None:
     for group, bearing in spec.bearings:
         kind = spec.bearing_types[group.bearing_type]
+        for row in element_rows(bearing, kind):
+            draw_elements(axes, row, BALL_COLOUR, linewidth=1.0)
+        if bearing.takes_thrust is None:
+            continue
         z = 0.5 * sum(bearing.z) * MM
         radius = 0.5 * kind.pitch * MM
-        ball = 0.5 * kind.ball_diameter * MM
         lean = 1.0 if bearing.takes_thrust == "towards_rear" else -1.0
         reach = 0.62 * (kind.outer_diameter - kind.bore_diameter) * MM
         step = np.array([lean * math.sin(kind.contact_angle), math.cos(kind.contact_angle)])
         for sign in (1.0, -1.0):
-            axes.add_patch(
-                Circle(
-                    (z, sign * radius), ball, facecolor=BALL_COLOUR, edgecolor=INK, linewidth=1.0, zorder=4
-                )
-            )
             line = np.array([z, radius])[:, None] + 0.5 * reach * step[:, None] * np.array([-1.0, 1.0])
             axes.plot(line[0], sign * line[1], color="#b00020", linewidth=0.9, zorder=5)
 

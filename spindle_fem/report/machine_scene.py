@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.errors import BadInputError
@@ -131,7 +132,7 @@ def solid_scene(
 
 
 def bearing_balls(spec: MachineSpec, values: Mapping[str, Mapping[str, Array]]) -> tuple[Sphere, ...]:
-    """Every ball of every bearing.
+    """Every ball of every bearing; rollers are shown as balls of their diameter.
 
     Parameters
     ----------
@@ -140,11 +141,11 @@ def bearing_balls(spec: MachineSpec, values: Mapping[str, Mapping[str, Array]]) 
     """
     found = []
     for group, bearing in spec.bearings:
-        kind = spec.bearing_types[group.bearing_type]
-        z = 0.5 * sum(bearing.z)
-        for angle in 2.0 * np.pi * np.arange(kind.ball_count) / kind.ball_count:
-            place = np.array([-0.5 * kind.pitch * np.sin(angle), 0.5 * kind.pitch * np.cos(angle), z])
-            found.append(Sphere(place, 0.5 * kind.ball_diameter, values.get(bearing.name, {})))
+        for row in element_rows(bearing, spec.bearing_types[group.bearing_type]):
+            found += [
+                Sphere(np.array(place), 0.5 * row.ball_diameter, values.get(bearing.name, {}))
+                for place in row.centres
+            ]
     return tuple(found)
 
 

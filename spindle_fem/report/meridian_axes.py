@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Circle, Rectangle
 
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry
+from spindle_fem.machine.geometry.part_shapes import BallRowGeometry
 from spindle_fem.report.figure_style import INK, pixel_axes
 
 MM = 1.0e3
@@ -49,6 +50,18 @@ def box(z: Span, radius: Span, sign: float = 1.0, **style: Any) -> Rectangle:
     """Rectangle between two places along the axis and two radii [m], mirrored by a negative ``sign``."""
     low = min(sign * radius[0], sign * radius[1]) * MM
     return Rectangle((z[0] * MM, low), (z[1] - z[0]) * MM, (radius[1] - radius[0]) * MM, **style)
+
+
+def draw_elements(axes: Axes, row: BallRowGeometry, colour: Any, *, linewidth: float) -> None:
+    """The balls or rollers of a row that the plane cuts, on both sides of the axis."""
+    radius, half = row.pitch_radius, 0.5 * row.ball_diameter
+    style = {"facecolor": colour, "edgecolor": INK, "linewidth": linewidth, "zorder": 4}
+    for sign in (1.0, -1.0):
+        if row.length:
+            ends = (row.z - 0.5 * row.length, row.z + 0.5 * row.length)
+            axes.add_patch(box(ends, (radius - half, radius + half), sign, **style))
+        else:
+            axes.add_patch(Circle((row.z * MM, sign * radius * MM), half * MM, **style))
 
 
 def draw_edges(

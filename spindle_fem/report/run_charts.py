@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Rectangle
 
+from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.report.figure_style import (
     BALLS,
     CYCLE,
@@ -24,7 +25,7 @@ from spindle_fem.report.figure_style import (
     set_title,
     styled,
 )
-from spindle_fem.report.meridian_axes import MM, meridian_axes
+from spindle_fem.report.meridian_axes import MM, draw_elements, meridian_axes
 from spindle_fem.report.profiles import (
     MeridianSection,
     axial_profile,
@@ -56,19 +57,9 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
     step = _isotherm_step(bar.high - bar.low)
     draw_field(axes, section, bar, np.arange(math.ceil(bar.low / step) * step, bar.high, step))
     for group, bearing in result.spec.bearings:
-        kind = result.spec.bearing_types[group.bearing_type]
         colour = bar.colours(result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K)
-        for sign in (1.0, -1.0):
-            axes.add_patch(
-                Circle(
-                    (0.5 * sum(bearing.z) * MM, sign * 0.5 * kind.pitch * MM),
-                    0.5 * kind.ball_diameter * MM,
-                    facecolor=colour,
-                    edgecolor=INK,
-                    linewidth=0.8,
-                    zorder=4,
-                )
-            )
+        for row in element_rows(bearing, result.spec.bearing_types[group.bearing_type]):
+            draw_elements(axes, row, colour, linewidth=0.8)
     for probe in result.spec.probe:
         if probe.kind == "point" and abs(math.sin(probe.angle)) < 0.02:
             axes.plot(

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.report.drawn_surfaces import (
@@ -54,7 +55,12 @@ def _half_of_balls(result: ThermalResult) -> TriangleSet:
     )
     # Whole balls: those with their centre on the kept side, and the ones that the cut goes through.
     triangles_a_ball = len(balls.triangles) // max(
-        1, sum(spec.bearing_types[group.bearing_type].ball_count for group, _ in spec.bearings)
+        1,
+        sum(
+            row.ball_count
+            for group, bearing in spec.bearings
+            for row in element_rows(bearing, spec.bearing_types[group.bearing_type])
+        ),
     )
     centres = balls.points[balls.triangles].mean(axis=1).reshape(-1, max(triangles_a_ball, 1), 3).mean(axis=1)
     return select_triangles(balls, np.repeat(centres[:, 0] > -1.0e-6, triangles_a_ball))

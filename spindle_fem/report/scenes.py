@@ -19,7 +19,9 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger
 from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
+from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.machine.geometry.part_shapes import BallRowGeometry
 from spindle_fem.report.drawn_surfaces import SegmentSet, TriangleSet
 from spindle_fem.report.figure_style import ColourBar
 
@@ -260,8 +262,20 @@ class SceneRenderer:
             plotter.add_light(light)
 
 
+def _cylinder(
+    sphere: NDArray[np.float64], row: BallRowGeometry
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points of a unit sphere pushed out to a roller, and their normals."""
+    across, along = np.hypot(sphere[:, 0], sphere[:, 1]), np.abs(sphere[:, 2])
+    size = np.array([row.ball_diameter, row.ball_diameter, row.length])
+    points = 0.5 * size * sphere / np.maximum(across, along)[:, None]
+    wall = (across >= along)[:, None]
+    normals = sphere * np.where(wall, [1.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
 def ball_triangles(spec: MachineSpec, values: dict[str, float], subdivisions: int = 3) -> TriangleSet:
-    """Every ball of every bearing as a sphere, ``values`` by bearing at its points.
+    """Every ball as a sphere and every roller as a cylinder, ``values`` by bearing at their points.
 
     ``label`` counts the bearings; the first ball stands at θ = 0.
     """
@@ -271,23 +285,18 @@ def ball_triangles(spec: MachineSpec, values: dict[str, float], subdivisions: in
     all_points, all_normals, all_values, triangles, labels = [], [], [], [], []
     first = 0
     for number, (group, bearing) in enumerate(spec.bearings):
-        kind = spec.bearing_types[group.bearing_type]
-        angle = 2.0 * np.pi * np.arange(kind.ball_count) / kind.ball_count
-        centres = np.column_stack(
-            [
-                -0.5 * kind.pitch * np.sin(angle),
-                0.5 * kind.pitch * np.cos(angle),
-                np.full(angle.size, 0.5 * sum(bearing.z)),
-            ]
-        )
-        placed = centres[:, None, :] + 0.5 * kind.ball_diameter * points
-        all_points.append(placed.reshape(-1, 3))
-        all_normals.append(np.tile(points, (angle.size, 1)))
-        all_values.append(np.full((angle.size * len(points), 1), values[bearing.name]))
-        offset = first + len(points) * np.arange(angle.size)[:, None, None]
-        triangles.append((faces + offset).reshape(-1, 3))
-        labels.append(np.full(angle.size * len(faces), number, dtype=np.int32))
-        first += angle.size * len(points)
+        for row in element_rows(bearing, spec.bearing_types[group.bearing_type]):
+            shape, normals = 0.5 * row.ball_diameter * points, points
+            if row.length:
+                shape, normals = _cylinder(points, row)
+            count = row.ball_count
+            all_points.append((np.array(row.centres)[:, None, :] + shape).reshape(-1, 3))
+            all_normals.append(np.tile(normals, (count, 1)))
+            all_values.append(np.full((count * len(points), 1), values[bearing.name]))
+            offset = first + len(points) * np.arange(count)[:, None, None]
+            triangles.append((faces + offset).reshape(-1, 3))
+            labels.append(np.full(count * len(faces), number, dtype=np.int32))
+            first += count * len(points)
     if not all_points:
         return TriangleSet(
             np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 1)), np.zeros(0, np.int32)

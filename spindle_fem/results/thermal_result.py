@@ -230,11 +230,11 @@ class ThermalResult(Presented):
 
     @property
     def _ball_forces(self) -> dict[str, tuple[float, float]]:
-        """Radial ball force on both raceways of every bearing, N."""
+        """Radial ball force on both raceways of every bearing, N; that of rollers is left out."""
         forces = dict(self._elastic.assembly_forces)
         for name, bearing in self.bearings.items():
-            if math.isfinite(bearing.axial_load):
-                angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
+            angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
+            if math.isfinite(bearing.axial_load) and all(angles):
                 forces[name] = tuple(bearing.axial_load / math.tan(angle) for angle in angles)
         return forces
 

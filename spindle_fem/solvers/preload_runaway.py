@@ -42,7 +42,7 @@ class PreloadGuard:
     Attributes
     ----------
     assembled : mapping of bearing to float, [N]
-        Preload with everything at the ambient temperature.
+        Preload with everything at the ambient temperature, of those that have one.
     """
 
     assembled: Mapping[str, float]
@@ -50,11 +50,11 @@ class PreloadGuard:
     @classmethod
     def of(cls, cold: Mapping[str, BearingHeat]) -> PreloadGuard:
         """From the bearings of a machine at ambient temperature."""
-        return cls({name: heat.preload for name, heat in cold.items()})
+        return cls({name: heat.preload for name, heat in cold.items() if not np.isnan(heat.preload)})
 
     def reason(self, bearings: Mapping[str, BearingHeat]) -> str:
         """Why there is no equilibrium; empty while every preload is bearable."""
-        ratio = {name: heat.preload / self.assembled[name] for name, heat in bearings.items()}
+        ratio = {name: bearings[name].preload / force for name, force in self.assembled.items()}
         worst = max(ratio, key=ratio.get, default="")
         if not worst or not ratio[worst] > LARGEST_PRELOAD_RATIO:
             return ""

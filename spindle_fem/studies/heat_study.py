@@ -14,6 +14,7 @@ from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperat
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.heat_model import friction_model_names
+from spindle_fem.physics.bearings.roller_set import RollerSet
 from spindle_fem.units import ZERO_CELSIUS_K
 from spindle_fem.validity import CodedWarning, fold_warnings
 
@@ -162,8 +163,8 @@ def _row(
         "preload_N": state.preload,
         "contact_angle_inner_deg": contact["inner"]["contact_angle_deg"],
         "contact_angle_outer_deg": contact["outer"]["contact_angle_deg"],
-        "film_um": min(contact["inner"]["film_um"], contact["outer"]["film_um"]),
-        "lambda": min(contact["inner"]["lambda"], contact["outer"]["lambda"]),
+        "film_um": 1e6 * state.thinnest_film,
+        "lambda": state.smallest_film_ratio,
         "centrifugal_force_N": first["centrifugal_force"],
         "gyroscopic_moment_Nmm": 1e3 * float(balls.gyroscopic_moment[0]),
         "orbital_speed_rad_s": first["orbital_speed"],
@@ -180,7 +181,8 @@ def _by_model(
 ) -> dict[str, Any]:
     """Heat of every bearing by every model, side by side."""
     heat: dict[str, dict[str, float]] = {}
-    for level in friction_model_names():
+    rollers = any(isinstance(mounted, RollerSet) for mounted in mechanics.sets.values())
+    for level in friction_model_names(rollers=rollers):
         options = replace(mechanics.options, level=level)
         states = mechanics.states(point, temperatures, expand=False, options=options)
         heat[level] = {name: state.heat.total for name, state in states.items()}

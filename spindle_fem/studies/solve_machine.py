@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -212,8 +213,14 @@ def _omitted_preload(
         return [CodedWarning("thermal_preload_omitted", text)]
     cold = coupled.loads.bearing_heat
     # Bearings of a set grow by the same preload, to rounding: of equals the one that heats most is named.
-    grown = {key: round(state.preload - cold[key].preload, 3) for key, state in states.items()}
-    name = max(states, key=lambda key: (grown[key], states[key].heat.total))
+    grown = {
+        key: round(state.preload - cold[key].preload, 3)
+        for key, state in states.items()
+        if math.isfinite(state.preload) and math.isfinite(cold[key].preload)
+    }
+    if not grown:
+        return []
+    name = max(grown, key=lambda key: (grown[key], states[key].heat.total))
     if not states[name].preload > 1.1 * cold[name].preload:
         return []
     text = (

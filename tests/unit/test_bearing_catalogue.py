@@ -7,8 +7,8 @@ import tomllib
 import pytest
 
 from spindle_fem.definition.bearing_catalogue import boundary_dimensions, catalogue_bearing
+from spindle_fem.definition.bearing_types import BallBearingType
 from spindle_fem.definition.load import examine, find_machine, load_machine, read_definition, write_machine
-from spindle_fem.definition.solid_tables import BearingType
 from spindle_fem.physics.bearings.bearing_file import bearing_report
 
 
@@ -39,8 +39,8 @@ def test_every_ball_bearing_of_the_catalogue_is_a_sound_type() -> None:
             assert kind.bore_diameter == pytest.approx(5e-3 * code)
 
 
-def _type_of(table) -> BearingType:
-    return BearingType.model_validate(table)
+def _type_of(table) -> BallBearingType:
+    return BallBearingType.model_validate(table)
 
 
 def test_estimated_balls_are_near_those_that_makers_publish() -> None:
@@ -83,7 +83,9 @@ def test_what_the_file_gives_replaces_the_catalogue() -> None:
     assert kind.mark_of("width") == "C"
 
 
-@pytest.mark.parametrize(("name", "word"), [("NN3010", "roller bearing"), ("7010_X", "7014 C")])
+@pytest.mark.parametrize(
+    ("name", "word"), [("NN3010", "preload"), ("7010_X", "7014 C"), ("7010 X", "7014 C")]
+)
 def test_other_bearings_are_refused_with_what_there_is(name, word) -> None:
     content = _named()
     content["bearing_set"][0]["bearing_type"] = name

@@ -9,6 +9,7 @@ import pytest
 import spindle_fem.physics
 from scripts.definition_page import options
 from spindle_fem.correlation import Correlation
+from spindle_fem.definition.bearing_types import has_rollers
 from spindle_fem.definition.exchange_tables import Coolant as CoolantTable
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
@@ -17,6 +18,9 @@ from spindle_fem.physics.bearings.bearing_set import solve_bearing
 from spindle_fem.physics.bearings.catalogue_friction import static_equivalent_load
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions, friction_model_names
+from spindle_fem.physics.bearings.mounting import ExternalLoad, uniform_temperatures
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
+from spindle_fem.physics.bearings.roller_set import RollerSet, solve_roller_set
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.coolants import COOLANTS
 from spindle_fem.physics.coolant.film_models import FILM_MODELS
@@ -134,9 +138,9 @@ def test_a_rotating_film_grows_with_speed(name):
     assert (np.diff(films.value) > 0.0).all()
 
 
-@pytest.mark.parametrize("kind", BEARING_KINDS)
+@pytest.mark.parametrize("kind", [name for name in BEARING_KINDS if not has_rollers(name)])
 @pytest.mark.parametrize("level", friction_model_names())
-def test_every_heat_model_takes_every_kind_of_bearing(kind, level):
+def test_every_heat_model_takes_every_kind_of_ball_bearing(kind, level):
     bearing = BearingGeometry(
         14.2875e-3,
         30,
@@ -154,6 +158,18 @@ def test_every_heat_model_takes_every_kind_of_bearing(kind, level):
     assert np.isfinite(heat.total)
     assert heat.total > 0.0
     assert static_equivalent_load(bearing, 1000.0, 100.0) > 0.0
+
+
+@pytest.mark.parametrize("kind", [name for name in BEARING_KINDS if has_rollers(name)])
+@pytest.mark.parametrize("level", friction_model_names(rollers=True))
+def test_every_heat_model_that_knows_rollers_takes_every_kind_of_them(kind, level):
+    rollers = RollerSet(("N",), RollerGeometry(9e-3, 8e-3, 27, 91e-3, kind=kind))
+    grease, warm = Lubricant(21e-6, 4.7e-6), [uniform_temperatures(1, 313.15)]
+    ((found,),) = solve_roller_set(
+        rollers, 300.0, ExternalLoad(0.0, 500.0), warm, lubricant=grease, heat=HeatOptions(level)
+    )
+    assert found.heat.model == level
+    assert 0.0 < found.heat.total < 1000.0
 
 
 def test_a_program_adds_its_own(monkeypatch):

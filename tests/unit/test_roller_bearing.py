@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 import spindle_fem
 from spindle_fem.commands.console import print_bearing
-from spindle_fem.errors import FaultsError, GeometryError
+from spindle_fem.errors import FaultsError, GeometryError, SpecError
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
 from spindle_fem.physics.bearings.line_contact import half_width, line_approach, line_pressure
 from spindle_fem.physics.bearings.roller_bearing import RollerGeometry, solve_roller_bearing
@@ -107,6 +107,23 @@ def test_file_of_a_roller_bearing(tmp_path: Path) -> None:
     assert solved["heat_W"] is None
     assert [note["code"] for note in solved["warnings"]] == ["roller_friction_missing"]
     assert "radial stiffness" in str(solved)
+
+
+def test_a_file_with_lubricant_has_friction_and_films(tmp_path: Path) -> None:
+    file = tmp_path / "rollers.toml"
+    grease = '[lubricant]\nkinematic_viscosity_40 = "22 mm**2/s"\nkinematic_viscosity_100 = "5 mm**2/s"\n'
+    load = '[operation]\nspeed = "3000 rpm"\nradial_load = "1 kN"\n'
+    file.write_text(f'[bearing]\ncatalogue = "NN3014 K"\n{load}{grease}', encoding="utf-8")
+    solved = spindle_fem.bearing(file)
+    assert solved["heat_W"] == pytest.approx(sum(solved["terms_W"].values()))
+    assert set(solved["terms_W"]) == {"viscous", "load"}
+    assert len(solved["rollers"]) == 54
+    top = max(solved["rollers"], key=lambda row: row["load_inner_N"])
+    assert 0.3 < top["film_central_um"] < 1.0 < 3.0 < top["lambda"]
+    assert solved["warnings"] == []
+    file.write_text(f'[bearing]\ncatalogue = "NN3014 K"\n{load}{grease}[heat]\nmodel = "full"\n', "utf-8")
+    with pytest.raises(SpecError, match=r'heat.model: "full" knows no rollers. Allowed: palmgren, skf'):
+        spindle_fem.bearing(file)
 
 
 def test_faults_of_a_roller_bearing_file_all_at_once(tmp_path: Path) -> None:

@@ -13,7 +13,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
-from spindle_fem.definition.drawn_tables import part_geometry, ring_geometries, surface_definition
+from spindle_fem.definition.drawn_tables import (
+    element_rows,
+    part_geometry,
+    ring_geometries,
+    surface_definition,
+)
 from spindle_fem.errors import FaultsError, GeometryError
 from spindle_fem.machine.geometry.channel_geometry import (
     ChannelDefinition,
@@ -96,11 +101,7 @@ def build_assembly(spec: MachineSpec, *, where: str | None = None) -> AssemblyGe
     for group, bearing in spec.bearings:
         kind = spec.bearing_types[group.bearing_type]
         parts += ring_geometries(bearing, kind)
-        balls.append(
-            BallRowGeometry(
-                bearing.name, 0.5 * sum(bearing.z), 0.5 * kind.pitch, kind.ball_diameter, kind.ball_count
-            )
-        )
+        balls += element_rows(bearing, kind)
     surfaces = [surface_definition(surface) for surface in spec.all_surfaces]
     channel = None
     if spec.channel is not None:

@@ -1,7 +1,8 @@
-"""What a machine is drawn from: rings of its parts, boxes that pick faces, named surfaces, rows of balls."""
+"""What a machine is drawn from: rings of parts, boxes that pick faces, named surfaces, balls and rollers."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -56,10 +57,30 @@ class SurfaceDefinition:
 
 @dataclass(frozen=True, slots=True)
 class BallRowGeometry:
-    """Balls of a bearing: drawn in the solid model, one temperature in the mesh."""
+    """A row of balls or rollers of a bearing: drawn in the solid model, one temperature in the mesh.
+
+    Attributes
+    ----------
+    length : float
+        Of rollers, m; 0 for balls.
+    turned : float, [rad]
+        Of the first one.
+    first : int
+        Its number in the bearing.
+    """
 
     name: str
     z: float
     pitch_radius: float
     ball_diameter: float
     ball_count: int
+    length: float = 0.0
+    turned: float = 0.0
+    first: int = 1
+
+    @property
+    def centres(self) -> list[tuple[float, float, float]]:
+        """x, y, z of every ball or roller; angle 0 points up (+y)."""
+        angles = (self.turned + 2.0 * math.pi * index / self.ball_count for index in range(self.ball_count))
+        radius = self.pitch_radius
+        return [(-radius * math.sin(angle), radius * math.cos(angle), self.z) for angle in angles]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Iterator
@@ -38,13 +37,14 @@ def export_step(assembly: AssemblyGeometry, path: str | Path) -> Path:
         solids = build_solids(scaled, geometry)
         names = {tag: name for name, tag in solids.volume_of_part.items()}
         for row in scaled.balls:
-            for index in range(row.ball_count):
-                angle = 2.0 * math.pi * index / row.ball_count
-                ball = geometry.add_ball(
-                    [-row.pitch_radius * math.sin(angle), row.pitch_radius * math.cos(angle), row.z],
-                    0.5 * row.ball_diameter,
-                )
-                names[ball.dim_tag[1]] = f"{row.name}.ball_{index + 1}"
+            for number, (x, y, z) in enumerate(row.centres, row.first):
+                if row.length:
+                    start, along = [x, y, z - 0.5 * row.length], [0.0, 0.0, row.length]
+                    solid = geometry.add_cylinder(start, along, 0.5 * row.ball_diameter)
+                    names[solid.dim_tag[1]] = f"{row.name}.roller_{number}"
+                else:
+                    solid = geometry.add_ball([x, y, z], 0.5 * row.ball_diameter)
+                    names[solid.dim_tag[1]] = f"{row.name}.ball_{number}"
         geometry.synchronize()
         for tag, name in names.items():
             gmsh.model.setEntityName(3, tag, name)
@@ -94,5 +94,5 @@ def _in_millimetres(assembly: AssemblyGeometry) -> AssemblyGeometry:
         assembly,
         edges=tuple(scaled(edge, "z", "r") for edge in assembly.edges),
         channel=channel,
-        balls=tuple(scaled(row, "z", "pitch_radius", "ball_diameter") for row in assembly.balls),
+        balls=tuple(scaled(row, "z", "pitch_radius", "ball_diameter", "length") for row in assembly.balls),
     )

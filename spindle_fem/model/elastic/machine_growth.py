@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, SetBearing
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.displacement_sensors import SensorSight, sensor_sights
@@ -74,6 +74,14 @@ class Growth:
     nose_tilt: tuple[float, float] | None = None
 
 
+def _assembled_radial_force(spec: MachineSpec, group: BearingSet, bearing: SetBearing) -> float:
+    """By which the balls of a bearing press its rings apart as assembled, N; rollers carry no preload."""
+    if not group.preload > 0.0:
+        return 0.0
+    share = group.preload / sum(other.takes_thrust == bearing.takes_thrust for other in group.bearing)
+    return share / math.tan(spec.bearing_types[group.bearing_type].contact_angle)
+
+
 def flange_back(layout: Layout) -> Face:
     """The plane behind the flange that is bolted to the frame."""
     flange = next(s for s in layout.housing.segment if s.name == layout.flange)
@@ -118,10 +126,8 @@ class GrowthModel:
         self.assembly_temperature = held[0].assembly_temperature if held else ROOM_TEMPERATURE
         self.assembly_forces = {
             bearing.name: (force, force)
-            for group in sets
-            for bearing in group.bearing
-            for share in [group.preload / sum(b.takes_thrust == bearing.takes_thrust for b in group.bearing)]
-            for force in [share / math.tan(spec.bearing_types[group.bearing_type].contact_angle)]
+            for group, bearing in spec.bearings
+            for force in [_assembled_radial_force(spec, group, bearing)]
         }
         self.seat_rows = np.zeros((len(self.rings), self._size))
         for name, outputs in self.seating.carriers.items():

@@ -20,14 +20,13 @@ from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry, beari
 from spindle_fem.physics.bearings.bearing_keys import (
     FIT,
     GEOMETRY,
-    HEAT_FIELDS,
     HOUSING_FIELDS,
     REQUIRED,
     TABLES,
 )
 from spindle_fem.physics.bearings.bearing_report import report_of_states
 from spindle_fem.physics.bearings.bearing_set import solve_bearing_set
-from spindle_fem.physics.bearings.bearing_tables import read_document, read_tables
+from spindle_fem.physics.bearings.bearing_tables import heat_of, lubricant_of, read_document, read_tables
 from spindle_fem.physics.bearings.fits import RingFits, fit_faults
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
@@ -159,7 +158,7 @@ def _build_case(
         faults.append(
             SpecError(f"{file}: bearing.preload", f"preload is {preload:g} N.", "It must not be negative.")
         )
-    lubricant = _lubricant(tables.get("lubricant"), file, faults)
+    lubricant = lubricant_of(tables.get("lubricant"), file, faults)
     control = operation.get("raceway_control", "outer")
     if control == "equilibrium" and lubricant is None and "lubricant" not in tables:
         faults.append(
@@ -169,12 +168,7 @@ def _build_case(
                 'Write [lubricant], or "outer" or "inner".',
             )
         )
-    heat_values = tables.get("heat", {})
-    heat = HeatOptions()
-    try:
-        heat = HeatOptions(**{HEAT_FIELDS.get(key, key): value for key, value in heat_values.items()})
-    except SpecError as error:
-        faults.append(SpecError(f"{file}: {error.where}", error.what, error.how_to_fix))
+    heat = heat_of(tables.get("heat", {}), file, faults)
     if faults:
         return None
     geometry = BearingGeometry(**geometry_values)
@@ -281,16 +275,3 @@ def _check_operation(
                 "It must not be negative: azimuth 0 lies under the radial load.",
             )
         )
-
-
-def _lubricant(values: dict[str, Any] | None, file: str, faults: list[SpindleFemError]) -> Lubricant | None:
-    if values is None:
-        return None
-    fields = {
-        ("density" if key == "base_oil_density" else key): v for key, v in values.items() if key != "name"
-    }
-    try:
-        return Lubricant(**fields)
-    except SpecError as error:
-        faults.append(SpecError(f"{file}: lubricant.{error.where}", error.what, error.how_to_fix))
-        return None

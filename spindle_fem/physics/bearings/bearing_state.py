@@ -1,4 +1,4 @@
-"""Result records of one bearing at one operating state."""
+"""Result records of one bearing at one operating state; rollers are recorded as balls are."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 from spindle_fem.validity import CodedWarning
 
 FloatArray = NDArray[np.float64]
@@ -17,7 +18,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BallStates:
-    """State of the balls that were solved for; (n,) or (n, 2) with the inner contact first.
+    """State of the balls or rollers that were solved for; (n,) or (n, 2) with the inner contact first.
+
+    The strip that a roller touches is an ellipse's: half its length is ``semi_major``, half its width
+    ``semi_minor``.
 
     Attributes
     ----------
@@ -113,7 +117,7 @@ class BearingState:
     """
 
     name: str
-    geometry: BearingGeometry
+    geometry: BearingGeometry | RollerGeometry
     speed: float
     axial_displacement: float
     radial_displacement: float
@@ -167,6 +171,16 @@ class BearingState:
         return float(np.average(slip, weights=balls.weight[loaded]))
 
     @property
+    def thinnest_film(self) -> float:
+        """Smallest central film of all contacts, m; NaN without film."""
+        return _smallest(self.balls.film_central)
+
+    @property
+    def smallest_film_ratio(self) -> float:
+        """Smallest Λ of all contacts; NaN without film."""
+        return _smallest(self.balls.film_thickness_ratio)
+
+    @property
     def film_central(self) -> float:
         """Smaller mean central film of both contacts, m; NaN without film."""
         return float(np.fmin(self.mean("film_central", INNER), self.mean("film_central", OUTER)))
@@ -186,3 +200,9 @@ class BearingState:
     def terms_W(self) -> dict[str, float]:  # noqa: N802
         """Friction heat term by term, W."""
         return {} if self.heat is None else dict(self.heat.terms)
+
+
+def _smallest(values: FloatArray) -> float:
+    """Least of the entries that are numbers; NaN where none is."""
+    known = values[np.isfinite(values)]
+    return float(known.min()) if known.size else float("nan")

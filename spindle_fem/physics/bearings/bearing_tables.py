@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from spindle_fem.errors import BadInputError, SpecError, SpindleFemError, UnknownKeyError, did_you_mean
-from spindle_fem.physics.bearings.bearing_keys import Reader
+from spindle_fem.physics.bearings.bearing_keys import HEAT_FIELDS, Reader
+from spindle_fem.physics.bearings.grease import Lubricant
+from spindle_fem.physics.bearings.heat_model import HeatOptions
 
 SCHEMA = "spindle-fem/bearing/1"
 
@@ -75,3 +77,26 @@ def read_tables(
                 faults.append(SpecError(f"{file}: {name}.{key}", "the key is missing.", "It is required."))
         tables[name] = values
     return tables
+
+
+def lubricant_of(values: dict[str, Any] | None, file: str, faults: list[SpindleFemError]) -> Lubricant | None:
+    """What a ``[lubricant]`` says; None without one, or with faults."""
+    if values is None:
+        return None
+    fields = {
+        ("density" if key == "base_oil_density" else key): v for key, v in values.items() if key != "name"
+    }
+    try:
+        return Lubricant(**fields)
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: lubricant.{error.where}", error.what, error.how_to_fix))
+        return None
+
+
+def heat_of(values: dict[str, Any], file: str, faults: list[SpindleFemError]) -> HeatOptions:
+    """What a ``[heat]`` says; the defaults without one, or with faults."""
+    try:
+        return HeatOptions(**{HEAT_FIELDS.get(key, key): value for key, value in values.items()})
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: {error.where}", error.what, error.how_to_fix))
+        return HeatOptions()

@@ -9,6 +9,7 @@ from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_state import BearingHeat
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.hertz import INNER, STATIC_PRESSURE, bearing_contact_constants
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,14 @@ def static_equivalent_load(geometry: BearingGeometry, axial_load: float, radial_
 def boundary_diameters(geometry: BearingGeometry) -> tuple[float, float]:
     """Bore and outer diameter, m; 1.75 ball diameters off the pitch circle where not given."""
     reach = 1.75 * geometry.ball_diameter
+    bore = geometry.pitch_diameter - reach if geometry.bore_diameter is None else geometry.bore_diameter
+    outer = geometry.pitch_diameter + reach if geometry.outer_diameter is None else geometry.outer_diameter
+    return bore, outer
+
+
+def roller_boundary(geometry: RollerGeometry) -> tuple[float, float]:
+    """Bore and outer diameter of rollers' rings, m; two rollers off the pitch circle where not given."""
+    reach = 2.0 * geometry.roller_diameter
     bore = geometry.pitch_diameter - reach if geometry.bore_diameter is None else geometry.bore_diameter
     outer = geometry.pitch_diameter + reach if geometry.outer_diameter is None else geometry.outer_diameter
     return bore, outer

@@ -1,4 +1,4 @@
-"""Conduction between raceway, ball and lubricant (the paper's Table 1, section on resistances)."""
+"""Conduction between raceway, ball or roller, and lubricant (the paper's Table 1, section on resistances)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,18 @@ from spindle_fem.errors import SpecError
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
+from spindle_fem.physics.bearings.line_contact import (
+    half_roller_resistance,
+    ring_constriction,
+    wedge_conductance,
+)
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 
 FloatArray = NDArray[np.float64]
 STEEL_CONDUCTIVITY = 46.0
 OIL_HEAT_CAPACITY = 1900.0
+# Gap that roughness keeps open where a roller just touches.
+_LEAST_GAP = 0.1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +135,45 @@ def contact_resistance(
     return float(inner), float(outer)
 
 
+def roller_resistance(
+    state: BearingState,
+    lubricant: Lubricant | None,
+    *,
+    ring_conductivity: float,
+    roller_conductivity: float,
+) -> tuple[float, float]:
+    """Resistance from each raceway to the rollers' middle, all rollers in parallel, K/W.
+
+    Per roller: constriction in the ring and half the roller, from the strip that it touches. Where it
+    bears nothing, lubricant at rest bridges the strip within which the gap doubles.
+
+    Returns
+    -------
+    (inner, outer) : float, [K/W]
+        Infinite where no roller touches and there is no lubricant.
+    """
+    geometry, balls = state.geometry, state.balls
+    length, radius = geometry.roller_length, geometry.contact_radius
+    gap = np.maximum(-balls.deformation, _LEAST_GAP)
+    touching = balls.load > 0.0
+    wedge = 0.0
+    if lubricant is not None:
+        wedge = wedge_conductance(gap, radius, length, lubricant.thermal_conductivity)
+    spacing = 0.5 * np.pi * np.array(geometry.raceway_diameters) / geometry.roller_count
+    # A strip under hardly any load is as wide as that across the least gap.
+    strip = np.clip(
+        np.where(touching, balls.semi_minor, np.sqrt(2.0 * radius * gap)),
+        np.sqrt(2.0 * radius * _LEAST_GAP),
+        spacing,
+    )
+    solid = ring_constriction(strip, spacing, length, ring_conductivity)
+    solid += half_roller_resistance(strip, geometry.roller_diameter, length, roller_conductivity)
+    with np.errstate(divide="ignore"):
+        resistance = solid + np.where(touching, 0.0, 1.0 / np.asarray(wedge))
+        inner, outer = 1.0 / (balls.weight @ (1.0 / resistance))
+    return float(inner), float(outer)
+
+
 def ball_conductance(
     state: BearingState,
     lubricant: Lubricant | None = None,
@@ -136,12 +183,12 @@ def ball_conductance(
     flow_share: float = 1.0 / 3.0,
     wetted_share: float | None = None,
 ) -> BallConductance:
-    """Conductance between each raceway and the balls of a bearing.
+    """Conductance between each raceway and the balls or rollers of a bearing.
 
     Parameters
     ----------
     state : BearingState
-        Gives the ellipses and the orbital speed.
+        Gives the contacts and the orbital speed.
     lubricant : Lubricant, optional
         Adds the film around the balls in parallel.
     flow_share : float
@@ -150,23 +197,31 @@ def ball_conductance(
         Share of the ball's surface in lubricant; None: the path fill, which
         is small once the grease has channelled. Half of it faces each raceway.
     """
-    inner, outer = contact_resistance(
-        state, ring_conductivity=ring_conductivity, ball_conductivity=ball_conductivity
-    )
+    geometry = state.geometry
+    if isinstance(geometry, RollerGeometry):
+        inner, outer = roller_resistance(
+            state, lubricant, ring_conductivity=ring_conductivity, roller_conductivity=ball_conductivity
+        )
+        diameter = geometry.roller_diameter
+        facing = 0.5 * np.pi * diameter * geometry.roller_length * geometry.number
+    else:
+        inner, outer = contact_resistance(
+            state, ring_conductivity=ring_conductivity, ball_conductivity=ball_conductivity
+        )
+        diameter = geometry.ball_diameter
+        facing = 0.5 * np.pi * diameter**2 * geometry.ball_count
     film = 0.0
     if lubricant is not None and state.speed > 0.0:
-        geometry = state.geometry
         temperature = state.lubricant_temperature
         coefficient = ball_film_coefficient(
-            geometry.ball_diameter,
+            diameter,
             flow_share * 0.5 * geometry.pitch_diameter * state.mean("orbital_speed"),
             float(lubricant.kinematic_viscosity(temperature)),
             lubricant,
             density=float(lubricant.oil_density(temperature)),
         )
         share = lubricant.path_fill if wetted_share is None else wetted_share
-        area = 0.5 * np.pi * geometry.ball_diameter**2 * geometry.ball_count
-        film = float(coefficient * share * area)
+        film = float(coefficient * share * facing)
     return BallConductance(1.0 / inner + film, 1.0 / outer + film, 1.0 / inner, 1.0 / outer, film)
 
 
@@ -179,4 +234,5 @@ __all__ = [
     "ball_resistance",
     "constriction_resistance",
     "contact_resistance",
+    "roller_resistance",
 ]

@@ -11,12 +11,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.errors import OutOfValidityError, SpecError, did_you_mean
 from spindle_fem.physics.bearings.ball_system import BallSystem
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_state import BearingHeat
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry, RollerStates
 from spindle_fem.physics.bearings.traction import ContactPatch, LubricantState, TractionIntegrals
 
 FloatArray = NDArray[np.float64]
@@ -123,6 +124,19 @@ class HeatInputs:
     radial_force: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RollerHeatInputs:
+    """What the equilibrium of a roller bearing hands to the heat models."""
+
+    geometry: RollerGeometry
+    states: RollerStates
+    speed: float
+    kinematic_viscosity: float
+
+
+RollerModel = Callable[[RollerHeatInputs, HeatOptions], BearingHeat]
+
+
 class FrictionModel:
     """A heat model that follows from a bearing's equilibrium.
 
@@ -134,6 +148,8 @@ class FrictionModel:
         Whether bore and outer diameter enter.
     counts_cage : bool
         Whether cage and seal enter.
+    rollers : callable or None
+        The same model for roller bearings; None where it knows balls only.
     """
 
     def __init__(
@@ -142,10 +158,12 @@ class FrictionModel:
         ball_attitude: BallAttitude,
         needs_boundary: bool,
         counts_cage: bool,
+        rollers: RollerModel | None = None,
     ) -> None:
         functools.update_wrapper(self, heat)
         self._heat, self.ball_attitude = heat, ball_attitude
         self.needs_boundary, self.counts_cage = needs_boundary, counts_cage
+        self.rollers = rollers
 
     def __call__(self, inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
         """Heat of one bearing, term by term."""
@@ -153,20 +171,50 @@ class FrictionModel:
 
 
 def friction_model(
-    *, ball_attitude: BallAttitude = "outer", needs_boundary: bool = False, counts_cage: bool = False
+    *,
+    ball_attitude: BallAttitude = "outer",
+    needs_boundary: bool = False,
+    counts_cage: bool = False,
+    rollers: RollerModel | None = None,
 ) -> Callable[[Callable[[HeatInputs, HeatOptions], BearingHeat]], FrictionModel]:
     """Make a function of ``(inputs, options)`` a heat model, with the facts of :class:`FrictionModel`."""
-    return lambda heat: FrictionModel(heat, ball_attitude, needs_boundary, counts_cage)
+    return lambda heat: FrictionModel(heat, ball_attitude, needs_boundary, counts_cage, rollers)
 
 
-def friction_model_names() -> tuple[str, ...]:
-    """Heat models that follow from a bearing's equilibrium: all but ``table``."""
-    return tuple(name for name, model in HEAT_MODELS.items() if isinstance(model, FrictionModel))
+def friction_model_names(*, rollers: bool = False) -> tuple[str, ...]:
+    """Heat models that follow from a bearing's equilibrium: all but ``table``.
+
+    Parameters
+    ----------
+    rollers : bool
+        Only those that know roller bearings too.
+
+    >>> friction_model_names(rollers=True)
+    ('palmgren', 'skf')
+    """
+    models = {name: model for name, model in HEAT_MODELS.items() if isinstance(model, FrictionModel)}
+    return tuple(name for name, model in models.items() if model.rollers is not None or not rollers)
 
 
 def bearing_heat(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
     """Heat of one bearing by the model that ``options`` names; all terms are 0 at rest."""
     return HEAT_MODELS[options.level](inputs, options)
+
+
+def roller_heat(inputs: RollerHeatInputs, options: HeatOptions) -> BearingHeat:
+    """Heat of one roller bearing by the model that ``options`` names.
+
+    Raises
+    ------
+    OutOfValidityError
+        The model knows balls only.
+    """
+    model = HEAT_MODELS[options.level].rollers
+    if model is None:
+        allowed = ", ".join(friction_model_names(rollers=True))
+        what = f'"{options.level}" knows no rollers.'
+        raise OutOfValidityError("heat.model", what, f"Allowed with roller bearings: {allowed}.")
+    return model(inputs, options)
 
 
 def ring_terms(inputs: HeatInputs, per_contact: Mapping[str, FloatArray]) -> dict[str, float]:

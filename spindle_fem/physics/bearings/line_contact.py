@@ -1,4 +1,4 @@
-"""Contact of a roller with a raceway: width, pressure and approach of a line contact."""
+"""Contact of a roller with a raceway: width, pressure, approach, film and heat path of a line contact."""
 
 from __future__ import annotations
 
@@ -62,3 +62,91 @@ def load_of_approach(approach: ArrayLike, length: float, compliance: float) -> F
     """Load that brings roller and ring together by an approach [m], N; 0 across a gap."""
     closed = np.maximum(np.asarray(approach, float), 0.0)
     return (closed / line_approach(1.0, length, compliance)) ** (1.0 / _LOAD_EXPONENT)
+
+
+def film_minimum_dowson_higginson(
+    speed_group: ArrayLike, material_group: ArrayLike, load_group: ArrayLike
+) -> FloatArray:
+    """Minimum film of a line contact over its radius, isothermal and flooded.
+
+    Parameters
+    ----------
+    speed_group, material_group, load_group : array_like, [-]
+        As :func:`~spindle_fem.physics.bearings.lubricant_film.film_groups` gives them, with the load on
+        the contact's length times its radius.
+
+    Source: Dowson (1968), Proc. Instn Mech. Engrs 182 3A; Harris & Kotzalas, vol. 2.
+
+    >>> film = film_minimum_dowson_higginson(1e-11, 5000.0, 3e-5)
+    >>> round(float(film) * 1e5, 2)
+    2.04
+    """
+    film = 2.65 * np.power(speed_group, 0.70) * np.power(material_group, 0.54)
+    return film * np.power(load_group, -0.13)
+
+
+def film_central_dowson_toyoda(
+    speed_group: ArrayLike, material_group: ArrayLike, load_group: ArrayLike
+) -> FloatArray:
+    """Central film of a line contact over its radius; parameters as of the minimum film.
+
+    Source: Dowson & Toyoda (1979), 5th Leeds-Lyon Symposium; Harris & Kotzalas, vol. 2.
+    """
+    film = 3.06 * np.power(speed_group, 0.69) * np.power(material_group, 0.56)
+    return film * np.power(load_group, -0.10)
+
+
+def ring_constriction(
+    half_width: ArrayLike, half_spacing: ArrayLike, length: float, thermal_conductivity: float
+) -> FloatArray:
+    """Resistance in a ring between its whole raceway and the strip under one of its rollers, K/W.
+
+    ln(1/sin(π b/2c)) / (π k L): isothermal strips of half width b, 2c apart, on a thick body.
+
+    Parameters
+    ----------
+    half_width, half_spacing : array_like, [m]
+    length : float, [m]
+    thermal_conductivity : float, [W/(m K)]
+
+    Source: Veziroglu & Chandra (1969); Bejan & Kraus, Heat Transfer Handbook, ch. 4.
+
+    Strips that touch leave none:
+
+    >>> float(ring_constriction(1e-3, 1e-3, 1e-2, 46.0))
+    0.0
+    """
+    share = np.sin(0.5 * np.pi * np.asarray(half_width, float) / np.asarray(half_spacing, float))
+    return -np.log(share) / (np.pi * thermal_conductivity * length)
+
+
+def half_roller_resistance(
+    half_width: ArrayLike, diameter: float, length: float, thermal_conductivity: float
+) -> FloatArray:
+    """Resistance of a roller from the strip that it touches to its middle, K/W.
+
+    ln(2D/b) / (π k L): half of a cylinder between opposite isothermal strips of half width b.
+
+    Source: Yovanovich, in Bejan & Kraus, Heat Transfer Handbook, ch. 4.
+    """
+    strip = np.asarray(half_width, float)
+    return np.log(2.0 * diameter / strip) / (np.pi * thermal_conductivity * length)
+
+
+def wedge_conductance(
+    gap: ArrayLike, radius: ArrayLike, length: float, thermal_conductivity: float
+) -> FloatArray:
+    """Conductance of lubricant at rest between a cylinder and a wall that it does not touch, W/K.
+
+    k L times the integral of 1/(h + x²/2R): π √(2R/h) k L.
+
+    Parameters
+    ----------
+    gap : array_like, [m]
+        h, where cylinder and wall are nearest.
+    radius : array_like, [m]
+        As of :func:`half_width`.
+    """
+    nearest = np.asarray(gap, float)
+    slenderness = np.sqrt(2.0 * np.asarray(radius, float) / nearest)
+    return np.pi * slenderness * thermal_conductivity * length

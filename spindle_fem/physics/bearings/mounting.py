@@ -19,6 +19,7 @@ from spindle_fem.physics.bearings.fits import (
     seated_rings,
 )
 from spindle_fem.physics.bearings.preload import require_force, tandem_approach
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 from spindle_fem.physics.bearings.rough_surface import SurfaceRoughness, roughness_from_rms
 from spindle_fem.physics.bearings.seat_contact import SeatBodies
 
@@ -229,18 +230,39 @@ class ExternalLoad:
 def rotation_growth(geometry: BearingGeometry, speed: float, shaft_bore: float | None) -> float:
     """Radial growth of the inner raceway by rotation, ring and shaft as one hollow body, m.
 
-    u = ρω²b/(4E) [(1-ν) b² + (3+ν) a²] at the outside b of a bore a.
-
-    Source: Timoshenko & Goodier, rotating discs.
+    Raises
+    ------
+    SpecError
+        A bore that is not inside the ring.
     """
     if shaft_bore is None or speed == 0.0:
         return 0.0
     outside = 0.5 * (geometry.pitch_diameter - geometry.ball_diameter * math.cos(geometry.contact_angle))
-    inside = 0.5 * shaft_bore
+    return disc_growth(geometry, speed, outside, 0.5 * shaft_bore)
+
+
+def disc_growth(
+    geometry: BearingGeometry | RollerGeometry, speed: float, outside: float, inside: float
+) -> float:
+    """Radial growth by rotation at the outside of an inner ring and its shaft as one hollow body, m.
+
+    u = ρω²b/(4E) [(1-ν) b² + (3+ν) a²] at the outside b of a bore a.
+
+    Parameters
+    ----------
+    speed : float, [rad/s]
+    outside, inside : float, [m]
+        b and a.
+
+    Raises
+    ------
+    SpecError
+        A bore that is not inside the ring.
+
+    Source: Timoshenko & Goodier, rotating discs.
+    """
     if not 0.0 <= inside < outside:
-        raise SpecError(
-            "shaft_bore_diameter", f"it is {shaft_bore * 1e3:g} mm.", "It must lie inside the ring."
-        )
+        raise SpecError("shaft_bore_diameter", f"it is {2e3 * inside:g} mm.", "It must lie inside the ring.")
     ratio = geometry.poisson_ratio
     shape = (1.0 - ratio) * outside**2 + (3.0 + ratio) * inside**2
     return geometry.ring_density * speed**2 * outside / (4.0 * geometry.young_modulus) * shape

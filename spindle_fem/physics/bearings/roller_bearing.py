@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -13,18 +14,33 @@ from scipy.optimize.elementwise import find_root
 from spindle_fem.errors import GeometryError
 from spindle_fem.physics.bearings.bearing_geometry import (
     STEEL_DENSITY,
+    STEEL_EXPANSION,
     STEEL_POISSON_RATIO,
     STEEL_YOUNG_MODULUS,
 )
-from spindle_fem.physics.bearings.hertz import OUTER
+from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
+from spindle_fem.physics.bearings.hertz import INNER, OUTER
 from spindle_fem.physics.bearings.line_contact import (
     half_width,
     line_approach,
     line_pressure,
     load_of_approach,
 )
+from spindle_fem.physics.bearings.roller_kind import RollerKind
 
 FloatArray = NDArray[np.float64]
+# of the approach over the load
+_EXPONENT = 10.0 / 9.0
+_REMEMBERED_STATES = 4096
+
+
+def _half_circle(exponent: float) -> float:
+    """Integral of a power of the cosine over half a circle."""
+    return math.sqrt(math.pi) * math.gamma(0.5 * exponent + 0.5) / math.gamma(0.5 * exponent + 1.0)
+
+
+# Sum of the rollers' loads over the radial load that they carry: no clearance, many rollers (1.258).
+LOAD_SUM = _half_circle(_EXPONENT) / _half_circle(_EXPONENT + 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +60,16 @@ class RollerGeometry:
     young_modulus, roller_young_modulus : float, [Pa]
         Of rings and rollers.
     poisson_ratio, roller_poisson_ratio : float, [-]
-    density : float, [kg/m³]
-        Of the rollers.
+    density, ring_density : float, [kg/m³]
+        Of the rollers, and of the inner ring, which turns.
+    thermal_expansion, roller_thermal_expansion : float, [1/K]
+        Of rings and rollers.
+    bore_diameter, outer_diameter : float or None, [m]
+        Boundary dimensions; only empirical heat needs them.
+    palmgren_lubrication_factor : float or None, [-]
+        f_0 of a row; None: that of the kind.
+    kind : str
+        One of ``BEARING_KINDS`` with rollers.
 
     Raises
     ------
@@ -64,10 +88,37 @@ class RollerGeometry:
     roller_young_modulus: float = STEEL_YOUNG_MODULUS
     roller_poisson_ratio: float = STEEL_POISSON_RATIO
     density: float = STEEL_DENSITY
+    ring_density: float = STEEL_DENSITY
+    thermal_expansion: float = STEEL_EXPANSION
+    roller_thermal_expansion: float = STEEL_EXPANSION
+    bore_diameter: float | None = None
+    outer_diameter: float | None = None
+    palmgren_lubrication_factor: float | None = None
+    kind: str = "cylindrical_roller"
 
     def __post_init__(self) -> None:
         for key, what, how_to_fix in roller_faults(self):
             raise GeometryError(key, what, how_to_fix)
+
+    @property
+    def catalogue(self) -> RollerKind:
+        """Catalogue constants of the bearing's kind."""
+        return BEARING_KINDS[self.kind]
+
+    @property
+    def number(self) -> int:
+        """Rollers of all rows."""
+        return self.rows * self.roller_count
+
+    @property
+    def diameter_ratio(self) -> float:
+        """γ: roller diameter over pitch diameter."""
+        return self.roller_diameter / self.pitch_diameter
+
+    @property
+    def raceway_diameters(self) -> tuple[float, float]:
+        """Of the inner and of the outer raceway, m."""
+        return self.pitch_diameter - self.roller_diameter, self.pitch_diameter + self.roller_diameter
 
     @property
     def compliance(self) -> float:
@@ -78,7 +129,7 @@ class RollerGeometry:
     @property
     def contact_radius(self) -> FloatArray:
         """Combined radius of inner and outer contact, m."""
-        ratio = self.roller_diameter / self.pitch_diameter
+        ratio = self.diameter_ratio
         return 0.5 * self.roller_diameter * np.array([1.0 - ratio, 1.0 + ratio])
 
     @property
@@ -89,9 +140,27 @@ class RollerGeometry:
 
     def centrifugal_force(self, speed: float) -> float:
         """Of one roller at a speed of the inner ring [rad/s], N: rollers orbit as rolling asks."""
-        orbit = 0.5 * speed * (1.0 - self.roller_diameter / self.pitch_diameter)
         mass = self.density * 0.25 * math.pi * self.roller_diameter**2 * self.roller_length
-        return 0.5 * mass * self.pitch_diameter * orbit**2
+        return 0.5 * mass * self.pitch_diameter * self.orbital_speed(speed) ** 2
+
+    def orbital_speed(self, speed: float) -> float:
+        """Of the rollers at a speed of the inner ring, rad/s, as rolling asks."""
+        return 0.5 * speed * (1.0 - self.diameter_ratio)
+
+    def spin_speed(self, speed: float) -> float:
+        """Of a roller about its own axis, against the cage, rad/s."""
+        return 0.5 * speed * (1.0 / self.diameter_ratio - self.diameter_ratio)
+
+    def entrainment_speed(self, speed: float) -> float:
+        """Mean speed of both surfaces of either contact past it, m/s."""
+        return 0.5 * self.roller_diameter * self.spin_speed(speed)
+
+    def clearance_at(self, inner: float, outer: float, roller: float) -> float:
+        """Clearance on the diameter with rings and rollers warmer by so much than as mounted [K], m."""
+        inside, outside = self.raceway_diameters
+        rings = self.thermal_expansion * (inside * inner - outside * outer)
+        rollers = 2.0 * self.roller_thermal_expansion * self.roller_diameter * roller
+        return self.radial_clearance - rings - rollers
 
 
 def roller_faults(geometry: RollerGeometry) -> list[tuple[str, str, str]]:
@@ -123,6 +192,7 @@ class RollerStates:
     ----------
     azimuth : (n,) ndarray, [rad]
     load, pressure, half_width, approach : (n, 2) ndarray, [N], [Pa], [m], [m]
+        The approach is negative across a gap.
     radial_displacement : float, [m]
         Of the inner ring along the load, from the middle of the clearance.
     radial_stiffness : float, [N/m]
@@ -139,6 +209,16 @@ class RollerStates:
     radial_displacement: float
     radial_stiffness: float
     centrifugal_force: float
+
+    @property
+    def driving_load(self) -> float:
+        """Radial load that a bearing without clearance carries with as much load on its rollers, N.
+
+        The load moments of catalogues go with the radial load; this makes them follow the
+        rollers, so that a preloaded bearing has friction without any radial load. Mean of
+        inner and outer contacts, centrifugal force among them.
+        """
+        return float(self.load.sum()) / (2.0 * LOAD_SUM)
 
 
 def inner_loads(geometry: RollerGeometry, approach: FloatArray, centrifugal: float) -> FloatArray:
@@ -162,6 +242,7 @@ def inner_loads(geometry: RollerGeometry, approach: FloatArray, centrifugal: flo
     return loads
 
 
+@functools.lru_cache(maxsize=_REMEMBERED_STATES)
 def solve_roller_bearing(geometry: RollerGeometry, radial_load: float, speed: float = 0.0) -> RollerStates:
     """Load of each roller where rigid rings stay parallel and the inner one balances a radial load.
 
@@ -202,8 +283,13 @@ def solve_roller_bearing(geometry: RollerGeometry, radial_load: float, speed: fl
         found = float(brentq(lambda value: carried(value) - radial_load, 0.0, most, xtol=1e-15, rtol=1e-12))
     inner = inner_loads(geometry, approach(found), centrifugal)
     load = np.stack([inner, inner + centrifugal], axis=1)
-    load[:, OUTER] = np.where(inner > 0.0, load[:, OUTER], centrifugal)
     radius = geometry.contact_radius
+    closer = line_approach(load, length, compliance)
+    free = inner <= 0.0
+    # a roller that nothing throws outwards floats in the middle of its gap
+    closer[free, INNER] = approach(found)[free] - closer[free, OUTER]
+    if centrifugal == 0.0:
+        closer[free] = 0.5 * closer[free, INNER][:, None]
     step = 1e-4 * max(most, 1e-9)
     stiffness = (carried(found + step) - carried(found - step)) / (2.0 * step)
     return RollerStates(
@@ -211,7 +297,7 @@ def solve_roller_bearing(geometry: RollerGeometry, radial_load: float, speed: fl
         load,
         line_pressure(load, length, radius, compliance),
         half_width(load, length, radius, compliance),
-        line_approach(load, length, compliance),
+        closer,
         found,
         stiffness,
         centrifugal,

@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from spindle_fem.errors import FaultsError, GeometryError, SpecError, SpindleFemError
-from spindle_fem.physics.bearings.bearing_keys import GEOMETRY, OPERATION, Reader
+from spindle_fem.definition.bearing_catalogue import SHIPPED, catalogue_bearing
+from spindle_fem.definition.bearing_types import has_rollers
+from spindle_fem.definition.standard_materials import MATERIALS
+from spindle_fem.errors import FaultsError, GeometryError, OutOfValidityError, SpecError, SpindleFemError
+from spindle_fem.physics.bearings.bearing_keys import GEOMETRY, HEAT, LUBRICANT, OPERATION, Reader
 from spindle_fem.physics.bearings.bearing_report import REPORT_SCHEMA
-from spindle_fem.physics.bearings.bearing_tables import read_document, read_tables
+from spindle_fem.physics.bearings.bearing_state import BearingState
+from spindle_fem.physics.bearings.bearing_tables import heat_of, lubricant_of, read_document, read_tables
+from spindle_fem.physics.bearings.heat_model import HeatOptions, friction_model_names
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
+from spindle_fem.physics.bearings.mounting import ExternalLoad, uniform_temperatures
 from spindle_fem.physics.bearings.roller_bearing import RollerGeometry, RollerStates, solve_roller_bearing
+from spindle_fem.physics.bearings.roller_set import RollerSet, solve_roller_set
 
-KIND = "cylindrical_roller"
+_SIZE_KEYS = ("roller_diameter", "roller_length", "roller_count", "pitch_diameter")
 
 
 def _rows(value: Any, where: str) -> int:
     if isinstance(value, bool) or value not in (1, 2):
         raise SpecError(where, f"{value!r} is no number of rows.", "Allowed: 1, 2.")
     return int(value)
-
-
-def _kind(value: Any, _where: str) -> str:
-    return str(value)
 
 
 _LENGTH, _NUMBER = GEOMETRY["width"], GEOMETRY["poisson_ratio"]
@@ -41,16 +45,35 @@ _BEARING: dict[str, Reader] = {
     "roller_young_modulus": GEOMETRY["young_modulus"],
     "roller_poisson_ratio": _NUMBER,
     "density": GEOMETRY["density"],
-    "kind": _kind,
+    "bore_diameter": _LENGTH,
+    "outer_diameter": _LENGTH,
+    "palmgren_f0": _NUMBER,
+    "kind": GEOMETRY["kind"],
 }
-_TABLES = {"bearing": _BEARING, "operation": {key: OPERATION[key] for key in ("speed", "radial_load")}}
-_REQUIRED = {"bearing": tuple(_BEARING)[:4], "operation": ("speed", "radial_load")}
+_FIELDS = {"palmgren_f0": "palmgren_lubrication_factor"}
+_TABLES = {
+    "bearing": _BEARING,
+    "operation": {key: OPERATION[key] for key in ("speed", "radial_load", "temperature")},
+    "lubricant": LUBRICANT,
+    "heat": {"model": HEAT["model"]},
+}
+_REQUIRED = {
+    "bearing": _SIZE_KEYS,
+    "operation": ("speed", "radial_load"),
+    "lubricant": ("kinematic_viscosity_40", "kinematic_viscosity_100"),
+    "heat": (),
+}
 
 
 def is_roller_document(document: Mapping[str, Any]) -> bool:
     """Whether a bearing file describes a cylindrical roller bearing."""
     table = document.get("bearing")
-    return isinstance(table, dict) and table.get("kind") == KIND
+    if not isinstance(table, dict):
+        return False
+    designation = table.get("catalogue")
+    found = catalogue_bearing(designation) if isinstance(designation, str) else None
+    kind = table.get("kind", (found or {}).get("kind"))
+    return isinstance(kind, str) and has_rollers(kind)
 
 
 def roller_report(path: str | Path) -> dict[str, Any]:
@@ -59,7 +82,7 @@ def roller_report(path: str | Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        As of a ball bearing, with ``rollers`` for ``balls``; no heat and no film.
+        As of a ball bearing, with ``rollers`` for ``balls``; no heat and no film without a lubricant.
 
     Raises
     ------
@@ -68,8 +91,9 @@ def roller_report(path: str | Path) -> dict[str, Any]:
     """
     file = str(path)
     faults: list[SpindleFemError] = []
-    tables = read_tables(read_document(path), file, faults, _TABLES, _REQUIRED)
-    geometry = None
+    document = _with_catalogue(read_document(path), file, faults)
+    tables = read_tables(document, file, faults, _TABLES, _REQUIRED)
+    geometry, heat, lubricant = None, HeatOptions("palmgren"), None
     if not faults:
         bearing, operation = tables["bearing"], tables["operation"]
         faults += [
@@ -77,21 +101,53 @@ def roller_report(path: str | Path) -> dict[str, Any]:
             for key in ("speed", "radial_load")
             if operation[key] < 0.0
         ]
+        heat = heat_of({"model": "palmgren", **tables.get("heat", {})}, file, faults)
+        known = friction_model_names(rollers=True)
+        if heat.level not in known:
+            what = f'"{heat.level}" knows no rollers.'
+            faults.append(SpecError(f"{file}: heat.model", what, f"Allowed: {', '.join(known)}."))
+        lubricant = lubricant_of(tables.get("lubricant"), file, faults)
         try:
-            geometry = RollerGeometry(**{key: value for key, value in bearing.items() if key != "kind"})
+            geometry = RollerGeometry(**{_FIELDS.get(key, key): value for key, value in bearing.items()})
         except GeometryError as error:
             faults.append(SpecError(f"{file}: bearing.{error.where}", error.what, error.how_to_fix))
     if len(faults) == 1:
         raise faults[0]
     if faults or geometry is None:
         raise FaultsError(file, faults)
-    states = solve_roller_bearing(geometry, tables["operation"]["radial_load"], tables["operation"]["speed"])
-    return _report(geometry, states)
+    load = operation["radial_load"]
+    warm = uniform_temperatures(1, operation.get("temperature", 313.15))
+    try:
+        ((state,),) = solve_roller_set(
+            RollerSet(("bearing",), geometry), operation["speed"], ExternalLoad(0.0, load), [warm],
+            lubricant=lubricant, heat=heat,
+        )  # fmt: skip
+    except OutOfValidityError as error:
+        raise SpecError(f"{file}: operation.temperature", error.what, error.how_to_fix) from error
+    return _report(geometry, state, solve_roller_bearing(geometry, load, operation["speed"]))
 
 
-def _report(geometry: RollerGeometry, states: RollerStates) -> dict[str, Any]:
-    rollers = []
-    for index, azimuth in enumerate(states.azimuth):
+def _with_catalogue(document: dict[str, Any], file: str, faults: list[SpindleFemError]) -> dict[str, Any]:
+    """A file whose ``bearing.catalogue`` names a roller bearing that ships, with what that gives."""
+    table = document.get("bearing")
+    if not isinstance(table, dict) or "catalogue" not in table:
+        return document
+    designation = table["catalogue"]
+    found = catalogue_bearing(designation) if isinstance(designation, str) else None
+    own = {key: value for key, value in table.items() if key != "catalogue"}
+    if found is None or "roller_count" not in found:
+        faults.append(SpecError(f"{file}: bearing.catalogue", f"{designation!r} has no rollers.", SHIPPED))
+        return {**document, "bearing": own}
+    if found["roller_material"] == "silicon_nitride":
+        roller = MATERIALS["silicon_nitride"]
+        found |= {f"roller_{key}": roller[key] for key in ("young_modulus", "poisson_ratio")}
+        found["density"] = roller["density"]
+    return {**document, "bearing": {key: found[key] for key in found if key in _BEARING} | own}
+
+
+def _report(geometry: RollerGeometry, state: BearingState, solved: RollerStates) -> dict[str, Any]:
+    rollers, balls = [], state.balls
+    for index, azimuth in enumerate(balls.azimuth):
         record: dict[str, Any] = {
             "row": index // geometry.roller_count + 1,
             "azimuth_deg": float(np.degrees(azimuth)),
@@ -99,24 +155,30 @@ def _report(geometry: RollerGeometry, states: RollerStates) -> dict[str, Any]:
         for name, field, factor in (
             ("load_{}_N", "load", 1.0),
             ("pressure_{}_GPa", "pressure", 1e-9),
-            ("half_width_{}_mm", "half_width", 1e3),
-            ("deformation_{}_um", "approach", 1e6),
+            ("half_width_{}_mm", "semi_minor", 1e3),
+            ("deformation_{}_um", "deformation", 1e6),
         ):
             for side, ring in ((INNER, "inner"), (OUTER, "outer")):
-                record[name.format(ring)] = float(getattr(states, field)[index, side]) * factor
-        record["centrifugal_force_N"] = states.centrifugal_force
+                record[name.format(ring)] = float(getattr(balls, field)[index, side]) * factor
+        record["centrifugal_force_N"] = float(balls.centrifugal_force[index])
+        for name, field, factor in (
+            ("film_central_um", "film_central", 1e6),
+            ("film_minimum_um", "film_minimum", 1e6),
+            ("lambda", "film_thickness_ratio", 1.0),
+        ):
+            least = float(np.fmin(*getattr(balls, field)[index])) * factor
+            record[name] = least if math.isfinite(least) else None
         rollers.append(record)
+    found = [{"code": note.code, "text": note.text} for note in state.warnings]
+    if state.heat is None:
+        text = "without a lubricant there is no friction and no film; heat is unknown, not zero."
+        found.append({"code": "roller_friction_missing", "text": text})
     return {
         "schema": REPORT_SCHEMA,
-        "radial_deflection_um": states.radial_displacement * 1e6,
-        "radial_stiffness_N_um": states.radial_stiffness * 1e-6,
-        "heat_W": None,
-        "terms_W": {},
+        "radial_deflection_um": state.radial_displacement * 1e6,
+        "radial_stiffness_N_um": solved.radial_stiffness * 1e-6,
+        "heat_W": None if state.heat is None else state.heat_W,
+        "terms_W": state.terms_W,
         "rollers": rollers,
-        "warnings": [
-            {
-                "code": "roller_friction_missing",
-                "text": "friction and film of rollers are not worked out; heat is unknown, not zero.",
-            }
-        ],
+        "warnings": found,
     }

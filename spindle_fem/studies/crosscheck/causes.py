@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.machine_spec import MachineSpec, RollerBearingType
 from spindle_fem.model.lumped.machine_network import MachineNetwork, build_machine_network
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures, HeatModel
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -194,14 +194,20 @@ def band_lines(low: float, high: float) -> tuple[Array, Array]:
 def contact_bands(
     spec: MachineSpec, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
 ) -> dict[str, tuple[float, float]]:
-    """Where the balls touch each raceway: from and to along z of the mean contact ellipse, m."""
+    """Where balls or rollers touch each raceway: from and to along z of the mean contact, m."""
     states = BearingMechanics(spec).states(point, temperatures, expand=False)
     bands = {}
     for group, bearing in spec.bearings:
         state = states[bearing.name]
+        kind = spec.bearing_types[group.bearing_type]
         middle = 0.5 * (bearing.z[0] + bearing.z[1])
+        if isinstance(kind, RollerBearingType):
+            half = 0.5 * kind.rows * kind.roller_length
+            for side in ("inner", "outer"):
+                bands[f"{bearing.name}.{side}_raceway"] = (middle - half, middle + half)
+            continue
         towards = 1.0 if bearing.takes_thrust == "towards_rear" else -1.0
-        radius = 0.5 * spec.bearing_types[group.bearing_type].ball_diameter
+        radius = 0.5 * kind.ball_diameter
         for index, side in enumerate(("inner", "outer")):
             # the inner ring pushes the balls along the thrust, the outer one holds them
             sign = towards * (-1.0 if side == "inner" else 1.0)

@@ -6,14 +6,36 @@ import math
 
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_state import BearingHeat
-from spindle_fem.physics.bearings.catalogue_friction import FrictionMoment, boundary_diameters
-from spindle_fem.physics.bearings.heat_model import HeatInputs, HeatOptions, friction_model
+from spindle_fem.physics.bearings.catalogue_friction import (
+    FrictionMoment,
+    boundary_diameters,
+    roller_boundary,
+)
+from spindle_fem.physics.bearings.heat_model import (
+    HeatInputs,
+    HeatOptions,
+    RollerHeatInputs,
+    friction_model,
+)
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.bearings.lubricant_film import inlet_shear_factor, replenishment_factor
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
+
+
+def of_rollers(inputs: RollerHeatInputs, options: HeatOptions) -> BearingHeat:
+    """The same moments of roller bearings, whose full-film coefficient is that of their kind."""
+    moment = skf_roller_moment(
+        inputs.geometry,
+        inputs.speed,
+        inputs.kinematic_viscosity,
+        inputs.states.driving_load,
+        friction_boundary=options.skf_friction_boundary,
+    )
+    return moment.heat("skf", inputs.speed, options)
 
 
 @HEAT_MODELS.register
-@friction_model(needs_boundary=True)
+@friction_model(needs_boundary=True, rollers=of_rollers)
 def skf(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
     """Heat of the ``rolling`` and ``sliding`` moments, and of a contact seal."""
     moment = skf_moment(
@@ -67,11 +89,63 @@ def skf_moment(
     )
     third = 4.0 / 3.0
     sliding = s1 * mean**0.26 * ((radial + s3 * inertia) ** third + s2 * axial**third)
-    boundary = math.exp(-2.6e-8 * (rpm * viscosity) ** 1.4 * mean)
-    coefficient = boundary * friction_boundary + (1.0 - boundary) * friction_ehl
+    coefficient = _sliding_coefficient(rpm * viscosity, mean, friction_ehl, friction_boundary)
     return FrictionMoment(
         {
             "rolling": reduction * rolling * (viscosity * rpm) ** 0.6 * 1e-3,
             "sliding": coefficient * sliding * 1e-3,
         }
     )
+
+
+def skf_roller_moment(
+    geometry: RollerGeometry,
+    speed: float,
+    kinematic_viscosity: float,
+    driving_load: float,
+    *,
+    friction_boundary: float = 0.15,
+) -> FrictionMoment:
+    """Friction moment of cylindrical rollers by the SKF model: ``rolling`` and ``sliding``.
+
+    Every row counts as a bearing of its own under its share of the load: the
+    catalogue has no constants of double rows with cage.
+
+    Parameters
+    ----------
+    speed : float, [rad/s]
+    kinematic_viscosity : float, [m²/s]
+    driving_load : float, [N]
+        Radial load, or what stands for it (``RollerStates.driving_load``).
+    friction_boundary : float
+        0.12-0.15.
+
+    Source: SKF rolling bearings catalogue (2013): G_rr = R1 d_m^2.41 F_r^0.31, G_sl = S2 d_m F_r without
+    axial load.
+    """
+    kind = geometry.catalogue
+    bore, outer = roller_boundary(geometry)
+    mean = 0.5 * (bore + outer) * 1e3
+    rpm = abs(speed) * 30.0 / math.pi
+    viscosity = kinematic_viscosity * 1e6
+    share = abs(driving_load) / geometry.rows
+    reduction = float(inlet_shear_factor(speed, mean * 1e-3, kinematic_viscosity)) * float(
+        replenishment_factor(
+            speed, bore, outer, kinematic_viscosity, geometry_constant=kind.skf_replenishment
+        )
+    )
+    rolling = kind.skf_rolling * mean**2.41 * share**0.31
+    sliding = kind.skf_sliding * mean * share
+    coefficient = _sliding_coefficient(rpm * viscosity, mean, kind.skf_friction_ehl, friction_boundary)
+    return FrictionMoment(
+        {
+            "rolling": geometry.rows * reduction * rolling * (viscosity * rpm) ** 0.6 * 1e-3,
+            "sliding": geometry.rows * coefficient * sliding * 1e-3,
+        }
+    )
+
+
+def _sliding_coefficient(product: float, mean: float, full_film: float, boundary: float) -> float:
+    """Friction coefficient between boundary and full film at ν n [mm²/s rpm] and a mean diameter [mm]."""
+    share = math.exp(-2.6e-8 * product**1.4 * mean)
+    return share * boundary + (1.0 - share) * full_film

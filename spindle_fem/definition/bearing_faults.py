@@ -1,0 +1,110 @@
+"""Faults of bearing sets and radial loads that only show when several tables are read together."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from spindle_fem.definition.bearing_catalogue import SHIPPED
+from spindle_fem.definition.bearing_seats import seat_faults
+from spindle_fem.definition.bearing_types import BearingType, RollerBearingType
+from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
+from spindle_fem.errors import SpecError, SpindleFemError, did_you_mean
+
+_TOLERANCE = 1.0e-9
+
+
+def bearing_faults(
+    spec: MachineSpec, types: Collection[str], *, all_sound: bool
+) -> Iterator[SpindleFemError]:
+    """Faults of every bearing set.
+
+    Parameters
+    ----------
+    types : collection of str
+        Names of bearing types that the file declares.
+    all_sound : bool
+        Whether every set could be read.
+    """
+    for group in spec.bearing_set:
+        if group.bearing_type not in types:
+            allowed = f"{did_you_mean(group.bearing_type, types)} {SHIPPED}".strip()
+            what = f'"{group.bearing_type}" is no bearing type of this machine.'
+            yield SpecError(f"bearing_set.{group.name}.bearing_type", what, allowed)
+        kind = spec.bearing_types.get(group.bearing_type)
+        if kind is None:
+            continue
+        yield from _width_faults(group, kind)
+        if isinstance(kind, RollerBearingType):
+            yield from _roller_set_faults(group)
+        else:
+            yield from _ball_set_faults(group)
+            if group.fit is not None:
+                yield from seat_faults(spec, group, kind)
+    carriers = [group.name for group in spec.bearing_set if group.carries_thrust]
+    if spec.bearing_set and len(carriers) != 1 and all_sound:
+        yield SpecError(
+            "bearing_set",
+            f"{', '.join(carriers)} have carries_thrust = true."
+            if carriers
+            else "none has carries_thrust = true.",
+            "Allowed: exactly one set.",
+        )
+    if all_sound:
+        yield from _radial_faults(spec)
+
+
+def _width_faults(group: BearingSet, kind: BearingType) -> Iterator[SpindleFemError]:
+    for bearing in group.bearing:
+        width = bearing.z[1] - bearing.z[0]
+        if abs(width - kind.width) > _TOLERANCE:
+            yield SpecError(
+                f"bearing_set.{group.name}.bearing.{bearing.name}.z",
+                f"spans {width * 1e3:g} mm.",
+                f'Allowed: {kind.width * 1e3:g} mm, the width of "{group.bearing_type}".',
+            )
+
+
+def _ball_set_faults(group: BearingSet) -> Iterator[SpindleFemError]:
+    where = f"bearing_set.{group.name}"
+    if "preload" not in group.model_fields_set:
+        yield SpecError(
+            f"{where}.preload", "is missing.", 'Allowed: a quantity such as "500 N", at least 0 N.'
+        )
+    for bearing in group.bearing:
+        if bearing.takes_thrust is None:
+            yield SpecError(
+                f"{where}.bearing.{bearing.name}.takes_thrust",
+                "is missing.",
+                "Allowed: towards_rear, towards_nose.",
+            )
+
+
+def _roller_set_faults(group: BearingSet) -> Iterator[SpindleFemError]:
+    where = f"bearing_set.{group.name}"
+    rollers = f'"{group.bearing_type}" has cylindrical rollers, which'
+    if group.preload > 0.0:
+        what = f"{rollers} no axial force preloads."
+        yield SpecError(f"{where}.preload", what, "Give radial_clearance of the bearing type instead.")
+    if group.carries_thrust:
+        yield SpecError(f"{where}.carries_thrust", f"{rollers} carry none.", "Name a set of ball bearings.")
+    if group.fit is not None:
+        what = f"{rollers} are known by their clearance as mounted."
+        yield SpecError(f"{where}.fit", what, "Give radial_clearance of the bearing type instead.")
+    for bearing in group.bearing:
+        if bearing.takes_thrust is not None:
+            key = f"{where}.bearing.{bearing.name}.takes_thrust"
+            yield SpecError(key, f"{rollers} carry none.", "Leave it out.")
+
+
+def _radial_faults(spec: MachineSpec) -> Iterator[SpindleFemError]:
+    """Radial loads that no bearing, or one alone, would have to hold."""
+    if not spec.radial_load:
+        return
+    holding = [group.name for group in spec.bearing_set if group.carries_radial]
+    if len(holding) < 2:
+        named = f"only {holding[0]} carries" if holding else "no bearing set carries"
+        yield SpecError(
+            "radial_load",
+            f"{named} radial loads; the shaft would tilt.",
+            "Allowed: at least two sets with carries_radial = true.",
+        )
