@@ -38,7 +38,7 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
         group_of_contacts(spec, build_assembly(spec).joint_names)
         named = {part.material for part in spec.part}
         for kind in spec.bearing_types.values():
-            named |= {kind.ring_material, kind.ball_material}
+            named |= {kind.ring_material, kind.element_material}
         # Of faulty materials, which are told already, no set is assembled.
         for group in spec.bearing_set if named <= spec.materials.keys() else ():
             assembled_set(spec, group)
