@@ -113,7 +113,7 @@ def ring_constriction(
 
     Strips that touch leave none:
 
-    >>> float(ring_constriction(1e-3, 1e-3, 1e-2, 46.0))
+    >>> abs(float(ring_constriction(1e-3, 1e-3, 1e-2, 46.0)))
     0.0
     """
     share = np.sin(0.5 * np.pi * np.asarray(half_width, float) / np.asarray(half_spacing, float))
