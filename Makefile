@@ -10,7 +10,7 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint lowest docs wheel-check reference study book proof clean
+.PHONY: run test setup lint lowest docs wheel-check reference study book proof hardening clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
@@ -81,6 +81,13 @@ BOOK ?=
 proof: $(READY)
 	$(BIN)/python -m validation.proof $(PROOF) -o reports/proof $(addprefix --real ,$(REAL)) $(addprefix --book ,$(BOOK)) \
 	    --recordings $(RECORDINGS)
+
+# Spoilt inputs, kills, full disks: at most half an hour on two cores, resumable; writes docs/reliability.md.
+# HARDENING=short: a sample in a minute, without the page.
+HARDENING ?= whole
+hardening: $(READY)
+	$(BIN)/python -m validation.hardening -o runs/hardening_$(HARDENING) --jobs 2 \
+	    $(if $(filter short,$(HARDENING)),--short,--page docs/reliability.md)
 
 clean:
 	rm -rf $(VENV) build dist runs .pytest_cache .ruff_cache .hypothesis

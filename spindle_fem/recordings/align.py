@@ -32,6 +32,8 @@ GAP_STEPS = 1.5
 UNIFORM_TOLERANCE = 0.01
 LONG_GAP_SECONDS = 1800.0
 LONG_GAP_STEPS = 60.0
+# Two years: a step a minute is kept of all of it, and of more that does not fit in usual memory.
+LONGEST_SECONDS = 2.0 * 366.0 * 86400.0
 # Least noise of a channel that declares none, K: no sensor on a machine is better than a millikelvin.
 SMALLEST_SIGMA = 1.0e-3
 
@@ -203,6 +205,16 @@ def read_recording(path: str | Path, *, long_gap: float | None = None) -> Record
     return align(manifest, read_table(data, manifest), source=str(path), long_gap=long_gap)
 
 
+def _require_length(times: Array, source: str) -> None:
+    length = float(times[-1] - times[0]) if times.size else 0.0
+    if not length <= LONGEST_SECONDS:
+        raise RecordingError(
+            source,
+            f"lasts {length / 86400.0:.4g} days.",
+            f"Allowed: {LONGEST_SECONDS / 86400.0:.0f} days; is one stamp wrong, or the unit of the time?",
+        )
+
+
 def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float | None = None) -> Recording:
     """Put a raw table on its grid of distinct stamps and flag its defects.
 
@@ -215,6 +227,7 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
     for channel in manifest.channel:
         by_role[channel.role].append(channel)
     times = grid.times
+    _require_length(times, source)
     merged = {
         channel.column: grid.merge(
             table.columns[channel.column], last=channel.role == "input" and channel.hold == "previous"

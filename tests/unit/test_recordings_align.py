@@ -262,3 +262,8 @@ def test_recording_arrays_cannot_be_written(tmp_path):
     recording = read(tmp_path, [(0.0, 20.0, 20.0, 0.0), (1.0, 20.0, 20.0, 0.0)])
     with pytest.raises(ValueError, match="read-only"):
         recording.temperature[0, 0] = 0.0
+
+
+def test_a_stamp_far_away_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match="days"):
+        read(tmp_path, [(0.0, 20.0, 20.0, 0.0), (60.0, 20.1, 20.0, 0.0), (1e19, 20.2, 20.0, 0.0)])

@@ -1,7 +1,8 @@
 """``python -m validation.hardening -o DIR``: spoilt inputs by the thousand, one JSON line a case.
 
 What is in ``DIR/cases.jsonl`` already is not done again. Folders of cases that showed a fault stay in
-``DIR/work`` for a look. ``--only FAMILY`` and ``--cases N`` make it shorter.
+``DIR/work`` for a look, ``DIR/result.json`` has the counts and ``--page FILE`` the page. ``--short`` is a
+sample that needs nothing built; ``--only FAMILY`` and ``--cases N`` choose.
 """
 
 from __future__ import annotations
@@ -11,17 +12,19 @@ import json
 import multiprocessing
 import os
 import sys
-from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
 from .child import warm
 from .families import FAMILIES, try_case
-from .judged import FAULT
+from .judged import ACCEPTED, FAULT, REFUSED
 from .material import make_originals
+from .page import page, summarise
 
 CASES = "cases.jsonl"
+# A sample: cases whose commands need nothing but the case.
+SHORT = {"definitions": 12, "recordings": 7, "studies": 4}
 
 
 def read_cases(place: Path) -> list[dict[str, Any]]:
@@ -43,19 +46,23 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", action="append", choices=sorted(FAMILIES))
     parser.add_argument("--cases", type=int, help="of each family at most")
+    parser.add_argument("--short", action="store_true", help="a sample of some seconds")
+    parser.add_argument("--page", type=Path, help="Markdown page to write")
     given = parser.parse_args(arguments)
     place = given.output.resolve()
     place.mkdir(parents=True, exist_ok=True)
     os.environ["SPINDLE_FEM_CACHE"] = str(place / "cache")
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    warm()
-    make_originals(place)
+    planned = _planned(given)
+    if set(planned) - SHORT.keys():
+        warm()
+        make_originals(place)
     done = {(item["family"], item["number"]) for item in read_cases(place)}
     waiting = [
         (family, number)
-        for family in given.only or FAMILIES
-        for number in range(1, min(FAMILIES[family][1], given.cases or 10**9) + 1)
+        for family, count in planned.items()
+        for number in range(1, count + 1)
         if (family, number) not in done
     ]
     # All families side by side: a fault of any shows early.
@@ -68,10 +75,22 @@ def main(arguments: list[str] | None = None) -> int:
             print(json.dumps(item), file=lines, flush=True)
             if item["outcome"] == FAULT:
                 print(f"{item['family']} {item['number']}: {item['reason']}", flush=True)
-    counts = Counter((item["family"], item["outcome"]) for item in read_cases(place))
-    for (family, outcome), number in sorted(counts.items()):
-        print(f"{family}: {number} {outcome}")
-    return int(any(outcome == FAULT for _, outcome in counts))
+    found = summarise(read_cases(place), {name: count for name, (_, count) in FAMILIES.items()}, given.seed)
+    (place / "result.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    if given.page:
+        given.page.write_text(page(found), encoding="utf-8")
+    for family, item in found["families"].items():
+        if item["done"]:
+            told = ", ".join(f"{item[outcome]} {outcome}" for outcome in (ACCEPTED, REFUSED, FAULT))
+            print(f"{family}: {item['done']} of {item['planned']} done, {told}")
+    return int(bool(found["faults"]))
+
+
+def _planned(given: argparse.Namespace) -> dict[str, int]:
+    """How many cases of each family are asked for."""
+    counts = SHORT if given.short else {name: count for name, (_, count) in FAMILIES.items()}
+    chosen = {name: count for name, count in counts.items() if name in (given.only or counts)}
+    return {name: min(count, given.cases or count) for name, count in chosen.items()}
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from . import texts
 from .definitions import try_definition
 from .folders import try_folder
 from .judged import FAULT, Record
@@ -15,6 +16,7 @@ from .kills import KILLS, try_kill
 from .recordings import try_recording
 from .studies import try_study
 from .surroundings import TRIALS, try_surroundings
+from .texts import try_text
 
 # Of each family: what tries one case, and how many cases there are.
 FAMILIES = {
@@ -22,6 +24,7 @@ FAMILIES = {
     "recordings": (try_recording, 1000),
     "studies": (try_study, 300),
     "folders": (try_folder, 200),
+    "texts": (try_text, texts.count()),
     "kills": (try_kill, sum(KILLS.values())),
     "surroundings": (try_surroundings, len(TRIALS)),
 }

@@ -23,7 +23,8 @@ WRITTEN = frozenset({"out", "out.png"})
 def try_recording(number: int, chance: random.Random, folder: Path) -> Record:
     """One spoilt recording, given to one of the commands that read recordings."""
     record = Record("recordings", number)
-    command = chance.choice([name for name, share in COMMANDS.items() for _ in range(share)])
+    order = [name for name, share in COMMANDS.items() for _ in range(share)]
+    command = order[number % len(order)]
     manifest, frame = spindle_recording() if command == "simulate_spindle" else pump_recording()
     record.done = [command]
     data, suffix = frame.to_csv(index=False).encode(), ".csv"

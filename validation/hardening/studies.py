@@ -19,7 +19,8 @@ TEXTS = {"ball": BALL, "roller": ROLLER, "sweep": SWEEP, "transient": TRANSIENT}
 def try_study(number: int, chance: random.Random, folder: Path) -> Record:
     """One spoilt study or bearing file, given to its command."""
     record = Record("studies", number)
-    kind = chance.choice([name for name, share in FILES.items() for _ in range(share)])
+    order = [name for name, share in FILES.items() for _ in range(share)]
+    kind = order[number % len(order)]
     content, done = mutated(chance, tables(TEXTS[kind]))
     record.done = [kind, *done]
     (folder / "file.toml").write_bytes(content)
