@@ -295,7 +295,7 @@ def examples(
 
 def main() -> None:
     """Entry point: exit status 0 done, 2 bad input, 1 anything else."""
-    from spindle_fem.errors import SpindleFemError
+    from spindle_fem.errors import SpindleFemError, of_system
 
     # The solver is bound by memory: more threads only wait for one another, spinning.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -310,5 +310,6 @@ def main() -> None:
     except OSError as error:
         if State.debug:
             raise
-        typer.echo(f"{type(error).__name__}: {error}", err=True)
-        sys.exit(1)
+        own = of_system(error)
+        typer.echo(f"{type(own).__name__}: {own}", err=True)
+        sys.exit(getattr(own, "exit_status", 1))

@@ -7,6 +7,7 @@ and the offending value) and ``how_to_fix`` (what is allowed).
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable
 
 
@@ -118,6 +119,33 @@ class CheckFailedError(SpindleFemError):
 
 class RecordingError(BadInputError):
     """A recording or its manifest cannot be used."""
+
+
+class PathError(BadInputError):
+    """A path that was given cannot be read or written."""
+
+
+class NoSpaceError(SpindleFemError):
+    """A disk is full."""
+
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def of_system(error: OSError) -> SpindleFemError | OSError:
+    """What the operating system refused, with where and how to fix; other errors as they are.
+
+    >>> str(of_system(OSError(errno.EROFS, "Read-only file system", "out/new.toml")))
+    'out/new.toml: cannot be used (Read-only file system). Give another path.'
+    """
+    where = str(error.filename or "")
+    if error.errno in _FULL:
+        return NoSpaceError(
+            where, f"there is no space left ({error.strerror}).", "Make room and run the command again."
+        )
+    if error.errno is not None and where:
+        return PathError(where, f"cannot be used ({error.strerror}).", "Give another path.")
+    return error
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

@@ -169,6 +169,7 @@ def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = 
         Another file ending.
     """
     from spindle_fem.machine.geometry.assembly import build_assembly
+    from spindle_fem.results.output_folder import whole_file
 
     endings = (".msh", ".vtu", ".step")
     if file.suffix not in endings:
@@ -181,14 +182,16 @@ def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = 
     if file.suffix == ".step":
         from spindle_fem.machine.geometry.step_file import export_step
 
-        export_step(assembly, file)
+        with whole_file(file) as partial:
+            export_step(assembly, partial)
         return {"machine": spec.name, "parts": len(assembly.parts)}
     from spindle_fem.machine.meshing.build_mesh import build_mesh
     from spindle_fem.machine.meshing.mesh_files import write_mesh
 
     settings = spec.mesh
     mesh = build_mesh(assembly, preset=settings.preset, size_factor=settings.size_factor, sizes=settings.size)
-    write_mesh(mesh, file)
+    with whole_file(file) as partial:
+        write_mesh(mesh, partial)
     return {
         "machine": spec.name,
         "nodes": len(mesh.points),

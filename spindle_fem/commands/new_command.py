@@ -8,6 +8,7 @@ from pathlib import Path
 from string import Template
 
 from spindle_fem.errors import SpecError
+from spindle_fem.results.output_folder import replace_text
 
 TEMPLATE = "new_machine.toml"
 
@@ -26,5 +27,5 @@ def new_machine(file: Path) -> Path:
         raise SpecError(str(file), "is there already.", "Give another name, or remove it.")
     text = resources.files("spindle_fem.commands").joinpath("templates", TEMPLATE).read_text("utf-8")
     name = re.sub(r"\W+", "_", file.stem, flags=re.ASCII).strip("_") or "machine"
-    file.write_text(Template(text).substitute(name=name, file=file.name), encoding="utf-8")
+    replace_text(file, Template(text).substitute(name=name, file=file.name))
     return file

@@ -146,6 +146,17 @@ def replace_bytes(path: Path, content: bytes) -> Path:
 
 
 @contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A path beside a file, with its ending, that takes the file's place when the block ends well."""
+    partial = path.with_name(f"{path.stem}.partial{path.suffix}")
+    try:
+        yield partial
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+@contextmanager
 def reading_results(folder: str | Path) -> Iterator[None]:
     """Tells files of a finished folder that somebody damaged or changed as what they are.
 

@@ -13,10 +13,16 @@ import pytest
 import xarray as xr
 
 from spindle_fem import cache
-from spindle_fem.errors import BadInputError, MeshTagError
+from spindle_fem.errors import BadInputError, MeshTagError, NoSpaceError, of_system
 from spindle_fem.machine.meshing.mesh_cache import load_npz
 from spindle_fem.results.dataset import write_dataset
-from spindle_fem.results.output_folder import MARKER, output_folder, reading_results, replace_bytes
+from spindle_fem.results.output_folder import (
+    MARKER,
+    output_folder,
+    reading_results,
+    replace_bytes,
+    whole_file,
+)
 
 
 @dataclass
@@ -136,3 +142,30 @@ def test_files_that_somebody_changed_are_told_as_such(tmp_path, error):
 def test_a_disk_that_is_full_is_no_damaged_file(tmp_path):
     with pytest.raises(OSError, match="full"), reading_results(tmp_path):
         raise OSError(errno.ENOSPC, "full")
+
+
+def test_what_the_system_refuses_is_told_with_its_path_and_its_status():
+    full = of_system(OSError(errno.EFBIG, os.strerror(errno.EFBIG)))
+    assert isinstance(full, NoSpaceError)
+    assert full.exit_status == 1
+    refused = of_system(OSError(errno.EROFS, os.strerror(errno.EROFS), "out/new.toml"))
+    assert refused.exit_status == 2
+    assert str(refused).startswith("out/new.toml: ")
+    other = OSError("HDF5 says something")
+    assert of_system(other) is other
+
+
+def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
+    file = tmp_path / "mesh.vtu"
+    file.write_text("old")
+
+    def fail(path):
+        path.write_text("half")
+        raise OSError(errno.ENOSPC, "full")
+
+    with pytest.raises(OSError, match="full"), whole_file(file) as partial:
+        fail(partial)
+    assert file.read_text() == "old"
+    with whole_file(file) as partial:
+        partial.write_text("new")
+    assert [item.read_text() for item in tmp_path.iterdir()] == ["new"]

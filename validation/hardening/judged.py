@@ -67,6 +67,11 @@ class Record:
         if self.outcome != FAULT:
             self.outcome, self.reason = FAULT, reason
 
+    def refused_rightly(self) -> None:
+        """A refusal that was looked for."""
+        if self.outcome == REFUSED:
+            self.outcome, self.reason = ACCEPTED, ""
+
     def long_work(self) -> None:
         """What was asked for takes longer than a case may: no fault where the work was under way."""
         self.outcome, self.ran, self.ran_outcome, self.reason = ACCEPTED, "long", ACCEPTED, ""

@@ -19,8 +19,8 @@ from .judged import ACCEPTED, BAD_INPUT, OTHER_REFUSAL, Record
 from .material import COARSE, FOLDERS, ORIGINALS, PATIENT, PUMP, SPINDLE
 from .same_numbers import MAIN_FILES, difference
 
-# Largest file that a full disk takes, bytes: nothing, less and more than tables, pictures and fields.
-SIZES = (0, 4_000, 60_000, 400_000)
+# Largest file that a full disk takes, bytes: a message, less and more than tables, pictures and fields.
+SIZES = (600, 4_000, 60_000, 400_000)
 # What writes: folders as in the material, and single files.
 SINGLE_FILES = {
     "mesh": ("mesh", SPINDLE, "-o", "out.vtu", *COARSE),
@@ -71,13 +71,16 @@ def _full_disk(kind: str, size: int, record: Record, folder: Path, originals: Pa
 
     ended = run_command(_arguments(kind), folder, Surroundings(before=limit, patience_s=PATIENT))
     outcome = record.step("full", ended, (OTHER_REFUSAL, BAD_INPUT))
-    if outcome == ACCEPTED:
-        _compare(record, kind, folder / "out", originals)
-        return
     out = folder / "out"
+    if outcome == ACCEPTED:
+        _compare(record, kind, out, originals)
+        cut = [path.name for path in folder.rglob("out*") if path.is_file() and path.stat().st_size == size]
+        if cut:
+            record.fault(f"cut without a word: {', '.join(cut)}")
+        return
     if kind in FOLDERS and out.is_dir() and any(out.iterdir()) and not (out / "INCOMPLETE").exists():
         record.fault("what was left is not marked")
-    record.outcome = ACCEPTED
+    record.refused_rightly()
     _finish(record, kind, folder, originals)
 
 
@@ -93,7 +96,7 @@ def _mounted(kind: str, size: str, record: Record, folder: Path, originals: Path
         record.step("full", run_command(_arguments(kind), folder, around), (OTHER_REFUSAL, BAD_INPUT))
         if record.outcome == ACCEPTED:
             return
-        record.outcome = ACCEPTED
+        record.refused_rightly()
         subprocess.run(["mount", "-o", "remount,size=100m", str(out)], check=True)
         _finish(record, kind, folder, originals)
 
@@ -119,7 +122,7 @@ def _read_only(kind: str, record: Record, folder: Path, originals: Path) -> None
         ended = run_command(_arguments(kind, "out/new"), folder)
         if record.step("read only", ended) == ACCEPTED:
             record.fault("wrote where nothing can be written")
-    record.outcome = ACCEPTED
+    record.refused_rightly()
 
 
 def _cache_read_only(kind: str, record: Record, folder: Path, originals: Path) -> None:
@@ -179,8 +182,8 @@ def _two_users(kind: str, record: Record, folder: Path, originals: Path) -> None
 
         from spindle_fem.command_line.application import app
 
-        for out in ("out2", "out"):
-            # the second time as somebody else, in this process: what it needs of Python is loaded
+        # as the first user to write and to read, so that all that is needed of Python is loaded, then as another
+        for out in ("out2", "out2", "out"):
             if out == "out":
                 os.setgid(NOBODY)
                 os.setuid(NOBODY)

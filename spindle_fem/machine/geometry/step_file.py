@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from spindle_fem.errors import GeometryError
+from spindle_fem.errors import GeometryError, PathError
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry
 from spindle_fem.machine.geometry.cad_solids import build_solids, gmsh_session
 
@@ -26,6 +26,8 @@ def export_step(assembly: AssemblyGeometry, path: str | Path) -> Path:
     ------
     GeometryError
         Another suffix.
+    PathError
+        The file cannot be written, or not whole.
     """
     import gmsh
 
@@ -48,8 +50,12 @@ def export_step(assembly: AssemblyGeometry, path: str | Path) -> Path:
         geometry.synchronize()
         for tag, name in names.items():
             gmsh.model.setEntityName(3, tag, name)
-        with _quiet_writer():
-            gmsh.write(str(path))
+        try:
+            with _quiet_writer():
+                gmsh.write(str(path))
+        except Exception as error:  # gmsh has no class of its own
+            what = f"cannot be written whole ({error})."
+            raise PathError(str(path), what, "Make room, or give another path.") from error
     return path
 
 
