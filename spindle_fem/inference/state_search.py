@@ -8,7 +8,7 @@ likelihood over that of all courses under the fitted chain.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,18 +67,13 @@ def add_states(search: Search, fit: Fit, number: int = PLACES_SETTLED) -> None:
     if any(search.in_intervals(c) for c in fit.candidates):
         return
     problem = search.problem
-    numbers = range(len(problem.predictor.recordings))
-    readings = [ReadingFilter(readings_about(problem, fit, n)) for n in numbers]
-    bases = [BaseRun(problem.predictor, n, fit.values, fit.candidates) for n in numbers]
+    recordings = range(len(problem.predictor.recordings))
+    readings = [ReadingFilter(readings_about(problem, fit, n)) for n in recordings]
+    bases = [BaseRun(problem.predictor, n, fit.values, fit.candidates) for n in recordings]
     found: list[tuple[float, StatePlace, Course]] = []
     for place in state_places(search):
-        answer = answer_of(bases[place.recording], place.pattern)
-        chain = Chain.usual(np.zeros(len(answer.group), dtype=np.int64))
-        usual = _usual(search, place)
-        for share in START_SIZES:
-            course = find_course(answer, readings[place.recording], chain, share * usual, 2.0 * usual, QUICK)
-            if course is not None and course.log_evidence > 0.0:
-                found.append((course.log_evidence, place, course))
+        courses = _courses(search, bases[place.recording], readings[place.recording], place)
+        found += [(course.log_evidence, place, course) for course in courses]
     found.sort(key=lambda item: -item[0])
     settled: list[StatePlace] = []
     for evidence, place, course in found:
@@ -161,7 +156,11 @@ def _bare(fit: Fit, candidate: Candidate) -> tuple[dict[str, float], tuple[Candi
 
 
 def settle_best(search: Search) -> None:
-    """Follow the state of the best set again, about a fit that holds its other effects too."""
+    """Follow the state of the best set again, about a fit that holds its other effects too.
+
+    Also as another effect at the same spot: whether heat or cooling switches shows in how its power follows
+    temperatures, which what else is missing hides while a state is first looked for.
+    """
     fit = search.ranked()[0].fit
     for candidate in fit.candidates:
         if len(fit.candidates) > 1 and search.is_hidden_state(candidate):
@@ -169,6 +168,42 @@ def settle_best(search: Search) -> None:
             again = course_about(search, fit, place, candidate, course)
             if again is not None:
                 settle(search, fit, place, again, candidate)
+                twin = _twin(search, fit, place, candidate, tuned.FAIR_SHARE * again.log_evidence)
+                if twin is not None:
+                    settle(search, fit, *twin, candidate)
+
+
+def _twin(
+    search: Search, fit: Fit, place: StatePlace, candidate: Candidate, least: float
+) -> tuple[StatePlace, Course] | None:
+    """Another effect at the spot of a state, with the course that is likeliest in that state's stead.
+
+    ``least`` is the evidence from which it is worth a fit.
+    """
+    rest, values = without(fit, candidate)
+    base = BaseRun(search.problem.predictor, place.recording, values, rest)
+    readings = ReadingFilter(readings_about(search.problem, fit, place.recording, candidate))
+    found = [
+        (course.log_evidence, other, course)
+        for other in state_places(search)
+        if other.effect != place.effect
+        and other.recording == place.recording
+        and set(other.pattern.places) & set(place.pattern.places)
+        for course in _courses(search, base, readings, other)
+    ]
+    best = max(found, key=lambda item: item[0], default=None)
+    return None if best is None or best[0] < least else best[1:]
+
+
+def _courses(search: Search, base: BaseRun, readings: ReadingFilter, place: StatePlace) -> Iterator[Course]:
+    """Courses of something that switches at a place, from each of the sizes that are tried."""
+    answer = answer_of(base, place.pattern)
+    chain = Chain.usual(np.zeros(len(answer.group), dtype=np.int64))
+    usual = _usual(search, place)
+    for share in START_SIZES:
+        course = find_course(answer, readings, chain, share * usual, 2.0 * usual, QUICK)
+        if course is not None and course.log_evidence > 0.0:
+            yield course
 
 
 def settle(
