@@ -318,6 +318,8 @@ def expected_information(weights: Array, distances: Array) -> float:
 def choose(options: Sequence[Option]) -> Option:
     """The simplest of the options that tell nearly as much as the best; of these the clearest."""
     new = [item for item in options if item.trial.name != AGAIN or item.place is not None]
+    # A network whose inputs never change, all of whose nodes are read, can only be read again.
+    new = new or list(options)
     highest = max(item.information for item in new)
     good = [item for item in new if item.information >= AS_GOOD * highest]
     effort = min(item.effort for item in good)

@@ -24,6 +24,8 @@ from spindle_fem.inference.mismatch_place import significant_stretches, smoothed
 from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged
 from spindle_fem.inference.next_measurement import (
     EXISTING,
+    Option,
+    choose,
     expected_information,
     next_measurement,
     pairwise_distances,
@@ -202,6 +204,12 @@ def test_a_lying_sensor_is_the_place_itself(lying):
     assert where.component == "SP02"
     assert where.radius == pytest.approx(0.096)
     assert "SP02" not in where.missing_heat
+
+
+def test_where_nothing_else_can_be_tried_it_is_read_again():
+    trial = SimpleNamespace(name=AGAIN, effort=0)
+    only = Option(trial, None, 0.1, 0.2, "housing", 0.3, 0.4, 0.0, (300.0, 300.3))
+    assert choose([only]) is only
 
 
 def test_noise_alone_is_not_significant(consistent):
