@@ -17,7 +17,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import variants_of
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Coordinate, Fit, Problem
+from spindle_fem.inference.hypothesis_fit import Coordinate, Fit, Problem, huber
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.input_sampling import left_over_noise
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
@@ -31,6 +31,7 @@ from spindle_fem.inference.prepared_problem import (
     with_inexact_laws,
     with_own_noise,
 )
+from spindle_fem.inference.reading_noise import Whitener
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.state_search import Told, told_states
@@ -190,6 +191,7 @@ def diagnose_recordings(
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
     readings = _Readings(final, plain, unseen, lambda fit: told_states(search, final, fit))
     refitted = with_own_noise(final, plain, readings.kept(refitted))
+    refitted = [replace(h, heldout=readings.heldout_misfit(h.fit)) for h in refitted]
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
     judgement = judge(
@@ -271,7 +273,7 @@ class _Readings:
         follow: Callable[[Fit], Mapping[str, Told]] = lambda fit: {},
     ) -> None:
         self._plant, self._unchanged = final.predictor, plain.predictor
-        self._slow, self._unseen = final.slow.sigma, unseen
+        self._slow, self._unseen = final.slow, unseen
         self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
         self._states: dict[int, tuple[Fit, Mapping[str, Told]]] = {}
@@ -280,7 +282,7 @@ class _Readings:
         """Root mean square of the difference over the noise, in the channel where it is largest."""
         largest = 0.0
         for item, first, second in zip(self._plant.observations, self._of(one), self._of(other), strict=True):
-            noise = np.hypot(self._plant.recordings[item.recording].sigma[item.channel], self._slow)
+            noise = np.hypot(self._plant.recordings[item.recording].sigma[item.channel], self._slow.sigma)
             largest = max(largest, float(np.sqrt(np.mean((first - second) ** 2))) / float(noise))
         return largest
 
@@ -295,6 +297,16 @@ class _Readings:
         if not plant.heldout:
             return 0.0
         return left_over_noise(plant, plant.heldout, self._heldout(fit), fit.values, self._unseen)
+
+    def heldout_misfit(self, fit: Fit) -> float | None:
+        """Minus twice the logarithm of their likelihood, the slow error that of the best set."""
+        plant = self._plant
+        if not plant.heldout:
+            return None
+        return sum(
+            float(np.sum(huber(Whitener(item.bins, self._slow)(item.values - told))))
+            for item, told in zip(plant.heldout, self._heldout(fit), strict=True)
+        )
 
     def _heldout(self, fit: Fit) -> list[Array]:
         """What held-out readings should be; what switches is on there as all readings tell it."""

@@ -25,6 +25,8 @@ class Hypothesis:
         with states that may take any course than with those that were found.
     course_cost : float
         That cost where the set was found, as a logarithm.
+    heldout : float or None
+        Minus twice the logarithm of the likelihood of held-out readings; None where there are none.
     """
 
     fit: Fit
@@ -32,6 +34,7 @@ class Hypothesis:
     deviance: float | None = None
     course_share: float = 0.0
     course_cost: float = 0.0
+    heldout: float | None = None
 
     @property
     def misfit(self) -> float:

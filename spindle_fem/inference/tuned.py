@@ -152,10 +152,9 @@ CHANCE_DIVISOR, CANDIDATES_A_TRIAL = 2.2, 64.0
 SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
 # A set whose error on held-out readings is this many times that of some of its effects alone is given up.
 WORSE_HELDOUT = 1.05
-# Share by which a set lowers what is left of held-out readings, over their noise, to be named at all: what
-# moves them by a quarter of their noise. (False alarms of seed 50 of validation.generate_rough lower it
-# less, right sets there and of seed 51 of generate_networks more.)
-LEAST_IMPROVEMENT = 0.03
+# What a set must make held-out readings likelier by to be named at all, as a gain that counts: twenty to one.
+# One that gains less there only moves parameters nearer to what was believed of them.
+LEAST_HELDOUT_GAIN = 3.0
 # Probability from which the first set alone is named.
 DECIDED = 0.75
 # Sets of as many effects are named together where their readings differ by less than this share of the noise

@@ -253,8 +253,7 @@ def judge(
         What a fit leaves of the readings over their noise; no more than the noise by default.
     beyond : callable, optional
         Likewise of readings that no fit has seen; 0 where there are none. A set that leaves more there
-        than where it was fitted is not the whole truth; one that lowers nothing there is not named: it
-        moves parameters nearer to what was believed of them, no reading.
+        than where it was fitted is not the whole truth.
     coarseness : float
         As :func:`tempered` has it.
     """
@@ -266,7 +265,7 @@ def judge(
         nothing = min(empty.probability, tuned.STILL_POSSIBLE) if p_value >= tuned.RULED_OUT else 0.0
         ranked = _without(ranked, empty)
     chosen = ranked[0]
-    improved = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
+    improved = _predicts(chosen.best, empty.best, coarseness)
     if (
         p_value > tuned.SIGNIFICANT
         or not (chosen.fit.candidates and improved)
@@ -336,6 +335,14 @@ def judge(
         share,
         more,
     )
+
+
+def _predicts(chosen: Hypothesis, empty: Hypothesis, coarseness: float) -> bool:
+    """Whether a set makes held-out readings likelier by more than chance does."""
+    if chosen.heldout is None or empty.heldout is None:
+        return True
+    gain = 0.5 * (empty.heldout - chosen.heldout) / (coarseness * tuned.GAIN_DIVISOR)
+    return gain >= tuned.LEAST_HELDOUT_GAIN
 
 
 def unexplained_share(rest: float) -> float:
