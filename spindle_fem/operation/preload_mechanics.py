@@ -82,7 +82,7 @@ class PreloadMechanics:
         digest = _digest(self.spec, group.name, self.places)
         if digest not in _known:
             path = cache_directory() / f"preload-{digest}.npz"
-            found = load_record(path, FORMAT)
+            found = load_record(path, FORMAT, PreloadResponse)
             if found is None:
                 _known[digest] = _solved(self.spec, group, self.places)
                 save_record(_known[digest], path, FORMAT)
