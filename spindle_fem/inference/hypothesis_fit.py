@@ -194,6 +194,7 @@ class Problem:
     observations: tuple[Observation, ...]
     whiteners: list[Whitener] = field(init=False)
     data: Array = field(init=False)
+    _straight: dict[str, Array] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.whiteners = [Whitener(item.bins, self.slow) for item in self.observations]
@@ -210,11 +211,31 @@ class Problem:
             ]
         )
 
+    def straight(self, candidates: Sequence[Candidate]) -> Mapping[str, Array]:
+        """Derivatives of the whitened data by coordinates on which nothing else depends, by their name.
+
+        Directions in which the machine may differ, unless a sensor changes what its channel reads. There may
+        be hundreds of them.
+        """
+        if self.predictor.effects.readings or any(c.reading is not None for c in candidates):
+            return {}
+        if self._straight is None:
+            rows = np.cumsum([0, *(len(item.values) for item in self.observations)])
+            found: dict[str, Array] = {}
+            for item, white, first in zip(self.observations, self.whiteners, rows[:-1], strict=True):
+                names, slopes = self.predictor.directions_of(item.recording)
+                if names:
+                    own = white(item.at(slopes[:, item.channel]))
+                    for name, column in zip(names, own.T, strict=True):
+                        whole = found.setdefault(name, np.zeros(rows[-1]))
+                        whole[first : first + len(column)] = column
+            self._straight = found
+        return self._straight
+
     def binned_residuals(self, fit: Fit) -> list[tuple[ChannelBins, Array]]:
         """Predicted less read, K, averaged over the bins of every observation."""
         predicted = [
-            item.temperature
-            for item in self.predict(fit.candidates, fit.coordinates, fit.position, slopes=False)
+            item.temperature for item in self.predict(fit.candidates, fit.coordinates, fit.position, by=())
         ]
         return [
             (item.bins, item.at(predicted[item.recording][:, item.channel]) - item.values)
@@ -227,16 +248,17 @@ class Problem:
         coordinates: Sequence[Coordinate],
         position: Array,
         *,
-        slopes: bool = True,
+        by: Sequence[int] | None = None,
         near: Sequence[Prediction] | None = None,
     ) -> list[Prediction]:
-        """Every recording, with derivatives to the coordinates where ``slopes`` are wanted.
+        """Every recording, with derivatives by some of the coordinates, by all when absent.
 
         ``near`` are predictions at a position that is near, which these begin from.
         """
         values = {c.name: c.at(u) for c, u in zip(coordinates, position, strict=True)}
-        names = [c.name for c in coordinates] if slopes else []
-        scale = np.array([c.sigma for c in coordinates]) if slopes else np.zeros(0)
+        derived = coordinates if by is None else [coordinates[index] for index in by]
+        names = [c.name for c in derived]
+        scale = np.array([c.sigma for c in derived])
         found = []
         for number in range(len(self.predictor.recordings)):
             beside = None if near is None else near[number]
@@ -288,17 +310,24 @@ class Problem:
         def cost_at(at: Array, near: list[Prediction] | None) -> tuple[float, Array, list[Prediction] | None]:
             nonlocal evaluations
             evaluations += 1
-            predicted = self.predict(candidates, coordinates, at, slopes=False, near=near)
+            predicted = self.predict(candidates, coordinates, at, by=(), near=near)
             residual = self.data - self.whitened([p.temperature for p in predicted])
             pull = root @ (at - mean)
             return float(np.sum(huber(residual)) + pull @ pull), residual, predicted
 
         def slopes_at(at: Array, near: list[Prediction]) -> tuple[Array, list[Prediction]]:
-            predicted = self.predict(candidates, coordinates, at, near=near)
-            return self.whitened([p.sensitivity for p in predicted]), predicted
+            predicted = self.predict(candidates, coordinates, at, by=bent, near=near)
+            slopes[:, bent] = self.whitened([p.sensitivity for p in predicted])
+            return slopes, predicted
 
         evaluations = 0
         scale = np.array([c.sigma for c in coordinates])
+        straight = self.straight(candidates)
+        bent = [index for index, c in enumerate(coordinates) if c.name not in straight]
+        slopes = np.empty((len(self.data), len(coordinates)))
+        for index, coordinate in enumerate(coordinates):
+            if coordinate.name in straight:
+                slopes[:, index] = coordinate.sigma * straight[coordinate.name]
         cost, residual, predicted = cost_at(position, None)
         jacobian, predicted = slopes_at(position, predicted)
         damping = 1e-3
@@ -324,7 +353,7 @@ class Problem:
                     damping *= 10.0
                     continue
                 try:
-                    trial = cost_at(position + move, [item.moved(scale * move) for item in predicted])
+                    trial = cost_at(position + move, [item.moved((scale * move)[bent]) for item in predicted])
                 except (ConvergenceError, OutOfValidityError, SpecError):
                     # Outside what can be simulated (a share above one, a runaway): a shorter step.
                     trial = (np.inf, residual, None)

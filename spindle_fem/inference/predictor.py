@@ -406,7 +406,7 @@ class Predictor:
         self, number: int, told: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
         """What happened in gaps of the recording, and how the machine differs, to first order, in place."""
-        known, slopes = self._directions_of(number)
+        known, slopes = self.directions_of(number)
         if known:
             told.temperature[:] += slopes @ [values.get(name, 0.0) for name in known]
             asked = [k for k, name in enumerate(known) if name in derivatives]
@@ -420,7 +420,7 @@ class Predictor:
                 if name in derivatives:
                     told.sensitivity[:, :, derivatives.index(name)] += slope
 
-    def _directions_of(self, number: int) -> tuple[list[str], Array]:
+    def directions_of(self, number: int) -> tuple[list[str], Array]:
         """Coordinates of directions that do something in a recording, and what they do, (G + 1, c, k) K."""
         if number not in self._stacked:
             known = [i.coordinate for i in self.misdescribed if (number, i.coordinate) in self._columns]

@@ -283,7 +283,7 @@ def test_a_prediction_without_derivatives_is_the_same(blank):
     problem = Problem(predictor, belief, QUIET, predictor.observations)
     at = belief.mean + 0.3
     whole = problem.predict((), belief.coordinates, at)
-    bare = problem.predict((), belief.coordinates, at, slopes=False, near=whole)
+    bare = problem.predict((), belief.coordinates, at, by=(), near=whole)
     assert bare[0].sensitivity.shape[2] == 0
     assert whole[0].sensitivity.shape[2] == len(belief.coordinates)
     assert np.abs(bare[0].temperature - whole[0].temperature).max() < 1e-9

@@ -250,6 +250,24 @@ def test_columns_go_where_the_predictor_goes(predictor):
     assert np.abs(expected - own.predict(0, {}).temperature).max() > 0.1
 
 
+def test_slopes_of_directions_are_those_of_a_prediction(off_at):
+    problem, _ = off_at(0.5)
+    coordinates = problem.belief.coordinates
+    told = problem.straight(())
+    scale = {c.name: c.sigma for c in coordinates}
+    whole = problem.whitened(
+        [item.sensitivity for item in problem.predict((), coordinates, problem.belief.mean)]
+    )
+    assert len(told) == len(problem.predictor.misdescribed) > 1
+    for index, coordinate in enumerate(coordinates):
+        if coordinate.name in told:
+            own = scale[coordinate.name] * told[coordinate.name]
+            np.testing.assert_allclose(own, whole[:, index], rtol=0.0, atol=1e-10 * np.abs(whole).max())
+    # a sensor that answers late does so to directions too
+    late = SimpleNamespace(reading=SimpleNamespace())
+    assert problem.straight((late,)) == {}
+
+
 def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
     problem, null = off_at(1.6)
     directions = problem.predictor.misdescribed
