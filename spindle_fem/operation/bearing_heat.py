@@ -53,6 +53,11 @@ class BearingTemperatures:
         """The temperatures alone."""
         return self.inner, self.outer, self.ball, self.shaft, self.housing
 
+    @classmethod
+    def of_state(cls, state: NDArray[np.float64]) -> BearingTemperatures:
+        """From what :attr:`state` gives."""
+        return cls(*state[:5].tolist(), 1.0e-6 * state[5:] if state.size > 5 else None)
+
     @property
     def state(self) -> NDArray[np.float64]:
         """Temperatures in K, then shifts in µm where there are any: all that heat follows, alike in size."""
@@ -110,6 +115,11 @@ def heat_model_of(spec: MachineSpec) -> HeatModel:
 def follows_preload(spec: MachineSpec) -> bool:
     """Whether expansion changes the preload of a machine's bearings, and with it their heat."""
     return bool(spec.bearing_set) and spec.heat.thermal_preload and spec.heat.model != "table"
+
+
+def grows(spec: MachineSpec) -> bool:
+    """Whether elastic bodies carry rings whose fits change with temperature."""
+    return follows_preload(spec) and any(group.fit for group in spec.bearing_set)
 
 
 def at_assembly_size(spec: MachineSpec) -> MachineSpec:

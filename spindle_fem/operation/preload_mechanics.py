@@ -170,20 +170,22 @@ def _rows(
     found = list(
         dict.fromkeys(layout.segment_place(part, item.name) for part in parts for item in part.segment)
     )
-    groups = {}
+    values = {}
     for name, body in bodies.bodies.items():
         z, r = body.section.mesh.p
         turning = name == bodies.shaft or name.endswith(".inner_ring")
-        groups[name] = np.full(z.size, 0 if turning else 1)
-        if name == bodies.housing:
-            for part in parts:
-                for item in part.segment:
-                    inside = (z >= item.z[0] - ON_LINE) & (z <= item.z[1] + ON_LINE)
-                    inside &= (r >= 0.5 * item.inner_diameter - ON_LINE) & (
-                        r <= 0.5 * item.outer_diameter + ON_LINE
-                    )
-                    groups[name][inside] = 2 + found.index(layout.segment_place(part, item.name))
-    return seating.thermal_rows(*seating.rows_over(groups)), found
+        values[name] = np.zeros((z.size, 2 + len(found)))
+        if name != bodies.housing:
+            values[name][:, 0 if turning else 1] = 1.0
+            continue
+        for part in parts:
+            for item in part.segment:
+                inside = (z >= item.z[0] - ON_LINE) & (z <= item.z[1] + ON_LINE)
+                inside &= r >= 0.5 * item.inner_diameter - ON_LINE
+                inside &= r <= 0.5 * item.outer_diameter + ON_LINE
+                values[name][inside, 2 + found.index(layout.segment_place(part, item.name))] = 1.0
+        values[name] /= values[name].sum(axis=1, keepdims=True)
+    return seating.thermal_rows(*seating.rows_over(values)), found
 
 
 def _fit_sigma(diameter: float) -> float:

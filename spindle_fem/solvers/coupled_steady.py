@@ -19,6 +19,7 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.fixed_point import REFUSED, Iteration, fixed_point
 from spindle_fem.solvers.preload_runaway import (
     HeatResponse,
+    beyond_the_branch,
     equilibria_above,
     no_equilibrium,
 )
@@ -265,10 +266,4 @@ def _beyond_the_fold(
         return error
     if branch.end == "end":
         return error
-    rpm = branch.limit * 30.0 / np.pi
-    what = (
-        f"Heat and preload feed each other: equilibria end in a fold at {rpm:.0f} rpm."
-        if branch.end == "fold"
-        else f"A thermal equilibrium exists up to about {rpm:.0f} rpm: {branch.reason}"
-    )
-    return NoSteadyStateError(error.where, error.what, f"{what} {error.how_to_fix}")
+    return beyond_the_branch(error, branch)

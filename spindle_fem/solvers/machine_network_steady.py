@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError
+from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError, SpindleFemError
 from spindle_fem.model.lumped.friction_table import tabulate_friction
 from spindle_fem.model.lumped.heat_laws import CoolantLaw, WallFilmLaw
 from spindle_fem.model.lumped.machine_balance import SparseBalance, bearing_temperatures
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.model.lumped.operating_state import OperatingNetwork, coolant_law, operate
 from spindle_fem.operation.bearing_heat import (
+    BearingMechanics,
     BearingTemperatures,
     HeatModel,
     at_assembly_size,
     follows_preload,
     heat_model_of,
 )
+from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.fixed_point import REFUSED, Iteration, fixed_point
 from spindle_fem.solvers.newton import newton
-from spindle_fem.solvers.preload_runaway import PreloadGuard, highest_settling_speed, no_equilibrium
+from spindle_fem.solvers.preload_runaway import SLOWEST, beyond_the_branch, no_equilibrium
+from spindle_fem.solvers.solution_branch import Branch, follow_branch
 
 Array = NDArray[np.float64]
 BALANCE_TOLERANCE = 1.0e-10
@@ -105,6 +108,13 @@ class MachineNetworkState:
         return found
 
 
+def network_heat_model(machine: MachineNetwork) -> HeatModel:
+    """The heat model that a definition asks for, its rings on the elastic bodies of the network."""
+    if machine.growth is None:
+        return heat_model_of(machine.spec)
+    return BearingMechanics(machine.spec, machine.growth.seats)
+
+
 def solve_machine_network(
     machine: MachineNetwork,
     point: OperatingPoint | None = None,
@@ -131,31 +141,99 @@ def solve_machine_network(
     point, and creeps up while the preload grows.
     """
     point = OperatingPoint.of(machine.spec) if point is None else point
-    heat_model = heat_model_of(machine.spec) if heat_model is None else heat_model
     if not follows_preload(machine.spec):
-        return _Operation(machine, point, heat_model).solve()
-
-    def settles(speed: float) -> bool:
-        try:
-            _follow_preload(machine, replace(point, speed=speed), heat_model)
-        except (NoSteadyStateError, ConvergenceError):
-            return False
-        return True
-
+        return _Operation(machine, point, heat_model or network_heat_model(machine)).solve()
+    heat_model = heat_model or network_heat_model(machine)
     try:
-        return _follow_preload(machine, point, heat_model)
-    except NoSteadyStateError as error:
-        limit = highest_settling_speed(point.speed, settles)
-        begins = f"A thermal equilibrium exists up to about {limit * 30.0 / np.pi:.0f} rpm."
-        raise NoSteadyStateError(error.where, error.what, f"{begins} {error.how_to_fix}") from error
+        rigid = replace(machine, spec=at_assembly_size(machine.spec))
+        first = _Operation(rigid, point, heat_model_of(rigid.spec)).solve()
+        return _PreloadOperation(machine, point, heat_model).solve(first.bearing_temperatures())
+    except (NoSteadyStateError, ConvergenceError) as error:
+        if not isinstance(heat_model, BearingMechanics):
+            raise
+        return _crept_up(machine, point, heat_model, error)
 
 
-def _follow_preload(
-    machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel
+def _crept_up(
+    machine: MachineNetwork,
+    point: OperatingPoint,
+    mechanics: BearingMechanics,
+    error: NoSteadyStateError | ConvergenceError,
 ) -> MachineNetworkState:
-    rigid = replace(machine, spec=at_assembly_size(machine.spec))
-    first = _Operation(rigid, point, heat_model_of(rigid.spec)).solve()
-    return _PreloadOperation(machine, point, heat_model).solve(first.bearing_temperatures())
+    """The state at the end of the branch of equilibria over the speed, from slow running.
+
+    Raises
+    ------
+    NoSteadyStateError
+        With the speed at which the branch ends before.
+    """
+    response = _NetworkResponse(machine, point, mechanics)
+    try:
+        branch = response.branch()
+    except SpindleFemError:
+        raise error from None
+    if branch.end != "end":
+        if not isinstance(error, NoSteadyStateError):
+            error = no_equilibrium(machine.spec.name, point, "heat and temperatures do not settle.")
+        raise beyond_the_branch(error, branch) from error
+    network, temperature, steps = response.solved(branch.states[-1], point.speed)
+    return _state(network, temperature, steps)
+
+
+class _NetworkResponse:
+    """What the temperatures that heats and contacts of the bearings make do to these again."""
+
+    def __init__(self, machine: MachineNetwork, point: OperatingPoint, mechanics: BearingMechanics) -> None:
+        self.machine, self.point, self.mechanics = machine, point, mechanics
+        self.names = [bearing.name for _, bearing in machine.spec.bearings]
+        self.coolant = None if machine.coolant is None else coolant_law(machine, point)
+        self.temperature = np.full(machine.n_nodes, point.ambient_temperature)
+
+    def solved(self, state: Array, speed: float) -> tuple[OperatingNetwork, Array, int]:
+        """Network, temperatures and Newton steps at given heats and contacts at a speed (rad/s)."""
+        count = len(self.names)
+        heats = {
+            name: BearingHeat(
+                heat, {"friction": heat}, conductance_inner=contacts[0], conductance_outer=contacts[1]
+            )
+            for name, heat, contacts in zip(
+                self.names, state[:count].tolist(), state[count:].reshape(count, 2).tolist(), strict=True
+            )
+        }
+        network = operate(
+            self.machine,
+            replace(self.point, speed=speed),
+            lambda point, around: (heats, ()),
+            coolant=self.coolant,
+        )
+        temperature, _, steps = newton(SparseBalance(network), self.temperature)
+        return network, temperature, steps
+
+    def respond(self, states: Array, speed: float) -> Array:
+        """The states (n, 3 n_bearings) that the temperatures of states make at a speed (rad/s)."""
+        around = []
+        for state in states:
+            network, self.temperature, _ = self.solved(state, speed)
+            around.append(bearing_temperatures(network, self.temperature))
+        return self._made(around, speed)
+
+    def _made(self, around: Sequence[Mapping[str, BearingTemperatures]], speed: float) -> Array:
+        point = replace(self.point, speed=speed)
+        heat, conductance = self.mechanics.heat_and_conductance(point, around, expand=True)
+        return np.hstack([heat, conductance.reshape(len(around), -1)])
+
+    def branch(self) -> Branch:
+        """States of the bearings from slow running to the speed of the point or a fold before."""
+        start = SLOWEST * self.point.speed
+        cold = _cold(self.machine, self.point.ambient_temperature)
+        first = self.respond(self._made([cold], start), start)[0]
+        return follow_branch(self.respond, first, start, self.point.speed, weak=2 * len(self.names))
+
+
+def _cold(machine: MachineNetwork, ambient: float) -> dict[str, BearingTemperatures]:
+    """Every bearing of a machine that is at ambient temperature (K) throughout."""
+    shifts = {} if machine.growth is None else machine.growth.shifts(np.full(machine.n_solid, ambient))
+    return {name: BearingTemperatures(*(ambient,) * 5, shifts.get(name)) for name in machine.ball_nodes}
 
 
 class _Operation:
@@ -167,7 +245,7 @@ class _Operation:
         self.coolant = None if machine.coolant is None else coolant_law(machine, point)
         ambient = point.ambient_temperature
         self.temperature = np.full(machine.n_nodes, ambient)
-        self.cold = {name: BearingTemperatures(*(ambient,) * 5) for name in machine.ball_nodes}
+        self.cold = _cold(machine, ambient)
         self.network: OperatingNetwork | None = None
         self.newton_steps = 0
         self.rounds = 0
@@ -208,7 +286,6 @@ class _PreloadOperation(_Operation):
 
     def __init__(self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel) -> None:
         super().__init__(machine, point, heat_model)
-        self.guard = PreloadGuard.of(heat_model(point, self.cold)[0])
         self.change, self.growing = np.inf, 0
 
     def solve(self, start: Mapping[str, BearingTemperatures]) -> MachineNetworkState:
@@ -223,9 +300,6 @@ class _PreloadOperation(_Operation):
     def settled(self, given: Array, found: Array) -> bool:
         """Whether the bearings have the temperatures that their heat was taken at; refuses a runaway."""
         name = self.machine.spec.name
-        reason = self.guard.reason(self.network.bearing_heat)
-        if reason:
-            raise no_equilibrium(name, self.point, reason)
         change = float(np.abs(found - given).max())
         if change < TOLERANCE:
             return True
@@ -239,12 +313,12 @@ class _PreloadOperation(_Operation):
 
 
 def _vector(around: Mapping[str, BearingTemperatures]) -> Array:
-    return np.array([item.kelvins for item in around.values()], dtype=float).ravel()
+    return np.array([item.state for item in around.values()], dtype=float).ravel()
 
 
 def _named(values: Array, like: Mapping[str, BearingTemperatures]) -> dict[str, BearingTemperatures]:
-    rows = values.reshape(len(like), -1).tolist() if like else []
-    return {name: BearingTemperatures(*row) for name, row in zip(like, rows, strict=True)}
+    rows = values.reshape(len(like), -1) if like else []
+    return {name: BearingTemperatures.of_state(row) for name, row in zip(like, rows, strict=True)}
 
 
 def _state(network: OperatingNetwork, temperature: Array, iterations: int) -> MachineNetworkState:

@@ -8,8 +8,8 @@ temperature.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,42 +26,10 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.solvers.solution_branch import Branch, follow_branch
 
-# A preload this many times that of assembly ends a bearing, whatever the loop then does.
-LARGEST_PRELOAD_RATIO = 5.0
 # Of the end of a search: where a branch of equilibria begins.
 SLOWEST = 0.05
-SPEED_TOLERANCE = 0.01
 # Of what a watt does to the machine, in the energy norm; means over surfaces err by less.
 RESPONSE_TOLERANCE = 1.0e-5
-
-
-@dataclass(frozen=True, slots=True)
-class PreloadGuard:
-    """Watches whether a preload grows beyond what a bearing survives.
-
-    Attributes
-    ----------
-    assembled : mapping of bearing to float, [N]
-        Preload with everything at the ambient temperature, of those that have one.
-    """
-
-    assembled: Mapping[str, float]
-
-    @classmethod
-    def of(cls, cold: Mapping[str, BearingHeat]) -> PreloadGuard:
-        """From the bearings of a machine at ambient temperature."""
-        return cls({name: heat.preload for name, heat in cold.items() if not np.isnan(heat.preload)})
-
-    def reason(self, bearings: Mapping[str, BearingHeat]) -> str:
-        """Why there is no equilibrium; empty while every preload is bearable."""
-        ratio = {name: bearings[name].preload / force for name, force in self.assembled.items()}
-        worst = max(ratio, key=ratio.get, default="")
-        if not worst or not ratio[worst] > LARGEST_PRELOAD_RATIO:
-            return ""
-        return (
-            f"the preload of {worst} passes {LARGEST_PRELOAD_RATIO:g} times the "
-            f"{self.assembled[worst]:.0f} N of assembly."
-        )
 
 
 def no_equilibrium(name: str, point: OperatingPoint, reason: str) -> NoSteadyStateError:
@@ -71,13 +39,15 @@ def no_equilibrium(name: str, point: OperatingPoint, reason: str) -> NoSteadySta
     return NoSteadyStateError(name, f"no thermal equilibrium at {rpm:.0f} rpm: {reason}", advice)
 
 
-def highest_settling_speed(highest: float, settles: Callable[[float], bool]) -> float:
-    """Largest speed (rad/s) below ``highest`` at which ``settles`` still holds, to a hundredth."""
-    low, high = 0.0, highest
-    while high - low > SPEED_TOLERANCE * highest:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if settles(middle) else (low, middle)
-    return low
+def beyond_the_branch(error: NoSteadyStateError, branch: Branch) -> NoSteadyStateError:
+    """The error of a runaway, with the speed at which a branch of equilibria over the speed ends."""
+    rpm = branch.limit * 30.0 / np.pi
+    what = (
+        f"Heat and preload feed each other: equilibria end in a fold at {rpm:.0f} rpm."
+        if branch.end == "fold"
+        else f"A thermal equilibrium exists up to about {rpm:.0f} rpm: {branch.reason}"
+    )
+    return NoSteadyStateError(error.where, error.what, f"{what} {error.how_to_fix}")
 
 
 class HeatResponse:
@@ -171,10 +141,7 @@ class HeatResponse:
         driving = (values[:, 2:3] - values[:, :2]).ravel()
         flow = np.linalg.solve(np.eye(2 * count) - more[:, None] * (drop @ flows), more * driving)
         values = values + self.per_watt @ (flows @ flow)
-        return {
-            name: BearingTemperatures(*row[:5].tolist(), 1.0e-6 * row[5:] if row.size > 5 else None)
-            for name, row in zip(self.names, values, strict=True)
-        }
+        return {name: BearingTemperatures.of_state(row) for name, row in zip(self.names, values, strict=True)}
 
     def state(self, heats: Mapping[str, BearingHeat]) -> NDArray[np.float64]:
         """Heats and conductances of the balls, as one state (3 n_bearings,)."""

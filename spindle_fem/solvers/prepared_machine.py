@@ -20,7 +20,7 @@ from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operat
 from spindle_fem.operation.bearing_heat import (
     BearingMechanics,
     at_assembly_size,
-    follows_preload,
+    grows,
     heat_model_of,
 )
 from spindle_fem.operation.coefficients import joint_conductances
@@ -153,14 +153,9 @@ def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOpera
     capacity_factor = spec.heat_capacity_factor.value
     growth = seat_joints = None
     heat_model = heat_model_of(spec)
-    if follows_preload(spec) and any(group.fit for group in spec.bearing_set):
+    if grows(spec):
         growth = GrowthModel(spec, mesh, operators.order)
-        seats = {
-            group.name: growth.seating.of_set([bearing.name for bearing in group.bearing])
-            for group in spec.bearing_set
-            if group.fit is not None
-        }
-        heat_model = BearingMechanics(spec, seats)
+        heat_model = BearingMechanics(spec, growth.seating.of_sets(spec))
         seat_joints = SeatJoints(spec, mesh.joints, heat_model.assembled_seats())
     return PreparedMachine(
         spec=spec,

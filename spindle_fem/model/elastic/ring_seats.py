@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.solid_tables import Fit
@@ -116,6 +117,14 @@ class RingSeats:
         """Seats of a set; what the seats of other sets press on the same bodies is left out."""
         return self.bodies.of([self.bearings.index(name) for name in names])
 
+    def of_sets(self, spec: MachineSpec) -> dict[str, SeatBodies]:
+        """Seats of every bearing set that has fits."""
+        return {
+            group.name: self.of_set([bearing.name for bearing in group.bearing])
+            for group in spec.bearing_set
+            if group.fit is not None
+        }
+
     def thermal_rows(self, seat_rows: Array, ring_rows: Array) -> Array:
         """Rows (k, 4, m) whose products with temperatures are shifts, as ``SeatBodies.law`` takes them.
 
@@ -130,21 +139,19 @@ class RingSeats:
         openings = self.inwards[:, None] * (seat_rows - ring_rows[:, 0])
         return np.concatenate([openings.reshape(-1, 2, size), ring_rows[:, 1].reshape(-1, 2, size)], axis=1)
 
-    def rows_over(self, groups: Mapping[str, NDArray[np.int64]]) -> tuple[Array, Array]:
-        """Seat and ring rows, as :meth:`thermal_rows` takes them, over temperatures of groups of corners.
+    def rows_over(self, values: Mapping[str, Array | sparse.csr_array]) -> tuple[Array, Array]:
+        """Seat and ring rows, as :meth:`thermal_rows` takes them, over m temperatures.
 
         Parameters
         ----------
-        groups : mapping of body to (n_corners,) ndarray of int
-            For every corner of the body's section the temperature that it has.
+        values : mapping of body to (n_corners, m) ndarray or sparse array
+            Temperature at every corner of the body's section by each of them.
         """
-        size = 1 + max(int(group.max()) for group in groups.values())
 
         def gathered(outputs: BodyOutputs) -> Array:
-            own = np.zeros((size, len(outputs.names)))
-            np.add.at(own, groups[outputs.body.name], outputs.by_temperature().T)
-            return own.T
+            return outputs.by_temperature() @ values[outputs.body.name]
 
+        size = next(iter(values.values())).shape[1]
         seats = np.zeros((len(self.rings), size))
         for name, outputs in self.carriers.items():
             seats[self.seats_on(name)] = gathered(outputs)

@@ -84,11 +84,14 @@ def bearing_temperatures(network: OperatingNetwork, temperature: Array) -> dict[
     """Raceways, balls and seats of every bearing at node temperatures (n,), K."""
     machine = network.machine
     found = {}
+    shifts = {} if machine.growth is None else machine.growth.shifts(temperature[: machine.n_solid])
     for name, ball in machine.ball_nodes.items():
         inner, outer = network.raceway_temperatures(temperature, name)
         shaft = _seat(machine, temperature, f"{name}.inner_ring", inner)
         housing = _seat(machine, temperature, f"{name}.outer_ring", outer)
-        found[name] = BearingTemperatures(inner, outer, float(temperature[ball]), shaft, housing)
+        found[name] = BearingTemperatures(
+            inner, outer, float(temperature[ball]), shaft, housing, shifts.get(name)
+        )
     return found
 
 

@@ -27,6 +27,7 @@ from spindle_fem.model.lumped.links import (
     solid_links,
     surface_patch,
 )
+from spindle_fem.model.lumped.network_growth import NetworkGrowth
 from spindle_fem.model.lumped.partition import (
     Partition,
     build_columns,
@@ -35,6 +36,7 @@ from spindle_fem.model.lumped.partition import (
     plan_nodes,
     sliced_partition,
 )
+from spindle_fem.operation.bearing_heat import grows
 from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.coefficients import ball_row_capacity, joint_conductances
 from spindle_fem.operation.coolant_loop import CoolantLoop
@@ -101,7 +103,8 @@ class MachineNetwork:
 
     Node order: solid nodes, balls, gap air, coolant along the flow.
     ``ball_nodes`` are the nodes of the ball rows; ``seats`` the nodes that each
-    ring sits on, and the share of its seat at each.
+    ring sits on, and the share of its seat at each; ``growth`` is there where
+    preload follows the fits.
     """
 
     spec: MachineSpec
@@ -119,6 +122,7 @@ class MachineNetwork:
     refinement: int
     ball_nodes: Mapping[str, int]
     seats: Mapping[str, tuple[NDArray[np.int64], Array]]
+    growth: NetworkGrowth | None = None
 
     @property
     def n_solid(self) -> int:
@@ -264,6 +268,7 @@ def build_machine_network(
             for _, bearing in spec.bearings
             for ring in (f"{bearing.name}.inner_ring", f"{bearing.name}.outer_ring")
         },
+        growth=NetworkGrowth.of(spec, cells, partition) if grows(spec) else None,
     )
 
 

@@ -13,10 +13,14 @@ from spindle_fem import __version__
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import BadInputError, GeometryError
 from spindle_fem.model.lumped.machine_network import MachineNetwork, build_machine_network
-from spindle_fem.operation.bearing_heat import HeatModel, heat_model_of
+from spindle_fem.operation.bearing_heat import HeatModel
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.coupled_steady import solve_coupled
-from spindle_fem.solvers.machine_network_steady import MachineNetworkState, solve_machine_network
+from spindle_fem.solvers.machine_network_steady import (
+    MachineNetworkState,
+    network_heat_model,
+    solve_machine_network,
+)
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.studies.crosscheck.axisymmetric import solve_axisymmetric
 from spindle_fem.studies.crosscheck.causes import CAUSES, CHECKS, CauseStudy, study_causes
@@ -70,10 +74,11 @@ def crosscheck(spec: MachineSpec, tell: Progress = lambda stage: None) -> Crossc
     SpindleFemError
         A model that has no solution.
     """
-    point, heat_model = OperatingPoint.of(spec), heat_model_of(spec)
+    point = OperatingPoint.of(spec)
     tell("network")
     started = time.perf_counter()
     network = build_machine_network(spec)
+    heat_model = network_heat_model(network)
     built = time.perf_counter()
     state = solve_machine_network(network, point, heat_model=heat_model)
     timing = {"network_set_up": built - started, "network_solve": time.perf_counter() - built}
