@@ -128,7 +128,9 @@ def _solved(spec: MachineSpec, group: BearingSet, places: Collection[str]) -> Pr
         replace(mechanics.options, level=level),
         group,
         turning,
-        spec.operation.thrust if group.carries_thrust else 0.0,
+        mounting.ExternalLoad(
+            spec.operation.thrust if group.carries_thrust else 0.0, mechanics.radial_loads[group.name]
+        ),
     )
     table = spec.heat.table
     highest = max(HIGHEST_SPEED * spec.operation.speed, 0.0 if table is None else table.speed[-1])
@@ -203,14 +205,14 @@ class _SetSolver:
     ----------
     turning : (n_bearings, 4) ndarray, [m/K]
         Shifts by a kelvin of shaft and inner rings.
-    thrust : float, [N]
+    load : ExternalLoad
     """
 
     mechanics: BearingMechanics
     options: HeatOptions
     group: BearingSet
     turning: Array
-    thrust: float
+    load: mounting.ExternalLoad
 
     def log_friction(self, gap: float, speed: float) -> Array:
         """Logarithm of the friction at every difference, (n_x, n_bearings).
@@ -239,7 +241,7 @@ class _SetSolver:
         found = solve_states(
             mounted,
             speed,
-            mounting.ExternalLoad(self.thrust),
+            self.load,
             [self._temperatures(mounted, difference, gap) for difference in differences],
             lubricant=self.mechanics.lubricant,
             control=HEAT_MODELS[self.options.level].ball_attitude,

@@ -182,7 +182,7 @@ def _two_users(kind: str, record: Record, folder: Path, originals: Path) -> None
 
         from spindle_fem.command_line.application import app
 
-        # as the first user to write and to read, so that all that is needed of Python is loaded, then as another
+        # as the first user to write and to read, so that all that Python needs is loaded, then as another
         for out in ("out2", "out2", "out"):
             if out == "out":
                 os.setgid(NOBODY)
