@@ -216,7 +216,7 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
     texts.append("ambient")
     if result.coolant is not None:
         inlet = result.coolant.inlet_temperature - ZERO_CELSIUS_K
-        handles.append(axes.axhline(inlet, color=CYCLE[5], linewidth=1.0, linestyle=(0, (4, 3))))
+        handles.append(axes.axhline(inlet, color=CYCLE[5], linewidth=1.4, linestyle=(0, (1, 1.5))))
         texts.append("coolant inlet")
     axes.set_xlabel("z / mm")
     axes.set_ylabel(TEMPERATURE_LABEL)
@@ -227,8 +227,8 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
         ncols=len(texts),
         loc="upper left",
         bbox_to_anchor=(0.012, 0.89),
-        columnspacing=1.4,
-        handlelength=1.6,
+        columnspacing=1.2,
+        handlelength=2.2,
     )
     set_title(figure, "Axial profiles", "Surfaces at θ = 180°; raceways and balls as means of each bearing.")
     return figure

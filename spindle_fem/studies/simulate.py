@@ -14,6 +14,7 @@ from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.load import find_machine, load_machine, read_definition, write_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import with_parameters
+from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.inference.calibration import Calibration, prediction_interval
 from spindle_fem.inference.calibration import calibrate as fit_parameters
 from spindle_fem.inference.coordinate_names import START_PREFIX
@@ -120,10 +121,8 @@ def _simulate_geometry(
             else f'"{spec.heat.model}" friction and ball contacts'
         )
         notes.append(f"{what} from a map over speed, thrust and film temperature")
-    if spec.coolant is not None and spec.coolant.properties_at == "bulk":
-        notes.append("the coolant's film is taken at its inlet temperature, not along the channel")
     if outside:
-        notes.append(f"coefficients outside the reduced model's range: {', '.join(outside)}")
+        notes.append(_beyond_words(outside))
     if len(recording.segments) > 1:
         notes.append(
             f"{len(recording.segments) - 1} gaps above {recording.defects.long_gap_s:g} s: "
@@ -168,14 +167,30 @@ def _displacements(predictor: Predictor, factors: Mapping[str, float]) -> Array:
     return found - found[first, np.arange(len(first))]
 
 
-def _outside_range(predictor: Predictor, parameters: Mapping[str, float]) -> tuple[str, ...]:
+def _outside_range(predictor: Predictor, parameters: Mapping[str, float]) -> dict[str, float]:
+    """Coefficients beyond the range of the reduced model, and by which share of its end."""
     fast = predictor.fast
     factors = fast.table.factors(predictor.effects.times_parameters(parameters))
-    found: dict[str, None] = {}
+    found: dict[str, float] = {}
     for drive in predictor.drives:
         for point in drive.points:
-            found |= dict.fromkeys(fast.model.outside_range(fast.coefficients(point, factors)))
-    return tuple(found)
+            values = fast.coefficients(point, factors)
+            for name in fast.model.outside_range(values):
+                low, high = fast.model.ranges[name]
+                share = max(values[name] / high, low / values[name]) - 1.0 if values[name] > 0.0 else 1.0
+                found[name] = max(share, found.get(name, 0.0))
+    return found
+
+
+def _beyond_words(outside: Mapping[str, float]) -> str:
+    """Which coefficients the recording takes beyond the model's range, how far, and what widens it."""
+    named = ", ".join(f"{name} by {100.0 * share:.2g} %" for name, share in outside.items())
+    return (
+        f"the recorded inputs take coefficients beyond what the reduced model was made for: {named}. "
+        "What is uncertain in the definition has a wider range"
+        + (" (coolant.film_factor)" if CHANNEL_FILM in outside else "")
+        + ": give it a sigma_rel"
+    )
 
 
 def _simulate_network(

@@ -12,7 +12,7 @@ from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for
 from spindle_fem.recordings.align import Recording
-from spindle_fem.studies.export.geometry_export import geometry_state_space, require_exportable
+from spindle_fem.studies.export.geometry_export import geometry_state_space
 from spindle_fem.studies.export.network_export import network_state_space
 from spindle_fem.studies.export.state_space import StateSpace
 
@@ -51,7 +51,6 @@ def machine_state_space(
         )
     if is_network:
         return network_state_space(fast_network(build_network(spec.network), spec), spec.name)
-    require_exportable(spec)
     fast = fast_model_for(spec, recordings, as_given=True, progress=progress)
     progress("tables over speed and coolant")
     return geometry_state_space(fast, spec.name, options_for(spec, recordings).highest_speed_of(spec))

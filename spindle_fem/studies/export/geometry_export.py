@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.term import CHANNEL_FILM
-from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.class_operators import NO_CHANGES
 from spindle_fem.model.reduced.coolant_maps import CoolantMaps, coolant_maps
-from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD
+from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD, WarmedPoint
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.source_terms import SOURCE_PREFIX
@@ -82,19 +81,34 @@ class OperatorTable:
 def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> StateSpace:
     """State space of a fast model.
 
+    A film that follows the channel's wall is no table over inputs: it is taken with the wall as far above
+    the inlet as it settles at the definition's operating point, where the film counts.
+
     Parameters
     ----------
     name : str
         Of the machine.
     highest_speed : float, [rad/s]
-
-    Raises
-    ------
-    SpecError
-        As :func:`require_exportable`.
     """
+    space, modes = _state_space(fast, name, highest_speed, None)
+    if fast.channel is None or not fast.channel.film_follows_wall:
+        return space
+    model = space.model()
+    model.settle({})
+    wall = fast.channel.walls((modes @ model.state)[None])[0] + ZERO_CELSIUS_K
+    inlet = OperatingPoint.of(fast.spec).coolant_inlet_temperature
+    space, _ = _state_space(fast, name, highest_speed, wall - inlet)
+    space.header["notes"].append(
+        "the coolant's film is that of a wall as far above the inlet as at the definition's operating point"
+    )
+    return space
+
+
+def _state_space(
+    fast: FastModel, name: str, highest_speed: float, wall_rise: Array | None
+) -> tuple[StateSpace, Array]:
+    """State space, and the fast model's unknowns of its modes; ``wall_rise`` as :func:`_at_wall` has it."""
     spec = fast.spec
-    require_exportable(spec)
     nominal = OperatingPoint.of(spec)
     film_heat = film_heat_of(fast)
     inputs = _inputs(fast, highest_speed)
@@ -103,7 +117,7 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
     position = {item.name: number for number, item in enumerate(inputs)}
     tables = {"speed": _speed_table(fast, nominal, highest_speed)}
     if fast.channel is not None:
-        tables["coolant"] = _coolant_table(fast, nominal)
+        tables["coolant"] = _coolant_table(fast, nominal, wall_rise)
     tables = {key: table for key, table in tables.items() if table.values.shape[-1]}
     # Loads that are inputs or constants come first, those of tables behind.
     n_heat, n_load = len(fast.heat_places), len(fast.load_names)
@@ -120,7 +134,7 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
     places = [*sources.places, *(table.place for table in sources.tables)]
     # The constant load drives nothing by itself.
     warmed = np.array([np.zeros(fast.model.size), *(fast.model.place(place) for place in places)]).T
-    operators = fast.operators(nominal, {}, changes=_changes(fast, nominal))
+    operators = fast.operators(_at_wall(nominal, wall_rise), {}, changes=_changes(fast, nominal))
     storage = fast.storage({})
     modes = modal_basis(storage, 0.5 * (operators.conduction + operators.conduction.T))
 
@@ -170,7 +184,15 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
         add_table(f"follows{number}", "feedback_tables", table.axes, numbers, table.values)
     if followed:
         arrays |= _feedback_arrays(followed, modes, list(loads))
-    return StateSpace(header, arrays)
+    return StateSpace(header, arrays), modes
+
+
+def _at_wall(point: OperatingPoint, wall_rise: Array | None) -> OperatingPoint:
+    """A point at which the channel's wall is so far above the inlet, cell by cell [K]; at it where None."""
+    if wall_rise is None:
+        return point
+    own = {name: getattr(point, name) for name in OperatingPoint.__slots__}
+    return WarmedPoint(**own, channel_wall=point.coolant_inlet_temperature + wall_rise)
 
 
 def _feedback_arrays(tables: list[FeedbackTable], modes: Array, loads: list[str]) -> dict[str, Array]:
@@ -195,21 +217,6 @@ def _changes(fast: FastModel, point: OperatingPoint) -> Mapping[str, float]:
     """Factors on coefficients at a point: ball rows whose contacts follow speed and thrust."""
     film_heat = film_heat_of(fast)
     return NO_CHANGES if film_heat is None else film_heat.operating_factor(point, {})
-
-
-def require_exportable(spec: MachineSpec) -> None:
-    """Refuse a coolant's film that follows its wall, cell by cell: it is no table over inputs.
-
-    Raises
-    ------
-    SpecError
-    """
-    if spec.coolant is not None and spec.coolant.properties_at == "bulk":
-        raise SpecError(
-            "coolant.properties_at",
-            '"bulk" lets the film follow the wall.',
-            "Export with --set coolant.properties_at=inlet.",
-        )
 
 
 def _inputs(fast: FastModel, highest_speed: float) -> list[ModelInput]:
@@ -318,12 +325,12 @@ def _speed_table(fast: FastModel, nominal: OperatingPoint, highest: float) -> Op
     return OperatorTable(inputs, axes, values[..., moving] - base[moving], stacked)
 
 
-def _coolant_table(fast: FastModel, nominal: OperatingPoint) -> OperatorTable:
+def _coolant_table(fast: FastModel, nominal: OperatingPoint, wall_rise: Array | None) -> OperatorTable:
     """What the coolant adds over flow and inlet temperature, on the few directions in which it varies."""
 
     def film(flow: float, inlet: float) -> tuple[Array, float, float]:
         point = replace(nominal, coolant_flow=flow, coolant_inlet_temperature=inlet + ZERO_CELSIUS_K)
-        return fast.channel.film(point, {})
+        return fast.channel.film(_at_wall(point, wall_rise), {})
 
     def values(flow: float, inlet: float) -> Array:
         cells, rate, friction = film(flow, inlet)
