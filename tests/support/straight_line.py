@@ -1,5 +1,7 @@
 """A predictor in which everything about the optimum is known: a straight line over each recording."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from spindle_fem.inference.observations import observe
@@ -17,6 +19,7 @@ class Line:
         nothing = [None] * len(self.recordings)
         self.observations = observe(self.recordings, nothing, nothing, nothing)
         self.priors = (Prior("level", 1.0, 0.5, "K", highest), Prior("slope", 1.0, slope_sigma, "K"))
+        self.effects = SimpleNamespace(readings=())
         self.offsets, self.stretch = np.array(offsets), stretch
 
     def uncertain(self):
@@ -24,6 +27,9 @@ class Line:
 
     def starts(self):
         return ()
+
+    def directions_of(self, number):
+        return [], np.zeros((0, 0, 0))
 
     def shapes(self, number):
         times = self.recordings[number].times

@@ -234,13 +234,13 @@ def test_steps_that_are_refused_cost_no_derivatives_and_are_not_tried_again(blan
     asked = []
     plain = Problem.predict
 
-    def predict(self, candidates, coordinates, position, *, slopes=True, near=None):
+    def predict(self, candidates, coordinates, position, *, by=None, near=None):
         # Nothing that the first step leads to can be simulated but what lies close to the start.
-        if not slopes and asked and np.abs(position - asked[0][0]).max() > 0.1:
+        if by == () and asked and np.abs(position - asked[0][0]).max() > 0.1:
             asked.append((position, "refused"))
             raise ConvergenceError("here", "nothing is found.")
-        asked.append((position, "slopes" if slopes else "taken"))
-        return plain(self, candidates, coordinates, position, slopes=slopes, near=near)
+        asked.append((position, "taken" if by == () else "slopes"))
+        return plain(self, candidates, coordinates, position, by=by, near=near)
 
     monkeypatch.setattr(Problem, "predict", predict)
     problem.fit((), {name: 1.0 / value for name, value in TRUTH.items()}, iterations=1)
@@ -260,9 +260,9 @@ def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeyp
     asked = []
     plain = Problem.predict
 
-    def predict(self, candidates, coordinates, position, *, slopes=True, near=None):
-        asked.append(slopes)
-        return plain(self, candidates, coordinates, position, slopes=slopes, near=near)
+    def predict(self, candidates, coordinates, position, *, by=None, near=None):
+        asked.append(by != ())
+        return plain(self, candidates, coordinates, position, by=by, near=near)
 
     monkeypatch.setattr(Problem, "predict", predict)
     start = {name: 1.0 / value for name, value in TRUTH.items()}
