@@ -24,6 +24,8 @@ SHORTEST_BIN = 60.0
 MOST_BINS = 500
 # Most bins that are whitened by a Cholesky factor, whose cost grows with the cube of their number.
 MOST_DENSE = 700
+# Key of the channels that share one slow error.
+COMMON = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,8 @@ class SlowError:
     time : float, [s]
         Correlation time.
     channels : tuple of (int, float, float)
-        Channels with a size and a time of their own, of which the others are means.
+        Channels with a size and a time of their own, by the key of their bins; of temperatures the common
+        ones are means.
     """
 
     sigma: float = 0.035
@@ -53,9 +56,10 @@ class SlowError:
 
     @classmethod
     def each(cls, channels: Mapping[int, SlowError]) -> SlowError:
-        """One for every channel."""
-        sigma = float(np.sqrt(np.mean([item.sigma**2 for item in channels.values()])))
-        time = float(np.exp(np.mean([np.log(item.time) for item in channels.values()])))
+        """One for every channel, by the key of its bins; the common one is that of temperatures."""
+        warm = [own for key, own in channels.items() if key >= 0] or list(channels.values())
+        sigma = float(np.sqrt(np.mean([item.sigma**2 for item in warm])))
+        time = float(np.exp(np.mean([np.log(item.time) for item in warm])))
         return cls(sigma, time, tuple((number, own.sigma, own.time) for number, own in channels.items()))
 
 
@@ -79,6 +83,9 @@ class ChannelBins:
         Mean distance of the readings in each; 0 where there is one.
     white : float, [K]
         Noise of a single reading, rounding included.
+    key : int
+        By which a slow error of its own is known: the channel, or, of a displacement, in µm, the place
+        from the end among the columns of the recording, below 0.
     """
 
     channel: int
@@ -88,6 +95,12 @@ class ChannelBins:
     number: Array
     spacing: Array
     white: float
+    key: int
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether a constant of its own is free: a displacement counts from where its sensor was set."""
+        return self.key < 0
 
     def average(self, values: Array) -> Array:
         """Means over the bins of values (N, ...) at all stamps of the recording."""
@@ -98,7 +111,7 @@ class ChannelBins:
 
     def factor(self, slow: SlowError) -> Array:
         """Lower Cholesky factor of the covariance of the bin means, (b, b) [K]."""
-        slow = slow.of(self.channel)
+        slow = slow.of(self.key)
         # Exact for readings at equal distances: what an average keeps of the slow error, ...
         half = 0.5 * self.spacing / slow.time
         kept = np.ones_like(half)
@@ -146,12 +159,17 @@ def channel_bins(
         np.minimum.at(first, owner, times[rows])
         np.maximum.at(last, owner, times[rows])
         spacing = (last - first) / np.maximum(number - 1.0, 1.0)
-        found.append(ChannelBins(channel, rows, owner, mean_time, number, spacing, white))
+        relative = recording.temperature_names[channel] in recording.displacement_names
+        key = channel - len(recording.temperature_names) if relative else channel
+        found.append(ChannelBins(channel, rows, owner, mean_time, number, spacing, white, key))
     return tuple(found)
 
 
 class Whitener:
     """Makes the errors of bin means independent, of unit variance.
+
+    Of a channel with a constant of its own nothing is left of that constant: what remains has the likelihood
+    with every constant as likely.
 
     Up to ``MOST_DENSE`` bins by the Cholesky factor of their covariance; beyond,
     by the innovations of a Kalman filter, which for a process of this kind are
@@ -165,7 +183,16 @@ class Whitener:
 
     def __init__(self, bins: ChannelBins, slow: SlowError) -> None:
         self.factor: Array | None = None
-        slow = slow.of(bins.channel)
+        self._constant: Array | None = None
+        self._prepare(bins, slow)
+        if bins.is_relative:
+            one = self._whitened(np.ones((len(bins.times), 1)))
+            size = float(np.linalg.norm(one))
+            self._constant = one / size
+            self.log_root_determinant += float(np.log(size))
+
+    def _prepare(self, bins: ChannelBins, slow: SlowError) -> None:
+        slow = slow.of(bins.key)
         if len(bins.times) <= MOST_DENSE:
             self.factor = bins.factor(slow)
             self.log_root_determinant = float(np.log(np.diag(self.factor)).sum())
@@ -187,6 +214,13 @@ class Whitener:
 
     def __call__(self, values: Array) -> Array:
         """Whitened values (b, ...)."""
+        white = self._whitened(values)
+        if self._constant is None:
+            return white
+        flat = white.reshape(len(white), -1)
+        return (flat - self._constant @ (self._constant.T @ flat)).reshape(white.shape)
+
+    def _whitened(self, values: Array) -> Array:
         if self.factor is not None:
             return whiten(self.factor, values)
         flat = values.reshape(len(values), -1)
@@ -222,7 +256,7 @@ def likely_slow_error(
     sigmas, times : sequence of float, [K], [s]
         Values to choose from.
     by_channel : bool
-        Whether every channel has its own.
+        Whether every channel has its own; displacements always do, as likely whatever their size.
     """
     several = [(bins, values[:, None]) for bins, values in residuals]
     choices = {"prior": prior, "prior_width": prior_width, "sigmas": sigmas, "times": times}
@@ -250,21 +284,28 @@ def slow_errors_of(
     Others as :func:`likely_slow_error` has them.
     """
     choices = [SlowError(sigma, time) for sigma in sigmas for time in times]
-    channels = sorted({bins.channel for bins, _ in residuals}) if by_channel else [0]
+    # Temperatures together, where they are not asked for one by one, and every displacement by itself.
+    group = [bins.key if by_channel or bins.is_relative else COMMON for bins, _ in residuals]
+    keys = list(dict.fromkeys(group))
     fits = residuals[0][1].shape[1]
-    found = np.zeros((len(choices), len(channels), fits))
+    found = np.zeros((len(choices), len(keys), fits))
     for row, slow in zip(found, choices, strict=True):
-        for bins, values in residuals:
-            whitener = Whitener(bins, slow)
-            own = row[channels.index(bins.channel) if by_channel else 0]
-            own += 2.0 * whitener.log_root_determinant + size(whitener(values)).sum(axis=0)
+        for own, (bins, values) in zip(group, residuals, strict=True):
+            whitener = Whitener(bins, SlowError(slow.sigma, slow.time))
+            size_of = 2.0 * whitener.log_root_determinant + size(whitener(values)).sum(axis=0)
+            row[keys.index(own)] += size_of
         if prior is not None:
-            row += (np.log(slow.sigma / prior.sigma) / prior_width) ** 2
+            held = [place for place, key in enumerate(keys) if key is COMMON or key >= 0]
+            row[held] += (np.log(slow.sigma / prior.sigma) / prior_width) ** 2
     best, least = found.argmin(axis=0), found.min(axis=0).sum(axis=0)
-    if by_channel:
-        told = [
-            SlowError.each({c: choices[best[i, fit]] for i, c in enumerate(channels)}) for fit in range(fits)
-        ]
-    else:
-        told = [choices[index] for index in best[0]]
+    told = [_joined({key: choices[best[i, fit]] for i, key in enumerate(keys)}) for fit in range(fits)]
     return list(zip(told, least.tolist(), strict=True))
+
+
+def _joined(chosen: Mapping[int | None, SlowError]) -> SlowError:
+    """The common slow error with those of single channels beside it."""
+    if COMMON not in chosen:
+        return SlowError.each(chosen)
+    common = chosen[COMMON]
+    own = tuple((key, item.sigma, item.time) for key, item in chosen.items() if key is not COMMON)
+    return SlowError(common.sigma, common.time, own)

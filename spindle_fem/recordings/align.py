@@ -36,6 +36,8 @@ LONG_GAP_STEPS = 60.0
 LONGEST_SECONDS = 2.0 * 366.0 * 86400.0
 # Least noise of a channel that declares none, K: no sensor on a machine is better than a millikelvin.
 SMALLEST_SIGMA = 1.0e-3
+# The same of a displacement, m: what the best capacitive probes resolve.
+SMALLEST_DISPLACEMENT_SIGMA = 1.0e-8
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,9 @@ class Recording:
         Columns, and the sensor of the machine of each.
     displacements : (N, d) float64 ndarray, [m]
         From each one's first reading; NaN where missing.
+    displacement_sigma : (d,) float64 ndarray, [m]
+        Declared white noise, measured where none is declared.
+    displacement_noise : tuple of ChannelNoise
     """
 
     name: str
@@ -108,6 +113,8 @@ class Recording:
     displacement_names: tuple[str, ...] = ()
     displacement_sensors: tuple[str, ...] = ()
     displacements: Array = field(default_factory=lambda: np.empty((0, 0)))
+    displacement_sigma: Array = field(default_factory=lambda: np.empty(0))
+    displacement_noise: tuple[ChannelNoise, ...] = ()
     unseen_changes: tuple[tuple[str, float, float], ...] = ()
 
     @property
@@ -262,6 +269,7 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
     input_values = _stack([np.where(flags[c.column] == 0, aligned[c.column], np.nan) for c in inputs], times)
     report, segments = _report(manifest, table, grid, tuple(defects), long_gap)
     sigma = [c.sigma or max(noises[c.column].white, SMALLEST_SIGMA) for c in temperatures]
+    displaced = by_role["displacement"]
     recording = Recording(
         name=manifest.name,
         source=source,
@@ -283,9 +291,18 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
         covariate_units=tuple(units[c.column].unit for c in by_role["covariate"]),
         segments=segments,
         defects=report,
-        displacement_names=tuple(c.column for c in by_role["displacement"]),
-        displacement_sensors=tuple(str(c.probe) for c in by_role["displacement"]),
-        displacements=_stack([_from_first(aligned[c.column]) for c in by_role["displacement"]], times),
+        displacement_names=tuple(c.column for c in displaced),
+        displacement_sensors=tuple(str(c.probe) for c in displaced),
+        displacements=_stack([_from_first(aligned[c.column]) for c in displaced], times),
+        displacement_sigma=np.array(
+            [
+                c.sigma * units[c.column].scale
+                if c.sigma
+                else max(noises[c.column].white, SMALLEST_DISPLACEMENT_SIGMA)
+                for c in displaced
+            ]
+        ),
+        displacement_noise=tuple(noises[c.column] for c in displaced),
     )
     for array in (recording.times, recording.temperature, recording.flags, recording.inputs, recording.sigma):
         array.setflags(write=False)

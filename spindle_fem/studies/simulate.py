@@ -26,6 +26,7 @@ from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for, recentred_model
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import Comparison, compare
+from spindle_fem.recordings.displaced_readings import with_displacements
 from spindle_fem.units import Uncertain
 
 Array = NDArray[np.float64]
@@ -101,7 +102,8 @@ def _simulate_geometry(
     effects = effects_on(spec.effects, fast, recording)
     result = None
     if calibration:
-        earlier = Predictor(fast, calibration, effects=effects, at_stamps=True)
+        told = [with_displacements(item) for item in calibration]
+        earlier = Predictor(fast, told, effects=effects, at_stamps=True)
         result = fit_parameters(earlier, progress=progress)
     predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
     factors = {} if result is None else result.factors

@@ -59,7 +59,7 @@ def bins_of(count, *, number=1.0, spacing=0.0, seed=0):
     times = np.cumsum(generator.uniform(40.0, 90.0, count))
     many = np.full(count, number)
     rows = np.arange(count)
-    return ChannelBins(0, rows, rows, times, many, np.full(count, spacing), 0.1)
+    return ChannelBins(0, rows, rows, times, many, np.full(count, spacing), 0.1, 0)
 
 
 def test_whitened_readings_are_independent_of_unit_variance():

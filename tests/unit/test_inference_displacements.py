@@ -1,0 +1,168 @@
+"""Displacements beside temperatures: units, a constant of their own, slow errors of their own size."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.machine_spec import DisplacementSensor
+from spindle_fem.inference.calibration import calibrate
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.reading_noise import (
+    SlowError,
+    Whitener,
+    channel_bins,
+    likely_slow_error,
+)
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.recordings.displaced_readings import with_displacements
+from tests.support.lumped_spindle import lumped_model
+
+MANIFEST = """schema = "spindle-fem/recording/1"
+name = "nose"
+data = "nose.csv"
+time = {column = "time_s", unit = "s"}
+[[channel]]
+column = "T1"
+role = "temperature"
+probe = "SP01"
+unit = "degC"
+sigma = 0.1
+[[channel]]
+column = "S1"
+role = "displacement"
+probe = "S1"
+unit = "um"
+sigma = 0.2
+"""
+
+
+@pytest.fixture
+def recording(tmp_path):
+    times = np.arange(0.0, 7200.0, 60.0)
+    rows = [f"{t:g},{20.0 + t / 900.0:.3f},{100.0 + t / 300.0:.3f}" for t in times]
+    rows[3] = rows[3].rpartition(",")[0] + ","
+    (tmp_path / "nose.csv").write_text("\n".join(("time_s,T1,S1", *rows)))
+    (tmp_path / "recording.toml").write_text(MANIFEST)
+    return read_recording(tmp_path)
+
+
+def test_displacements_stand_beside_the_temperatures(recording):
+    told = with_displacements(recording)
+    assert told.temperature_names == ("T1", "S1")
+    assert told.probes == ("SP01", "S1")
+    assert told.temperature[[0, 60], 1] == pytest.approx([0.0, 12.0])
+    assert told.sigma == pytest.approx([0.1, 0.2])
+    assert not told.usable[3, 1]
+    assert told.usable[3, 0]
+    assert with_displacements(told) is told
+    plain, displaced = channel_bins(told)
+    assert (plain.is_relative, displaced.is_relative) == (False, True)
+
+
+def test_a_constant_of_a_displacement_says_nothing(recording):
+    plain, displaced = channel_bins(with_displacements(recording))
+    random = np.random.default_rng(1).normal(size=len(plain.times))
+    for bins, same in ((plain, False), (displaced, True)):
+        white = Whitener(bins, SlowError(0.3, 900.0))
+        values = random[: len(bins.times)]
+        assert np.allclose(white(values), white(values + 250.0)) is same
+
+
+def test_what_is_left_has_the_likelihood_over_all_constants(recording):
+    """Against a Gaussian constant so wide that it is free."""
+    _, displaced = channel_bins(with_displacements(recording))
+    values = np.random.default_rng(2).normal(size=len(displaced.times)) + 40.0
+    width = 1.0e4
+    found = []
+    for slow in (SlowError(0.05, 600.0), SlowError(0.6, 2400.0)):
+        white = Whitener(displaced, slow)
+        ours = 2.0 * white.log_root_determinant + np.sum(white(values) ** 2)
+        covariance = displaced.factor(slow) @ displaced.factor(slow).T + width**2
+        exact = np.linalg.slogdet(covariance)[1] + values @ np.linalg.solve(covariance, values)
+        found.append((ours, exact - 2.0 * np.log(width)))
+    assert found[0] == pytest.approx((found[0][1],) * 2, rel=1e-5)
+    assert found[1] == pytest.approx((found[1][1],) * 2, rel=1e-5)
+
+
+def test_displacements_have_a_slow_error_of_their_own_size(recording):
+    plain, displaced = channel_bins(with_displacements(recording))
+    random = np.random.default_rng(3)
+    residuals = [
+        (bins, bins.factor(true) @ random.normal(size=len(bins.times)))
+        for bins, true in ((plain, SlowError(0.02, 1200.0)), (displaced, SlowError(1.6, 1200.0)))
+    ]
+    for by_channel in (False, True):
+        slow = likely_slow_error(residuals, prior=SlowError(0.035), by_channel=by_channel)
+        assert slow.of(displaced.key).sigma >= 0.65
+        assert slow.of(plain.key).sigma <= 0.05
+        assert slow.sigma <= 0.05
+
+
+# ------------------------------------------------------------------ fits
+RUN = np.arange(0.0, 10800.0, 60.0)
+# µm/K of shaft and housing in the sensor's reading, as a nose that both carry.
+BY_SHAFT, BY_HOUSING = 3.0, -1.2
+TRUTH = {"shaft_end_films": 1.4, "heat.front": 1.1}
+
+
+def nose_machine():
+    """The lumped spindle with a displacement sensor."""
+    spec = load_machine("recorded_spindle")
+    sensor = DisplacementSensor.model_validate(
+        {"name": "S1", "at": "shaft.nose_end", "direction": "axial", "mount": "flange"}
+    )
+    spec = spec.model_copy(update={"displacement_sensor": (sensor,)})
+    model = lumped_model(spec)
+    places = dict(zip(model.place_names, model.places, strict=True))
+    reading = BY_SHAFT * places["shaft"] + BY_HOUSING * places["housing"]
+    return fast_spindle(
+        replace(model, probe_names=(*model.probe_names, "S1"), probes=np.vstack([model.probes, reading])),
+        spec,
+    )
+
+
+def nose_recording(folder, readings):
+    columns = {"t": RUN, "speed": np.where((RUN > 900.0) & (RUN < 7200.0), 3000.0, 0.0), "ambient": 20.0}
+    channels = [
+        {"column": name, "role": role, "probe": name, "unit": unit, "sigma": 0.1}
+        for name, role, unit in (
+            ("SP01", "temperature", "degC"),
+            ("SP05", "temperature", "degC"),
+            ("S1", "displacement", "um"),
+        )
+    ] + [
+        {"column": name, "role": "input", "hold": "previous", "drives": name, "unit": unit}
+        for name, unit in (("speed", "rpm"), ("ambient", "degC"))
+    ]
+    text = MANIFEST[: MANIFEST.index("[[channel]]")].replace("time_s", "t")
+    for channel in channels:
+        text += "[[channel]]\n" + "".join(f"{key} = {json.dumps(item)}\n" for key, item in channel.items())
+    pd.DataFrame(columns | readings).to_csv(folder / "nose.csv", index=False)
+    (folder / "recording.toml").write_text(text)
+    return read_recording(folder)
+
+
+def test_a_displacement_tells_of_the_shaft(tmp_path):
+    """Its interval holds what is true and is narrower; the constant of the sensor does no harm."""
+    fast = nose_machine()
+    blank = nose_recording(tmp_path, {name: np.full(RUN.size, 20.0) for name in ("SP01", "SP05", "S1")})
+    told = Predictor(fast, [with_displacements(blank)], at_stamps=True).predict(0, TRUTH, ()).temperature
+    random = np.random.default_rng(5)
+    noisy = told + 0.1 * random.normal(size=told.shape)
+    readings = {"SP01": noisy[:, 0] - 273.15, "SP05": noisy[:, 1] - 273.15, "S1": noisy[:, 2] + 57.0}
+    recording = nose_recording(tmp_path, readings)
+    found = {}
+    for name, own in (("without", recording), ("with", with_displacements(recording))):
+        result = calibrate(Predictor(fast, [own], at_stamps=True))
+        found[name] = {item.name: item for item in result.estimates}
+        assert result.chi_square < 1.5
+    films = {name: item["shaft_end_films"] for name, item in found.items()}
+    assert films["with"].low < TRUTH["shaft_end_films"] * films["with"].prior < films["with"].high
+    assert films["with"].sigma_log < 0.6 * films["without"].sigma_log
