@@ -57,6 +57,15 @@ ROLLER_RULE = (
     "bearing, on 0.85 of the pitch circle; no clearance as mounted"
 )
 
+# N/mm² of the pitch circle's square: heavy preload of a pair with 15 and with 25 degrees, by series.
+_HEAVY_PRELOAD = {"719": (0.112, 0.158), "70": (0.1585, 0.215), "72": (0.208, 0.284)}
+PRELOAD_CLASSES = {"light": 1.0 / 4.5, "medium": 0.5, "heavy": 1.0}
+PRELOAD_RULE = (
+    "heavy: 0.112, 0.1585, 0.208 N/mm² (C), 0.158, 0.215, 0.284 N/mm² (E, AC) of the pitch diameter squared "
+    "for 719, 70, 72; medium half, light 1/4.5 of it, fitted to IBC TI-I-5050.0 (2010); sets by the approach "
+    "of their bearings"
+)
+
 SHIPPED = (
     "Bearings that ship: 719xx, 70xx, 72xx with C, E or AC, such as 7014 C, N10xx and NN30xx, such as "
     "NN3014 K, bores 20 to 200 mm."
@@ -113,6 +122,22 @@ def catalogue_bearing(designation: str) -> dict[str, Any] | None:
         **table,
         "ring_material": "bearing_steel",
     }
+
+
+def preload_of_class(designation: str, name: str) -> float | None:
+    """Preload of a pair of ball bearings in a class, N; None of what is no ball bearing of the catalogue.
+
+    Classes of makers differ by half; these are IBC's (L, M, H).
+
+    >>> round(preload_of_class("7020 C", "heavy"))
+    2477
+    """
+    match, dimensions = _BALL.fullmatch(designation), boundary_dimensions(designation)
+    if match is None or dimensions is None:
+        return None
+    pitch = 0.5e3 * (dimensions[0] + dimensions[1])
+    heavy = _HEAVY_PRELOAD[match[1]][0 if match[3] == "C" else 1] * pitch**2
+    return PRELOAD_CLASSES[name] * heavy
 
 
 def estimated(table: dict[str, Any]) -> str:

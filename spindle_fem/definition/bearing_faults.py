@@ -8,6 +8,8 @@ from spindle_fem.definition.bearing_catalogue import SHIPPED
 from spindle_fem.definition.bearing_seats import seat_faults
 from spindle_fem.definition.bearing_types import BearingType, RollerBearingType
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
+from spindle_fem.definition.set_completion import is_known_material
+from spindle_fem.definition.standard_materials import MATERIALS
 from spindle_fem.errors import SpecError, SpindleFemError, did_you_mean
 
 _TOLERANCE = 1.0e-9
@@ -30,6 +32,10 @@ def bearing_faults(
             allowed = f"{did_you_mean(group.bearing_type, types)} {SHIPPED}".strip()
             what = f'"{group.bearing_type}" is no bearing type of this machine.'
             yield SpecError(f"bearing_set.{group.name}.bearing_type", what, allowed)
+        if group.spacers is not None and not is_known_material(group.spacers, spec.materials):
+            what = f'"{group.spacers}" is no material of this machine.'
+            allowed = did_you_mean(group.spacers, (*spec.materials, *MATERIALS))
+            yield SpecError(f"bearing_set.{group.name}.spacers", what, allowed)
         kind = spec.bearing_types.get(group.bearing_type)
         if kind is None:
             continue

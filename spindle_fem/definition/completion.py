@@ -1,4 +1,4 @@
-"""What a definition leaves out and a named rule gives: catalogue bearings, standard materials, surroundings.
+"""What a definition leaves out and named rules give: catalogue bearings, spacers, materials, surroundings.
 
 Works on raw tables before they are validated, so that whatever reads a machine
 sees a complete one. What is malformed stays as it is, for validation to name.
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spindle_fem.definition import bearing_catalogue, standard_materials
+from spindle_fem.definition.set_completion import add_set_rules
 from spindle_fem.errors import SpindleFemError
 from spindle_fem.units import to_si
 
@@ -48,6 +49,7 @@ def complete(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Assumpti
     result, assumed = dict(content), []
     _bearing_types(result, assumed)
     _bearing_places(result, assumed)
+    assumed += [Assumption(where, rule) for where, rule in add_set_rules(result)]
     _grease(result, assumed)
     _materials(result, assumed)
     if result.get("surroundings") == "workshop":

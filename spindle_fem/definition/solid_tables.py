@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from spindle_fem.definition.bearing_catalogue import SHIPPED
+from spindle_fem.definition.bearing_catalogue import PRELOAD_CLASSES, SHIPPED
 from spindle_fem.definition.field_types import (
     Conductivity,
     Density,
@@ -49,6 +49,18 @@ def _read_bearing_type(value: Any) -> Any:
 
 
 BearingTypeName = Annotated[Name, BeforeValidator(_read_bearing_type)]
+
+
+def _read_preload(value: Any) -> Any:
+    """A force; classes of bearings that ship have become forces before."""
+    if isinstance(value, str) and value.isalpha():
+        classes = ", ".join(PRELOAD_CLASSES)
+        allowed = f"Allowed: a force, or {classes} of ball bearings that ship, mounted against each other."
+        raise_faults([Fault("", f'"{value}" gives no force here.', allowed)])
+    return value
+
+
+PreloadOrClass = Annotated[Preload, BeforeValidator(_read_preload)]
 
 
 class Material(SpecModel):
@@ -179,9 +191,9 @@ class BearingSet(SpecModel):
     """Shared factors and overrides use it."""
     bearing_type: BearingTypeName
     """A key of ``[bearing_types]``, or a bearing that ships, such as ``7014 C`` or ``NN3014 K``."""
-    preload: Preload = 0.0
-    """Force through the set, which sets of ball bearings must give; bearings in tandem share it. Rollers
-    have `radial_clearance` instead."""
+    preload: PreloadOrClass = 0.0
+    """Force through the set, which sets of ball bearings must give; bearings in tandem share it. `light`,
+    `medium` or `heavy` of bearings that ship. Rollers have `radial_clearance` instead."""
     preload_kind: Literal["rigid", "spring"] = "rigid"
     """Held by a distance (rings, locknut) or by a force (springs)."""
     fit: Fit | None = None
@@ -198,6 +210,9 @@ class BearingSet(SpecModel):
     """Heat paths through the balls."""
     bearing: Annotated[tuple[SetBearing, ...], Field(min_length=1)]
     """From the nose to the rear."""
+    spacers: Name | None = None
+    """A material: bearings that stand apart get rings between them, the parts `NAME_inner_spacer` and
+    `NAME_outer_spacer` of the set NAME (numbered where there are several), unless the file has such parts."""
 
     @model_validator(mode="after")
     def _check(self) -> BearingSet:

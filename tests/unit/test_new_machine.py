@@ -20,6 +20,49 @@ def test_the_machine_to_start_from_is_sound_and_named_as_its_file(tmp_path) -> N
     assert [row["name"] for row in content["sources"]] == ["belt"]
 
 
+def test_it_is_a_page_and_every_rule_that_it_leans_on_is_listed(tmp_path) -> None:
+    file = new_machine(tmp_path / "a.toml")
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= 65
+    assumed = {item["name"] for item in check_machine(file)["assumed"]}
+    assert assumed >= {
+        "bearing_types.7014_C",
+        "bearing_set.front.preload",
+        "bearing_set.rear.bearing.R2.z",
+        "part.front_inner_spacer",
+        "part.rear_outer_spacer",
+        "grease",
+        "materials.bearing_steel",
+        "joint.workshop_inner_seats",
+        "remaining_surfaces",
+    }
+
+
+MISTAKES = {
+    "a bearing that there is none of": ('"7012 C"', '"7012 Q"'),
+    "a preload class that there is none of": ('"medium"', '"middle"'),
+    "spacers of a material that there is none of": ('"steel", bearing = [', '"steal", bearing = ['),
+    "no unit": ('speed = "4000 rpm"', "speed = 4000"),
+    "a unit of something else": ('force = "400 N"', 'force = "400 mm"'),
+    "a key that there is none of": ("grease = {", 'grease = {maker = "X", '),
+    "a coolant that there is none of": ('"water"', '"watter"'),
+    "a source in no part": ('"shaft.drive_end"', '"shaft.drive"'),
+    "a probe outside its part": ('z = "288 mm", r = "52 mm"', 'z = "288 mm", r = "152 mm"'),
+    "a heat model that there is none of": ('"palmgren"', '"palmgreen"'),
+}
+
+
+def test_ten_mistakes_in_it_are_ten_faults_at_once(tmp_path) -> None:
+    file = new_machine(tmp_path / "a.toml")
+    text = file.read_text(encoding="utf-8")
+    for old, new in MISTAKES.values():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(FaultsError) as refused:
+        check_machine(file)
+    assert len(refused.value.faults) == len(MISTAKES), "\n".join(map(str, refused.value.faults))
+
+
 def test_a_file_that_is_there_is_kept(tmp_path) -> None:
     file = new_machine(tmp_path / "a.toml")
     with pytest.raises(SpecError, match="is there already"):
@@ -31,8 +74,8 @@ def test_a_file_that_is_there_is_kept(tmp_path) -> None:
 def test_the_picture_marks_each_fault_where_it_belongs(tmp_path) -> None:
     file = new_machine(tmp_path / "a.toml")
     text = file.read_text()
-    text = text.replace('name = "R1", z = ["260 mm"', 'name = "R1", z = ["255 mm"')
-    text = text.replace('emperature = "22 degC"', 'emperature = "22 N"').replace("turns = 6", "turns = 9")
+    text = text.replace('name = "R1", z = "260 mm"', 'name = "R1", z = ["255 mm", "278 mm"]')
+    text = text.replace('emperature = "22 degC"', 'emperature = "22 N"').replace("turns = 5", "turns = 9")
     file.write_text(text)
     picture = tmp_path / "a.png"
     with pytest.raises(FaultsError) as refused:
