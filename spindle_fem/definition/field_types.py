@@ -263,24 +263,13 @@ NAME_RULE = "letters, digits, _ and . (first a letter or digit), at most 64 char
 
 
 def _read_name(value: Any) -> str:
-    if not isinstance(value, str) or not is_name(value):
+    if not isinstance(value, str) or _NAME.fullmatch(value) is None:
         shown = f'"{value}"' if isinstance(value, str) else repr(value)
         _refuse(f"{shown} is not a name.", f"Allowed: {NAME_RULE}.")
     return value
 
 
 Name = Annotated[str, BeforeValidator(_read_name)]
-
-
-def is_name(value: str) -> bool:
-    """Whether a text may be a name.
-
-    >>> is_name("F1.inner_ring"), is_name("7014 C")
-    (True, False)
-    """
-    return _NAME.fullmatch(value) is not None
-
-
 Flag = Annotated[bool, Field(strict=True)]
 
 _LENGTH_RULE = QuantityRule("m")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from spindle_fem.definition.bearing_catalogue import PRELOAD_CLASSES, SHIPPED
+from spindle_fem.definition.bearing_catalogue import PRELOAD_CLASSES
 from spindle_fem.definition.field_types import (
     Conductivity,
     Density,
@@ -28,7 +28,6 @@ from spindle_fem.definition.field_types import (
     UncertainConductance,
     UncertainLength,
     UncertainNumber,
-    is_name,
     quantity_field,
     raise_faults,
 )
@@ -39,16 +38,6 @@ PathFill = quantity_field("", at_least=0.0, at_most=0.3)
 FilmStarvation = quantity_field("", at_least=0.1, at_most=1.0)
 ThermalExpansion = quantity_field("1/K", at_least=0.0, at_most=1.0e-4)
 FitDiameter = quantity_field("m", at_least=-1.0e-3, at_most=1.0e-3)
-
-
-def _read_bearing_type(value: Any) -> Any:
-    """What may name a type; designations of bearings that ship have become names before."""
-    if isinstance(value, str) and not is_name(value):
-        raise_faults([Fault("", f'"{value}" is no name and no bearing that ships.', SHIPPED)])
-    return value
-
-
-BearingTypeName = Annotated[Name, BeforeValidator(_read_bearing_type)]
 
 
 def _read_preload(value: Any) -> Any:
@@ -189,7 +178,7 @@ class BearingSet(SpecModel):
 
     name: Name
     """Shared factors and overrides use it."""
-    bearing_type: BearingTypeName
+    bearing_type: Annotated[str, Field(strict=True)]
     """A key of ``[bearing_types]``, or a bearing that ships, such as ``7014 C`` or ``NN3014 K``."""
     preload: PreloadOrClass = 0.0
     """Force through the set, which sets of ball bearings must give; bearings in tandem share it. `light`,
