@@ -287,6 +287,7 @@ def _surfaces(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError
         else:
             claimed[name] = where
     yield from _motion(spec, declared)
+    yield from _circuits(spec, declared)
     for name in dict.fromkeys(names):
         if name not in claimed:
             yield SpecError(
@@ -294,6 +295,25 @@ def _surfaces(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError
                 "has no film and no gap.",
                 "Give it one, or drop the name to leave the face with the remaining surfaces.",
             )
+
+
+def _circuits(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
+    for film in spec.circuits:
+        for key in ("part", "outer_part"):
+            part = getattr(film, key)
+            if part is None:
+                continue
+            if part not in declared.parts:
+                yield _unknown(f"film.{film.name}.{key}", part, "part", declared.parts)
+            elif film.duct == "annulus" and declared.rotating[part]:
+                yield SpecError(
+                    f"film.{film.name}.{key}",
+                    f'"{part}" turns.',
+                    "The walls of an annulus stand; a turning one drags its coolant.",
+                )
+        for name in film.surface:
+            if name in declared.names["surface"]:
+                yield SpecError(f"surface.{name}", "has the name that a circuit gives.", "Choose another.")
 
 
 def _motion(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:

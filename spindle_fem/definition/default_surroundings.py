@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from spindle_fem.definition.bearing_types import BearingType
+from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.drawn_tables import part_geometry, ring_geometries, surface_definition
 from spindle_fem.definition.exchange_tables import JointGroup, Surface, raceway_surfaces
 from spindle_fem.definition.solid_tables import Part, SetBearing
@@ -91,6 +92,8 @@ def _drawn(content: Mapping[str, Any]) -> _Drawn | None:
     surfaces: list[SurfaceDefinition] = [
         surface_definition(surface) for surface in _sound(Surface, content.get("surface"))
     ]
+    for circuit in _sound(CircuitFilm, content.get("film")):
+        surfaces += map(surface_definition, circuit.walls)
     types = content.get("bearing_types")
     groups = content.get("bearing_set")
     for group in groups if isinstance(groups, list) else ():

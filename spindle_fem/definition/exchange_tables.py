@@ -275,9 +275,6 @@ class RotatingFilm(SpecModel):
     """Needed where a shared factor applies."""
 
 
-Film = Annotated[ConstantFilm | NaturalFilm | RotatingFilm, Field(discriminator="kind")]
-
-
 class Gap(SpecModel):
     """Air between a rotating surface and the standing one around it.
 

@@ -14,13 +14,13 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from spindle_fem.definition.bearing_types import BallBearingType, BearingType, RollerBearingType
+from spindle_fem.definition.circuit_tables import CircuitFilm, Film
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.exchange_tables import (
     Channel,
     ConstantFilm,
     Coolant,
     FaceSelector,
-    Film,
     Gap,
     JointGroup,
     NaturalFilm,
@@ -330,19 +330,24 @@ class MachineSpec(SpecModel):
         return coolant is not None and (coolant.pressure_limit, coolant.pump_curve) != (None, None)
 
     @property
+    def circuits(self) -> tuple[CircuitFilm, ...]:
+        """Circuits beside the channel."""
+        return tuple(film for film in self.film if isinstance(film, CircuitFilm))
+
+    @property
     def source_inputs(self) -> tuple[str, ...]:
         """Recorded quantities that heat sources follow."""
         return tuple(dict.fromkeys(source.input for source in self.source if source.input is not None))
 
     @property
     def all_surfaces(self) -> tuple[Surface, ...]:
-        """The named surfaces of the file and the raceways of every bearing.
+        """The named surfaces of the file, the raceways of every bearing and the walls of circuits.
 
         ``F1.inner_raceway`` is the outer cylinder of ``F1.inner_ring``,
         ``F1.outer_raceway`` the inner cylinder of ``F1.outer_ring``.
         """
         raceways = (surface for _, bearing in self.bearings for surface in raceway_surfaces(bearing.name))
-        return self.surface + tuple(raceways)
+        return (*self.surface, *raceways, *(wall for film in self.circuits for wall in film.walls))
 
     def part_material(self, part_name: str) -> Material:
         """Material of a part, the rings of bearings included (``F1.inner_ring``)."""
@@ -364,6 +369,7 @@ __all__ = [
     "BearingSet",
     "BearingType",
     "Channel",
+    "CircuitFilm",
     "ConstantFilm",
     "Coolant",
     "DisplacementSensor",

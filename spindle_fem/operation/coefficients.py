@@ -12,15 +12,16 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.circuit_tables import CircuitFilm, Film
 from spindle_fem.definition.machine_spec import (
     BearingSet,
     ConstantFilm,
-    Film,
     Gap,
     MachineSpec,
     NaturalFilm,
 )
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+from spindle_fem.operation.circuits import circuit_film
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.surroundings.air_gaps import AirGap
@@ -61,6 +62,9 @@ def film_coefficient(
             wall, fluid, film.characteristic_length, film.emissivity, orientation=film.orientation
         )
         return film.factor.value * value, ()
+    if isinstance(film, CircuitFilm):
+        answer = circuit_film(film)
+        return np.full(wall.shape, film.factor.value * answer.coefficient), answer.warnings
     rotating = rotating_film(film.correlation, point.speed, film.diameter, minimum=film.minimum)
     return np.full(wall.shape, film.factor.value * rotating.value), rotating.warnings
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.channel_cells import ChannelCells, build_channel_cells
+from spindle_fem.operation.circuits import coolant_temperatures
 from spindle_fem.operation.coefficients import (
     ball_conductances,
     ball_row_capacity,
@@ -227,6 +229,9 @@ class LoadsBuilder:
         films = {}
         for film in self.spec.film:
             fluid = fluid_temperature(film, point.ambient_temperature)
+            if isinstance(film, CircuitFilm):
+                films |= self._circuit_films(film, point, state, warnings, change)
+                continue
             for surface in film.surface:
                 wall = state.facets[surface]
                 coefficient, said = film_coefficient(film, point, wall, fluid)
@@ -237,6 +242,30 @@ class LoadsBuilder:
                     np.full(wall.shape, fluid + change.fluids.get(surface, 0.0)),
                 )
         return films
+
+    def _circuit_films(
+        self,
+        film: CircuitFilm,
+        point: OperatingPoint,
+        state: FieldState,
+        warnings: list[CodedWarning],
+        change: LoadChange,
+    ) -> dict[str, FilmLoad]:
+        """Films of a circuit's walls, its coolant warmed by those that it has passed."""
+        walls = {surface: self.surface_mean(surface, state) for surface in film.surface}
+        value, said = film_coefficient(film, point, np.zeros(1), film.inlet_temperature)
+        warnings += said
+        values = {surface: float(value[0]) * change.factor(f"film.{surface}") for surface in walls}
+        conductance = {surface: values[surface] * float(self.facet_area[surface].sum()) for surface in walls}
+        coolant, _ = coolant_temperatures(film, conductance, walls, film.inlet_temperature)
+        return {
+            surface: FilmLoad(
+                surface,
+                np.full(self.facet_area[surface].shape, values[surface]),
+                np.full(self.facet_area[surface].shape, coolant[surface] + change.fluids.get(surface, 0.0)),
+            )
+            for surface in walls
+        }
 
     def _gap_nodes(
         self, point: OperatingPoint, warnings: list[CodedWarning], change: LoadChange

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import ConvergenceError, EnergyBalanceError, NoSteadyStateError, SpindleFemError
 from spindle_fem.model.lumped.friction_table import tabulate_friction
-from spindle_fem.model.lumped.heat_laws import CoolantLaw, WallFilmLaw
+from spindle_fem.model.lumped.heat_laws import CircuitLaw, CoolantLaw, WallFilmLaw
 from spindle_fem.model.lumped.machine_balance import SparseBalance, bearing_temperatures
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.model.lumped.operating_state import OperatingNetwork, coolant_law, operate
@@ -92,6 +92,9 @@ class MachineNetworkState:
         for law in network.laws:
             if isinstance(law, WallFilmLaw):
                 heat = np.bincount(law.patch.node, law.heat(self.temperature)[0], self.temperature.size)
+                found += [(int(n), ambient, law.name, float(heat[n])) for n in np.flatnonzero(heat)]
+            elif isinstance(law, CircuitLaw):
+                heat = np.bincount(law.patch.node, law.heat(self.temperature), self.temperature.size)
                 found += [(int(n), ambient, law.name, float(heat[n])) for n in np.flatnonzero(heat)]
             elif isinstance(law, CoolantLaw):
                 h = law.coefficients(self.temperature)[0]
@@ -334,6 +337,8 @@ def _state(network: OperatingNetwork, temperature: Array, iterations: int) -> Ma
         law.require_valid(temperature)
         if isinstance(law, WallFilmLaw):
             out[law.name] = float(law.heat(temperature)[0].sum())
+        elif isinstance(law, CircuitLaw):
+            out[law.name] = float(law.heat(temperature).sum())
         elif not isinstance(law, CoolantLaw):
             heat_in += float(law(temperature)[0].sum())
     outlet = float("nan")

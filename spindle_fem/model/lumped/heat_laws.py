@@ -201,6 +201,41 @@ class CoolantLaw:
         return heat, (rows, np.tile(column, 2), np.concatenate([slope, -slope]))
 
 
+@dataclass(frozen=True, slots=True)
+class CircuitLaw:
+    """Heat from walls into a circuit, whose coolant follows its walls at constant films.
+
+    Attributes
+    ----------
+    conductance : (k,) ndarray, [W/K]
+        Of each face, from its node to the coolant beside it.
+    warming : (k, k) ndarray, [-]
+        Coolant beside each face above the inlet, for each kelvin of each node above the inlet.
+    inlet : float, [K]
+    """
+
+    patch: SurfacePatch
+    conductance: Array
+    warming: Array
+    inlet: float
+    name: str
+
+    def require_valid(self, temperature: Array) -> None:
+        """Constant films hold at every temperature."""
+
+    def heat(self, temperature: Array) -> Array:
+        """Heat that leaves through each face, W."""
+        rise = temperature[self.patch.node] - self.inlet
+        return self.conductance * (rise - self.warming @ rise)
+
+    def __call__(self, temperature: Array) -> tuple[Array, Triplets]:
+        """Heat into every node and its derivative."""
+        node = self.patch.node
+        slope = self.conductance[:, None] * (np.eye(len(node)) - self.warming)
+        rows, columns = np.repeat(node, len(node)), np.tile(node, len(node))
+        return np.bincount(node, -self.heat(temperature), len(temperature)), (rows, columns, -slope.ravel())
+
+
 def faces_by_cell(cell: NDArray[np.int64]) -> NDArray[np.int64]:
     """All ordered pairs of faces that share a cell, (2, m).
 

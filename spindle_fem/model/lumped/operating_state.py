@@ -10,12 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
+from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.model.lumped.ball_contacts import BallContactLaw, ContactFaces
 from spindle_fem.model.lumped.friction_table import FrictionTables
-from spindle_fem.model.lumped.heat_laws import CoolantLaw, FrictionLaw, WallFilmLaw, faces_by_cell
+from spindle_fem.model.lumped.heat_laws import (
+    CircuitLaw,
+    CoolantLaw,
+    FrictionLaw,
+    WallFilmLaw,
+    faces_by_cell,
+)
+from spindle_fem.model.lumped.links import SurfacePatch
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
+from spindle_fem.operation.circuits import CircuitMarch, wall_cells
 from spindle_fem.operation.coefficients import ball_conductances, film_coefficient, gap_coefficient
 from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.heat_shares import heat_shares
@@ -27,7 +36,7 @@ from spindle_fem.physics.coolant.properties import Coolant
 from spindle_fem.physics.coolant.regimes import ChannelState, select_film
 
 Array = NDArray[np.float64]
-Law = WallFilmLaw | CoolantLaw | FrictionLaw | BallContactLaw
+Law = WallFilmLaw | CoolantLaw | CircuitLaw | FrictionLaw | BallContactLaw
 # Wall less fluid, K; the points lie close because the coefficient has a cusp where both are equal.
 FILM_RANGE = (-60.0, 140.0)
 FILM_POINTS = 801
@@ -290,6 +299,9 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
     """Films to the surroundings and the bands of mixed air."""
     spec = machine.spec
     for film in spec.film:
+        if isinstance(film, CircuitFilm):
+            laws.append(_circuit(machine, film, point))
+            continue
         if film.temperature == "ambient":
             boundary = "ambient"
         else:
@@ -329,6 +341,17 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
                 )
             )
         start += bands.n_bands
+
+
+def _circuit(machine: MachineNetwork, film: CircuitFilm, point: OperatingPoint) -> CircuitLaw:
+    """The coolant of a circuit, eliminated: it holds no heat of its own."""
+    value, _ = film_coefficient(film, point, np.zeros(1), film.inlet_temperature)
+    patches = [machine.surfaces[surface] for surface in film.surface]
+    patch = SurfacePatch.joined(patches)
+    cell = np.repeat(wall_cells(film), [len(item.node) for item in patches])
+    conductance = 1.0 / (patch.resistance + 1.0 / (float(value[0]) * patch.area))
+    march = CircuitMarch.of(film, conductance, cell)
+    return CircuitLaw(patch, conductance, march.warming, film.inlet_temperature, film.name)
 
 
 def _pumping(machine: MachineNetwork, point: OperatingPoint) -> Array:

@@ -19,6 +19,7 @@ from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.model.reduced.channel_operators import ChannelOperators
+from spindle_fem.model.reduced.circuit_operators import CircuitOperators
 from spindle_fem.model.reduced.class_operators import NO_CHANGES, ClassOperators
 from spindle_fem.model.reduced.coefficient_directions import ConductingDirections
 from spindle_fem.model.reduced.drive import Drive
@@ -143,6 +144,8 @@ class FastModel:
         self._fluid_columns = {
             name: self.load_names.index(inputs.fluid_input(name)) for name in model.fluid_names
         }
+        circuits = getattr(self.spec, "circuits", ())
+        self.circuits = CircuitOperators(model, circuits, self._fluid_columns) if circuits else None
         self._heat_loads = np.array([model.place(place) for place in self.heat_places])
         self._heat_loads = self._heat_loads.reshape(-1, model.size).T
 
@@ -267,12 +270,14 @@ class FastModel:
         output_inputs = np.zeros((len(self.channels), len(self.load_names)))
         found = ClassOperators(conduction, loads, outputs, output_inputs)
         self._add_conductances(found, conductances)
-        cooled = []
+        cooled: list[str] = []
+        touched: dict[str, tuple[int, ...]] = {}
         for parameter in parameters:
             rows = self._rows_of(parameter)
             if rows:
                 found.conduction_by[parameter] = self._sum(rows, values)
             films = self._films_among(rows)
+            touched[parameter] = rows
             if films:
                 found.loads_by[parameter] = np.zeros_like(loads)
                 self._add_fluids(found.loads_by[parameter], films, values)
@@ -280,6 +285,8 @@ class FastModel:
                 cooled.append(parameter)
                 if rows:
                     found.conduction_by[parameter] = found.conduction_by[parameter].copy()
+        if self.circuits is not None:
+            self.circuits.add(found, values, touched)
         if self.channel is not None:
             self.channel.add(found, point, factors, changes, cooled)
         return found
@@ -313,6 +320,8 @@ class FastModel:
             for place in {*conductances[0], *conductances[1]}
         }
         self._add_conductances(found, differences)
+        if self.circuits is not None:
+            self.circuits.add_difference(found, upper, lower)
         if self.channel is not None:
             self.channel.add_difference(found, point, factors, changes)
         return found

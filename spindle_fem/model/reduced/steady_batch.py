@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.model.reduced.circuit_operators import CircuitWalls
 from spindle_fem.model.reduced.coolant_batch import ChannelBatch, ChannelField
 from spindle_fem.model.reduced.design_inputs import DesignInputs
 from spindle_fem.model.reduced.heat_tables import (
@@ -135,6 +136,7 @@ class _Run:
         given = inputs.coefficients
         self.base = (given[:, solver.steady] @ solver.fixed).reshape(self.number, self.size, self.size)
         self.fluid_load = (given[:, solver.fluids] * inputs.fluid) @ self.model.fluid_load
+        self._add_circuits()
         self._tables: list[tuple[HeatTable, NDArray[np.int64]]] = []
         owners: dict[str, list[int]] = {}
         for row, key in enumerate(inputs.mechanics):
@@ -142,6 +144,16 @@ class _Run:
         for key, rows in owners.items():
             table = solver.tables.of(inputs.specs[rows[0]], inputs.points[rows[0]], key)
             self._tables.append((table, np.array(rows)))
+
+    def _add_circuits(self) -> None:
+        """Let the coolant of circuits warm on its way: films by themselves have it at inlet temperature."""
+        for number, film in enumerate(self.inputs.specs[0].circuits):
+            walls = CircuitWalls(self.model, film)
+            for row, spec in enumerate(self.inputs.specs):
+                own = spec.circuits[number]
+                maps = walls.maps(own, self.inputs.coefficients[row, walls.rows])
+                self.base[row] += maps.conduction
+                self.fluid_load[row] += own.inlet_temperature * maps.inlet_load
 
     # ------------------------------------------------------------- what follows the field
     def _quantities(self, film: Array) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.model.reduced.circuit_operators import CircuitWalls
 from spindle_fem.model.reduced.coolant_batch import pressure_drops
 from spindle_fem.model.reduced.design_inputs import DesignInputs
 from spindle_fem.model.reduced.heat_tables import QUANTITIES
@@ -200,6 +201,11 @@ def _energy(model: ThermalModel, inputs: DesignInputs, batch: SteadyBatch) -> It
     area = model.fluid_load @ model.one
     means = batch.unknowns @ np.array([model.place(name) for name in surfaces]).reshape(-1, model.size).T
     out = batch.coefficients[:, columns] * area * (means - inputs.fluid)
+    for number, film in enumerate(inputs.specs[0].circuits):
+        walls, places = CircuitWalls(model, film), [surfaces.index(name) for name in film.surface]
+        for row, spec in enumerate(inputs.specs):
+            coefficients = batch.coefficients[row, walls.rows]
+            out[row, places] = walls.heat(spec.circuits[number], coefficients, batch.unknowns[row])
     heat = batch.bearings[:, :, QUANTITIES.index("total")].sum(axis=1)
     wall = f"{inputs.specs[0].channel.part}.channel_wall" if batch.channel is not None else ""
     for row in range(len(inputs)):

@@ -12,7 +12,7 @@ from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 # Values of a definition that only move coefficients, heat or fluids; all else must be equal in a group.
 _FREE = {
     "operation": ("speed", "thrust", "ambient_temperature"),
-    "coolant": ("inlet_temperature", "flow", "film_factor"),
+    "coolant": ("inlet_temperature", "flow", "film_factor", "pressure_limit", "pump_curve"),
     "heat": ("inner_share", "ball_share", "table", "palmgren_f0", "skf_mu_ehl"),
 }
 _FREE_OF_LISTS = {
@@ -21,6 +21,8 @@ _FREE_OF_LISTS = {
     "gap": ("at_rest", "rise", "reference_speed", "exponent", "factor"),
     "joint": ("conductance",),
 }
+# The diameter of a circuit is that of its walls.
+_FREE_OF_CIRCUITS = ("fluid", "inlet_temperature", "flow", "law", "factor")
 _FREE_OF_MATERIALS = ("thermal_conductivity", "density", "specific_heat_capacity")
 _FREE_TABLES = ("grease", "heat_capacity_factor", "factor", "initial", "name", "title", "description")
 
@@ -33,7 +35,10 @@ def structure_digest(dump: Mapping[str, Any]) -> str:
             kept[table] = _without(kept[table], keys)
     for table, keys in _FREE_OF_LISTS.items():
         if table in kept:
-            kept[table] = [_without(item, keys) for item in kept[table]]
+            kept[table] = [
+                _without(item, _FREE_OF_CIRCUITS if item.get("kind") == "circuit" else keys)
+                for item in kept[table]
+            ]
     materials = kept.get("materials", {})
     kept["materials"] = {name: _without(item, _FREE_OF_MATERIALS) for name, item in materials.items()}
     text = json.dumps(without_marks(kept), sort_keys=True, default=str)

@@ -1,0 +1,8 @@
+"""Ducts that a circuit flows through, one file each; the file's name is the value of ``film.duct``.
+
+A kind is a function of the diameters of a :class:`spindle_fem.physics.coolant.ducts.Duct`.
+"""
+
+from spindle_fem.registry import registry
+
+DUCT_KINDS = registry(__name__)

@@ -1,0 +1,144 @@
+"""Straight ducts: what flows through one, its film and its pressure loss."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spindle_fem.correlation import Array, correlation
+from spindle_fem.physics.coolant.properties import Coolant, CoolantProperties
+from spindle_fem.validity import POSITIVE, require_range
+
+# Reynolds numbers between which a straight duct turns turbulent (Gnielinski 2013).
+LAMINAR_TO, TURBULENT_FROM = 2300.0, 4000.0
+
+
+@dataclass(frozen=True, slots=True)
+class DuctSection:
+    """A section that does not change along a duct.
+
+    Attributes
+    ----------
+    area, perimeter : float, [m²], [m]
+        Free section and its wetted perimeter.
+    laminar_nusselt : float, [-]
+        Developed, walls of one temperature, on the hydraulic diameter.
+    laminar_friction : float, [-]
+        Darcy friction factor times Reynolds number.
+    """
+
+    area: float
+    perimeter: float
+    laminar_nusselt: float
+    laminar_friction: float
+
+    @property
+    def hydraulic_diameter(self) -> float:
+        """Four times area over perimeter, [m]."""
+        return 4.0 * self.area / self.perimeter
+
+
+@dataclass(frozen=True, slots=True)
+class DuctFlow:
+    """Flow through a straight duct, properties at its inlet.
+
+    Attributes
+    ----------
+    length : float, [m]
+    volume_flow, inlet_temperature : float, [m³/s], [K]
+
+    Raises
+    ------
+    OutOfValidityError
+        A length or flow that is not positive, a temperature outside the coolant's range.
+    """
+
+    section: DuctSection
+    length: float
+    coolant: Coolant
+    volume_flow: float
+    inlet_temperature: float
+
+    def __post_init__(self) -> None:
+        require_range(
+            "duct",
+            length=(self.length, *POSITIVE),
+            volume_flow=(self.volume_flow, *POSITIVE),
+            how_to_fix="Give SI values; the coolant must flow.",
+        )
+
+    @property
+    def properties(self) -> CoolantProperties:
+        """Of the coolant as it enters."""
+        return self.coolant.properties(self.inlet_temperature)
+
+    @property
+    def velocity(self) -> float:
+        """Mean over the section, [m/s]."""
+        return self.volume_flow / self.section.area
+
+    @property
+    def reynolds(self) -> float:
+        """On the hydraulic diameter, [-]."""
+        return self.velocity * self.section.hydraulic_diameter / float(self.properties.kinematic_viscosity)
+
+    @property
+    def prandtl(self) -> float:
+        """Of the coolant, [-]."""
+        return float(self.properties.prandtl)
+
+    @property
+    def slenderness(self) -> float:
+        """Length over hydraulic diameter, [-]."""
+        return self.length / self.section.hydraulic_diameter
+
+    @property
+    def turbulent_share(self) -> float:
+        """0 in laminar, 1 in turbulent flow, linear in Re between."""
+        return float(np.clip((self.reynolds - LAMINAR_TO) / (TURBULENT_FROM - LAMINAR_TO), 0.0, 1.0))
+
+    @property
+    def regime(self) -> str:
+        """Laminar, transition or turbulent."""
+        share = self.turbulent_share
+        return "laminar" if share <= 0.0 else "turbulent" if share >= 1.0 else "transition"
+
+    @property
+    def capacity_rate(self) -> float:
+        """Mass flow times heat capacity, [W/K]."""
+        return float(self.properties.density * self.properties.specific_heat_capacity) * self.volume_flow
+
+    @property
+    def pressure_drop(self) -> float:
+        """Friction along the duct without what is before and after it, [Pa]."""
+        laminar = self.section.laminar_friction / min(self.reynolds, LAMINAR_TO)
+        smooth = float(friction_factor_smooth(max(self.reynolds, TURBULENT_FROM), extrapolate=True))
+        factor = laminar + self.turbulent_share * (smooth - laminar)
+        return factor * self.slenderness * 0.5 * float(self.properties.density) * self.velocity**2
+
+
+@dataclass(frozen=True, slots=True)
+class DuctFilm:
+    """What a film law answers: Nusselt number on the hydraulic diameter, source, what leaves its range."""
+
+    nusselt: float
+    source: str
+    faults: tuple[str, ...]
+
+
+@correlation(how_to_fix="Let the duct choose by its regime.", reynolds=(4.0e3, 1.0e6))
+def friction_factor_smooth(reynolds: Array) -> Array:
+    """Darcy friction factor of turbulent flow in a smooth duct.
+
+    Parameters
+    ----------
+    reynolds : (n,) array_like, [-]
+        On the hydraulic diameter.
+
+    Source: Konakov (1946), as Gnielinski (2013), Int. J. Heat Mass Transfer 63, 134–140, takes it.
+
+    >>> float(friction_factor_smooth(1.0e4).round(5))
+    0.03078
+    """
+    return (1.8 * np.log10(reynolds) - 1.5) ** -2
