@@ -145,7 +145,8 @@ def check_machine(
         "surfaces": [{"name": surface.name, "detail": surface.part} for surface in spec.all_surfaces],
         "contacts": [{"name": name, "detail": conductance(name)} for name in assembly.joint_names],
         "probes": [
-            {"name": probe.name, "detail": probe.part or "mixed coolant outlet"} for probe in spec.probe
+            {"name": probe.name, "detail": probe.part or probe.circuit or "mixed coolant outlet"}
+            for probe in spec.probe
         ],
         "sources": [{"name": source.name, "detail": _source_detail(source)} for source in spec.source],
         "radial_loads": _radial_load_rows(spec),

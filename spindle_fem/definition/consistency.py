@@ -382,6 +382,9 @@ def _probes(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
                 "reads the coolant outlet, but there is no [coolant].",
                 "Drop it, or add one.",
             )
+        names = [film.name for film in spec.circuits]
+        if probe.circuit is not None and probe.circuit not in names:
+            yield _unknown(f"probe.{probe.name}.circuit", probe.circuit, "circuit", names)
         if probe.part is not None and probe.part not in declared.parts:
             yield _unknown(f"probe.{probe.name}.part", probe.part, "part", declared.parts)
         elif probe.part is not None:

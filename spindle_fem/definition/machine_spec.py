@@ -180,12 +180,14 @@ class SharedFactor(SpecModel):
 
 
 class Probe(SpecModel):
-    """A temperature reading: a point on a part, or the mixed coolant outlet."""
+    """A temperature reading: a point on a part, the mixed outlet of the channel, or that of a circuit."""
 
     name: Name
     """Results and recordings use it."""
-    kind: Literal["point", "coolant_outlet"] = "point"
+    kind: Literal["point", "coolant_outlet", "circuit_outlet"] = "point"
     """What it reads."""
+    circuit: Name | None = None
+    """Name of the circuit, with ``kind = "circuit_outlet"`` only."""
     part: Name | None = None
     """A part, or a ring such as ``F1.outer_ring``; for a point only, like r, z and angle."""
     r: Radius | None = None
@@ -206,10 +208,13 @@ class Probe(SpecModel):
             )
         else:
             raise_faults(
-                Fault(key, "is given.", 'A probe of kind "coolant_outlet" takes no part, r or z.')
+                Fault(key, "is given.", f'A probe of kind "{self.kind}" takes no part, r or z.')
                 for key, present in given.items()
                 if present
             )
+        if (self.circuit is not None) != (self.kind == "circuit_outlet"):
+            what = "is missing." if self.circuit is None else "is given."
+            raise_faults([Fault("circuit", what, 'It goes with kind = "circuit_outlet".')])
         return self
 
 

@@ -111,7 +111,7 @@ def wall_cells(film: CircuitFilm) -> NDArray[np.int64]:
 
 
 def coolant_temperatures(
-    film: CircuitFilm, conductance: Mapping[str, float], wall: Mapping[str, float], inlet: float
+    film: CircuitFilm, conductance: Mapping[str, float], wall: Mapping[str, float]
 ) -> tuple[dict[str, float], float]:
     """Coolant at every wall of a circuit and at its outlet, K.
 
@@ -119,9 +119,8 @@ def coolant_temperatures(
     ----------
     conductance, wall : mapping of surface to float, [W/K], [K]
         Film times area, mean temperature.
-    inlet : float, [K]
     """
-    names = film.surface
+    names, inlet = film.surface, film.inlet_temperature
     march = CircuitMarch.of(film, np.array([conductance[name] for name in names]), wall_cells(film))
     rise = np.array([wall[name] for name in names]) - inlet
     found = inlet + march.warming @ rise

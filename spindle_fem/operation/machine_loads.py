@@ -252,20 +252,38 @@ class LoadsBuilder:
         change: LoadChange,
     ) -> dict[str, FilmLoad]:
         """Films of a circuit's walls, its coolant warmed by those that it has passed."""
-        walls = {surface: self.surface_mean(surface, state) for surface in film.surface}
         value, said = film_coefficient(film, point, np.zeros(1), film.inlet_temperature)
         warnings += said
-        values = {surface: float(value[0]) * change.factor(f"film.{surface}") for surface in walls}
-        conductance = {surface: values[surface] * float(self.facet_area[surface].sum()) for surface in walls}
-        coolant, _ = coolant_temperatures(film, conductance, walls, film.inlet_temperature)
+        coefficients = {
+            surface: np.full(
+                self.facet_area[surface].shape, float(value[0]) * change.factor(f"film.{surface}")
+            )
+            for surface in film.surface
+        }
+        coolant, _ = self.circuit_coolant(film, coefficients, state)
         return {
             surface: FilmLoad(
                 surface,
-                np.full(self.facet_area[surface].shape, values[surface]),
-                np.full(self.facet_area[surface].shape, coolant[surface] + change.fluids.get(surface, 0.0)),
+                coefficient,
+                np.full(coefficient.shape, coolant[surface] + change.fluids.get(surface, 0.0)),
             )
-            for surface in walls
+            for surface, coefficient in coefficients.items()
         }
+
+    def circuit_coolant(
+        self, film: CircuitFilm, coefficients: Mapping[str, NDArray[np.float64]], state: FieldState
+    ) -> tuple[dict[str, float], float]:
+        """Coolant of a circuit at each of its walls and at its outlet, K.
+
+        Parameters
+        ----------
+        coefficients : mapping of surface to (n_facets,) ndarray, [W/(m²·K)]
+        """
+        conductance = {
+            surface: float(coefficients[surface] @ self.facet_area[surface]) for surface in film.surface
+        }
+        walls = {surface: self.surface_mean(surface, state) for surface in film.surface}
+        return coolant_temperatures(film, conductance, walls)
 
     def _gap_nodes(
         self, point: OperatingPoint, warnings: list[CodedWarning], change: LoadChange

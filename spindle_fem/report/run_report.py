@@ -166,6 +166,8 @@ def render_run_report(
         state = [Text(tables.regime_words(coolant)), tables.coolant_table(coolant)]
         pictures = _drawn(illustrations, "coolant", "channel_walls")
         sections.append(Section("coolant", "Coolant", [*state, *pictures]))
+    if summary.get("circuits"):
+        sections.append(Section("circuits", "Circuits beside the channel", [tables.circuit_table(summary)]))
     balance = tables.balance_table(summary)
     sections += [
         Section("balance", "Energy balance", [balance, *_drawn(illustrations, "heat_balance")]),

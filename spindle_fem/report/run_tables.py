@@ -188,6 +188,27 @@ def coolant_table(coolant: Mapping[str, Any]) -> Table:
     return Table((column("quantity"), column("value", number=True), column("unit")), rows_of(entries))
 
 
+def circuit_table(summary: Mapping[str, Any]) -> Table:
+    """Flow, temperatures and heat of every circuit beside the channel."""
+    columns = ("flow / L/min", "inlet / °C", "outlet / °C", "heat / W", "Re", "film / W/(m²·K)", "drop / bar")
+    rows = [
+        [
+            readable(name),
+            significant(circuit["flow_m3_s"] * 6.0e4),
+            number(circuit["inlet_degC"], 2),
+            number(circuit["outlet_degC"], 2),
+            number(circuit["heat_W"]),
+            significant(circuit["reynolds"]),
+            significant(circuit["film_coefficient_W_m2K"]),
+            significant(circuit["pressure_drop_Pa"] / 1.0e5),
+            f"{circuit['regime']}, {circuit['source']}",
+        ]
+        for name, circuit in summary["circuits"].items()
+    ]
+    head = (column("circuit"), *(column(name, number=True) for name in columns), column("film by"))
+    return Table(head, rows_of(rows))
+
+
 def balance_table(summary: Mapping[str, Any]) -> Table:
     """Heat in and out."""
     energy = summary["energy"]

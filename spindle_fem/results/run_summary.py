@@ -8,7 +8,13 @@ import platform
 from typing import TYPE_CHECKING, Any
 
 from spindle_fem.operation.source_terms import SOURCE_PREFIX
-from spindle_fem.results.thermal_result import BearingResult, CoolantResult, Equilibrium, ThermalResult
+from spindle_fem.results.thermal_result import (
+    BearingResult,
+    CircuitResult,
+    CoolantResult,
+    Equilibrium,
+    ThermalResult,
+)
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -79,6 +85,7 @@ def build_summary(
             },
             "bearings": {name: _bearing(bearing) for name, bearing in result.bearings.items()},
             "coolant": None if result.coolant is None else _coolant(result.coolant),
+            "circuits": {name: _circuit(circuit) for name, circuit in result.circuits.items()},
             "probes": {name: value - ZERO_CELSIUS_K for name, value in result.probes.items()},
             "temperature": {
                 "min_degC": result.temperature_minimum - ZERO_CELSIUS_K,
@@ -148,6 +155,23 @@ def _coolant(coolant: CoolantResult) -> dict[str, Any]:
         "wetted_area_m2": coolant.wetted_area,
         "length_m": coolant.length,
         "hydraulic_diameter_m": coolant.hydraulic_diameter,
+    }
+
+
+def _circuit(circuit: CircuitResult) -> dict[str, Any]:
+    return {
+        "flow_m3_s": circuit.flow,
+        "inlet_degC": circuit.inlet_temperature - ZERO_CELSIUS_K,
+        "outlet_degC": circuit.outlet_temperature - ZERO_CELSIUS_K,
+        "heat_W": circuit.heat,
+        "reynolds": circuit.reynolds,
+        "prandtl": circuit.prandtl,
+        "velocity_m_s": circuit.velocity,
+        "regime": circuit.regime,
+        "source": circuit.source,
+        "film_coefficient_W_m2K": circuit.film_coefficient,
+        "pressure_drop_Pa": circuit.pressure_drop,
+        "wetted_area_m2": circuit.wetted_area,
     }
 
 

@@ -99,6 +99,24 @@ class CoolantResult:
 
 
 @dataclass(frozen=True, slots=True)
+class CircuitResult:
+    """A circuit beside the channel, SI; properties and film at its inlet temperature."""
+
+    flow: float
+    inlet_temperature: float
+    outlet_temperature: float
+    heat: float
+    reynolds: float
+    prandtl: float
+    velocity: float
+    regime: str
+    source: str
+    film_coefficient: float
+    pressure_drop: float
+    wetted_area: float
+
+
+@dataclass(frozen=True, slots=True)
 class EnergyBalance:
     """Heat in W; ``heat_out`` by surface or film name, positive when it leaves."""
 
@@ -203,6 +221,7 @@ class ThermalResult(Presented):
     warnings: tuple[CodedWarning, ...]
     iterations: Mapping[str, int]
     timings: Mapping[str, float]
+    circuits: Mapping[str, CircuitResult] = field(default_factory=dict)
     extra: Mapping[str, Any] = field(default_factory=dict)
     heat_study: Mapping[str, Any] | None = None
     growth_model: GrowthModel | None = None

@@ -13,6 +13,7 @@ from spindle_fem.errors import ConvergenceError, NoSteadyStateError, SpindleFemE
 from spindle_fem.model.mesh.linear_solvers import RELATIVE_TOLERANCE
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady
 from spindle_fem.operation.bearing_heat import follows_preload
+from spindle_fem.operation.circuits import duct_flow
 from spindle_fem.operation.coolant_loop import CoolantState
 from spindle_fem.operation.loads import NO_CHANGE, LoadChange, Loads
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -216,6 +217,7 @@ class _Operation:
         return (
             abs(heat - before) <= HEAT_TOLERANCE * max(abs(heat), 1.0e-12)
             and coolant_mismatch(self.machine, self.solution, self.coolant) <= COOLANT_TOLERANCE
+            and circuit_mismatch(self.machine, self.solution, self.loads) <= COOLANT_TOLERANCE
             and self.solution.residual <= LINEAR_RESIDUAL_LIMIT
             and self.change < FIELD_TOLERANCE * max(1.0, hottest - self.point.coldest)
         )
@@ -237,6 +239,30 @@ def coolant_mismatch(
     taken = march.enthalpy_rise - float(march.pumping_heat.sum())
     moved = float(np.abs(march.heat).sum() + np.abs(march.pumping_heat).sum())
     return abs(given - taken) / max(moved, 1.0e-12)
+
+
+def circuit_outlets(machine: PreparedMachine, solution: ConductionSolution, loads: Loads) -> dict[str, float]:
+    """Outlet temperature of every circuit as its walls have it, K."""
+    circuits = machine.spec.circuits
+    if not circuits:
+        return {}
+    field = machine.field_state(solution.temperature, {})
+    films = {name: film.coefficient for name, film in loads.films.items()}
+    return {film.name: machine.builder.circuit_coolant(film, films, field)[1] for film in circuits}
+
+
+def circuit_mismatch(machine: PreparedMachine, solution: ConductionSolution, loads: Loads) -> float:
+    """Heat that the walls of circuits give less the enthalpy rise of their coolant; the worst, relative."""
+    worst = 0.0
+    for name, outlet in circuit_outlets(machine, solution, loads).items():
+        film = next(film for film in machine.spec.circuits if film.name == name)
+        if any(loads.change.fluids.get(surface) for surface in film.surface):
+            # A term that shifts the fluid of one wall says nothing of the coolant that goes on.
+            continue
+        heat = np.array([solution.balance.films[surface] for surface in film.surface])
+        rise = duct_flow(film).capacity_rate * (outlet - film.inlet_temperature)
+        worst = max(worst, abs(float(heat.sum()) - rise) / max(float(np.abs(heat).sum()), 1.0e-12))
+    return worst
 
 
 def _linear_tolerance(change: float) -> float:

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.model.mesh.evaluate import mean_matrix, probe_matrix
+from spindle_fem.operation.circuits import CircuitMarch, circuit_film, wall_cells
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 
@@ -24,7 +26,8 @@ class ReadingRows:
     Attributes
     ----------
     rows : (n_outputs, n + m) sparse array
-        Point probes, raceway means of every bearing, ball rows, channel cells.
+        Point probes, raceway means of every bearing, ball rows, outlets of circuits above their inlets,
+        channel cells.
     probes : tuple of str
         In the order of the definition.
     """
@@ -57,6 +60,8 @@ class ReadingRows:
                 for node in nodes:
                     balls[row, operators.n_unknowns + lumped_names.index(node)] = 1.0 / len(nodes)
             blocks.append(sparse.csr_array(balls))
+        if spec.circuits:
+            blocks.append(_widened(_circuit_outlets(machine), width))
         if machine.builder.cells is not None:
             blocks.append(_widened(_cell_means(machine), width))
         rows = sparse.csr_array(sparse.vstack(blocks)) if blocks else sparse.csr_array((0, width))
@@ -76,6 +81,8 @@ class ReadingRows:
         for column, probe in enumerate(self.machine.spec.probe):
             if probe.kind == "coolant_outlet":
                 readings[:, column] = self._coolant_outlet(outputs, times, coolant_at)
+            elif probe.kind == "circuit_outlet":
+                readings[:, column] = self._circuit_outlet(outputs, probe.circuit)
             else:
                 readings[:, column] = outputs[:, self._points.index(probe.name)]
         return readings
@@ -85,6 +92,15 @@ class ReadingRows:
         first, number = len(self._points), len(self.bearings)
         rings = outputs[:, first : first + 2 * number]
         return rings[:, 0::2], rings[:, 1::2], outputs[:, first + 2 * number : first + 3 * number]
+
+    def _circuit_outlet(self, outputs: Array, name: str) -> Array:
+        """Outlet of a circuit, its films those of the definition: (n_times,) K."""
+        machine = self.machine
+        number = [film.name for film in machine.spec.circuits].index(name)
+        film = machine.spec.circuits[number]
+        kept = 1.0 - float(_outlet_weights(machine, film).sum())
+        row = len(self._points) + 3 * len(self.bearings) + number
+        return outputs[:, row] + kept * film.inlet_temperature
 
     def _coolant_outlet(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
         builder = self.machine.builder
@@ -101,6 +117,23 @@ class ReadingRows:
 def _widened(block: sparse.sparray, width: int) -> sparse.csr_array:
     missing = sparse.csr_array((block.shape[0], width - block.shape[1]))
     return sparse.csr_array(sparse.hstack((block, missing)))
+
+
+def _outlet_weights(machine: PreparedMachine, film: CircuitFilm) -> Array:
+    """Outlet of a circuit from the means of its walls, (n_walls,)."""
+    value = film.factor.value * circuit_film(film).coefficient
+    areas = np.array([machine.builder.facet_area[name].sum() for name in film.surface])
+    return CircuitMarch.of(film, value * areas, wall_cells(film)).outlet
+
+
+def _circuit_outlets(machine: PreparedMachine) -> sparse.csr_array:
+    """What the walls of each circuit give to its outlet, (n_circuits, n_unknowns)."""
+    rows = [
+        sparse.csr_array(_outlet_weights(machine, film)[None, :])
+        @ mean_matrix(machine.operators, list(film.surface))
+        for film in machine.spec.circuits
+    ]
+    return sparse.csr_array(sparse.vstack(rows))
 
 
 def _cell_means(machine: PreparedMachine) -> sparse.csr_array:

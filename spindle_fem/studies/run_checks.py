@@ -32,6 +32,12 @@ def check_coolant(mismatch: float) -> Check:
     )
 
 
+def check_circuits(mismatch: float) -> Check:
+    """What the walls of circuits give equals what their coolant carries away."""
+    what = "Film heat less enthalpy rise of each circuit's coolant, relative; the worst."
+    return _within("circuit enthalpy", mismatch, BALANCE_LIMIT, "", what)
+
+
 def check_measures(kind: str, errors: dict[str, float]) -> Check:
     """Meshed areas or volumes against the solid model; the worst is named."""
     worst = max(errors, key=lambda name: abs(errors[name]))

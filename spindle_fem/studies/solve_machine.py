@@ -14,9 +14,11 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
+from spindle_fem.operation.circuits import circuit_film, duct_flow
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import (
     BearingResult,
+    CircuitResult,
     CoolantResult,
     EnergyBalance,
     ThermalResult,
@@ -25,6 +27,8 @@ from spindle_fem.solvers.coupled_steady import (
     FIELD_TOLERANCE,
     LINEAR_RESIDUAL_LIMIT,
     CoupledState,
+    circuit_mismatch,
+    circuit_outlets,
     coolant_mismatch,
     solve_coupled,
 )
@@ -115,6 +119,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     lumped = dict(zip(solution.problem.lumped_names, solution.lumped_temperature.tolist(), strict=True))
     bearings = _bearings(machine, coupled, lumped)
     coolant = _coolant(machine, point, coupled)
+    coldest = min([point.coldest, *(film.inlet_temperature for film in spec.circuits)])
     area_error, volume_error = operators.area_error(), operators.volume_error()
     warnings = [CodedWarning("mesh_note", note) for note in machine.mesh.notes]
     warnings += [CodedWarning("geometry_note", note) for note in machine.geometry_notes]
@@ -123,7 +128,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         checks.check_energy(energy),
         checks.check_measures("areas", area_error),
         checks.check_measures("volumes", volume_error),
-        checks.check_coldest(float(nodes.min()), point.coldest),
+        checks.check_coldest(float(nodes.min()), coldest),
         checks.check_residual(solution.residual, LINEAR_RESIDUAL_LIMIT),
         checks.check_closing_shift(solution.closing_shift),
         checks.check_fixed_point(
@@ -132,6 +137,9 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     ]
     if coupled.coolant is not None:
         done.append(checks.check_coolant(coolant_mismatch(machine, solution, coupled.coolant)))
+    circuits = _circuits(machine, coupled)
+    if circuits:
+        done.append(checks.check_circuits(circuit_mismatch(machine, solution, coupled.loads)))
     warnings += [*_pump_pressure(spec, coolant), *_omitted_preload(machine, point, coupled, lumped)]
     if spec.grease is not None and bearings:
         grease = checks.check_grease(
@@ -155,7 +163,8 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         fluid_temperature={name: film.temperature for name, film in films.items()},
         bearings=bearings,
         coolant=coolant,
-        probes=_probes(machine, coupled, coolant),
+        circuits=circuits,
+        probes=_probes(machine, coupled, coolant, circuits),
         energy=energy,
         heat_flows=dict(balance.joints),
         area_error_relative=area_error,
@@ -301,8 +310,36 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
     )
 
 
+def _circuits(machine: PreparedMachine, coupled: CoupledState) -> dict[str, CircuitResult]:
+    """What the coolant of every circuit beside the channel did."""
+    found = {}
+    outlets = circuit_outlets(machine, coupled.solution, coupled.loads)
+    for film in machine.spec.circuits:
+        flow, law = duct_flow(film), circuit_film(film)
+        areas = {name: float(machine.builder.facet_area[name].sum()) for name in film.surface}
+        films = {name: float(coupled.loads.films[name].coefficient.mean()) for name in film.surface}
+        found[film.name] = CircuitResult(
+            flow=film.flow,
+            inlet_temperature=film.inlet_temperature,
+            outlet_temperature=outlets[film.name],
+            heat=float(sum(coupled.solution.balance.films[name] for name in film.surface)),
+            reynolds=flow.reynolds,
+            prandtl=flow.prandtl,
+            velocity=flow.velocity,
+            regime=flow.regime,
+            source=law.source,
+            film_coefficient=sum(films[name] * areas[name] for name in areas) / sum(areas.values()),
+            pressure_drop=flow.pressure_drop,
+            wetted_area=sum(areas.values()),
+        )
+    return found
+
+
 def _probes(
-    machine: PreparedMachine, coupled: CoupledState, coolant: CoolantResult | None
+    machine: PreparedMachine,
+    coupled: CoupledState,
+    coolant: CoolantResult | None,
+    circuits: Mapping[str, CircuitResult],
 ) -> dict[str, float]:
     points = [probe for probe in machine.spec.probe if probe.kind == "point"]
     readings: dict[str, float] = {}
@@ -313,10 +350,12 @@ def _probes(
         rows = probe_matrix(machine.operators, places, [probe.part for probe in points])
         values = rows @ coupled.solution.temperature
         readings = {probe.name: float(value) for probe, value in zip(points, values, strict=True)}
-    return {
-        probe.name: coolant.outlet_temperature if probe.kind == "coolant_outlet" else readings[probe.name]
-        for probe in machine.spec.probe
-    }
+    for probe in machine.spec.probe:
+        if probe.kind == "coolant_outlet":
+            readings[probe.name] = coolant.outlet_temperature
+        elif probe.kind == "circuit_outlet":
+            readings[probe.name] = circuits[probe.circuit].outlet_temperature
+    return {probe.name: readings[probe.name] for probe in machine.spec.probe}
 
 
 def with_heat_study(result: ThermalResult) -> ThermalResult:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from spindle_fem.effects.framework.card import Card, Makes
-from spindle_fem.effects.framework.effect import Candidate, Effect, Reported
+from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital
 from spindle_fem.effects.framework.laws import amplitude, factor, linear, shape, smooth_step
 from spindle_fem.effects.framework.machine_view import ChannelFlow, MachineView
 from spindle_fem.effects.framework.term import CHANNEL_FILM, Operating, Term
@@ -91,15 +91,25 @@ class CoolantFilm(Effect):
         group="Coolant",
         law="fouling: film × factor; transition: × 1 + a S((Re - Re₀)/w); curvature: × (Re/Re_m)^p",
         size="factor ×/÷ e^0.6; a ± 3, Re₀ searched over the range that occurs, w 80 ×/÷ e^0.7; p ± 0.3",
-        acts_on="channel",
+        acts_on="channel, circuits",
         source="Dravid et al. (1971), AIChE J. 17, 1114; TEMA",
         makes=Makes("colder", probe="SP04", at="channel"),
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """Fouling, transition and curvature of the channel."""
+        """Fouling, transition and curvature of the channel; fouling of every circuit beside it."""
+        fouled = tuple(
+            self.factor_candidate(
+                name,
+                (factor(f"film.{name}", machine.parameters.get(f"film.{name}"), 0.6),),
+                FOULING,
+                0.6,
+                shift=f"film.{name}" in machine.parameters,
+            )
+            for name in machine.circuits
+        )
         if machine.channel is None:
-            return ()
+            return fouled
         own = machine.parameters.get(FILM_FACTOR)
         found = [
             self.factor_candidate(
@@ -129,7 +139,7 @@ class CoolantFilm(Effect):
             found.append(
                 self.candidate("channel", curved, amplitude="further_exponent", reference=0.3, form=CURVATURE)
             )
-        return tuple(found)
+        return (*found, *fouled)
 
     def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
         """A law of the Reynolds number needs a range of it."""
@@ -150,7 +160,8 @@ class CoolantFilm(Effect):
         """Which factor, and from where on."""
         if candidate.form == FOULING:
             return (
-                f"Channel: the film coefficient is {reported['factor'].value:.2f} times the modelled one "
+                f"{capital(candidate.component.replace('_', ' '))}: the film coefficient is "
+                f"{reported['factor'].value:.2f} times the modelled one "
                 "at every flow (fouling, where below 1)."
             )
         if candidate.form == TRANSITION:

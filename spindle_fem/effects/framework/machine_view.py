@@ -216,6 +216,8 @@ class MachineView:
         All recorded heat at full load.
     typical_rise : float, [K]
         Above the surroundings, in the recording.
+    circuits : tuple of str
+        Circuits beside the channel; ``film.NAME`` scales the film of one.
     reynolds : (float, float)
         Range that occurs; zeros without a channel.
     friction : mapping of bearing to FrictionTable
@@ -273,6 +275,7 @@ class MachineView:
     typical_heat: float = 100.0
     typical_rise: float = 10.0
     channel: ChannelFlow | None = None
+    circuits: tuple[str, ...] = ()
     reynolds: tuple[float, float] = (0.0, 0.0)
     friction: Mapping[str, FrictionTable] = field(default_factory=dict)
     inner_share: float = 0.5

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.effects.framework.machine_view import ChannelFlow, MachineView
@@ -100,6 +101,7 @@ def view_of(names: MachineNames, recording: Recording) -> MachineView:
         typical_heat=max(LEAST_HEAT, float(tabulated.max())),
         typical_rise=usual_rise(recording, inputs["ambient"]),
         channel=channel,
+        circuits=tuple(film.name for film in spec.circuits),
         reynolds=_reynolds(channel, inputs["coolant_flow"], inputs["coolant_inlet"]),
         friction=tables if spec.heat.model == "table" else {},
         inner_share=spec.heat.inner_share.value,
@@ -119,6 +121,9 @@ def _films(
     spec, places = names.spec, layout.places
     rotating = {part.name for part in spec.part if part.rotating}
     for film in spec.film:
+        if isinstance(film, CircuitFilm):
+            # Of the coolant's effects, not of those on the air around the machine.
+            continue
         for name in film.surface:
             coefficient = f"film.{name}"
             if coefficient not in names.fluid_names:

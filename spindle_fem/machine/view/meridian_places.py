@@ -98,6 +98,10 @@ def _of_probe(spec: MachineSpec, name: str) -> tuple[Region, ...]:
         if probe.name == name.removeprefix(NEAR):
             if probe.kind == "point":
                 return (Region((probe.z, probe.z), (probe.r, probe.r)),)
+            for film in spec.circuits:
+                if film.name == probe.circuit:
+                    place = film.z[1] if film.flows_to == "rear" else film.z[0]
+                    return (Region((place, place), (0.5 * film.diameter,) * 2),)
             channel = spec.channel
             if channel is None:
                 return ()

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.circuit_tables import CircuitFilm
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.model.reduced.class_operators import ClassOperators
 from spindle_fem.model.reduced.coolant_maps import COMPLEX_STEP
 from spindle_fem.model.thermal_model import ThermalModel
@@ -82,17 +83,20 @@ class CircuitOperators:
 
     Parameters
     ----------
-    circuits : sequence of CircuitFilm
+    spec : MachineSpec
     columns : mapping of str to int
         Load input that is the fluid of each film.
     """
 
-    def __init__(
-        self, model: ThermalModel, circuits: Sequence[CircuitFilm], columns: Mapping[str, int]
-    ) -> None:
+    def __init__(self, model: ThermalModel, spec: MachineSpec, columns: Mapping[str, int]) -> None:
         self._circuits = [
-            (film, CircuitWalls(model, film), columns[f"film.{film.surface[0]}"]) for film in circuits
+            (film, CircuitWalls(model, film), columns[f"film.{film.surface[0]}"]) for film in spec.circuits
         ]
+        # Outputs that read the outlet of each circuit.
+        self._readers = {
+            film.name: [row for row, probe in enumerate(spec.probe) if probe.circuit == film.name]
+            for film in spec.circuits
+        }
 
     def add(self, operators: ClassOperators, values: Array, touched: Mapping[str, Sequence[int]]) -> None:
         """Add the circuits to the operators of a class.
@@ -109,6 +113,9 @@ class CircuitOperators:
             maps = walls.maps(film, own)
             operators.conduction[...] += maps.conduction
             operators.loads[:, column] += maps.inlet_load
+            rows_read = self._readers[film.name]
+            operators.outputs[rows_read] = maps.outlet
+            operators.output_inputs[rows_read, column] = maps.outlet_inlet
             for parameter, rows in touched.items():
                 scaled = np.isin(walls.rows, list(rows))
                 if scaled.any():
@@ -116,6 +123,16 @@ class CircuitOperators:
                     before = operators.conduction_by[parameter]
                     operators.conduction_by[parameter] = before + by.conduction.imag / COMPLEX_STEP
                     operators.loads_by[parameter][:, column] += by.inlet_load.imag / COMPLEX_STEP
+                    if rows_read:
+                        outputs, inputs = (
+                            derivatives.setdefault(parameter, np.zeros_like(whole))
+                            for derivatives, whole in (
+                                (operators.outputs_by, operators.outputs),
+                                (operators.output_inputs_by, operators.output_inputs),
+                            )
+                        )
+                        outputs[rows_read] = by.outlet.imag / COMPLEX_STEP
+                        inputs[rows_read, column] = np.imag(by.outlet_inlet) / COMPLEX_STEP
 
     def add_difference(self, operators: ClassOperators, upper: Array, lower: Array) -> None:
         """Add what the circuits do at the first of two sets of coefficients less the second, in place."""
@@ -125,3 +142,6 @@ class CircuitOperators:
                 one, other = (walls.maps(film, own) for own in pair)
                 operators.conduction[...] += one.conduction - other.conduction
                 operators.loads[:, column] += one.inlet_load - other.inlet_load
+                rows_read = self._readers[film.name]
+                operators.outputs[rows_read] = one.outlet - other.outlet
+                operators.output_inputs[rows_read, column] = one.outlet_inlet - other.outlet_inlet

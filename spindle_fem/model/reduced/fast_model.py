@@ -144,8 +144,9 @@ class FastModel:
         self._fluid_columns = {
             name: self.load_names.index(inputs.fluid_input(name)) for name in model.fluid_names
         }
-        circuits = getattr(self.spec, "circuits", ())
-        self.circuits = CircuitOperators(model, circuits, self._fluid_columns) if circuits else None
+        self.circuits = None
+        if getattr(self.spec, "circuits", ()):
+            self.circuits = CircuitOperators(model, self.spec, self._fluid_columns)
         self._heat_loads = np.array([model.place(place) for place in self.heat_places])
         self._heat_loads = self._heat_loads.reshape(-1, model.size).T
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from spindle_fem import __version__
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.errors import BadInputError, GeometryError
+from spindle_fem.errors import BadInputError, GeometryError, SpecError
 from spindle_fem.model.lumped.machine_network import MachineNetwork, build_machine_network
 from spindle_fem.operation.bearing_heat import HeatModel
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -71,9 +71,17 @@ def crosscheck(spec: MachineSpec, tell: Progress = lambda stage: None) -> Crossc
 
     Raises
     ------
+    SpecError
+        A machine with circuits beside its channel.
     SpindleFemError
         A model that has no solution.
     """
+    if spec.circuits:
+        raise SpecError(
+            f"film.{spec.circuits[0].name}",
+            "is a circuit beside the channel, which crosscheck does not take apart node by node.",
+            "Leave it out (remove = true in a definition on this one's base).",
+        )
     point = OperatingPoint.of(spec)
     tell("network")
     started = time.perf_counter()

@@ -192,6 +192,12 @@ def _probes(model: ThermalModel, inputs: DesignInputs, batch: SteadyBatch) -> It
         for probe in inputs.specs[0].probe:
             if probe.kind == "coolant_outlet":
                 found[probe.name] = float(batch.channel.march.outlet_temperature[row].mean()) - ZERO_CELSIUS_K
+            elif probe.kind == "circuit_outlet":
+                film = next(film for film in inputs.specs[row].circuits if film.name == probe.circuit)
+                walls = CircuitWalls(model, film)
+                maps = walls.maps(film, batch.coefficients[row, walls.rows])
+                outlet = maps.outlet @ batch.unknowns[row] + maps.outlet_inlet * film.inlet_temperature
+                found[probe.name] = float(outlet) - ZERO_CELSIUS_K
         yield found
 
 
