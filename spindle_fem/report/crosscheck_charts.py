@@ -14,7 +14,16 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from spindle_fem.model.lumped.machine_network import MachineNetwork
-from spindle_fem.report.figure_style import CYCLE, INK, MUTED, TEMPERATURE_MAP, new_figure, save_png, styled
+from spindle_fem.report.figure_style import (
+    CYCLE,
+    INK,
+    MUTED,
+    TEMPERATURE_MAP,
+    new_figure,
+    plain_decades,
+    save_png,
+    styled,
+)
 from spindle_fem.studies.crosscheck.causes import CAUSES, CauseStudy
 from spindle_fem.studies.crosscheck.crosscheck_study import Crosscheck
 from spindle_fem.studies.crosscheck.node_comparison import Comparison
@@ -179,6 +188,8 @@ def convergence_chart(rows: list[Mapping[str, float]]) -> Figure:
     axes = figure.add_axes((0.11, 0.15, 0.85, 0.76))
     nodes = [row["nodes"] for row in rows]
     axes.loglog(nodes, [row["max_difference_K"] for row in rows], "o-", color=CYCLE[0])
+    plain_decades(axes.xaxis)
+    plain_decades(axes.yaxis)
     axes.set(xlabel="nodes of the network", ylabel="largest difference at the paper's nodes / K")
     return figure
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.view.place_names import NEAR
@@ -21,6 +20,7 @@ from spindle_fem.report.figure_style import (
     draw_colour_bar,
     new_figure,
     pixel_axes,
+    plain_decades,
     set_title,
     styled,
 )
@@ -109,9 +109,7 @@ def detectable_sizes(content: Mapping[str, Any]) -> Figure:
     colours = [CYCLE[0] if value <= 1.0 else "#a9b7c4" for value in values]
     axes.barh(range(len(items)), values, color=colours, height=0.7, left=0.0)
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    plain_decades(axes.xaxis)
     axes.axvline(1.0, color=MUTED, linewidth=1.0)
     axes.set_yticks(range(len(items)), labels, fontsize=7.5)
     axes.set_ylim(len(items) - 0.5, -0.5)

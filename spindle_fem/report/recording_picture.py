@@ -116,8 +116,7 @@ def _rows(recording: Recording) -> list[tuple[str, str, Array, NDArray[np.uint8]
 
 
 def _title(column: str, means: str) -> str:
-    # a dollar sign in a name would begin a formula
-    return f"{column} ({means})".replace("$", r"\$")
+    return f"{column} ({means})"
 
 
 def _in_shown_unit(values: Array, unit: str) -> tuple[Array, str]:

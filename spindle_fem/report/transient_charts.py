@@ -16,6 +16,7 @@ from spindle_fem.report.figure_style import (
     OUTER,
     TEMPERATURE_LABEL,
     new_figure,
+    plain_decades,
     styled,
 )
 from spindle_fem.studies.transient_study import StudyResult
@@ -136,9 +137,11 @@ def step_history(result: StudyResult) -> Figure:
     figure, (upper, lower) = _stacked(800.0, f"{result.study.name}: time steps", (1.0, 1.0))
     hours = _hours(result.step_record("times"))
     upper.semilogy(hours, result.step_record("sizes"), ".-", color=CYCLE[0])
+    plain_decades(upper.yaxis)
     upper.set_ylabel("step / s")
     errors = result.step_record("errors")
     lower.semilogy(hours[errors > 0.0], errors[errors > 0.0], ".-", color=CYCLE[1])
+    plain_decades(lower.yaxis)
     lower.axhline(result.study.error, color=MUTED, linewidth=1.0, linestyle="--")
     lower.set_ylabel("estimated error / K")
     return figure

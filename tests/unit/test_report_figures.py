@@ -256,3 +256,23 @@ def test_time_goes_by_the_clock_where_it_is_known(start, seconds, shown):
     if ":" in texts[0]:
         assert told == [text[:5] for text in texts]
     assert label.endswith(f"from {start[:10]}")
+
+
+def test_a_dollar_sign_in_a_name_begins_no_formula():
+    from spindle_fem.report.figure_style import new_figure, plain_decades, rasterise, styled
+
+    @styled
+    def drawn():
+        figure = new_figure(700.0, 800.0)
+        axes = figure.add_axes((0.3, 0.3, 0.6, 0.5))
+        axes.semilogy([1.0, 2.0], [0.1, 30.0])
+        plain_decades(axes.yaxis)
+        axes.set_title("$(x)`y`$")
+        axes.set_xticks([1.0, 2.0], ["$a_$", "b"])
+        return figure
+
+    figure = drawn()
+    assert rasterise(figure).min() < 128
+    shown = {label.get_text() for label in figure.axes[0].get_yticklabels()}
+    assert "0.1" in shown
+    assert not any("mathdefault" in text for text in shown)
