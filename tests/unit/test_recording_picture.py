@@ -59,6 +59,6 @@ def test_gaps_are_shaded_on_every_strip(figure):
 
 
 def test_names_with_dollar_signs_and_units_are_shown(figure):
-    assert figure.axes[0].get_title(loc="left") == r"a \$x_ b (probe SP01)"
+    assert figure.axes[0].get_title(loc="left") == "a $x_ b (probe SP01)"
     assert figure.axes[2].get_ylabel() == "W"
     assert max(figure.axes[2].lines[0].get_ydata()) == 2000.0
