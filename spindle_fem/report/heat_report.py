@@ -22,8 +22,8 @@ from spindle_fem.results.output_folder import read_content, replace_text
 from spindle_fem.studies.heat_study import HEAT_SCHEMA
 
 _TERMS = (
-    "Loads, angles and films of the ball under the largest load; film and Λ are the smaller of both "
-    "raceways. Terms of both raceways are added up."
+    "Loads, angles and films of the ball or roller under the largest load; film and Λ are the smaller of "
+    "both raceways. Terms of both raceways are added up."
 )
 _MODELS = (
     "The same loads and temperatures by every heat model. How far they are apart is what is not known about "

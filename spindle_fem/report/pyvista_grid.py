@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.results.field_file import heat_flux
 from spindle_fem.units import ZERO_CELSIUS_K
+
+with warnings.catch_warnings():
+    # of a progress bar that one of its libraries would like in notebooks
+    warnings.filterwarnings("ignore", message="IProgress not found")
+    import pyvista as pv
 
 
 def grid_of(spec: MachineSpec, mesh: TaggedMesh, temperature: NDArray[np.float64]) -> pv.UnstructuredGrid:
