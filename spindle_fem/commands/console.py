@@ -405,16 +405,20 @@ def print_transient(content: dict[str, Any], folder: Path) -> None:
 
 @contextlib.contextmanager
 def stages(show: bool) -> Iterator[Any]:
-    """Stage names on the terminal while they run, and in the log."""
-    if not show or Verbosity.quiet or Verbosity.verbose:
+    """Stage names and the time since the start on the terminal while they run, and in the log."""
+    console = Console(stderr=True)
+    if not show or Verbosity.quiet or Verbosity.verbose or not console.is_terminal:
         yield LOGGER.info
         return
-    console = Console(stderr=True)
-    with console.status("starting") as status:
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as shown:
+        task = shown.add_task("starting", total=None)
 
         def tell(stage: str) -> None:
             LOGGER.info(stage)
-            status.update(f"{stage} ...")
+            shown.update(task, description=f"{stage} ...")
 
         yield tell
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -127,12 +128,15 @@ def diagnose_folder(
         ]
         done = len(found) - len(waiting)
         progress(f"{done} of {len(found)} recordings")
+        began = time.perf_counter()
         for number, row in WorkerPool(jobs, scheduler).stream(calls, waiting):
             name = waiting[number]
             if keys[name] not in table:
                 table.append(row | {"recording": name, "key": keys[name]})
             done += 1
-            progress(f"{done} of {len(found)} recordings")
+            left = len(found) - done
+            each = (time.perf_counter() - began) / (len(waiting) - left)
+            progress(f"{done} of {len(found)} recordings{_left_words(left * each)}")
         rows = table.finish({"key": keys[name], "recording": name} for name in found)
         good = [row for row in rows if row["status"] == OK]
         content = {
@@ -196,6 +200,18 @@ def _content_of(manifest: Path) -> str:
     with contextlib.suppress(SpindleFemError, OSError):
         found.update(load_manifest(manifest)[1].read_bytes())
     return found.hexdigest()
+
+
+def _left_words(seconds: float) -> str:
+    """Time left in words, rounded up; empty when nothing is left.
+
+    >>> _left_words(0.0), _left_words(40.0), _left_words(5000.0)
+    ('', ', some 1 min left', ', some 1.4 h left')
+    """
+    if seconds <= 0.0:
+        return ""
+    minutes = math.ceil(seconds / 60.0)
+    return f", some {minutes} min left" if minutes < 60 else f", some {seconds / 3600.0:.1f} h left"
 
 
 def _key(name: str, parts: Sequence[str]) -> str:

@@ -44,7 +44,7 @@ CAPTIONS = {
     "its mark.",
     "speeds": "Largest difference of any node against the elements over speed.",
     "convergence": "Refined network against axisymmetric elements of the same machine with the helix "
-    "smeared.",
+    "smeared, at the paper's nodes.",
 }
 
 
@@ -104,6 +104,7 @@ def _section_axes(figure: Figure, machine: MachineNetwork, both_halves: bool) ->
         ylabel="r / mm",
         aspect="equal",
     )
+    axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
     axes.grid(False)
     return axes
 
@@ -170,14 +171,22 @@ def speed_chart(rows: list[Mapping[str, float]]) -> Figure:
     figure = new_figure(620.0, 1100.0)
     axes = figure.add_axes((0.1, 0.14, 0.86, 0.74))
     speed = [row["speed_rpm"] for row in rows]
-    for key, label, colour in (
-        ("unmatched_max_K", "network as computed", CYCLE[1]),
-        ("fixed_max_K", "matched, conductances of the matched speed", CYCLE[4]),
-        ("matched_max_K", "matched, films follow the speed", CYCLE[0]),
+    for key, label, colour, style in (
+        ("unmatched_max_K", "network as computed", CYCLE[1], "o--"),
+        ("fixed_max_K", "matched, conductances of the matched speed", CYCLE[4], "o:"),
+        ("matched_max_K", "matched, films follow the speed", CYCLE[0], "o-"),
     ):
-        axes.plot(speed, [row[key] for row in rows], "o-", color=colour, label=label)
+        axes.plot(speed, [row[key] for row in rows], style, color=colour, label=label)
     axes.set(xlabel="speed / rpm", ylabel="largest difference to the elements / K", ylim=(0.0, None))
-    axes.legend()
+    # above the curves, which may be anywhere
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=2,
+        handlelength=3.0,
+        columnspacing=1.2,
+        fontsize=7.5,
+    )
     return figure
 
 
@@ -190,7 +199,7 @@ def convergence_chart(rows: list[Mapping[str, float]]) -> Figure:
     axes.loglog(nodes, [row["max_difference_K"] for row in rows], "o-", color=CYCLE[0])
     plain_decades(axes.xaxis)
     plain_decades(axes.yaxis)
-    axes.set(xlabel="nodes of the network", ylabel="largest difference at the paper's nodes / K")
+    axes.set(xlabel="nodes of the network", ylabel="largest difference / K")
     return figure
 
 

@@ -15,6 +15,7 @@ from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.report import run_tables as tables
 from spindle_fem.report import table_rows
 from spindle_fem.report.clock_axis import clock_numbers
+from spindle_fem.report.crosscheck_charts import convergence_chart, speed_chart
 from spindle_fem.report.definition_tables import customary, input_groups
 from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of
 from spindle_fem.report.heat_charts import CHARTS
@@ -276,3 +277,17 @@ def test_a_dollar_sign_in_a_name_begins_no_formula():
     shown = {label.get_text() for label in figure.axes[0].get_yticklabels()}
     assert "0.1" in shown
     assert not any("mathdefault" in text for text in shown)
+
+
+def test_no_label_of_crosscheck_charts_is_clipped_or_lies_on_a_curve():
+    rows = [
+        {"speed_rpm": speed, "unmatched_max_K": value, "fixed_max_K": 5.0 - value, "matched_max_K": 0.1}
+        for speed, value in ((500.0, 0.2), (3000.0, 4.0), (8000.0, 2.0))
+    ]
+    speeds = speed_chart(rows)
+    converging = convergence_chart(
+        [{"nodes": 72, "max_difference_K": 3.0}, {"nodes": 2000, "max_difference_K": 0.1}]
+    )
+    assert not clipped(speeds) + clipped(converging)
+    (axes,) = speeds.axes
+    assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
