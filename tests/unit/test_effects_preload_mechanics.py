@@ -14,6 +14,7 @@ from spindle_fem.effects.catalogue.thermal_preload import (
     ThermalPreload,
 )
 from spindle_fem.effects.framework.term import TermContext
+from spindle_fem.effects.registry import build, definition_entry
 from tests.support.effect_machines import _spindle
 from tests.support.set_response import OUTER_RING, log_friction, set_response
 
@@ -99,3 +100,19 @@ def test_mechanics_take_the_place_of_the_power_law(tmp_path):
     # a definition may still say either
     forms = [item.form for item in ThermalPreload().forms(known) if item.component == "front_bearings"]
     assert forms == ["", MECHANICS]
+
+
+def test_a_definition_takes_what_a_diagnosis_wrote(tmp_path):
+    view = replace(_spindle(tmp_path)[2], preload=lambda group: set_response())
+    candidate = next(item for item in ThermalPreload().candidates(view) if item.component == "front_bearings")
+    values = {f"{candidate.terms[0].name}.outer_clearance": 17e-6, candidate.amplitude: 0.3}
+    entry = definition_entry(candidate, values)
+    assert entry["form"] == MECHANICS
+    again = build(entry["effect"], entry["component"], entry["form"], entry["parameters"], view)
+    assert not again.free
+    assert again.parameters[candidate.amplitude].value == pytest.approx(0.3)
+    told = ThermalPreload().report(again, {})
+    assert (told["outer_clearance"].value, told["outer_clearance"].unit) == (pytest.approx(17.0), "um")
+    said = ThermalPreload().statement(again, told)
+    assert "30 % higher" in said
+    assert "mechanics" in said
