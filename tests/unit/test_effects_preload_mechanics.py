@@ -67,6 +67,17 @@ def test_the_amplitude_is_the_mean_increase_at_ten_kelvin():
     assert term.friction(context(term, [293.15] * 7, [10.0, 0.0])).real == pytest.approx(1.0)
 
 
+def test_an_even_set_shares_its_friction():
+    term = term_of(set_response())
+    at = ([293.15] * 7, [10.0, 0.0])
+    even = term.friction(context(term, *at, **{NAME: 1.0, "unevenness": 0.0})).real[:, 0]
+    assert even == pytest.approx(even[0])
+    uneven = [
+        np.ptp(term.friction(context(term, *at, **{NAME: 1.0, "unevenness": u})).real) for u in (0.5, 1.0)
+    ]
+    assert 0.0 < uneven[0] < uneven[1]
+
+
 def test_a_slack_set_keeps_some_friction():
     term = term_of(set_response())
     for size in (0.1, 3.0 * term.increase):
@@ -111,8 +122,8 @@ def test_a_definition_takes_what_a_diagnosis_wrote(tmp_path):
     again = build(entry["effect"], entry["component"], entry["form"], entry["parameters"], view)
     assert not again.free
     assert again.parameters[candidate.amplitude].value == pytest.approx(0.3)
-    told = ThermalPreload().report(again, {})
+    told = ThermalPreload().report(candidate, values)
     assert (told["outer_clearance"].value, told["outer_clearance"].unit) == (pytest.approx(17.0), "um")
-    said = ThermalPreload().statement(again, told)
+    said = ThermalPreload().statement(candidate, told)
     assert "30 % higher" in said
     assert "mechanics" in said

@@ -31,6 +31,8 @@ MECHANICS = "bearing mechanics"
 LOAD_SHARE_SIGMA = 0.5
 # Of the same: friction that follows its load more than this is none of rings.
 MOST_LOAD_SHARE = 3.0
+# Of what mechanics has between the bearings of a set: spacers ground to fit share the load otherwise.
+UNEVENNESS_SIGMA = 0.5
 # Of the standard clearance deviation: a fit looser than ordered is likelier than a tighter one, as rings
 # are made smaller than their size and bores larger.
 CLEARANCES = (-2.0, 4.0)
@@ -75,8 +77,9 @@ class PreloadMechanicsTerm(Term):
     """Friction of every bearing of a set as its mechanics answers to rings and fit, ``1 + a (m - 1) / m₁₀``.
 
     ``m`` is friction over that without temperature differences: by the mean ring difference of the set,
-    and by the gap that outer rings, warmer than the housing, close. ``m₁₀`` is its mean increase at 10 K
-    as assembled, so that ``a / m₁₀`` is the share of the friction that follows the load. A set that goes
+    and by the gap that outer rings, warmer than the housing, close. How much more one bearing takes than
+    another scales with the unevenness: 1 as mechanics has it, 0 all alike. ``m₁₀`` is its mean increase at
+    10 K as assembled, so that ``a / m₁₀`` is the share of the friction that follows the load. A set that goes
     slack loses that share as a power of its friction, which stays above 0. The lag is that of what
     lies between the places read and the raceways.
     """
@@ -95,20 +98,23 @@ class PreloadMechanicsTerm(Term):
         self.parameters = (
             amplitude(NAME, LOAD_SHARE_SIGMA * self.increase, high=MOST_LOAD_SHARE * self.increase),
             linear("outer_clearance", nominal, sigma, "m", low=low, high=high),
+            linear("unevenness", 1.0, UNEVENNESS_SIGMA, low=0.0, high=1.0 + 2.0 * UNEVENNESS_SIGMA),
             shape("lag", 200.0, 0.8, "s", low=1.0, high=20000.0),
         )
 
     def friction(self, context: TermContext) -> Complex:
         """Factor on every bearing, (n, k)."""
         own = context.parameters
-        ratio = self.response.ratio(
+        each = self.response.log_ratio(
             context.state[0],
             context.state[1],
             own["outer_clearance"],
             np.abs(context.inputs["speed"]),
         )
+        middle = each.mean(axis=0)
+        ratio = np.exp(middle + own["unevenness"] * (each - middle))
         share = own[NAME] / self.increase
-        return np.where(ratio.real > 1.0, 1.0 + share * (ratio - 1.0), np.exp(share * np.log(ratio)))
+        return np.where(ratio.real > 1.0, 1.0 + share * (ratio - 1.0), ratio**share)
 
     def advance(self, context: TermContext, step: float) -> Complex:
         """Ring difference and closing of the fit, lagged, (2, k) K."""
@@ -144,8 +150,8 @@ class ThermalPreload(Effect):
             "inner less outer rings of the set, lagged τ; without fits × 1 + a (w s₊(x/w) / 10 K)^m"
         ),
         size=(
-            "a ± m₁₀/2, clearance ± IT6/3, τ 200 s ×/÷ e^0.8; without fits a ± 0.25; m 1.45 ×/÷ e^0.12; "
-            "τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4"
+            "a ± m₁₀/2, clearance ± IT6/3, unevenness 1 ± 0.5, τ 200 s ×/÷ e^0.8; "
+            "without fits a ± 0.25; m 1.45 ×/÷ e^0.12; τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4"
         ),
         acts_on="each bearing set (its bearings share one preload)",
         source=(

@@ -98,10 +98,10 @@ class PreloadResponse:
         axes = (self.difference, self.gap, self.speed)
         return np.array([[[axis[end]] for axis in axes] for end in (0, -1)])
 
-    def ratio(
+    def log_ratio(
         self, difference: ArrayLike, closed: ArrayLike, clearance: ArrayLike, speed: ArrayLike
     ) -> NDArray[np.complex128]:
-        """Friction of every bearing over that of the same set without differences, (n_bearings, k).
+        """Logarithm of every bearing's friction over that without differences, (n_bearings, k).
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class PreloadResponse:
         cold = 0.5 * np.asarray(clearance)
         gap = cold - self.outer_ring * np.asarray(closed)
         still = np.zeros_like(np.asarray(difference, complex))
-        return np.exp(self.friction(difference, gap, speed) - self.friction(still, cold, speed))
+        return self.friction(difference, gap, speed) - self.friction(still, cold, speed)
 
     def closing(self, outer: NDArray, housing: NDArray) -> NDArray:
         """Kelvins by which outer rings (k,) close their gap beyond what the housing (n, k) opens it."""
@@ -123,8 +123,8 @@ class PreloadResponse:
 
     def increase(self, difference: float) -> float:
         """Mean increase of the friction at a ring difference (K), nominal clearance, reference speed."""
-        ratio = self.ratio([difference], [0.0], [self.clearance], [self.reference_speed])
-        return float(ratio.real.mean() - 1.0)
+        found = self.log_ratio([difference], [0.0], [self.clearance], [self.reference_speed])
+        return float(np.exp(found.real).mean() - 1.0)
 
     def exponent(self, difference: float) -> float:
         """Power of the difference with which the set's friction grows at a difference (K)."""
