@@ -87,6 +87,12 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
             f"film {film['value']:.0f} ({film['low']:.0f}–{film['high']:.0f}) W/(m²·K), "
             f"pressure drop {coolant['pressure_drop_Pa'] / 1e5:.2f} bar"
         )
+    for name, circuit in summary["circuits"].items():
+        console.print(
+            f"Circuit {name} {circuit['flow_m3_s'] * 6e4:.3g} L/min, "
+            f"{circuit['inlet_degC']:.2f} → {circuit['outlet_degC']:.2f} °C, {circuit['heat_W']:.1f} W, "
+            f"{circuit['regime']}, film {circuit['film_coefficient_W_m2K']:.0f} W/(m²·K)"
+        )
     temperature, energy, mesh = summary["temperature"], summary["energy"], summary["mesh"]
     console.print(f"Hottest {temperature['max_degC']:.2f} °C at {temperature['max_at_mm']} mm")
     console.print(
