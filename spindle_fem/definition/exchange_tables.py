@@ -51,11 +51,11 @@ class Ports(SpecModel):
     diameter: PositiveLength
     """At most width - 2 mm fits the channel."""
     wetted: Flag = True
-    """Whether the oil exchanges heat with the walls of the drillings."""
+    """Whether the coolant exchanges heat with the walls of the drillings."""
 
 
 class Channel(SpecModel):
-    """Helical rectangular oil channel."""
+    """Helical rectangular coolant channel."""
 
     part: Name
     """The standing part that it is milled into."""
@@ -74,7 +74,7 @@ class Channel(SpecModel):
     hand: Literal["right", "left"] = "right"
     """Right-handed advances to the rear as the angle grows."""
     z_start: UncertainPlace
-    """Centre line of the section at angle 0, where the oil enters."""
+    """Centre line of the section at angle 0, where the coolant enters."""
     ports: Ports | None = None
     """None leaves the channel closed in the solid at both ends."""
 
@@ -123,12 +123,12 @@ class PumpCurve(SpecModel):
 
 
 class Coolant(SpecModel):
-    """Oil in the channel."""
+    """Coolant in the channel."""
 
     fluid: Fluid = "iso_vg_32"
     """Whose properties are taken."""
     inlet_temperature: Temperature
-    """Mixed, where the oil enters."""
+    """Mixed, where the coolant enters."""
     flow: VolumeFlow
     """Volume flow of all starts together; less flows where the pump's pressure does not suffice."""
     pressure_limit: Pressure | None = None
@@ -140,9 +140,9 @@ class Coolant(SpecModel):
     film_factor: UncertainNumber = Uncertain(1.0)
     """Factor on the film coefficient of the channel."""
     properties_at: Literal["inlet", "bulk"] = "bulk"
-    """Temperature of the oil properties: at the inlet, or along the channel."""
+    """Temperature of its properties: at the inlet, or along the channel."""
     pumping_heat: Flag = False
-    """Whether the pressure loss heats the oil."""
+    """Whether the pressure loss heats it."""
 
 
 class SeatSurface(SpecModel):

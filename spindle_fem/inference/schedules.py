@@ -56,7 +56,7 @@ def _minutes(seconds: float) -> str:
 def geometry_schedules(
     usual: Mapping[str, float], high: float, *, has_channel: bool, length: float | None = None
 ) -> list[Schedule]:
-    """Tests of a machine with geometry: speed, cool-down, thrust, oil and room temperature, oil flow.
+    """Tests of a machine with geometry: speed, cool-down, thrust, coolant and room temperature, coolant flow.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def geometry_schedules(
         part = hold_of(3.0)
         found += [
             Schedule(
-                f"{rpm[1]} rpm held, oil temperature +{TEMPERATURE_STEP:.0f} K after {_minutes(part)}, "
+                f"{rpm[1]} rpm held, coolant temperature +{TEMPERATURE_STEP:.0f} K after {_minutes(part)}, "
                 f"−{TEMPERATURE_STEP:.0f} K after {_minutes(2.0 * part)}",
                 "coolant inlet temperature",
                 1,
@@ -119,7 +119,8 @@ def geometry_schedules(
                 ),
             ),
             Schedule(
-                f"{rpm[1]} rpm held, oil flow reduced to {100.0 * THROTTLED:.0f} % after {_minutes(hold)}",
+                f"{rpm[1]} rpm held, coolant flow reduced to {100.0 * THROTTLED:.0f} % "
+                f"after {_minutes(hold)}",
                 "coolant flow",
                 1,
                 (

@@ -66,7 +66,7 @@ class SolvedMachine(ThermalResult):
         return draw_charts(self)["heat_by_bearing"]()
 
     def plot_coolant(self) -> Figure | None:
-        """Oil, wall and film along the channel; None without one."""
+        """Coolant, wall and film along the channel; None without one."""
         return draw_charts(self)["coolant"]()
 
     def plot_growth(self) -> Figure | None:

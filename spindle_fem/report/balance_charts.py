@@ -1,4 +1,4 @@
-"""Charts of heat and coolant: where heat comes from, enters and goes; oil along the channel."""
+"""Charts of heat and coolant: where heat comes from, enters and goes; coolant along the channel."""
 
 from __future__ import annotations
 
@@ -249,5 +249,5 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
         axes.margins(x=0.01)
         for turn in range(1, math.floor(turns.max()) + 1):
             axes.axvline(np.interp(turn, turns, place), color="#cfd6dc", linewidth=0.8, linestyle=":")
-    set_title(figure, "Oil along the helical channel", notes)
+    set_title(figure, "Coolant along the helical channel", notes)
     return figure

@@ -188,7 +188,7 @@ def _claim_blocks(claim: Mapping[str, Any]) -> list[Any]:
         fixed("maximum °C", "max_degC"),
         words("inner − outer K", lambda item: _by_name(item["ring_difference_K"])),
         fixed("film W/(m²·K)", "film_coefficient_W_m2K", 0),
-        fixed("to the oil W", "coolant_heat_W", 0),
+        fixed("to the coolant W", "coolant_heat_W", 0),
         fixed("friction W", "friction_heat_W", 0),
     )
     return [table_of(fields, claim["cases"], claim["source"]), Bullets(claim["explanation"])]

@@ -34,7 +34,7 @@ _NUMBER_SIZE = 8.5
 _MOST_LETTERS = 62
 # Room of "z / mm" at the end of the line of numbers, and from the frame to the numbers.
 _UNIT_WIDTH_PX, _NUMBER_DROP_PX = 90.0, 14.0
-OIL_COLOUR = "#f0c419"
+COOLANT_COLOUR = "#f0c419"
 
 
 def part_colours(names: Sequence[str]) -> tuple[str, ...]:
@@ -190,7 +190,7 @@ def _draw_channel(axes: Axes, spec: MachineSpec) -> None:
     if channel is None:
         return
     inner, outer = channel.inner_radius, channel.inner_radius + channel.depth
-    style = {"facecolor": OIL_COLOUR, "edgecolor": INK, "linewidth": 0.8}
+    style = {"facecolor": COOLANT_COLOUR, "edgecolor": INK, "linewidth": 0.8}
     for theta, sign in ((0.0, 1.0), (math.pi, -1.0)):
         for z in channel_sections(channel, theta):
             sides = (z - 0.5 * channel.width, z + 0.5 * channel.width)

@@ -138,7 +138,7 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
     set_title(
         figure,
         "Radial profiles through the bearings",
-        "At θ = 0, middle of each bearing; steps are joints (seats) and the ball contacts, gaps are oil.",
+        "At θ = 0, middle of each bearing; steps are joints (seats) and the ball contacts, gaps are coolant.",
     )
     return figure
 

@@ -183,7 +183,7 @@ def bearing_close_ups(renderer: SceneRenderer, result: ThermalResult, bar: Colou
 
 
 def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | None:
-    """Channel walls with film coefficient and oil temperature side by side; None without a channel."""
+    """Channel walls with film coefficient and coolant temperature side by side; None without a channel."""
     spec, mesh = result.spec, result.mesh
     if result.coolant is None or spec.channel is None:
         return None
@@ -195,12 +195,12 @@ def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | No
     facets = np.concatenate([mesh.surfaces[name] for name in names])
     film = np.concatenate([result.film_coefficient[name] for name in names])
     helix = result.film_coefficient[names[0]]
-    oil = np.concatenate([result.fluid_temperature[name] for name in names]) - ZERO_CELSIUS_K
-    values = np.repeat(np.column_stack([film, oil])[:, None, :], 6, axis=1)
+    bulk = np.concatenate([result.fluid_temperature[name] for name in names]) - ZERO_CELSIUS_K
+    values = np.repeat(np.column_stack([film, bulk])[:, None, :], 6, axis=1)
     shape = facet_triangles(mesh.points, facets, values, np.zeros(len(facets), dtype=np.int32))
     bars = (
         _film_scale(helix, film),
-        scale_of(oil, TEMPERATURE_MAP, "coolant temperature / °C"),
+        scale_of(bulk, TEMPERATURE_MAP, "coolant temperature / °C"),
     )
     view = View((-1.0, 0.55, -0.75), UP, shape.points)
     lines = sharp_edges_of_facets(mesh.points, facets)

@@ -51,7 +51,7 @@ HEAT_CAPTIONS = {
 CAPTIONS = {
     **{f"{OVER_SPEED}{name}": caption for name, caption in HEAT_CAPTIONS.items()},
     "machine_definition": (
-        "The machine as defined: parts by colour, contact lines of the bearings in red, oil in yellow, "
+        "The machine as defined: parts by colour, contact lines of the bearings in red, coolant in yellow, "
         "surfaces with a film as thick lines, probes as dots."
     ),
     "temperature_cut": "The machine cut open along the vertical plane through its axis.",
@@ -59,7 +59,7 @@ CAPTIONS = {
     "axial_profiles": "Temperature along the machine on its main surfaces.",
     "radial_profiles": "Temperature from the bore to the outside through each bearing; steps are joints.",
     "heat_by_bearing": "Friction heat of each bearing by its terms, and the bodies that it enters.",
-    "coolant": "Oil along the channel: temperatures, and the film coefficient with its low and high value.",
+    "coolant": "Coolant along the channel: temperatures, the film coefficient with its low and high value.",
     "channel_walls": "Walls of the channel, seen without the housing.",
     "heat_balance": "Where the heat comes from and where it goes.",
     "deformed_machine": "The machine as it has grown since assembly, exaggerated as its title says.",

@@ -30,7 +30,7 @@ NO_LIMITS = PumpLimits()
 
 @styled
 def film_maps(charts: Sequence[FilmChart], limits: PumpLimits = NO_LIMITS) -> Figure:
-    """Film coefficient over oil temperature and depth, one scale a row.
+    """Film coefficient over coolant temperature and depth, one scale a row.
 
     White line: laminar to turbulent. Dashed line: the pump's limit, hatched
     beyond it.
@@ -50,7 +50,7 @@ def film_maps(charts: Sequence[FilmChart], limits: PumpLimits = NO_LIMITS) -> Fi
             _limit(axes, limits.demand(item), x, y)
             _mark(axes, item)
             axes.set(
-                xlabel="oil temperature / °C",
+                xlabel="coolant temperature / °C",
                 ylabel="channel depth / mm",
                 title=f"{MODELS[item.model]}, {held_text(item)}",
             )
@@ -123,7 +123,7 @@ def _logarithmic(
     bar.set_label(label)
     _mark(axes, item, own=False)
     axes.set(
-        xlabel="oil temperature / °C",
+        xlabel="coolant temperature / °C",
         ylabel="channel depth / mm",
         title=f"{label.split(' /')[0]}, {held_text(item)}",
     )
@@ -159,7 +159,7 @@ def film_words(films: Sequence[FilmChart], limits: PumpLimits = NO_LIMITS) -> li
         words("equations", lambda item: MODELS[item.model]),
         words("held", held_text),
         fixed("largest at: depth / mm", lambda item: item.best[0] * 1e3),
-        fixed("oil / °C", lambda item: item.best[1] - ZERO_CELSIUS_K),
+        fixed("coolant / °C", lambda item: item.best[1] - ZERO_CELSIUS_K),
         rounded("W/(m²·K)", lambda item: item.best_value),
         rounded("at 19 mm, 31 °C", lambda item: item.paper_value),
         whole("share of the largest", lambda item: f"{item.paper_value / item.best_value:.0%}"),
@@ -169,8 +169,8 @@ def film_words(films: Sequence[FilmChart], limits: PumpLimits = NO_LIMITS) -> li
     text = (
         "The paper chose 19 mm and 31 °C from its map of the film coefficient. The velocity held here is the "
         "one at which that point lies on the paper's laminar–turbulent line; the flow is the machine's own. "
-        "A film map says nothing of the bearings: hotter oil also lifts the whole machine, which only the "
-        "solved designs show."
+        "A film map says nothing of the bearings: a hotter coolant also lifts the whole machine, which only "
+        "the solved designs show."
     )
     return [Text(text), table_of(fields, films)]
 

@@ -243,7 +243,7 @@ def _sections(
     if films:
         told = sweep_film.film_words(films, pump_limits(summary["constraints"]))
         blocks = [*told, pictures["film_maps"], pictures["pump_maps"]]
-        sections.append(Section("film", "The paper's choice of depth and oil temperature", blocks))
+        sections.append(Section("film", "The paper's choice of depth and coolant temperature", blocks))
     sections.append(Section("table", "All designs", _table(rows, parameters, outputs)))
     packages = (words("package", itemgetter(0)), words("version", itemgetter(1)))
     sections.append(Section("versions", "Versions", [table_of(packages, summary["versions"].items())]))

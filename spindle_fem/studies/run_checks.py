@@ -26,9 +26,13 @@ def check_energy(energy: EnergyBalance) -> Check:
 
 
 def check_coolant(mismatch: float) -> Check:
-    """What the walls give equals what the oil carries away."""
+    """What the walls give equals what the coolant carries away."""
     return _within(
-        "coolant enthalpy", mismatch, BALANCE_LIMIT, "", "Film heat less enthalpy rise of the oil, relative."
+        "coolant enthalpy",
+        mismatch,
+        BALANCE_LIMIT,
+        "",
+        "Film heat less enthalpy rise of the coolant, relative.",
     )
 
 

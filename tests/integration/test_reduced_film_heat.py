@@ -71,6 +71,27 @@ def test_it_follows_the_full_model_whose_friction_follows_its_films(spec, fast):
 
 
 @pytest.mark.slow
+def test_a_spindle_on_rollers_follows_its_full_model():
+    spec = load_machine("belt_lathe", OVERRIDES)
+    point = OperatingPoint.of(spec)
+    speed = RPM * np.where(TIMES < 1200.0, 2500.0, 1200.0)
+    columns = (speed, point.thrust, point.ambient_temperature, point.coolant_inlet_temperature, 0.0)
+    values = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), TIMES.shape) for c in columns])
+    fast = fast_model_for(spec, [SimpleNamespace(input_names=("speed",), inputs=speed[:, None])])
+    run = simulate_fast(fast, make_drive(TIMES, STANDARD, values, HELD), point.ambient_temperature)
+    full = simulate_full(
+        prepare_machine(spec),
+        InputHistory(TIMES, STANDARD, values, HELD),
+        sample_times=TIMES[::6],
+        options=TransientOptions(error=0.02),
+    )
+    for probe in full.probes:
+        reduced = run.temperature[::6, fast.channels.index(probe)]
+        assert np.ptp(full.reading(probe)) > 2.0
+        assert np.abs(reduced - full.reading(probe)).max() < 0.1, probe
+
+
+@pytest.mark.slow
 def test_simulate_takes_it_and_a_calibrated_machine_keeps_its_heat_model(spec, fast, recorded_in, tmp_path):
     point, values = driven(spec)
     drive = make_drive(TIMES, STANDARD, values, HELD)

@@ -85,7 +85,7 @@ class CoolantFilm(Effect):
     check = (
         "Channel for deposits, air pockets and the right flow (pressure drop against flow); where the "
         "film changes "
-        "with the Reynolds number, step the oil temperature and watch the housing beside the channel."
+        "with the Reynolds number, step the coolant temperature and watch the housing beside the channel."
     )
     card = Card(
         group="Coolant",

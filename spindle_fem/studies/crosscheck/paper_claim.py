@@ -129,7 +129,7 @@ def reynolds_number(spec: MachineSpec) -> float:
 
 
 def applies(spec: MachineSpec) -> bool:
-    """Whether the claim can be asked of a machine: bearings inside an oil channel."""
+    """Whether the claim can be asked of a machine: bearings inside a cooling channel."""
     return spec.channel is not None and spec.coolant is not None and bool(spec.bearing_set)
 
 
@@ -149,7 +149,7 @@ def check_claim(
     progress("the paper's optimum")
     designs = {
         "base": spec,
-        "oil 31 °C only": with_design(spec, None, OPTIMUM_INLET),
+        "coolant 31 °C only": with_design(spec, None, OPTIMUM_INLET),
         "19 mm only": with_design(spec, OPTIMUM_DEPTH, None),
         "19 mm and 31 °C": with_design(spec, OPTIMUM_DEPTH, OPTIMUM_INLET),
     }
@@ -178,7 +178,7 @@ def check_claim(
 
 def _explanation(spec: MachineSpec, network: dict[str, ClaimCase], verdict: dict[str, Any]) -> list[str]:
     """Why the claim comes out or does not, with the numbers of the refined network."""
-    base, oil, deep, both, perfect = network.values()
+    base, warm, deep, both, perfect = network.values()
     drops = verdict["ring_difference_change_K"]
     hottest = max(base.ring_difference, key=lambda name: base.ring_difference[name])
     sentences = [
@@ -187,18 +187,18 @@ def _explanation(spec: MachineSpec, network: dict[str, ClaimCase], verdict: dict
         f"Elements: maximum {verdict['max_rise_K']:+.1f} K, ring differences "
         + ", ".join(f"{name} {value:+.1f} K" for name, value in drops.items())
         + ".",
-        f"Oil 16 K warmer alone moves the maximum by {oil.maximum - base.maximum:+.1f} K and the ring "
+        f"Coolant 16 K warmer alone moves the maximum by {warm.maximum - base.maximum:+.1f} K and the ring "
         "difference of "
-        f"{hottest} by {oil.ring_difference[hottest] - base.ring_difference[hottest]:+.1f} K: all "
+        f"{hottest} by {warm.ring_difference[hottest] - base.ring_difference[hottest]:+.1f} K: all "
         "that sits on the "
-        "housing follows the oil, the shaft side only through balls and air, so the outer ring warms "
+        "housing follows the coolant, the shaft side only through balls and air, so the outer ring warms "
         "more than the "
         "inner one.",
         f"The deeper channel alone moves the maximum by {deep.maximum - base.maximum:+.1f} K: the "
         "flow is slower, "
         f"the film coefficient goes from {base.film_coefficient:.0f} to {deep.film_coefficient:.0f} W/(m²·K) "
         "while the wetted area grows.",
-        f"Together the oil takes {both.coolant_heat:.0f} W instead of {base.coolant_heat:.0f} W, and "
+        f"Together the coolant takes {both.coolant_heat:.0f} W instead of {base.coolant_heat:.0f} W, and "
         "friction makes "
         f"{both.heat:.0f} W instead of {base.heat:.0f} W.",
     ]
@@ -221,8 +221,8 @@ def _explanation(spec: MachineSpec, network: dict[str, ClaimCase], verdict: dict
         "maximum still changes "
         f"by {perfect.maximum - base.maximum:+.1f} K and the ring difference of {hottest} by "
         f"{change:+.1f} K. "
-        "The wall cannot be colder than the oil, and the ring difference is made by the heat that "
+        "The wall cannot be colder than the coolant, and the ring difference is made by the heat that "
         "must cross from the "
-        "inner ring to the outer, which the oil hardly changes."
+        "inner ring to the outer, which the coolant hardly changes."
     )
     return sentences

@@ -212,8 +212,8 @@ def derived_values(summary: Mapping[str, Any], spec: MachineSpec) -> dict[str, f
     ``largest_ring_difference_K``: inner less outer ring, of the bearing where
     its size is largest. ``axial_difference_K``: warmest less coldest outer
     ring; ``axial_gradient_K_per_m`` the same over the distance between these
-    two bearings. ``cooler_heat_W``: what the oil carries away, with the
-    pumping power, all of which ends as heat in the oil.
+    two bearings. ``cooler_heat_W``: what the coolant carries away, with the
+    pumping power, all of which ends as heat in it.
     """
     found: dict[str, float] = {}
     bearings = summary["bearings"]
