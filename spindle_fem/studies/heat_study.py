@@ -160,7 +160,7 @@ def _row(
         "friction_moment_Nmm": 1e3 * state.friction_moment,
         "axial_load_N": state.axial_force,
         "axial_displacement_um": 1e6 * state.axial_displacement,
-        "preload_N": state.preload,
+        "preload_N": state.preload if np.isfinite(state.preload) else None,
         "contact_angle_inner_deg": contact["inner"]["contact_angle_deg"],
         "contact_angle_outer_deg": contact["outer"]["contact_angle_deg"],
         "film_um": 1e6 * state.thinnest_film,

@@ -25,6 +25,11 @@ TIMES = np.arange(0.0, 2401.0, 20.0)
 SPEED = RPM * np.where(TIMES < 1200.0, 3000.0, 1000.0)
 
 
+def at_speeds(speed):
+    """What the fast model asks of a recording."""
+    return SimpleNamespace(source="speeds", input_names=("speed",), inputs=speed[:, None])
+
+
 @pytest.fixture(scope="module")
 def spec():
     return load_machine("wu_tan_2016", OVERRIDES)
@@ -32,7 +37,7 @@ def spec():
 
 @pytest.fixture(scope="module")
 def fast(spec):
-    return fast_model_for(spec, [SimpleNamespace(input_names=("speed",), inputs=SPEED[:, None])])
+    return fast_model_for(spec, [at_speeds(SPEED)])
 
 
 def driven(spec):
@@ -77,7 +82,7 @@ def test_a_spindle_on_rollers_follows_its_full_model():
     speed = RPM * np.where(TIMES < 1200.0, 2500.0, 1200.0)
     columns = (speed, point.thrust, point.ambient_temperature, point.coolant_inlet_temperature, 0.0)
     values = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), TIMES.shape) for c in columns])
-    fast = fast_model_for(spec, [SimpleNamespace(input_names=("speed",), inputs=speed[:, None])])
+    fast = fast_model_for(spec, [at_speeds(speed)])
     run = simulate_fast(fast, make_drive(TIMES, STANDARD, values, HELD), point.ambient_temperature)
     full = simulate_full(
         prepare_machine(spec),
