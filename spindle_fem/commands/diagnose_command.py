@@ -117,10 +117,12 @@ def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
     opened = open_machine(asked.machine, overrides, read, earlier, heldout=asked.heldout, progress=tell)
     opened = refined(opened)
     with output_folder(asked.folder) as place:
-        replace_text(place / "machine.toml", resolved_text(asked.machine, overrides))
         drawn = None
         reason = says_too_little(opened)
+        # written once there is something to say: an interrupted one leaves the machine of an earlier one
+        definition = resolved_text(asked.machine, overrides)
         if reason:
+            replace_text(place / "machine.toml", definition)
             content = unexplained_content(opened, reason)
             content["fit"]["full_model"] = nothing_run(
                 OFF if asked.full_model == AUTO else asked.full_model, "Nothing was fitted."
@@ -130,6 +132,7 @@ def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
             workers.wake()
             diagnosis = diagnose_recordings(opened, heldout=asked.heldout, progress=tell, workers=workers)
             tell("writing")
+            replace_text(place / "machine.toml", definition)
             proposed = workers.ahead(partial(next_measurement, diagnosis))
             content = _write(diagnosis, opened, place, report=report)
             if report:

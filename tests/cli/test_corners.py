@@ -9,12 +9,14 @@ import typer
 from typer.testing import CliRunner
 
 from spindle_fem.cli import app
+from spindle_fem.commands import diagnose_command
 from spindle_fem.commands.console import print_check, print_sweep
 from spindle_fem.commands.machine_commands import mesh_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError
 from spindle_fem.results.output_folder import output_folder
 from spindle_fem.studies.heat_study import heat_study
+from tests.support.documented_commands import made_recording
 
 
 def test_heat_at_speeds_without_equilibrium_is_refused_with_the_reason(command, tmp_path):
@@ -33,6 +35,23 @@ def test_heat_leaves_a_report_that_can_be_rebuilt(command, tmp_path):
     (tmp_path / "report.html").unlink()
     assert command("report", tmp_path).returncode == 0
     assert (tmp_path / "report.html").read_text(encoding="utf-8") == page
+
+
+def test_an_interrupted_diagnosis_leaves_the_machine_of_an_earlier_one(tmp_path, monkeypatch):
+    machine = Path(__file__).parents[2] / "examples" / "pump.toml"
+    made_recording(tmp_path / "recording", machine)
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "machine.toml").write_text("earlier", encoding="utf-8")
+
+    def interrupted(*told, **settings):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(diagnose_command, "diagnose_recordings", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        diagnose_command.diagnose(machine, [tmp_path / "recording"], folder)
+    assert (folder / "machine.toml").read_text(encoding="utf-8") == "earlier"
+    assert (folder / "INCOMPLETE").is_file()
 
 
 def test_a_folder_without_results_has_no_report(command, tmp_path):
