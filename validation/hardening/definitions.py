@@ -15,7 +15,7 @@ from .solved import solve_elements, solve_lumped, solve_written
 
 ROOT = Path(__file__).parents[2]
 # Numbers that these divide are checked by an interpreter of their own, solved by finite elements, and run.
-EVERY_PROCESS, EVERY_ELEMENTS, EVERY_RUN = 50, 8, 100
+EVERY_PROCESS, EVERY_ELEMENTS, EVERY_RUN = 50, 12, 100
 SHARE_OVERRIDES = 0.1
 OVERRIDDEN = ("operation.speed", "operation.thrust", "channel.depth", "channel.pitch", "coolant.flow")
 OVERRIDDEN = (*OVERRIDDEN, "mesh.preset", "heat.model", "channel.turns", "part.0.name", "name", "x.y.z", "")

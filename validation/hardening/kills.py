@@ -17,13 +17,13 @@ from .same_numbers import MAIN_FILES, difference
 
 # How many of each are killed; what a kill hits shares its cache or begins with an empty one.
 KILLS = {
-    "run": 16,
-    "sweep": 16,
-    "transient": 12,
-    "diagnose": 18,
-    "report": 16,
-    "mesh cache": 16,
-    "model cache": 6,
+    "run": 10,
+    "sweep": 14,
+    "transient": 10,
+    "diagnose": 14,
+    "report": 24,
+    "mesh cache": 24,
+    "model cache": 4,
 }
 # A command that ended before its kill is tried again with a moment this much earlier.
 EARLIER = 0.5

@@ -99,12 +99,12 @@ schema = "spindle-fem/transient/1"
 name = "minutes"
 machine = "SPINDLE"
 start = "ambient"
-sample_every = "1 min"
-fields_every = "2 min"
+sample_every = "30 s"
+fields_every = "30 s"
 error = "1 K"
 phase = [
-    {name = "run", speed = "2500 rpm", thrust = "800 N", duration = "4 min"},
-    {name = "stop", speed = "0 rpm", duration = "3 min"},
+    {name = "run", speed = "2500 rpm", thrust = "800 N", duration = "1 min"},
+    {name = "stop", speed = "0 rpm", duration = "1 min"},
 ]
 """
 BALL = """

@@ -58,4 +58,5 @@ def page(found: Mapping[str, Any]) -> str:
         keep_trailing_newline=True,
     )
     limits = {"most_seconds": f"{MOST_SECONDS:.0f}", "most_MB": f"{MOST_MB:.0f}"}
-    return template.render(found=found, what=WHAT, **limits)
+    unfinished = any(item["done"] < item["planned"] for item in found["families"].values())
+    return template.render(found=found, what=WHAT, unfinished=unfinished, **limits)
