@@ -100,22 +100,20 @@ def test_outer_rings_close_the_gap_that_the_housing_opens():
     assert np.all(tight > loose)
 
 
-def test_mechanics_take_the_place_of_the_power_law(tmp_path):
+def test_mechanics_stand_beside_the_power_law(tmp_path):
     view = _spindle(tmp_path)[2]
     known = replace(view, preload=lambda group: set_response() if group == "front_bearings" else None)
     labels = [item.label for item in ThermalPreload().candidates(known)]
     assert labels == [
+        "thermal_preload @ front_bearings",
         f"thermal_preload @ front_bearings ({MECHANICS})",
         "thermal_preload @ rear_bearings",
     ]
-    # a definition may still say either
-    forms = [item.form for item in ThermalPreload().forms(known) if item.component == "front_bearings"]
-    assert forms == ["", MECHANICS]
 
 
 def test_a_definition_takes_what_a_diagnosis_wrote(tmp_path):
     view = replace(_spindle(tmp_path)[2], preload=lambda group: set_response())
-    candidate = next(item for item in ThermalPreload().candidates(view) if item.component == "front_bearings")
+    candidate = next(item for item in ThermalPreload().candidates(view) if item.form == MECHANICS)
     values = {f"{candidate.terms[0].name}.outer_clearance": 17e-6, candidate.amplitude: 0.3}
     entry = definition_entry(candidate, values)
     assert entry["form"] == MECHANICS

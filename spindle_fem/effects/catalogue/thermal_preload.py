@@ -128,7 +128,8 @@ class ThermalPreload(Effect):
     """Preload that follows the inner-outer temperature difference.
 
     Where a definition has fits and preload, the mechanics of its bearings says in which form and by how
-    much each of them; otherwise a power of the difference stands for it.
+    much each of them. A power of the difference, alike for a set, stands for it elsewhere, and beside it for
+    bearings that were mounted otherwise than the definition says.
 
     Source: Hertz (1882), load with deflection^1.5; Bossmanns & Tu (1999), Int.
     J. Mach. Tools Manuf. 39, 1345-1366, thermally induced preload in spindles;
@@ -147,7 +148,7 @@ class ThermalPreload(Effect):
         group="Bearings",
         law=(
             "friction × 1 + a (m - 1)/m₁₀, m(x, gap of the outer rings, speed) by bearing mechanics, x: "
-            "inner less outer rings of the set, lagged τ; without fits × 1 + a (w s₊(x/w) / 10 K)^m"
+            "inner less outer rings of the set, lagged τ; or, as without fits, × 1 + a (w s₊(x/w) / 10 K)^m"
         ),
         size=(
             "a ± m₁₀/2, clearance ± IT6/3, unevenness 1 ± 0.5, τ 200 s ×/÷ e^0.8; "
@@ -191,10 +192,6 @@ class ThermalPreload(Effect):
                 for form, term in terms.items()
             ]
         return tuple(found)
-
-    def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
-        """The power law stands in for mechanics that are not known."""
-        return MECHANICS in candidate.form or machine.preload(candidate.component) is None
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How strongly friction follows."""
