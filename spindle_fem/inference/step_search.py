@@ -69,9 +69,11 @@ def add_steps(search: Search, fit: Fit) -> None:
             if changes is not None:
                 found.append((changes.gain, effect, onsets))
     found.sort(key=lambda item: -item[0])
-    for gain, effect, onsets in found[:PLACES_SETTLED]:
-        if gain > tuned.FAIR_SHARE * found[0][0]:
-            _settle(search, fit, effect, onsets)
+    fair = [item for item in found if item[0] > tuned.FAIR_SHARE * found[0][0]]
+    # Heat and cooling are much alike to first order: the second place is another effect's where there is one.
+    others = [item for item in fair if item[1] is not fair[0][1]]
+    for _, effect, onsets in [*fair[:1], *others, *fair[1:]][:PLACES_SETTLED]:
+        _settle(search, fit, effect, onsets)
 
 
 def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) -> None:

@@ -236,8 +236,10 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_not_named():
     assert verdict(*better).verdict == "missing_physics"
     assert verdict(*same).verdict == "consistent"
     assert not verdict(*same).chosen.fit.candidates
-    # the picture that a network gives is coarser
-    assert verdict(*better, coarseness=2.0).verdict == "consistent"
+    # the picture that a network gives is coarser: what is left of single readings counts
+    for share, told in ((0.5, "missing_physics"), (0.99, "consistent")):
+        left = {"beyond": lambda fit, share=share: share if fit.candidates else 1.0}
+        assert verdict(*better, coarseness=2.0, **left).verdict == told
     # where readings leave far more than noise, nothing that is known explains it
     assert verdict(*same, left=lambda fit: 3.0).verdict == "unexplained"
 
