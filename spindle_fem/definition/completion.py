@@ -73,19 +73,34 @@ def length_of(value: Any) -> float | None:
     return None
 
 
-def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
+def with_named_types(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables with an entry in ``bearing_types`` for every bearing that ships and that a set names.
+
+    So that single values of it can be changed by its name: ``bearing_types.NN3014_K.radial_clearance``.
+    """
     given = content.get("bearing_types", {})
-    if not isinstance(given, Mapping):
-        return
+    sets = content.get("bearing_set")
+    if not isinstance(given, Mapping) or not isinstance(sets, list):
+        return dict(content)
     types, groups = dict(given), []
-    for group in content.get("bearing_set") if isinstance(content.get("bearing_set"), list) else ():
+    for group in sets:
         if isinstance(group, Mapping) and isinstance(group.get("bearing_type"), str):
             designation = group["bearing_type"]
             name = designation.replace(" ", "_").replace("/", "_")
-            if name not in types and bearing_catalogue.catalogue_bearing(designation):
-                types[name] = {"catalogue": designation, "marks": {"catalogue": "C"}}
+            own = types.get(name, {})
+            if bearing_catalogue.catalogue_bearing(designation) and _is_partial(own):
+                types[name] = _under({"catalogue": designation, "marks": {"default": "C"}}, own)
             group = {**group, "bearing_type": name} if name in types else group
         groups.append(group)
+    return {**content, "bearing_set": groups, **({"bearing_types": types} if types else {})}
+
+
+def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
+    content.update(with_named_types(content))
+    types = content.get("bearing_types")
+    if not isinstance(types, Mapping):
+        return
+    content["bearing_types"] = types = dict(types)
     for name, table in types.items():
         designation = table.get("catalogue") if isinstance(table, Mapping) else None
         found = bearing_catalogue.catalogue_bearing(designation) if isinstance(designation, str) else None
@@ -96,10 +111,11 @@ def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
         if taken:
             text = f"{designation}: {bearing_catalogue.estimated(types[name])}"
             assumed.append(Assumption(f"bearing_types.{name}", text))
-    if groups:
-        content["bearing_set"] = groups
-    if types:
-        content["bearing_types"] = types
+
+
+def _is_partial(table: Any) -> bool:
+    """Whether a table of a bearing type gives no bearing of its own."""
+    return isinstance(table, Mapping) and not {"catalogue", "bore_diameter"} & set(table)
 
 
 def _under(found: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:

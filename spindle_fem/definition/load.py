@@ -11,7 +11,7 @@ from typing import Any
 import tomli_w
 from pydantic import TypeAdapter, ValidationError
 
-from spindle_fem.definition.completion import Assumption, complete
+from spindle_fem.definition.completion import Assumption, complete, with_named_types
 from spindle_fem.definition.consistency import Declared, find_faults
 from spindle_fem.definition.faults import validation_faults
 from spindle_fem.definition.inherit import (
@@ -284,7 +284,7 @@ def validate(content: Mapping[str, Any], source: str | Iterable[Layer] = "machin
 
 def _layers_and_content(machine: str | Path, overrides: Iterable[str]) -> tuple[list[Layer], dict[str, Any]]:
     layers = read_layers(find_machine(machine))
-    content = _merged(layers)
+    content = with_named_types(_merged(layers))
     faults: list[SpindleFemError] = []
     for override in overrides:
         try:

@@ -70,6 +70,15 @@ def test_a_designation_gives_the_rollers(spec):
     assert catalogue_bearing("NN3018 K HC")["roller_material"] == "silicon_nitride"
 
 
+def test_a_value_of_a_bearing_that_ships_is_changed_by_its_name():
+    spec = load_machine("belt_lathe", ["bearing_types.NN3018_K.radial_clearance=-3 um"])
+    kind = spec.bearing_types["NN3018_K"]
+    assert kind.radial_clearance == pytest.approx(-3e-6)
+    assert (kind.roller_count, kind.mark_of("radial_clearance"), kind.mark_of("rows")) == (28, "U", "C")
+    idle = BearingMechanics(spec).states(OperatingPoint.of(spec), everywhere(spec, 20.0), expand=False)
+    assert idle["F1"].balls.load[:, 0].min() > 0.0
+
+
 def test_every_roller_bearing_of_the_catalogue_is_a_sound_type():
     for series in ("N10", "NN30"):
         for code in (*range(4, 23), *range(24, 42, 2)):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from spindle_fem.definition.completion import with_named_types
 from spindle_fem.definition.load import (
     apply_overrides,
     find_machine,
@@ -75,7 +76,7 @@ def prepare_study(machine: str | Path, study: str | Path, overrides: Iterable[st
     """
     overrides = tuple(overrides)
     spec = load_machine(machine, overrides)
-    content = apply_overrides(read_definition(find_machine(machine)), overrides)
+    content = apply_overrides(with_named_types(read_definition(find_machine(machine))), overrides)
     read = load_study(study)
     where = Path(study).name
     faults: list[SpindleFemError] = []
