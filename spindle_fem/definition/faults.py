@@ -53,7 +53,7 @@ def validation_faults(
 def _untagged(item: Any, content: Any) -> Location:
     """Location without the tag of a union, which ends it where a whole table is at fault."""
     location, node = item["loc"], content
-    if item["type"] != "faults":
+    if item["type"] != "faults" or not location:
         return location
     for step in location[:-1]:
         known = isinstance(node, Mapping) and step in node
