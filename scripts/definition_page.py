@@ -97,7 +97,7 @@ keys (or `--set bearing_types.NN3014_K.radial_clearance=-3um`) changes what that
 `[bearing_types.front]` with `catalogue = "7014 C"` makes a type of another name of it.
 
 Checked against rows of one open catalogue (IBC TI-I-5050.0, 2010;
- `tests/published/test_bearing_catalogue_rows.py`): outer raceways of 19 N10 and NN30 within 0.7 %;
+`tests/published/test_bearing_catalogue_rows.py`): outer raceways of 19 N10 and NN30 within 0.7 %;
 static load ratings of 35 of them within 11 % (NN3006 and NN3007, up to 37 % too high, are not as the rule has
 them) and of 18 ball bearings within 18 %; boundary dimensions where its columns are sure. The other rows
 stand on ISO 15 alone.
