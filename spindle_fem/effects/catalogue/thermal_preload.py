@@ -31,6 +31,9 @@ MECHANICS = "bearing mechanics"
 LOAD_SHARE_SIGMA = 0.5
 # Of the same: friction that follows its load more than this is none of rings.
 MOST_LOAD_SHARE = 3.0
+# Of the logarithm: how widely the power spreads with which friction grows over the ring difference, as
+# the state of the grease has it (load^(2/3..4/3)).
+EXPONENT_SIGMA = 0.12
 # Of what mechanics has between the bearings of a set: spacers ground to fit share the load otherwise.
 UNEVENNESS_SIGMA = 0.5
 # Of the standard clearance deviation: a fit looser than ordered is likelier than a tighter one, as rings
@@ -55,7 +58,7 @@ class ThermalPreloadTerm(Term):
         self.reads = (*inner, *outer)
         self.parameters = (
             amplitude(NAME, 0.25, high=20.0),
-            shape("exponent", 1.45, 0.12, low=0.5, high=4.0),
+            shape("exponent", 1.45, EXPONENT_SIGMA, low=0.5, high=4.0),
             shape("lag", 600.0, 0.4, "s", low=1.0, high=20000.0),
             shape("width", 1.5, 0.4, "K", low=0.05, high=20.0),
         )
@@ -74,7 +77,7 @@ class ThermalPreloadTerm(Term):
 
 
 class PreloadMechanicsTerm(Term):
-    """Friction of every bearing of a set as its mechanics answers to rings and fit, ``1 + a (m - 1) / m₁₀``.
+    """Friction of every bearing of a set as mechanics answers to rings and fit, ``1 + a ((m - 1) / m₁₀)^e``.
 
     ``m`` is friction over that without temperature differences: by the mean ring difference of the set,
     and by the gap that outer rings, warmer than the housing, close. How much more one bearing takes than
@@ -99,6 +102,7 @@ class PreloadMechanicsTerm(Term):
             amplitude(NAME, LOAD_SHARE_SIGMA * self.increase, high=MOST_LOAD_SHARE * self.increase),
             linear("outer_clearance", nominal, sigma, "m", low=low, high=high),
             linear("unevenness", 1.0, UNEVENNESS_SIGMA, low=0.0, high=1.0 + 2.0 * UNEVENNESS_SIGMA),
+            shape("exponent_factor", 1.0, EXPONENT_SIGMA, low=0.5, high=2.0),
             shape("lag", 200.0, 0.8, "s", low=1.0, high=20000.0),
         )
 
@@ -113,8 +117,9 @@ class PreloadMechanicsTerm(Term):
         )
         middle = each.mean(axis=0)
         ratio = np.exp(middle + own["unevenness"] * (each - middle))
+        loaded = power((ratio - 1.0) / self.increase, own["exponent_factor"])
         share = own[NAME] / self.increase
-        return np.where(ratio.real > 1.0, 1.0 + share * (ratio - 1.0), ratio**share)
+        return np.where(ratio.real > 1.0, 1.0 + own[NAME] * loaded, ratio**share)
 
     def advance(self, context: TermContext, step: float) -> Complex:
         """Ring difference and closing of the fit, lagged, (2, k) K."""
@@ -147,11 +152,11 @@ class ThermalPreload(Effect):
     card = Card(
         group="Bearings",
         law=(
-            "friction × 1 + a (m - 1)/m₁₀, m(x, gap of the outer rings, speed) by bearing mechanics, x: "
+            "friction × 1 + a ((m - 1)/m₁₀)^e, m(x, gap of the outer rings, speed) by bearing mechanics, x: "
             "inner less outer rings of the set, lagged τ; or, as without fits, × 1 + a (w s₊(x/w) / 10 K)^m"
         ),
         size=(
-            "a ± m₁₀/2, clearance ± IT6/3, unevenness 1 ± 0.5, τ 200 s ×/÷ e^0.8; "
+            "a ± m₁₀/2, clearance ± IT6/3, unevenness 1 ± 0.5, e 1 ×/÷ e^0.12, τ 200 s ×/÷ e^0.8; "
             "without fits a ± 0.25; m 1.45 ×/÷ e^0.12; τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4"
         ),
         acts_on="each bearing set (its bearings share one preload)",
@@ -196,7 +201,11 @@ class ThermalPreload(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """How strongly friction follows."""
         by_mechanics = "exponent" not in reported
-        exponent = candidate.constants["exponent"] if by_mechanics else reported["exponent"].value
+        exponent = (
+            candidate.constants["exponent"] * reported["exponent_factor"].value
+            if by_mechanics
+            else reported["exponent"].value
+        )
         return (
             f"{capital(place_words(candidate.component))}: the friction heat follows the inner-outer "
             "temperature difference (thermally induced preload); at 10 K it is "
