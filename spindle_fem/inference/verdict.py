@@ -265,7 +265,7 @@ def judge(
         nothing = min(empty.probability, tuned.STILL_POSSIBLE) if p_value >= tuned.RULED_OUT else 0.0
         ranked = _without(ranked, empty)
     chosen = ranked[0]
-    improved = _predicts(chosen.best, empty.best, beyond, coarseness)
+    improved = _predicts(chosen.best, empty.best, left, beyond, coarseness)
     if (
         p_value > tuned.SIGNIFICANT
         or not (chosen.fit.candidates and improved)
@@ -338,17 +338,22 @@ def judge(
 
 
 def _predicts(
-    chosen: Hypothesis, empty: Hypothesis, beyond: Callable[[Fit], float], coarseness: float
+    chosen: Hypothesis,
+    empty: Hypothesis,
+    left: Callable[[Fit], float],
+    beyond: Callable[[Fit], float],
+    coarseness: float,
 ) -> bool:
     """Whether a set tells held-out readings better than chance does.
 
     A coarse picture leaves more than noise, so that likelihoods make too much of it: of a network what is
-    left counts, and sensors' white noise hides less of it.
+    left of readings counts, of those that were fitted too, and sensors' white noise hides less of it.
     """
     if chosen.heldout is None or empty.heldout is None:
         return True
     if coarseness > 1.0:
-        return beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
+        lower = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
+        return lower and left(chosen.fit) <= left(empty.fit)
     return 0.5 * (empty.heldout - chosen.heldout) / tuned.GAIN_DIVISOR >= tuned.LEAST_HELDOUT_GAIN
 
 

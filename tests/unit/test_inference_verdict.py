@@ -237,6 +237,9 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_not_named():
     for share, told in ((0.5, "missing_physics"), (0.99, "consistent")):
         left = {"beyond": lambda fit, share=share: share if fit.candidates else 1.0}
         assert verdict(*better, coarseness=2.0, **left).verdict == told
+    worse = {"left": lambda fit: 1.1 if fit.candidates else 1.0}
+    better_later = {"beyond": lambda fit: 0.5 if fit.candidates else 1.0}
+    assert verdict(*better, coarseness=2.0, **better_later, **worse).verdict == "consistent"
     # where readings leave far more than noise, nothing that is known explains it
     assert verdict(*same, left=lambda fit: 3.0).verdict == "unexplained"
 
