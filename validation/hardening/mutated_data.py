@@ -69,13 +69,15 @@ def odd_column(chance: random.Random, sheet: Sheet) -> str:
     number = _column(chance, sheet)
     kind = chance.choice(("nan", "constant", "huge", "cold", "dropped", "renamed", "twice", "decimal comma"))
     name = sheet.header[number]
+    # an earlier change may have cut a row
+    rows = [row for row in sheet.rows if number < len(row)]
     if kind == "dropped":
-        for line in (sheet.header, *sheet.rows):
+        for line in (sheet.header, *rows):
             del line[number]
     elif kind == "renamed":
         sheet.header[number] = chance.choice((*HOSTILE, name + " [degC]", "Unnamed: 0", sheet.header[0]))
     elif kind == "twice":
-        for line in (sheet.header, *sheet.rows):
+        for line in (sheet.header, *rows):
             line.append(line[number])
     else:
         change: dict[str, Callable[[str], str]] = {
@@ -85,7 +87,7 @@ def odd_column(chance: random.Random, sheet: Sheet) -> str:
             "cold": lambda text: "-300",
             "decimal comma": lambda text: text.replace(".", ","),
         }
-        for row in sheet.rows:
+        for row in rows:
             row[number] = change[kind](row[number])
     return f"column {name} {kind}"
 
