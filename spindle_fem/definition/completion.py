@@ -135,7 +135,7 @@ def _bearing_places(content: dict[str, Any], assumed: list[Assumption]) -> None:
     for group in content.get("bearing_set") if isinstance(content.get("bearing_set"), list) else ():
         if isinstance(group, Mapping) and isinstance(group.get("bearing"), list):
             types = content.get("bearing_types")
-            kind = types.get(group.get("bearing_type")) if isinstance(types, Mapping) else None
+            kind = types.get(str(group.get("bearing_type"))) if isinstance(types, Mapping) else None
             width = length_of(kind.get("width")) if isinstance(kind, Mapping) else None
             # An unknown type is the one fault: its bearings have some width.
             width = _UNKNOWN_WIDTH if width is None else width

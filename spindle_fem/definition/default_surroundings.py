@@ -97,7 +97,7 @@ def _drawn(content: Mapping[str, Any]) -> _Drawn | None:
     types = content.get("bearing_types")
     groups = content.get("bearing_set")
     for group in groups if isinstance(groups, list) else ():
-        named = types.get(group.get("bearing_type")) if isinstance(types, Mapping) else None
+        named = types.get(str(group.get("bearing_type"))) if isinstance(types, Mapping) else None
         for kind in _sound(BearingType, [named]):
             for bearing in _sound(SetBearing, group.get("bearing")):
                 parts += ring_geometries(bearing, kind)

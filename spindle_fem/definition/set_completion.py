@@ -30,11 +30,11 @@ def add_set_rules(content: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for position, group in enumerate(groups):
         if not isinstance(group, Mapping):
             continue
-        kind = types.get(group.get("bearing_type"))
+        kind = types.get(str(group.get("bearing_type")))
         if isinstance(kind, Mapping):
             yield from _preload(groups, position, kind)
             yield from _spacers(content, group, kind)
-        elif group.get("preload") in PRELOAD_CLASSES:
+        elif str(group.get("preload")) in PRELOAD_CLASSES:
             # An unknown type is the one fault: its bearings have some preload.
             groups[position] = {**group, "preload": "0 N"}
 
@@ -42,7 +42,7 @@ def add_set_rules(content: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def _preload(groups: list[Any], position: int, kind: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """A preload class as the force through the set."""
     group = groups[position]
-    name, designation = group.get("preload"), kind.get("catalogue")
+    name, designation = str(group.get("preload")), kind.get("catalogue")
     if name not in PRELOAD_CLASSES or not isinstance(designation, str):
         return
     own = preload_of_class(designation, name)

@@ -32,8 +32,9 @@ GAP_STEPS = 1.5
 UNIFORM_TOLERANCE = 0.01
 LONG_GAP_SECONDS = 1800.0
 LONG_GAP_STEPS = 60.0
-# Two years: a step a minute is kept of all of it, and of more that does not fit in usual memory.
-LONGEST_SECONDS = 2.0 * 366.0 * 86400.0
+# Four years, more than machines are logged in one piece: at a step a minute two million steps are kept, and
+# a wrong stamp asks for more than any memory.
+LONGEST_SECONDS = 4.0 * 366.0 * 86400.0
 # Least noise of a channel that declares none, K: no sensor on a machine is better than a millikelvin.
 SMALLEST_SIGMA = 1.0e-3
 # The same of a displacement, m: what the best capacitive probes resolve.

@@ -112,7 +112,8 @@ def test_goals_modules_and_extras_that_pages_name_exist():
     for page in PAGES:
         for words in (command.words for command in documented(page)):
             if words[0] == "make":
-                assert set(words[1:]) <= goals, f"{page.name}: {words}"
+                asked = {word for word in words[1:] if "=" not in word}
+                assert asked <= goals, f"{page.name}: {words}"
             elif words[:2] == ("python", "-m"):
                 assert importlib.util.find_spec(words[2]), f"{page.name}: {words}"
             elif words[0] == "python":

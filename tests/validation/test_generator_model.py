@@ -39,7 +39,9 @@ def test_shares_nothing_with_the_program_it_tries_to_fool():
             for name in node.names
         }
         ours = {name for name in imported if name.startswith("spindle_fem")}
-        assert path.stem in CALL_THE_PROGRAM or not ours, path.name
+        # Hardening makes no cases to be fooled by: it spoils inputs of the program itself.
+        calls = path.stem in CALL_THE_PROGRAM or "hardening" in path.relative_to(FOLDER).parts
+        assert calls or not ours, path.name
 
 
 def test_film_of_the_reference_page():

@@ -37,7 +37,7 @@ class Pump:
 
     >>> pump = Pump(20e-3 / 60, pressure_limit=1.0e5)
     >>> resistance = 2.0e5 / pump.flow
-    >>> pump.delivered(lambda flow: resistance * flow) / pump.flow
+    >>> round(pump.delivered(lambda flow: resistance * flow) / pump.flow, 12)
     0.5
     """
 
