@@ -106,14 +106,18 @@ def probe_labels(spec: MachineSpec, probes: Mapping[str, float]) -> tuple[list[L
 
 
 def ball_labels(result: ThermalResult) -> list[Label]:
-    """Name and ball temperature of every bearing, at its lowest ball."""
-    return [
-        Label(
-            f"{bearing.name} balls\n{result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K:.1f} °C",
-            np.array([0.0, -0.5 * result.spec.bearing_types[group.bearing_type].pitch, 0.5 * sum(bearing.z)]),
+    """Name and temperature of the balls or rollers of every bearing, at the lowest of them."""
+    labels = []
+    for group, bearing in result.spec.bearings:
+        kind = result.spec.bearing_types[group.bearing_type]
+        warm = result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K
+        labels.append(
+            Label(
+                f"{bearing.name} {kind.element_word}s\n{warm:.1f} °C",
+                np.array([0.0, -0.5 * kind.pitch, 0.5 * sum(bearing.z)]),
+            )
         )
-        for group, bearing in result.spec.bearings
-    ]
+    return labels
 
 
 def temperature_cut(
@@ -124,9 +128,11 @@ def temperature_cut(
     hottest = result.temperature_maximum - ZERO_CELSIUS_K
     place = result.temperature_maximum_at * 1.0e3
     labels, removed = probe_labels(result.spec, result.probes)
+    kinds = {result.spec.bearing_types[group.bearing_type].element_word for group, _ in result.spec.bearings}
+    elements = " and ".join(f"{word}s" for word in sorted(kinds))
     notes = (
         f"Near half removed. Warmest place of the solid {hottest:.1f} °C "
-        f"at r = {np.hypot(*place[:2]):.0f} mm, z = {place[2]:.0f} mm; balls at their own temperature."
+        f"at r = {np.hypot(*place[:2]):.0f} mm, z = {place[2]:.0f} mm; {elements} at their own temperature."
     )
     return picture_figure(
         renderer.render(view),
@@ -165,7 +171,7 @@ def bearing_close_ups(renderer: SceneRenderer, result: ThermalResult, bar: Colou
             below.append(
                 Label(
                     f"inner race {state.temperature_inner - ZERO_CELSIUS_K:.1f} °C\n"
-                    f"balls {state.temperature_ball - ZERO_CELSIUS_K:.1f} °C\n"
+                    f"{kind.element_word}s {state.temperature_ball - ZERO_CELSIUS_K:.1f} °C\n"
                     f"outer race {state.temperature_outer - ZERO_CELSIUS_K:.1f} °C\n"
                     f"inner − outer {state.ring_difference:.1f} K",
                     np.array([0.0, 0.25 * (kind.bore_diameter + kind.inner_ring_outer_diameter), middle]),

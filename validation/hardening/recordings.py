@@ -44,7 +44,7 @@ def try_recording(number: int, chance: random.Random, folder: Path) -> Record:
         "show": ["recording", "show", "recording.toml", "-o", "out.png"],
         "draft": ["recording", "draft", f"data{suffix}", "-o", "out"],
         "simulate_spindle": ["simulate", SPINDLE, "recording.toml", "-o", "out", *COARSE],
-        "watch": ["watch", str(PUMP), "recording.toml", "--warm-up", "40 min"],
+        "watch": ["watch", str(PUMP), "recording.toml", "--warm-up", "40 min", "--until-end"],
         "diagnose": ["diagnose", str(PUMP), "recording.toml", "-o", "out"],
     }[command]
     run = run_process if number % EVERY_PROCESS == 0 else run_command
