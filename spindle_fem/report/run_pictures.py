@@ -161,7 +161,8 @@ def bearing_close_ups(renderer: SceneRenderer, result: ThermalResult, bar: Colou
         for bearing in group.bearing:
             state = result.bearings[bearing.name]
             middle = 0.5 * sum(bearing.z)
-            parts = "\n".join(f"{value:.0f} W to {BODY_NAMES[name]}" for name, value in state.heat_to.items())
+            names = BODY_NAMES | {"balls": f"{kind.element_word}s"}
+            parts = "\n".join(f"{value:.0f} W to {names[name]}" for name, value in state.heat_to.items())
             labels.append(
                 Label(
                     f"{bearing.name}: {state.heat:.0f} W\n{parts}",
