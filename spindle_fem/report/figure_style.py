@@ -19,6 +19,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
+from spindle_fem.results.output_folder import whole_file
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
@@ -198,8 +200,9 @@ def image_of(figure: Figure, *, colours: int = 0) -> Image:
 
 
 def write_png(image: Image, path: Path) -> Path:
-    """Write an image of a figure."""
-    image.save(path, dpi=(DPI, DPI), compress_level=6)
+    """Write an image of a figure, whole or not at all: a sweep that goes on takes up its pictures."""
+    with whole_file(path) as partial:
+        image.save(partial, "PNG", dpi=(DPI, DPI), compress_level=6)
     return path
 
 

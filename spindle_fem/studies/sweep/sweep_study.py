@@ -20,7 +20,7 @@ def require_own_table(folder: Path, columns: Sequence[str]) -> None:
     path = folder / RESULTS
     if not path.is_file() or path.stat().st_size == 0:
         return
-    with path.open(encoding="utf-8", newline="") as stream:
+    with path.open(encoding="utf-8", errors="replace", newline="") as stream:
         heading = stream.readline()
     if heading.endswith("\n") and heading.strip() != ",".join(columns):
         raise BadInputError(
