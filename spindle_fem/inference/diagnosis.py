@@ -274,6 +274,7 @@ class _Readings:
     ) -> None:
         self._plant, self._unchanged = final.predictor, plain.predictor
         self._slow, self._unseen = final.slow, unseen
+        self._whiteners = [Whitener(item.bins, final.slow) for item in self._plant.heldout]
         self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
         self._states: dict[int, tuple[Fit, Mapping[str, Told]]] = {}
@@ -299,13 +300,14 @@ class _Readings:
         return left_over_noise(plant, plant.heldout, self._heldout(fit), fit.values, self._unseen)
 
     def heldout_misfit(self, fit: Fit) -> float | None:
-        """Minus twice the logarithm of their likelihood, the slow error that of the best set."""
-        plant = self._plant
-        if not plant.heldout:
+        """Minus twice the logarithm of their likelihood but for a constant, with the best set's error."""
+        if not self._whiteners:
             return None
         return sum(
-            float(np.sum(huber(Whitener(item.bins, self._slow)(item.values - told))))
-            for item, told in zip(plant.heldout, self._heldout(fit), strict=True)
+            float(np.sum(huber(white(item.values - told))))
+            for item, white, told in zip(
+                self._plant.heldout, self._whiteners, self._heldout(fit), strict=True
+            )
         )
 
     def _heldout(self, fit: Fit) -> list[Array]:
