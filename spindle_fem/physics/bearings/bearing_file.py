@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.definition.bearing_catalogue import SHIPPED, catalogue_bearing
-from spindle_fem.definition.standard_materials import MATERIALS
 from spindle_fem.errors import (
     FaultsError,
     OutOfValidityError,
@@ -26,7 +24,13 @@ from spindle_fem.physics.bearings.bearing_keys import (
 )
 from spindle_fem.physics.bearings.bearing_report import report_of_states
 from spindle_fem.physics.bearings.bearing_set import solve_bearing_set
-from spindle_fem.physics.bearings.bearing_tables import heat_of, lubricant_of, read_document, read_tables
+from spindle_fem.physics.bearings.bearing_tables import (
+    heat_of,
+    lubricant_of,
+    read_document,
+    read_tables,
+    with_catalogue,
+)
 from spindle_fem.physics.bearings.fits import RingFits, fit_faults
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
@@ -113,7 +117,7 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     """
     file, document = Path(path), read_document(path)
     faults: list[SpindleFemError] = []
-    document = _with_catalogue(document, str(file), faults)
+    document = with_catalogue(document, str(file), faults, GEOMETRY)
     tables = read_tables(document, str(file), faults, TABLES, REQUIRED)
     case = None
     if not faults:
@@ -123,24 +127,6 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     if faults or case is None:
         raise FaultsError(str(file), faults)
     return case
-
-
-def _with_catalogue(document: dict[str, Any], file: str, faults: list[SpindleFemError]) -> dict[str, Any]:
-    """A file whose ``bearing.catalogue`` names a bearing that ships, with what that gives."""
-    table = document.get("bearing")
-    if not isinstance(table, dict) or "catalogue" not in table:
-        return document
-    designation = table["catalogue"]
-    found = catalogue_bearing(designation) if isinstance(designation, str) else None
-    own = {key: value for key, value in table.items() if key != "catalogue"}
-    if found is None:
-        faults.append(SpecError(f"{file}: bearing.catalogue", f"{designation!r} does not ship.", SHIPPED))
-        return {**document, "bearing": own}
-    if found["ball_material"] == "silicon_nitride":
-        ball = MATERIALS["silicon_nitride"]
-        found |= {f"ball_{key}": ball[key] for key in ("young_modulus", "poisson_ratio")}
-        found["density"] = ball["density"]
-    return {**document, "bearing": {key: found[key] for key in found if key in GEOMETRY} | own}
 
 
 def _build_case(

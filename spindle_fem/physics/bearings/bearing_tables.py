@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from spindle_fem.definition.bearing_catalogue import SHIPPED, catalogue_bearing
+from spindle_fem.definition.standard_materials import MATERIALS
 from spindle_fem.errors import BadInputError, SpecError, SpindleFemError, UnknownKeyError, did_you_mean
 from spindle_fem.physics.bearings.bearing_keys import HEAT_FIELDS, Reader
 from spindle_fem.physics.bearings.grease import Lubricant
@@ -100,3 +102,28 @@ def heat_of(values: dict[str, Any], file: str, faults: list[SpindleFemError]) ->
     except SpecError as error:
         faults.append(SpecError(f"{file}: {error.where}", error.what, error.how_to_fix))
         return HeatOptions()
+
+
+def with_catalogue(
+    document: dict[str, Any],
+    file: str,
+    faults: list[SpindleFemError],
+    keys: Collection[str],
+    element: str = "ball",
+) -> dict[str, Any]:
+    """A file whose ``bearing.catalogue`` names a bearing that ships, with what that gives under ``keys``."""
+    table = document.get("bearing")
+    if not isinstance(table, dict) or "catalogue" not in table:
+        return document
+    designation = table["catalogue"]
+    found = catalogue_bearing(designation) if isinstance(designation, str) else None
+    own = {key: value for key, value in table.items() if key != "catalogue"}
+    if found is None or f"{element}_count" not in found:
+        what = "does not ship" if found is None else f"has no {element}s"
+        faults.append(SpecError(f"{file}: bearing.catalogue", f"{designation!r} {what}.", SHIPPED))
+        return {**document, "bearing": own}
+    if found[f"{element}_material"] == "silicon_nitride":
+        hybrid = MATERIALS["silicon_nitride"]
+        found |= {f"{element}_{key}": hybrid[key] for key in ("young_modulus", "poisson_ratio")}
+        found["density"] = hybrid["density"]
+    return {**document, "bearing": {key: found[key] for key in found if key in keys} | own}

@@ -9,14 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from spindle_fem.definition.bearing_catalogue import SHIPPED, catalogue_bearing
+from spindle_fem.definition.bearing_catalogue import catalogue_bearing
 from spindle_fem.definition.bearing_types import has_rollers
-from spindle_fem.definition.standard_materials import MATERIALS
 from spindle_fem.errors import FaultsError, GeometryError, OutOfValidityError, SpecError, SpindleFemError
 from spindle_fem.physics.bearings.bearing_keys import GEOMETRY, HEAT, LUBRICANT, OPERATION, Reader
 from spindle_fem.physics.bearings.bearing_report import REPORT_SCHEMA
 from spindle_fem.physics.bearings.bearing_state import BearingState
-from spindle_fem.physics.bearings.bearing_tables import heat_of, lubricant_of, read_document, read_tables
+from spindle_fem.physics.bearings.bearing_tables import (
+    heat_of,
+    lubricant_of,
+    read_document,
+    read_tables,
+    with_catalogue,
+)
 from spindle_fem.physics.bearings.heat_model import HeatOptions, friction_model_names
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
 from spindle_fem.physics.bearings.mounting import ExternalLoad, uniform_temperatures
@@ -91,7 +96,7 @@ def roller_report(path: str | Path) -> dict[str, Any]:
     """
     file = str(path)
     faults: list[SpindleFemError] = []
-    document = _with_catalogue(read_document(path), file, faults)
+    document = with_catalogue(read_document(path), file, faults, _BEARING, "roller")
     tables = read_tables(document, file, faults, _TABLES, _REQUIRED)
     geometry, heat, lubricant = None, HeatOptions("palmgren"), None
     if not faults:
@@ -125,24 +130,6 @@ def roller_report(path: str | Path) -> dict[str, Any]:
     except OutOfValidityError as error:
         raise SpecError(f"{file}: operation.temperature", error.what, error.how_to_fix) from error
     return _report(geometry, state, solve_roller_bearing(geometry, load, operation["speed"]))
-
-
-def _with_catalogue(document: dict[str, Any], file: str, faults: list[SpindleFemError]) -> dict[str, Any]:
-    """A file whose ``bearing.catalogue`` names a roller bearing that ships, with what that gives."""
-    table = document.get("bearing")
-    if not isinstance(table, dict) or "catalogue" not in table:
-        return document
-    designation = table["catalogue"]
-    found = catalogue_bearing(designation) if isinstance(designation, str) else None
-    own = {key: value for key, value in table.items() if key != "catalogue"}
-    if found is None or "roller_count" not in found:
-        faults.append(SpecError(f"{file}: bearing.catalogue", f"{designation!r} has no rollers.", SHIPPED))
-        return {**document, "bearing": own}
-    if found["roller_material"] == "silicon_nitride":
-        roller = MATERIALS["silicon_nitride"]
-        found |= {f"roller_{key}": roller[key] for key in ("young_modulus", "poisson_ratio")}
-        found["density"] = roller["density"]
-    return {**document, "bearing": {key: found[key] for key in found if key in _BEARING} | own}
 
 
 def _report(geometry: RollerGeometry, state: BearingState, solved: RollerStates) -> dict[str, Any]:
