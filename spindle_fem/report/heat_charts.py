@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from spindle_fem.report.figure_style import CYCLE, new_figure, save_png, styled
+from spindle_fem.report.figure_style import CYCLE, new_figure, plain_decades, save_png, styled
 
 SPEED_LABEL = "speed / rpm"
 # Lines that may hide one another, points: the first, by how much the next is narrower, the last.
@@ -237,6 +237,7 @@ def heat_models(content: Mapping[str, Any]) -> Figure:
             style = ("-", "--", "-.", ":")[index % 4]
             panel.plot(speeds, heat, style, color=CYCLE[index % len(CYCLE)], label=f"model {level}")
         panel.set(title=group, xlabel=SPEED_LABEL, yscale="log")
+        plain_decades(panel.yaxis)
     axes[0].set_ylabel("friction heat / W")
     _legend(figure, axes[0])
     return figure

@@ -120,6 +120,7 @@ def _logarithmic(
     axes.clabel(lines, fmt=_short, fontsize=7.5)
     bar = figure.colorbar(filled, ax=axes, pad=0.02)
     bar.set_ticks(levels[::4], labels=[_short(level) for level in levels[::4]])
+    bar.minorticks_off()
     bar.set_label(label)
     _mark(axes, item, own=False)
     axes.set(
