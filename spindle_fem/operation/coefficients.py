@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.definition.circuit_tables import CircuitFilm, Film
 from spindle_fem.definition.machine_spec import (
@@ -29,6 +29,8 @@ from spindle_fem.physics.surroundings.gap_laws import GAP_LAWS
 from spindle_fem.physics.surroundings.rotating_surfaces import rotating_film
 from spindle_fem.physics.surroundings.still_air import outside_coefficient
 from spindle_fem.validity import CodedWarning
+
+Array = NDArray[np.float64]
 
 # K; a natural film's reference coefficient is taken where the wall is this much warmer than the air.
 NATURAL_DIFFERENCE = 10.0
@@ -58,10 +60,7 @@ def film_coefficient(
     if isinstance(film, ConstantFilm):
         return np.full(wall.shape, film.coefficient.value), ()
     if isinstance(film, NaturalFilm):
-        value = outside_coefficient(
-            wall, fluid, film.characteristic_length, film.emissivity, orientation=film.orientation
-        )
-        return film.factor.value * value, ()
+        return _natural_coefficient(film, wall, fluid), ()
     if isinstance(film, CircuitFilm):
         answer = circuit_film(film)
         return np.full(wall.shape, film.factor.value * answer.coefficient), answer.warnings
@@ -69,15 +68,24 @@ def film_coefficient(
     return np.full(wall.shape, film.factor.value * rotating.value), rotating.warnings
 
 
-def film_coefficient_and_slope(
-    film: Film, point: OperatingPoint, wall: float, fluid: float
-) -> tuple[float, float]:
-    """Coefficient of a film at one wall temperature (K) and its slope to it [W/(m²·K²)].
+def _natural_coefficient(film: NaturalFilm, wall: Array, fluid: ArrayLike) -> Array:
+    return film.factor.value * outside_coefficient(
+        wall, fluid, film.characteristic_length, film.emissivity, orientation=film.orientation
+    )
+
+
+def natural_coefficient_and_slope(film: NaturalFilm, wall: Array, fluid: ArrayLike) -> tuple[Array, Array]:
+    """Coefficient of a natural film and its slope to the wall's temperature [W/(m²·K²)].
 
     Correlations take no complex numbers, so the slope is a central difference.
+
+    Parameters
+    ----------
+    wall : (..., k) ndarray, [K]
+    fluid : float or (k,) array_like, [K]
     """
-    walls = np.array([wall, wall + SLOPE_STEP, wall - SLOPE_STEP])
-    value, above, below = film_coefficient(film, point, walls, fluid)[0].tolist()
+    walls = wall + np.array([0.0, SLOPE_STEP, -SLOPE_STEP]).reshape(-1, *(1,) * wall.ndim)
+    value, above, below = _natural_coefficient(film, walls, fluid)
     return value, (above - below) / (2.0 * SLOPE_STEP)
 
 

@@ -25,10 +25,6 @@ Positions = slice | NDArray[np.int64]
 COMPLEX_STEP = 1e-30
 
 
-class OneInstant:
-    """Mark of terms that can be evaluated at one instant only, not at many side by side."""
-
-
 class Derivatives(Enum):
     """Which derivatives are evaluated beside the values."""
 
@@ -275,11 +271,6 @@ class EffectTerms:
                 first = self.n_sensed + self.n_states
                 found += [slice(first + target, first + target + 1) for target in layout.targets]
         return [part for part in found if part.stop > part.start]
-
-    @property
-    def one_instant_only(self) -> bool:
-        """Whether a term cannot be evaluated at many instants."""
-        return any(isinstance(term, OneInstant) for term in self.terms)
 
     def initial_states(self) -> Array:
         """Memories at time zero, (n_x,)."""

@@ -94,6 +94,19 @@ def test_table_and_term_together_are_the_map(spec, friction, table):
     assert term.friction(context(term, np.repeat(film, 3)[:, None], speed=0.0)).tolist() == [[1.0]] * 5
 
 
+def test_many_instants_are_those_one_by_one(spec, friction, table):
+    term = FilmHeat(friction, spec, table)
+    warm = 303.15 + np.random.default_rng(1).uniform(0.0, 20.0, (3 * len(friction.bearings), 6))
+    speeds = RPM * np.array([0.0, 900.0, 3000.0, 900.0, 0.0, 900.0])
+    thrusts = np.array([1750.0] * 5 + [1200.0])
+    together = context(term, warm, speed=speeds, thrust=thrusts)
+    for answer in (term.friction, term.heat):
+        alone = [
+            answer(context(term, warm[:, [i]], speed=speeds[i], thrust=thrusts[i]))[:, 0] for i in range(6)
+        ]
+        assert answer(together) == pytest.approx(np.array(alone).T, rel=1e-12)
+
+
 def test_the_film_has_a_quarter_of_each_raceway_and_half_of_the_balls(spec, friction, table):
     term = FilmHeat(friction, spec, table)
     uneven = np.tile([310.0, 306.0, 302.0], len(friction.bearings))[:, None]

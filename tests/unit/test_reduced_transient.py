@@ -12,6 +12,7 @@ from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from spindle_fem.model.reduced.term_march import TermMarch
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.coefficient_table import free_parameters
 from spindle_fem.physics.surroundings.still_air import outside_coefficient
@@ -117,6 +118,17 @@ def test_a_natural_film_carries_what_its_correlation_says(fast):
     _, rate, _ = natural.channel.film(point, {})
     taken = rate * (run.temperature[-1, natural.channels.index("COOLANT_OUT")] - 290.15)
     assert out + taken == pytest.approx(2 * 155 + 140 + 2 * 85, rel=1e-6)
+
+
+def test_natural_films_of_a_whole_run_are_those_step_by_step(fast, monkeypatch):
+    natural = with_natural_film(fast)
+    times = np.linspace(0.0, 7200.0, 121)
+    drive = drive_of(times, 3000.0 * (times < 4000.0), ambient=294.15 + 4.0 * np.sin(times / 900.0))
+    run = simulate_fast(natural, drive, 293.15)
+    monkeypatch.setattr(TermMarch, "_at_once", lambda self, near: None)
+    stepped = simulate_fast(natural, drive, 293.15)
+    assert np.ptp(run.states) > 5.0
+    assert np.abs(run.states - stepped.states).max() < 1e-6
 
 
 def test_unknown_parameters_and_other_heat_models_are_refused(fast, spec, steps):

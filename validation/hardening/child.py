@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
+import importlib
 import os
+import pkgutil
 import resource
 import signal
 import subprocess
@@ -12,6 +15,11 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import xarray
+
+import spindle_fem
+from spindle_fem.units import registry
 
 # What is asked of every case: seconds of processor, and memory.
 MOST_SECONDS, MOST_MB = 30.0, 2048.0
@@ -71,22 +79,15 @@ class Surroundings:
 
 
 def warm() -> None:
-    """Load what commands load, once for all children."""
-    import matplotlib.pyplot  # noqa: F401
-
-    import spindle_fem.cli
-    import spindle_fem.commands.checked_machine
-    import spindle_fem.commands.console
-    import spindle_fem.commands.machine_commands
-    import spindle_fem.commands.simulate_command
-    import spindle_fem.inference.diagnosis
-    import spindle_fem.machine.geometry.assembly
-    import spindle_fem.model.reduced.defined_effects
-    import spindle_fem.operation.assembled_sets
-    import spindle_fem.physics.bearings.bearing_file
-    import spindle_fem.solvers.machine_network_steady
-    import spindle_fem.studies.solve_machine
-    import spindle_fem.studies.sweep.prepared_study  # noqa: F401
+    """Load what commands load, once for all children: every module, units, readers of files."""
+    for module in pkgutil.walk_packages(spindle_fem.__path__, "spindle_fem."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
+    for name in ("distributed", "h5netcdf", "matplotlib.pyplot"):
+        importlib.import_module(name)
+    xarray.backends.list_engines()
+    registry()
+    gc.freeze()
 
 
 def run_command(arguments: Sequence[str], folder: Path, around: Surroundings | None = None) -> Ended:

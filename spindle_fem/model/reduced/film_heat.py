@@ -7,7 +7,7 @@ both those of the film temperature of the moment.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import HeatTable, MachineSpec
 from spindle_fem.effects.framework.term import Operating, Term, TermContext
 from spindle_fem.model.reduced.build_reduced import ReductionOptions
-from spindle_fem.operation.effect_terms import OneInstant
 from spindle_fem.operation.friction_map import (
     CONDUCTANCES,
     FILM_TEMPERATURES,
@@ -35,7 +34,7 @@ MOST_KNOWN = 1024
 CONDUCTANCE_DECIMALS = 2
 
 
-class FilmHeat(OneInstant, Term):
+class FilmHeat(Term):
     """Friction and ball rows of a map at the film temperature of the moment.
 
     Parameters
@@ -65,9 +64,21 @@ class FilmHeat(OneInstant, Term):
         self.heat_places = tuple(self.reads[3 * row + side] for row in self.follow for side in range(3))
         self._known: dict[tuple[float, float], tuple[FilmSeries, Array]] = {}
 
-    def _series(self, context: TermContext) -> tuple[FilmSeries, Array]:
+    def _points(self, context: TermContext) -> Iterator[tuple[slice | NDArray[np.int64], float, float]]:
+        """Each speed and thrust that occurs, with the columns in which it does."""
+        speed, thrust = context.inputs["speed"], context.inputs["thrust"]
+        if np.ndim(speed) == 0:
+            yield slice(None), float(speed), float(thrust)
+            return
+        distinct, number = np.unique(np.column_stack((speed, thrust)), axis=0, return_inverse=True)
+        order = np.argsort(number.ravel(), kind="stable")
+        ends = np.cumsum(np.bincount(number.ravel()))[:-1]
+        for columns, point in zip(np.split(order, ends), distinct.tolist(), strict=True):
+            yield columns, *point
+
+    def _series(self, speed: float, thrust: float) -> tuple[FilmSeries, Array]:
         """Moments and conductances over the film temperature, and conductances at 30 °C."""
-        key = (float(context.inputs["speed"]), float(context.inputs["thrust"]))
+        key = (speed, thrust)
         if key not in self._known:
             if len(self._known) >= MOST_KNOWN:
                 self._known.clear()
@@ -81,19 +92,23 @@ class FilmHeat(OneInstant, Term):
 
     def friction(self, context: TermContext) -> NDArray[np.complex128]:
         """Heat of the map over that of the table; 1 at standstill."""
-        speed = float(context.inputs["speed"])
         _, film = self._film(context)
-        if speed == 0.0:
-            return np.ones_like(film[: len(self.bearings)])
-        moment = self._series(context)[0].at(film, MOMENT)[:, 0]
-        tabulated = np.array([np.interp(speed, self._grid, row) for row in self._table])
-        return np.exp(moment + np.log(speed / tabulated)[:, None])[: len(self.bearings)]
+        found = np.ones_like(film)
+        for columns, speed, thrust in self._points(context):
+            if speed == 0.0:
+                continue
+            moment = self._series(speed, thrust)[0].at(film[:, columns], MOMENT)[:, 0]
+            tabulated = np.array([np.interp(speed, self._grid, row) for row in self._table])
+            found[:, columns] = np.exp(moment + np.log(speed / tabulated)[:, None])
+        return found[: len(self.bearings)]
 
     def heat(self, context: TermContext) -> NDArray[np.complex128]:
         """What flows between balls and raceways beside what flows with a film at 30 °C."""
         temperatures, film = self._film(context)
-        series, nominal = self._series(context)
-        more = np.exp(series.at(film, CONDUCTANCES)) - nominal[:, :, None]
+        more = np.empty((len(film), 2, film.shape[1]), dtype=film.dtype)
+        for columns, speed, thrust in self._points(context):
+            series, nominal = self._series(speed, thrust)
+            more[:, :, columns] = np.exp(series.at(film[:, columns], CONDUCTANCES)) - nominal[:, :, None]
         flow = more * (temperatures[:, 2:] - temperatures[:, :2])
         found = np.concatenate((flow, -flow.sum(axis=1, keepdims=True)), axis=1)
         return found[self.follow].reshape(len(self.heat_places), -1)

@@ -8,15 +8,13 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.term import Term, TermContext
 from spindle_fem.operation.coefficients import (
-    film_coefficient_and_slope,
     fluid_temperature,
+    natural_coefficient_and_slope,
     natural_reference,
 )
-from spindle_fem.operation.effect_terms import OneInstant
-from spindle_fem.operation.operating_point import OperatingPoint
 
 
-class NaturalFilmTerm(OneInstant, Term):
+class NaturalFilmTerm(Term):
     """A film that follows the temperature of its surface.
 
     The full model takes the coefficient of each facet, this one that of the
@@ -32,12 +30,9 @@ class NaturalFilmTerm(OneInstant, Term):
 
     def factor(self, context: TermContext) -> NDArray[np.complex128]:
         """Coefficient at the wall's temperature over that which the operators hold, (1, k)."""
-        ambient = context.inputs["ambient"]
-        fluid = fluid_temperature(self.film, ambient)
-        wall = float(context.temperatures[0, 0].real)
-        point = OperatingPoint(context.inputs["speed"], context.inputs["thrust"], ambient, ambient, 0.0)
-        value, slope = film_coefficient_and_slope(self.film, point, wall, fluid)
-        return ((value + slope * (context.temperatures - wall)) / self.reference).astype(complex)
+        fluid = fluid_temperature(self.film, context.inputs["ambient"])
+        value, slope = natural_coefficient_and_slope(self.film, context.temperatures.real, fluid)
+        return (value + 1j * slope * context.temperatures.imag) / self.reference
 
 
 def natural_film_terms(spec: MachineSpec) -> tuple[NaturalFilmTerm, ...]:

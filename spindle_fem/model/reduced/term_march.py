@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import ConvergenceError
+from spindle_fem.errors import ConvergenceError, OutOfValidityError
 from spindle_fem.model.reduced.added_heat import (
     TEMPERATURE_TOLERANCE,
     AddedHeat,
@@ -131,11 +131,12 @@ class TermMarch:
         ConvergenceError
             The terms run away.
         """
-        found = None
-        if not self.dynamic.terms.one_instant_only:
-            # What runs away on the way, in Newton's first rounds, may have a state all the same.
-            with np.errstate(all="ignore"):
+        # What runs away on the way, in Newton's first rounds, may have a state all the same.
+        with np.errstate(all="ignore"):
+            try:
                 found = self._at_once(near)
+            except OutOfValidityError:
+                found = None
         return self._step_by_step() if found is None else found
 
     def _goes_on(self) -> NDArray[np.bool_]:
