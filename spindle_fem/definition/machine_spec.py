@@ -329,6 +329,12 @@ class MachineSpec(SpecModel):
         return tuple((group, bearing) for group in self.bearing_set for bearing in group.bearing)
 
     @property
+    def rolling_elements(self) -> str:
+        """What its bearings roll on: "balls", "rollers" or "balls and rollers"; empty without bearings."""
+        words = {f"{self.bearing_types[group.bearing_type].element_word}s" for group in self.bearing_set}
+        return " and ".join(sorted(words))
+
+    @property
     def has_pump_limit(self) -> bool:
         """Whether the pump's pressure can keep the coolant's flow below what is asked for."""
         coolant = self.coolant

@@ -126,6 +126,7 @@ def heat_by_bearing(result: ThermalResult) -> Figure | None:
     if not result.bearings:
         return None
     names = list(result.bearings)
+    bodies = BODY_NAMES | {"balls": result.spec.rolling_elements}
     panels = (
         ("Friction heat term by term", _large_terms([result.bearings[name].terms for name in names]), None),
         ("Where it enters", [dict(result.bearings[name].heat_to) for name in names], BODY_COLOURS),
@@ -148,7 +149,7 @@ def heat_by_bearing(result: ThermalResult) -> Figure | None:
                 left=left,
                 color=colour,
                 height=0.62,
-                label=BODY_NAMES.get(key, key.replace("_", " ")),
+                label=bodies.get(key, key.replace("_", " ")),
             )
             for row, value in enumerate(values):
                 if value > 0.07 * limit:

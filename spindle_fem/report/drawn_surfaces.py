@@ -175,13 +175,6 @@ def outer_faces(
     return faces[single], part[single]
 
 
-def select_triangles(shape: TriangleSet, chosen: NDArray[np.bool_]) -> TriangleSet:
-    """The triangles where ``chosen`` (m,) holds, without points that nothing uses."""
-    return compact(
-        TriangleSet(shape.points, shape.triangles[chosen], shape.values, shape.label[chosen], shape.normals)
-    )
-
-
 def all_facets(mesh: TaggedMesh) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Every facet (n, 6) of every part, those in joints included, and its part."""
     part_index = {name: index for index, name in enumerate(mesh.part_names)}

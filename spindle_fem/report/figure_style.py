@@ -49,7 +49,7 @@ CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8c6
 INNER, BALLS, OUTER = "#D55E00", "#E69F00", "#0072B2"
 # Bodies that friction heat enters, by their keys in ``heat_to``.
 BODY_COLOURS = {"inner": INNER, "balls": BALLS, "outer": OUTER}
-BODY_NAMES = {"inner": "inner ring", "balls": "balls", "outer": "outer ring"}
+BODY_NAMES = {"inner": "inner ring", "balls": "rolling elements", "outer": "outer ring"}
 
 _STYLE = {
     "font.family": "sans-serif",

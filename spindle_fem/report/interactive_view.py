@@ -43,7 +43,7 @@ def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGE
     xarray.Dataset
         ``position`` (m), ``normal``, ``temperature`` (degC) on ``vertex``;
         ``triangle``, ``triangle_part``, ``triangle_is_section``; balls as
-        ``ball_centre``, ``ball_radius``, ``ball_temperature``.
+        ``ball_centre``, ``ball_radius``, ``ball_length`` (0; a roller's), ``ball_temperature``.
     """
     import xarray as xr
 
@@ -69,7 +69,7 @@ def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGE
     first[weld.ravel()] = np.arange(len(section.points))
     cap = section.points[first]
     towards = np.tile([-1.0, 0.0, 0.0], (len(cap), 1))
-    centres, radii, ball_values = _balls(result)
+    centres, radii, lengths, ball_values = _balls(result)
     return xr.Dataset(
         {
             "position": (
@@ -98,6 +98,7 @@ def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGE
             ),
             "ball_centre": (("ball", "axis"), centres.astype(np.float32), {"units": "m"}),
             "ball_radius": ("ball", radii.astype(np.float32), {"units": "m"}),
+            "ball_length": ("ball", lengths.astype(np.float32), {"units": "m"}),
             "ball_temperature": ("ball", ball_values.astype(np.float32), {"units": "degC"}),
         },
         {},
@@ -112,10 +113,8 @@ def viewer_payload(surface: xr.Dataset) -> dict[str, Any]:
     """What the page's viewer reads of a surface for drawing."""
     is_section = surface["triangle_is_section"].values == 1
     triangles, part = (surface[name].values.astype(np.int64) for name in ("triangle", "triangle_part"))
-    balls = zip(
-        *(surface[f"ball_{name}"].values.astype(np.float64) for name in ("centre", "radius", "temperature")),
-        strict=True,
-    )
+    columns = ("centre", "radius", "temperature", "length")
+    balls = zip(*(surface[f"ball_{name}"].values.astype(np.float64) for name in columns), strict=True)
     return Scene(
         points=surface["position"].values.astype(np.float64),
         layers=(Layer(TEMPERATURE, "°C", surface["temperature"].values.astype(np.float64)[None]),),
@@ -127,8 +126,8 @@ def viewer_payload(surface: xr.Dataset) -> dict[str, Any]:
         caps=triangles[is_section],
         cap_part=part[is_section],
         balls=tuple(
-            Sphere(centre, round(float(radius), 5), {TEMPERATURE: np.array([value])})
-            for centre, radius, value in balls
+            Sphere(centre, round(radius, 5), {TEMPERATURE: np.array([value])}, length=round(length, 5))
+            for centre, radius, value, length in balls
         ),
     ).payload()
 
@@ -202,12 +201,12 @@ def _corner_labels(label: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.repeat(label, 3)
 
 
-def _balls(result: ThermalResult) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    centres, radii, values = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0)]
+def _balls(result: ThermalResult) -> tuple[NDArray[np.float64], ...]:
+    """Centre, radius, length and temperature of every ball and roller."""
+    centres, sizes = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for group, bearing in result.spec.bearings:
         warmth = result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K
         for row in element_rows(bearing, result.spec.bearing_types[group.bearing_type]):
             centres.append(np.array(row.centres))
-            radii.append(np.full(row.ball_count, 0.5 * row.ball_diameter))
-            values.append(np.full(row.ball_count, warmth))
-    return np.concatenate(centres), np.concatenate(radii), np.concatenate(values)
+            sizes.append(np.tile([0.5 * row.ball_diameter, row.length, warmth], (row.ball_count, 1)))
+    return np.concatenate(centres), *np.concatenate(sizes).T

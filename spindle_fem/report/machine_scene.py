@@ -132,7 +132,7 @@ def solid_scene(
 
 
 def bearing_balls(spec: MachineSpec, values: Mapping[str, Mapping[str, Array]]) -> tuple[Sphere, ...]:
-    """Every ball of every bearing; rollers are shown as balls of their diameter.
+    """Every ball and roller of every bearing.
 
     Parameters
     ----------
@@ -143,7 +143,9 @@ def bearing_balls(spec: MachineSpec, values: Mapping[str, Mapping[str, Array]]) 
     for group, bearing in spec.bearings:
         for row in element_rows(bearing, spec.bearing_types[group.bearing_type]):
             found += [
-                Sphere(np.array(place), 0.5 * row.ball_diameter, values.get(bearing.name, {}))
+                Sphere(
+                    np.array(place), 0.5 * row.ball_diameter, values.get(bearing.name, {}), length=row.length
+                )
                 for place in row.centres
             ]
     return tuple(found)

@@ -134,11 +134,11 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
         Rectangle((0, 0), 1, 1, color=BALLS),
         Rectangle((0, 0), 1, 1, color=kinds["standing"]),
     ]
-    _legend(figure, handles, ["turning parts", "balls", "standing parts"])
+    _legend(figure, handles, ["turning parts", result.spec.rolling_elements, "standing parts"])
     set_title(
         figure,
         "Radial profiles through the bearings",
-        "At θ = 0, middle of each bearing; steps are joints (seats) and the ball contacts, gaps are coolant.",
+        "At θ = 0, middle of each bearing; steps are joints (seats) and rolling contacts, gaps are coolant.",
     )
     return figure
 
@@ -159,7 +159,7 @@ def _legend(figure: Figure, handles: list[object], texts: list[str]) -> None:
 
 @styled
 def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
-    """Temperature along the machine: shaft surface, housing bore and outside, raceways and balls."""
+    """Temperature along the machine: shaft surface, housing bore and outside, raceways, balls or rollers."""
     figure = new_figure(740.0)
     axes = pixel_axes(figure, 96.0, 150.0, 1480.0, 500.0)
     mesh = result.mesh
@@ -180,7 +180,7 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
         texts.append(text)
     for name, colour, text in (
         ("temperature_inner", INNER, "inner raceway"),
-        ("temperature_ball", BALLS, "balls"),
+        ("temperature_ball", BALLS, result.spec.rolling_elements),
         ("temperature_outer", OUTER, "outer raceway"),
     ):
         if not result.bearings:
@@ -230,5 +230,6 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
         columnspacing=1.2,
         handlelength=2.2,
     )
-    set_title(figure, "Axial profiles", "Surfaces at θ = 180°; raceways and balls as means of each bearing.")
+    races = "; raceways and rolling elements as means of each bearing" if result.bearings else ""
+    set_title(figure, "Axial profiles", f"Surfaces at θ = 180°{races}.")
     return figure

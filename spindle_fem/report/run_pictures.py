@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.report.drawn_surfaces import (
@@ -19,7 +18,6 @@ from spindle_fem.report.drawn_surfaces import (
     exposed_triangles,
     facet_edges,
     facet_triangles,
-    select_triangles,
     sharp_edges,
 )
 from spindle_fem.report.figure_style import (
@@ -49,21 +47,12 @@ def _kept_points(result: ThermalResult, section: MeridianSection) -> NDArray[np.
 
 
 def _half_of_balls(result: ThermalResult) -> TriangleSet:
-    spec = result.spec
-    balls = ball_triangles(
-        spec, {name: item.temperature_ball - ZERO_CELSIUS_K for name, item in result.bearings.items()}
-    )
     # Whole balls: those with their centre on the kept side, and the ones that the cut goes through.
-    triangles_a_ball = len(balls.triangles) // max(
-        1,
-        sum(
-            row.ball_count
-            for group, bearing in spec.bearings
-            for row in element_rows(bearing, spec.bearing_types[group.bearing_type])
-        ),
+    return ball_triangles(
+        result.spec,
+        {name: item.temperature_ball - ZERO_CELSIUS_K for name, item in result.bearings.items()},
+        lambda centres: centres[:, 0] > -1.0e-6,
     )
-    centres = balls.points[balls.triangles].mean(axis=1).reshape(-1, max(triangles_a_ball, 1), 3).mean(axis=1)
-    return select_triangles(balls, np.repeat(centres[:, 0] > -1.0e-6, triangles_a_ball))
 
 
 def _celsius(shape: TriangleSet) -> TriangleSet:
@@ -128,11 +117,10 @@ def temperature_cut(
     hottest = result.temperature_maximum - ZERO_CELSIUS_K
     place = result.temperature_maximum_at * 1.0e3
     labels, removed = probe_labels(result.spec, result.probes)
-    kinds = {result.spec.bearing_types[group.bearing_type].element_word for group, _ in result.spec.bearings}
-    elements = " and ".join(f"{word}s" for word in sorted(kinds))
     notes = (
         f"Near half removed. Warmest place of the solid {hottest:.1f} °C "
-        f"at r = {np.hypot(*place[:2]):.0f} mm, z = {place[2]:.0f} mm; {elements} at their own temperature."
+        f"at r = {np.hypot(*place[:2]):.0f} mm, z = {place[2]:.0f} mm; "
+        f"{result.spec.rolling_elements} at their own temperature."
     )
     return picture_figure(
         renderer.render(view),

@@ -96,8 +96,8 @@ _LIMITS = (
     "Turning parts have one temperature all round in the time mean; standing parts are three-dimensional.",
     "Joints have the constant conductance of the definition, the least certain input of such a model; "
     "seats that close or open with temperature are not followed unless the definition says so.",
-    "The balls of a bearing are one body with one temperature; they meet the races through the contact "
-    "resistances of the definition.",
+    "The balls or rollers of a bearing are one body with one temperature; they meet the races through the "
+    "contact resistances of the definition.",
     "The film coefficient of the channel is a correlation; its low and high value show what the sources "
     "leave open. Pipes, filter and pump outside the machine are not part of the pressure drop.",
     "Heat of seals, drive, churning and cutting is included only where the definition names it.",
@@ -281,7 +281,7 @@ def caption_of(stem: str) -> str:
         return CAPTIONS[stem]
     kind, _, name = stem.partition("_")
     if kind == "bearings" and name:
-        return f"Bearing set {name}: where its heat goes, and the temperatures of races and balls."
+        return f"Bearing set {name}: where its heat goes, and the temperatures of races and rolling elements."
     return stem.replace("_", " ").capitalize() + "."
 
 

@@ -68,7 +68,7 @@ def headline(summary: Mapping[str, Any]) -> list[dict[str, str]]:
         ball = max(bearings, key=lambda name: _or_low(bearings[name]["temperature_ball_degC"]))
         rings = max(bearings, key=lambda name: _or_low(bearings[name]["ring_difference_K"]))
         items += [
-            (f"{number(bearings[ball]['temperature_ball_degC'])} °C", f"warmest balls, {ball}"),
+            (f"{number(bearings[ball]['temperature_ball_degC'])} °C", f"warmest rolling elements, {ball}"),
             (
                 f"{number(bearings[rings]['ring_difference_K'])} K",
                 f"largest inner minus outer raceway temperature, {rings}",
@@ -105,7 +105,7 @@ def bearing_table(summary: Mapping[str, Any]) -> Table:
     columns = (
         ("heat_W", "heat / W", 1),
         ("temperature_inner_degC", "inner race / °C", 1),
-        ("temperature_ball_degC", "balls / °C", 1),
+        ("temperature_ball_degC", "rolling elements / °C", 1),
         ("temperature_outer_degC", "outer race / °C", 1),
         ("ring_difference_K", "inner − outer / K", 1),
         ("contact_angle_inner_deg", "contact angle inner / °", 1),

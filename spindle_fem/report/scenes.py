@@ -7,7 +7,7 @@ One plotter serves all views. A view is an image with its projection
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
@@ -21,12 +21,13 @@ from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.machine.geometry.part_shapes import BallRowGeometry
 from spindle_fem.report.drawn_surfaces import SegmentSet, TriangleSet
 from spindle_fem.report.figure_style import ColourBar
 
 EDGE_COLOUR = "#1b2127"
 LINE_LIFT = 3.0e-4
+# Of balls, and of rollers.
+SUBDIVISIONS, SIDES = 3, 48
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,51 +263,72 @@ class SceneRenderer:
             plotter.add_light(light)
 
 
-def _cylinder(
-    sphere: NDArray[np.float64], row: BallRowGeometry
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points of a unit sphere pushed out to a roller, and their normals."""
-    across, along = np.hypot(sphere[:, 0], sphere[:, 1]), np.abs(sphere[:, 2])
-    size = np.array([row.ball_diameter, row.ball_diameter, row.length])
-    points = 0.5 * size * sphere / np.maximum(across, along)[:, None]
-    wall = (across >= along)[:, None]
-    normals = sphere * np.where(wall, [1.0, 1.0, 0.0], [0.0, 0.0, 1.0])
-    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+def _unit_sphere() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    sphere = pv.Icosphere(radius=1.0, nsub=SUBDIVISIONS)
+    points = np.asarray(sphere.points, dtype=np.float64)
+    return points, points, np.asarray(sphere.faces).reshape(-1, 4)[:, 1:].astype(np.int64)
 
 
-def ball_triangles(spec: MachineSpec, values: dict[str, float], subdivisions: int = 3) -> TriangleSet:
+def _unit_cylinder() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Points, normals and triangles of a cylinder of radius 1 from z = -1 to 1, its rims sharp."""
+    turn = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(SIDES)])
+    axis = np.array([0.0, 0.0, 1.0])
+    # Both rings of the wall, then both ends: each point as often as it has normals.
+    points = np.concatenate([ring - axis, ring + axis, ring - axis, ring + axis])
+    normals = np.concatenate([ring, ring, np.tile(-axis, (SIDES, 1)), np.tile(axis, (SIDES, 1))])
+    first = np.arange(SIDES)
+    after = (first + 1) % SIDES
+    wall = [(first, after, after + SIDES), (first, after + SIDES, first + SIDES)]
+    inner = np.arange(1, SIDES - 1)
+    start = np.full_like(inner, 2 * SIDES)
+    near = (start, start + inner + 1, start + inner)
+    far = (start + SIDES, start + SIDES + inner, start + SIDES + inner + 1)
+    return points, normals, np.concatenate([np.column_stack(own) for own in (*wall, near, far)])
+
+
+def ball_triangles(
+    spec: MachineSpec,
+    values: dict[str, float],
+    shown: Callable[[NDArray[np.float64]], NDArray[np.bool_]] = lambda centres: np.ones(len(centres), bool),
+) -> TriangleSet:
     """Every ball as a sphere and every roller as a cylinder, ``values`` by bearing at their points.
 
-    ``label`` counts the bearings; the first ball stands at θ = 0.
+    ``label`` counts the bearings; the first ball stands at θ = 0. ``shown`` tells from their
+    centres (n, 3) which are wanted.
     """
-    sphere = pv.Icosphere(radius=1.0, nsub=subdivisions)
-    points = np.asarray(sphere.points, dtype=np.float64)
-    faces = np.asarray(sphere.faces).reshape(-1, 4)[:, 1:].astype(np.int64)
-    all_points, all_normals, all_values, triangles, labels = [], [], [], [], []
+    found = [
+        TriangleSet(
+            np.zeros((0, 3)),
+            np.zeros((0, 3), np.int64),
+            np.zeros((0, 1)),
+            np.zeros(0, np.int32),
+            np.zeros((0, 3)),
+        )
+    ]
     first = 0
     for number, (group, bearing) in enumerate(spec.bearings):
         for row in element_rows(bearing, spec.bearing_types[group.bearing_type]):
-            shape, normals = 0.5 * row.ball_diameter * points, points
-            if row.length:
-                shape, normals = _cylinder(points, row)
-            count = row.ball_count
-            all_points.append((np.array(row.centres)[:, None, :] + shape).reshape(-1, 3))
-            all_normals.append(np.tile(normals, (count, 1)))
-            all_values.append(np.full((count * len(points), 1), values[bearing.name]))
-            offset = first + len(points) * np.arange(count)[:, None, None]
-            triangles.append((faces + offset).reshape(-1, 3))
-            labels.append(np.full(count * len(faces), number, dtype=np.int32))
-            first += count * len(points)
-    if not all_points:
-        return TriangleSet(
-            np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 1)), np.zeros(0, np.int32)
-        )
+            points, normals, faces = _unit_cylinder() if row.length else _unit_sphere()
+            size = 0.5 * np.array([row.ball_diameter, row.ball_diameter, row.length or row.ball_diameter])
+            centres = np.array(row.centres)
+            centres = centres[shown(centres)]
+            offset = first + len(points) * np.arange(len(centres))[:, None, None]
+            found.append(
+                TriangleSet(
+                    (centres[:, None, :] + size * points).reshape(-1, 3),
+                    (faces + offset).reshape(-1, 3),
+                    np.full((len(centres) * len(points), 1), values[bearing.name]),
+                    np.full(len(centres) * len(faces), number, dtype=np.int32),
+                    np.tile(normals, (len(centres), 1)),
+                )
+            )
+            first += len(centres) * len(points)
     return TriangleSet(
-        np.concatenate(all_points),
-        np.concatenate(triangles),
-        np.concatenate(all_values),
-        np.concatenate(labels),
-        np.concatenate(all_normals),
+        *(
+            np.concatenate([getattr(item, name) for item in found])
+            for name in ("points", "triangles", "values", "label", "normals")
+        )
     )
 
 

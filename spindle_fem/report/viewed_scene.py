@@ -57,7 +57,7 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Sphere:
-    """A ball of a bearing or, with a name, a probe or a node.
+    """A ball or roller of a bearing or, with a name, a probe or a node.
 
     Attributes
     ----------
@@ -65,12 +65,15 @@ class Sphere:
     radius : float, [m]
     values : mapping of str to (t,) ndarray
         By name of the layer, a value a time; NaN where none was read. A layer that is missing leaves it grey.
+    length : float, [m]
+        Along the axis, of a roller; 0 for a sphere.
     """
 
     place: Array
     radius: float
     values: Mapping[str, Array]
     name: str = ""
+    length: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +239,9 @@ class Scene:
             _rounded(item.values[layer.name], 3) if layer.name in item.values else None
             for layer in self.layers
         ]
-        return {"name": item.name, "place": _rounded(item.place, 5), "radius": item.radius, "values": values}
+        place = _rounded(item.place, 5)
+        found = {"name": item.name, "place": place, "radius": item.radius, "values": values}
+        return found | {"length": item.length} if item.length else found
 
 
 def _quantised(share: Array) -> NDArray[np.uint16]:

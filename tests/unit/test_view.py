@@ -11,9 +11,12 @@ import pytest
 
 from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.commands.view_command import view_folder
+from spindle_fem.definition.drawn_tables import element_rows
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError
 from spindle_fem.model.elastic.deformed_shape import BodyShape
 from spindle_fem.report.machine_scene import Solid, bearing_balls, probes_of, solid_scene, spread_out
+from spindle_fem.report.scenes import ball_triangles
 from spindle_fem.report.viewed_scene import Layer, Scene, Sphere
 from spindle_fem.results.field_series import FieldSeries, read_series
 from spindle_fem.results.growth_file import growth_dataset, shift_of_points
@@ -133,6 +136,26 @@ def test_balls_and_probes_stand_where_the_definition_has_them(result):
     probe = next(item for item in result.spec.probe if item.kind == "point")
     (shown,) = probes_of(result.spec, scene, {probe.name: {"temperature": np.array([30.0])}})
     assert np.hypot(*shown.place[:2]) == pytest.approx(probe.r)
+
+
+def test_rollers_are_cylinders():
+    spec = load_machine("belt_lathe")
+    assert spec.rolling_elements == "balls and rollers"
+    (group, bearing), *_ = spec.bearings
+    rows = element_rows(bearing, spec.bearing_types[group.bearing_type])
+    shown = bearing_balls(spec, {})
+    assert {item.length for item in shown} >= {0.0, rows[0].length}
+    values = {bearing.name: 30.0 for _, bearing in spec.bearings}
+    shape = ball_triangles(spec, values)
+    corners = shape.points[shape.triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.all(np.einsum("ij,ij->i", across, shape.normals[shape.triangles].mean(axis=1)) > 0.0)
+    volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    row = rows[0]
+    wanted = len(rows) * row.ball_count * 0.25 * np.pi * row.ball_diameter**2 * row.length
+    assert volumes[shape.label == 0].sum() == pytest.approx(wanted, rel=5e-3)
+    half = ball_triangles(spec, values, lambda centres: centres[:, 0] > 0.0)
+    assert 0.4 < len(half.triangles) / len(shape.triangles) < 0.6
 
 
 def test_a_chain_of_nodes_is_drawn_as_long_as_it_is():

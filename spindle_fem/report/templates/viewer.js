@@ -20,10 +20,10 @@
   // ---------------------------------------------------------------- what the graphics processor runs
   const VERTEX = `#version 300 es
     in vec3 place; in vec3 normal; in vec3 moved; in float value;
-    uniform mat3 turn; uniform vec3 centre; uniform vec3 zoom; uniform vec2 shift; uniform vec4 sphere; uniform float stretch;
+    uniform mat3 turn; uniform vec3 centre; uniform vec3 zoom; uniform vec2 shift; uniform vec4 sphere; uniform float along; uniform float stretch;
     out vec3 world; out vec3 facing; out float shade;
     void main() {
-      world = sphere.w * place + sphere.xyz; facing = turn * normal; shade = value;
+      world = sphere.w * place * vec3(1.0, 1.0, along) + sphere.xyz; facing = turn * normal; shade = value;
       vec3 seen = turn * (world + stretch * moved - centre);
       gl_Position = vec4(seen.xy * zoom.xy + shift, -seen.z * zoom.z, 1.0);
     }`;
@@ -57,7 +57,7 @@
   } catch (error) { giveUp("The interactive view did not start (" + error.message + ")."); return; }
   gl.useProgram(program);
   const at = {};
-  ["turn", "centre", "zoom", "shift", "sphere", "stretch", "colours", "clip", "plane", "flatLight", "mode", "part", "plain", "byPart"].forEach(function (n) { at[n] = gl.getUniformLocation(program, n); });
+  ["turn", "centre", "zoom", "shift", "sphere", "along", "stretch", "colours", "clip", "plane", "flatLight", "mode", "part", "plain", "byPart"].forEach(function (n) { at[n] = gl.getUniformLocation(program, n); });
   const slot = {};
   ["place", "normal", "moved", "value"].forEach(function (n) { slot[n] = gl.getAttribLocation(program, n); });
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
@@ -125,7 +125,7 @@
   const state = { yaw: flat ? 0 : -0.423, pitch: flat ? 0 : 0.255, zoom: 1, x: 0, y: 0, open: !flat, hidden: new Set(), balls: true, places: true, layer: 0, time: 0, stretch: 0, around: 0, along: 0, depth: 0 };
   const start = Object.assign({}, state);
   const centre = data.low.map(function (v, k) { return v + data.size[k] / 2; });
-  const solid = shape(), cut = shape(), ball = shape(), tube = shape();
+  const solid = shape(), cut = shape(), ball = shape(), roller = shape(), tube = shape();
   let asked = false, stale = true;
   function plane() {
     // Kept is what lies on the side of the normal; at 0, 0, 0 the half with x above the axis.
@@ -141,6 +141,10 @@
     return [right[0], up[0], out[0], right[1], up[1], out[1], right[2], up[2], out[2]];
   }
   function current() { const frames = mesh.layers[state.layer]; return frames ? frames[Math.min(state.time, frames.length - 1)] : null; }
+  function rolling() {
+    const rollers = data.balls.filter(function (s) { return s.length; }).length;
+    return rollers === data.balls.length ? "rollers" : rollers ? "balls and rollers" : "balls";
+  }
   function valueOf(sphere) { const v = sphere.values[state.layer]; return v ? v[Math.min(state.time, v.length - 1)] : null; }
 
   // ---------------------------------------------------------------- the cut: marching tetrahedra
@@ -197,7 +201,23 @@
     for (let i = 0; i <= rings; i++) for (let j = 0; j < sides; j++) { const a = Math.PI * i / rings, c = 2 * Math.PI * j / sides; unit.push(Math.sin(a) * Math.cos(c), Math.sin(a) * Math.sin(c), Math.cos(a)); }
     for (let i = 0; i < rings; i++) for (let j = 0; j < sides; j++) { const k = (j + 1) % sides, u = i * sides, v = u + sides; faces.push(u + j, v + j, v + k, u + j, v + k, u + k); }
     fill(ball, { place: new Float32Array(unit), normal: new Float32Array(unit) }, new Uint32Array(faces));
+    cylinder();
     tubes();
+  }
+  function cylinder() {
+    // A wall and two ends, each with its own normals: the rims are sharp.
+    const sides = 32, place = [], normal = [], index = [];
+    for (let ring = 0; ring < 4; ring++) for (let j = 0; j < sides; j++) {
+      const c = 2 * Math.PI * j / sides, z = ring % 2 ? 1 : -1;
+      place.push(Math.cos(c), Math.sin(c), z);
+      if (ring < 2) normal.push(Math.cos(c), Math.sin(c), 0); else normal.push(0, 0, z);
+    }
+    for (let j = 0; j < sides; j++) {
+      const k = (j + 1) % sides;
+      index.push(j, k, k + sides, j, k + sides, j + sides);
+      for (let end = 2; end < 4; end++) if (j && k) index.push(end * sides, end * sides + j, end * sides + k);
+    }
+    fill(roller, { place: new Float32Array(place), normal: new Float32Array(normal) }, new Uint32Array(index));
   }
   function tubes() {
     // A line as six sides, thin against the places that it joins.
@@ -241,18 +261,20 @@
   }
   function kept(p, place) { return !state.open || p[0] * place[0] + p[1] * place[1] + p[2] * place[2] > p[3] - 1e-6; }
   function spheres(list, part, visible, scale) {
-    gl.bindVertexArray(ball.array); gl.disableVertexAttribArray(slot.moved); gl.vertexAttrib3f(slot.moved, 0, 0, 0);
     gl.uniform1i(at.clip, 0); gl.uniform1i(at.flatLight, 0);
     list.forEach(function (s, i) {
       if (!visible(s)) return;
+      const drawn = s.length ? roller : ball;
+      gl.bindVertexArray(drawn.array); gl.disableVertexAttribArray(slot.moved); gl.vertexAttrib3f(slot.moved, 0, 0, 0);
+      gl.uniform1f(at.along, s.length ? 0.5 * s.length / s.radius : 1);
       const value = valueOf(s);
       gl.uniform1i(at.byPart, value === null ? 1 : 0); gl.uniform3f(at.plain, 0.55, 0.58, 0.62);
       gl.vertexAttrib1f(slot.value, value === null ? 0 : scaled(data.layers[state.layer], value));
       gl.uniform4f(at.sphere, s.place[0], s.place[1], s.place[2], s.radius * (scale || 1));
       gl.uniform1f(at.part, part);
-      gl.drawElements(gl.TRIANGLES, ball.count, gl.UNSIGNED_INT, 0);
+      gl.drawElements(gl.TRIANGLES, drawn.count, gl.UNSIGNED_INT, 0);
     });
-    gl.uniform4f(at.sphere, 0, 0, 0, 1);
+    gl.uniform4f(at.sphere, 0, 0, 0, 1); gl.uniform1f(at.along, 1);
   }
   function draw(mode) {
     if (stale) refresh();
@@ -263,7 +285,7 @@
     const p = plane(), plain = current() === null;
     gl.bindTexture(gl.TEXTURE_2D, textures[state.layer]);
     gl.uniformMatrix3fv(at.turn, false, view.turn); gl.uniform3fv(at.centre, centre); gl.uniform3fv(at.zoom, view.zoom);
-    gl.uniform2f(at.shift, state.x, state.y); gl.uniform4f(at.sphere, 0, 0, 0, 1); gl.uniform1f(at.stretch, state.stretch);
+    gl.uniform2f(at.shift, state.x, state.y); gl.uniform4f(at.sphere, 0, 0, 0, 1); gl.uniform1f(at.along, 1); gl.uniform1f(at.stretch, state.stretch);
     gl.uniform4fv(at.plane, p); gl.uniform1i(at.mode, mode); gl.uniform1i(at.byPart, plain ? 1 : 0); gl.uniform3f(at.plain, 0.8, 0.82, 0.85);
     data.parts.forEach(function (part, i) {
       if (state.hidden.has(i)) return;
@@ -350,7 +372,7 @@
     if (near) { const v = valueOf(near); readout.textContent = near.name + (v === null ? "" : ": " + told(v, 2) + " " + layer.unit); return; }
     const pixel = pixelAt(event, 1).pixel;
     if (!pixel[3] || (current() === null && pixel[2] < 252)) { readout.textContent = TOLD; return; }
-    const name = pixel[2] === 254 ? "balls" : (data.parts[pixel[2]] || { name: "" }).name;
+    const name = pixel[2] === 254 ? rolling() : (data.parts[pixel[2]] || { name: "" }).name;
     readout.textContent = name + ": " + told(restored(layer, (pixel[0] * 256 + pixel[1]) / 65535), layer.difference ? 2 : 1) + " " + layer.unit;
   }
   function placeNear(event) {
@@ -573,7 +595,7 @@
   }
   function partControls() {
     const list = find(".view3d-parts");
-    data.parts.concat(data.balls.length ? [{ name: "balls" }] : []).forEach(function (p, i) {
+    data.parts.concat(data.balls.length ? [{ name: rolling() }] : []).forEach(function (p, i) {
       const label = document.createElement("label"), box = document.createElement("input");
       box.type = "checkbox"; box.checked = true;
       box.addEventListener("change", function () {
