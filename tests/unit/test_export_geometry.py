@@ -145,7 +145,7 @@ def test_the_range_holds_a_recording(fast, spec, monkeypatch):
     monkeypatch.setattr(
         exported, "fast_model_for", lambda spec, recordings, **options: asked.append(recordings)
     )
-    monkeypatch.setattr(exported, "geometry_state_space", lambda fast, name, highest: highest)
+    monkeypatch.setattr(exported, "geometry_state_space", lambda fast, name, highest, effects: highest)
     plain = exported.machine_state_space("recorded_spindle")
     faster = spec.operation.model_copy(update={"speed": 2.0 * plain})
     recording = at_the_defined_point(spec.model_copy(update={"operation": faster}))

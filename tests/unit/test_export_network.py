@@ -12,7 +12,7 @@ import pytest
 
 from spindle_fem.commands.export_command import export_machine
 from spindle_fem.definition.network_load import load_network_machine
-from spindle_fem.errors import BadInputError, SpecError
+from spindle_fem.errors import BadInputError
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_inputs import fast_network
@@ -185,8 +185,9 @@ def test_refuses_other_kinds_of_file_and_effects(machine, tmp_path):
     with pytest.raises(BadInputError, match="xls"):
         export_machine(machine, tmp_path / "m.xls")
     path = tmp_path / "with_effect.toml"
-    path.write_text(MACHINE + '[[effect]]\neffect = "radiation"\ncomponent = "housing"\n')
-    with pytest.raises(SpecError, match="radiation"):
+    entry = '[[effect]]\neffect = "sensor_lag"\ncomponent = "housing"\n'
+    path.write_text(MACHINE + entry + 'parameters = {time_constant = "60 s"}\n')
+    with pytest.raises(BadInputError, match=r"sensor_lag @ housing .*read before"):
         export_machine(path, tmp_path / "m.npz")
     assert not (tmp_path / "m.npz").exists()
 

@@ -82,7 +82,7 @@ def run_operators(
     machine = {name: value for name, value in parameters.items() if name not in owned}
     factors = fast.table.factors(machine)
     asked = tuple(name for name in derivatives if name not in owned)
-    changes = _Changes(fast, terms)
+    changes = SteadyChanges(fast, terms)
     parts = [changes.parts(point, parameters) for point in points]
     scaled = [changes.together(own) for own in parts]
     added = changes.conductances(parameters)
@@ -185,7 +185,7 @@ class _SteadyChange:
     @classmethod
     def of(
         cls,
-        changes: _Changes,
+        changes: SteadyChanges,
         parts: Sequence[Sequence[dict[str, float]]],
         points: Sequence[OperatingPoint],
         parameters: Mapping[str, float],
@@ -229,7 +229,7 @@ def _with_change(
     )
 
 
-class _Changes:
+class SteadyChanges:
     """Steady changes of all terms together."""
 
     def __init__(self, fast: FastModel, terms: Sequence[Term]) -> None:
@@ -279,9 +279,11 @@ class _Changes:
         return found
 
     def capacities(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Heat capacity that terms add to places, J/K."""
         return self._at_places("place_capacity", values)
 
     def conductances(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Conductance that terms add from places to the ambient, W/K."""
         return self._at_places("place_conductance", values)
 
     def _at_places(self, method: str, values: Mapping[str, float]) -> dict[str, float]:

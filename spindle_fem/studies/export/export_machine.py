@@ -7,13 +7,15 @@ from pathlib import Path
 
 from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.load import find_machine, load_machine, read_definition
-from spindle_fem.errors import SpecError
+from spindle_fem.machine.view.defined_point import at_the_defined_point
+from spindle_fem.model.lumped.network_view import day_of_a_network
 from spindle_fem.model.lumped.written_network import build_network
+from spindle_fem.model.reduced.defined_effects import effects_on
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for
 from spindle_fem.recordings.align import Recording
 from spindle_fem.studies.export.geometry_export import geometry_state_space
-from spindle_fem.studies.export.network_export import network_state_space
+from spindle_fem.studies.export.network_export import network_inputs, network_state_space
 from spindle_fem.studies.export.state_space import StateSpace
 
 Progress = Callable[[str], None]
@@ -43,14 +45,13 @@ def machine_state_space(
     is_network = network_spec.is_network_machine(read_definition(find_machine(machine)))
     load = network_spec.load_network_machine if is_network else load_machine
     spec = load(machine, overrides)
-    if spec.effects:
-        raise SpecError(
-            "effect",
-            f'"{spec.effects[0].effect}" follows what only simulate works out.',
-            "Export the machine without its [[effect]] tables.",
-        )
     if is_network:
-        return network_state_space(fast_network(build_network(spec.network), spec), spec.name)
+        fast = fast_network(build_network(spec.network), spec)
+        turning = [item.name for item in network_inputs(fast.network) if item.magnitude]
+        day = day_of_a_network(fast.network, turning)
+        return network_state_space(fast, spec.name, effects_on(spec.effects, fast, day))
     fast = fast_model_for(spec, recordings, as_given=True, progress=progress)
     progress("tables over speed and coolant")
-    return geometry_state_space(fast, spec.name, options_for(spec, recordings).highest_speed_of(spec))
+    effects = effects_on(spec.effects, fast, at_the_defined_point(spec))
+    highest = options_for(spec, recordings).highest_speed_of(spec)
+    return geometry_state_space(fast, spec.name, highest, effects)

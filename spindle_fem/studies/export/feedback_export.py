@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from spindle_fem.model.reduced.film_heat import FilmHeat
 from spindle_fem.operation.coefficients import film_coefficient, fluid_temperature, natural_reference
 from spindle_fem.operation.friction_map import CONDUCTANCES, FILM_TEMPERATURES, MOMENT
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.studies.export.effect_export import ExportedEffects
 from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -64,7 +66,9 @@ def film_heat_of(fast: FastModel) -> FilmHeat | None:
     return next((term for term in fast.inputs.extra_terms if isinstance(term, FilmHeat)), None)
 
 
-def feedback_tables(fast: FastModel, constant: str, highest: float) -> list[FeedbackTable]:
+def feedback_tables(
+    fast: FastModel, constant: str, highest: float, effects: ExportedEffects
+) -> list[FeedbackTable]:
     """Every table of a fast model's own terms.
 
     Parameters
@@ -73,16 +77,18 @@ def feedback_tables(fast: FastModel, constant: str, highest: float) -> list[Feed
         Load that is 1.
     highest : float, [rad/s]
     """
-    found = [] if film_heat_of(fast) is None else _bearing_tables(fast, constant, highest)
+    found = [] if film_heat_of(fast) is None else _bearing_tables(fast, constant, highest, effects.factors)
     return found + [
-        _natural_table(fast, film, surface)
+        _natural_table(fast, film, surface, effects)
         for film in fast.spec.film
         if isinstance(film, NaturalFilm)
         for surface in film.surface
     ]
 
 
-def _bearing_tables(fast: FastModel, constant: str, highest: float) -> list[FeedbackTable]:
+def _bearing_tables(
+    fast: FastModel, constant: str, highest: float, scaled: Mapping[str, float]
+) -> list[FeedbackTable]:
     """Friction heat and what ball rows conduct beyond films at 30 °C, of every bearing."""
     term, names = film_heat_of(fast), fast.bearings
     known = term.friction_map
@@ -130,7 +136,7 @@ def _bearing_tables(fast: FastModel, constant: str, highest: float) -> list[Feed
     inputs, axes = ("speed", "thrust"), (kelvin - ZERO_CELSIUS_K, speeds, loads)
     if loads.size == 1:
         values, inputs, axes = values[:, :, :, 0], inputs[:1], axes[:2]
-    shares, _ = fast.inputs.friction_loads(np.eye(len(names)), {})
+    shares, _ = fast.inputs.friction_loads(np.eye(len(names)), scaled)
     none = np.zeros(fast.model.size)
     found = []
     for row, name in enumerate(names):
@@ -154,23 +160,27 @@ def _bearing_tables(fast: FastModel, constant: str, highest: float) -> list[Feed
     return found
 
 
-def _natural_table(fast: FastModel, film: NaturalFilm, surface: str) -> FeedbackTable:
+def _natural_table(
+    fast: FastModel, film: NaturalFilm, surface: str, effects: ExportedEffects
+) -> FeedbackTable:
     """A natural film beyond what the operators hold, over the wall's rise and its surroundings."""
     coefficient = f"film.{surface}"
     fluid = fast.inputs.fluid_input(coefficient)
     reference = natural_reference(fast.spec, film)
+    scale = fast.table.scale(coefficient, effects.factors)
+    scale *= effects.changes(OperatingPoint.of(fast.spec)).get(coefficient, 1.0)
 
     def more(rise: float, surroundings: float) -> Array:
         kelvin = fluid_temperature(film, surroundings + ZERO_CELSIUS_K)
         point = OperatingPoint(0.0, 0.0, kelvin, kelvin, 0.0)
-        return film_coefficient(film, point, np.array([kelvin + rise]), kelvin)[0] - reference
+        return scale * (film_coefficient(film, point, np.array([kelvin + rise]), kelvin)[0] - reference)
 
     usual = np.mean(SURROUNDINGS_RANGE)
-    rises = refined_axis(lambda rise: more(rise, usual) + reference, *WALL_RANGE, TOLERANCE)
+    rises = refined_axis(lambda rise: more(rise, usual) + scale * reference, *WALL_RANGE, TOLERANCE)
     axes, inputs = (rises,), ()
     if fluid == "ambient":
         low, high = SURROUNDINGS_RANGE
-        axes = (rises, refined_axis(lambda air: more(10.0, air) + reference, low, high, TOLERANCE))
+        axes = (rises, refined_axis(lambda air: more(10.0, air) + scale * reference, low, high, TOLERANCE))
         inputs = ("ambient",)
     values = values_on(more if inputs else lambda rise: more(rise, 0.0), axes)
     vectors, spectrum = fast.directions.of(coefficient)

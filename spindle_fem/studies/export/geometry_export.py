@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.effects.framework.term import CHANNEL_FILM
+from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.class_operators import NO_CHANGES
 from spindle_fem.model.reduced.coolant_maps import CoolantMaps, coolant_maps
+from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD, WarmedPoint
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.source_terms import SOURCE_PREFIX
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.standard_inputs import standard_inputs
+from spindle_fem.studies.export.effect_export import ExportedEffects, heat_tables
 from spindle_fem.studies.export.feedback_export import (
     SURROUNDINGS_RANGE,
     FeedbackTable,
@@ -28,6 +30,7 @@ from spindle_fem.studies.export.interpolation_axes import refined_axis, values_o
 from spindle_fem.studies.export.source_export import source_loads
 from spindle_fem.studies.export.state_space import (
     CELSIUS,
+    CONSTANT,
     TR_BDF2,
     ModelInput,
     PowerLoad,
@@ -52,8 +55,8 @@ THRUST_SHARE = 2.0
 TOLERANCE = 5e-5
 # Of the coolant's operators, left out with the directions in which they hardly vary.
 LEFT_OUT = 1e-7
-# A load that is 1, for heats that follow temperatures.
-CONSTANT = "constant"
+# Points of the coolant's table.
+MOST_POINTS = 3000
 PARTS = ("conduction", "load", "output", "feedthrough")
 
 
@@ -78,7 +81,9 @@ class OperatorTable:
     parts: dict[str, Array]
 
 
-def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> StateSpace:
+def geometry_state_space(
+    fast: FastModel, name: str, highest_speed: float, effects: ActiveEffects = NO_EFFECTS
+) -> StateSpace:
     """State space of a fast model.
 
     A film that follows the channel's wall is no table over inputs: it is taken with the wall as far above
@@ -89,15 +94,23 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
     name : str
         Of the machine.
     highest_speed : float, [rad/s]
+    effects : ActiveEffects
+        Of its definition.
+
+    Raises
+    ------
+    FaultsError
+        Effects that an exported model cannot hold.
     """
-    space, modes = _state_space(fast, name, highest_speed, None)
+    held = ExportedEffects(fast, effects)
+    space, modes = _state_space(fast, name, highest_speed, held, None)
     if fast.channel is None or not fast.channel.film_follows_wall:
         return space
     model = space.model()
     model.settle({})
     wall = fast.channel.walls((modes @ model.state)[None])[0] + ZERO_CELSIUS_K
     inlet = OperatingPoint.of(fast.spec).coolant_inlet_temperature
-    space, _ = _state_space(fast, name, highest_speed, wall - inlet)
+    space, _ = _state_space(fast, name, highest_speed, held, wall - inlet)
     space.header["notes"].append(
         "the coolant's film is that of a wall as far above the inlet as at the definition's operating point"
     )
@@ -105,7 +118,7 @@ def geometry_state_space(fast: FastModel, name: str, highest_speed: float) -> St
 
 
 def _state_space(
-    fast: FastModel, name: str, highest_speed: float, wall_rise: Array | None
+    fast: FastModel, name: str, highest_speed: float, effects: ExportedEffects, wall_rise: Array | None
 ) -> tuple[StateSpace, Array]:
     """State space, and the fast model's unknowns of its modes; ``wall_rise`` as :func:`_at_wall` has it."""
     spec = fast.spec
@@ -113,29 +126,36 @@ def _state_space(
     film_heat = film_heat_of(fast)
     inputs = _inputs(fast, highest_speed)
     sources = source_loads(spec, inputs)
+    effect_tables = heat_tables(effects, inputs)
     inputs += sources.inputs
     position = {item.name: number for number, item in enumerate(inputs)}
-    tables = {"speed": _speed_table(fast, nominal, highest_speed)}
+    tables = {"speed": _speed_table(fast, effects, nominal, highest_speed)}
     if fast.channel is not None:
-        tables["coolant"] = _coolant_table(fast, nominal, wall_rise)
+        tables["coolant"] = _coolant_table(fast, effects, nominal, wall_rise)
     tables = {key: table for key, table in tables.items() if table.values.shape[-1]}
     # Loads that are inputs or constants come first, those of tables behind.
     n_heat, n_load = len(fast.heat_places), len(fast.load_names)
     by_table = film_heat is None or not film_heat.bearings
     heats = range(n_heat) if by_table else ()
-    own = range(n_load, n_load + 1 + len(sources.powers) + len(sources.tables))
+    heat_over_inputs = [*sources.tables, *effect_tables]
+    own = range(n_load, n_load + 1 + len(sources.powers) + len(heat_over_inputs))
     order = [*range(n_heat, n_load), *own[: 1 + len(sources.powers)], *heats, *own[1 + len(sources.powers) :]]
     powers = [_fluid_load(fast, load, position) for load in fast.load_names[n_heat:]]
     powers += [PowerLoad(CONSTANT, "1", -1), *sources.powers]
     loads = {load.name: load.unit for load in powers}
     if by_table:
         loads |= {f"heat.{place}": "W" for place in fast.heat_places}
-    loads |= {table.load: "W" for table in sources.tables}
-    places = [*sources.places, *(table.place for table in sources.tables)]
+    loads |= {table.load: "W" for table in heat_over_inputs}
+    places = [*sources.places, *(table.place for table in heat_over_inputs)]
     # The constant load drives nothing by itself.
     warmed = np.array([np.zeros(fast.model.size), *(fast.model.place(place) for place in places)]).T
-    operators = fast.operators(_at_wall(nominal, wall_rise), {}, changes=_changes(fast, nominal))
-    storage = fast.storage({})
+    operators = fast.operators(
+        _at_wall(nominal, wall_rise),
+        effects.factors,
+        changes=_changes(fast, effects, nominal),
+        conductances=effects.conductances,
+    )
+    storage = fast.storage(effects.factors, effects.capacities)
     modes = modal_basis(storage, 0.5 * (operators.conduction + operators.conduction.T))
 
     def arrays_of(conduction: Array, load: Array, output: Array, feedthrough: Array) -> dict[str, Array]:
@@ -152,14 +172,13 @@ def _state_space(
 
     arrays = power_load_arrays(powers)
     arrays |= arrays_of(operators.conduction, operators.loads, operators.outputs, operators.output_inputs)
-    arrays["load"][:, [load.startswith(SOURCE_PREFIX) or load == CONSTANT for load in loads]] = (
-        modes.T @ warmed
-    )
+    entering = {CONSTANT, *(load.name for load in sources.powers), *(item.load for item in heat_over_inputs)}
+    arrays["load"][:, [load in entering for load in loads]] = modes.T @ warmed
     arrays["uniform"] = modes.T @ storage @ fast.model.one
     sensors = {item.name for item in spec.displacement_sensor}
     outputs = {channel: "um" if channel in sensors else CELSIUS for channel in fast.channels}
     header = header_of(name, TR_BDF2, LARGEST_STEP, inputs, outputs, loads)
-    header["notes"] += sources.notes
+    header["notes"] += [*sources.notes, *effects.notes]
 
     def add_table(key: str, kind: str, axes: tuple[Array, ...], numbers: list[int], values: Array) -> None:
         header[kind].append(key)
@@ -168,17 +187,21 @@ def _state_space(
         arrays.update({f"{key}.axis{number}": axis for number, axis in enumerate(axes)})
 
     if by_table:
-        heat_inputs, heat_axes, heat = _heat_table(fast, inputs)
+        heat_inputs, heat_axes, heat = _heat_table(fast, effects, inputs)
         add_table("heat", "load_tables", heat_axes, [position[item] for item in heat_inputs], heat)
-    for table in sources.tables:
+    for table in heat_over_inputs:
         add_table(
             table.key, "load_tables", table.axes, [position[item] for item in table.inputs], table.values
         )
     for key, table in tables.items():
         parts = arrays_of(*(table.parts[part] for part in PARTS))
+        for sensor, line in effects.sensors:
+            for part in ("output", "feedthrough"):
+                parts[part][:, fast.channels.index(sensor)] *= line.gain
         arrays |= {f"{key}.{part}": value for part, value in parts.items()}
         add_table(key, "operator_tables", table.axes, [position[item] for item in table.inputs], table.values)
-    followed = feedback_tables(fast, CONSTANT, highest_speed)
+    effects.read(fast.channels, list(loads), arrays["output"], arrays["feedthrough"])
+    followed = feedback_tables(fast, CONSTANT, highest_speed, effects)
     for number, table in enumerate(followed):
         numbers = [len(inputs) + number, *(position[item] for item in table.inputs)]
         add_table(f"follows{number}", "feedback_tables", table.axes, numbers, table.values)
@@ -213,10 +236,10 @@ def _feedback_arrays(tables: list[FeedbackTable], modes: Array, loads: list[str]
     }
 
 
-def _changes(fast: FastModel, point: OperatingPoint) -> Mapping[str, float]:
-    """Factors on coefficients at a point: ball rows whose contacts follow speed and thrust."""
+def _changes(fast: FastModel, effects: ExportedEffects, point: OperatingPoint) -> dict[str, float]:
+    """Factors on coefficients at a point: effects, and ball rows whose contacts follow speed and thrust."""
     film_heat = film_heat_of(fast)
-    return NO_CHANGES if film_heat is None else film_heat.operating_factor(point, {})
+    return effects.changes(point, NO_CHANGES if film_heat is None else film_heat.operating_factor(point, {}))
 
 
 def _inputs(fast: FastModel, highest_speed: float) -> list[ModelInput]:
@@ -271,7 +294,7 @@ def _fluid_load(fast: FastModel, name: str, position: dict[str, int]) -> PowerLo
 
 
 def _heat_table(
-    fast: FastModel, inputs: list[ModelInput]
+    fast: FastModel, effects: ExportedEffects, inputs: list[ModelInput]
 ) -> tuple[tuple[str, ...], tuple[Array, ...], Array]:
     """Heat of every place over speed, and over thrust where it follows that."""
     table = fast.spec.heat.table
@@ -280,20 +303,22 @@ def _heat_table(
     thrusts = np.array([thrust.low, thrust.high])
     grid = np.array(np.meshgrid(speeds, thrusts, indexing="ij")).reshape(2, -1).T
     rest = np.tile([thrust.default] * (len(STANDARD) - 2), (len(grid), 1))
-    loads, _ = fast.load_inputs(STANDARD, np.hstack((grid, rest)), {})
+    loads, _ = fast.load_inputs(STANDARD, np.hstack((grid, rest)), effects.factors)
     heat = loads[:, : len(fast.heat_places)].reshape(speeds.size, thrusts.size, -1)
     if any(table.thrust_coefficient.values()):
         return ("speed", "thrust"), (speeds, thrusts), heat
     return ("speed",), (speeds,), heat[:, 0]
 
 
-def _speed_table(fast: FastModel, nominal: OperatingPoint, highest: float) -> OperatorTable:
+def _speed_table(
+    fast: FastModel, effects: ExportedEffects, nominal: OperatingPoint, highest: float
+) -> OperatorTable:
     """Coefficients that follow the speed, ball rows also the thrust, each with its own matrices."""
     names = [name for name in fast.model.coefficient_names if name != CHANNEL_FILM]
 
     def at(speed: float, thrust: float = nominal.thrust) -> Array:
         point = replace(nominal, speed=speed, thrust=thrust)
-        found = fast.coefficients(point, {}, _changes(fast, point))
+        found = fast.coefficients(point, effects.factors, _changes(fast, effects, point))
         return np.array([found[name] for name in names])
 
     inputs, axes = ("speed",), (refined_axis(at, 0.0, highest, TOLERANCE),)
@@ -309,15 +334,16 @@ def _speed_table(fast: FastModel, nominal: OperatingPoint, highest: float) -> Op
     every = values.reshape(-1, len(names))
     moving = np.flatnonzero(np.any(every != base, axis=0))
     parts: dict[str, list[Array]] = {part: [] for part in PARTS}
-    own = fast.coefficients(nominal, {})
+    factors = effects.factors
+    own = fast.coefficients(nominal, factors)
     for row in moving:
         # Twice the coefficient less once: its own share of the operators.
         point, value = nominal, own[names[row]]
         if value == 0.0:
             turning = float(axes[0][np.argmax(np.abs(every[:: every.shape[0] // axes[0].size, row]))])
             point = replace(nominal, speed=turning)
-            value = fast.coefficients(point, {})[names[row]]
-        change = fast.change(point, {}, ({names[row]: 2.0}, {names[row]: 1.0}), ({}, {}))
+            value = fast.coefficients(point, factors)[names[row]]
+        change = fast.change(point, factors, ({names[row]: 2.0}, {names[row]: 1.0}), ({}, {}))
         matrices = (change.conduction, change.loads, change.outputs, change.output_inputs)
         for part, matrix in zip(PARTS, matrices, strict=True):
             parts[part].append(matrix / value)
@@ -325,12 +351,14 @@ def _speed_table(fast: FastModel, nominal: OperatingPoint, highest: float) -> Op
     return OperatorTable(inputs, axes, values[..., moving] - base[moving], stacked)
 
 
-def _coolant_table(fast: FastModel, nominal: OperatingPoint, wall_rise: Array | None) -> OperatorTable:
+def _coolant_table(
+    fast: FastModel, effects: ExportedEffects, nominal: OperatingPoint, wall_rise: Array | None
+) -> OperatorTable:
     """What the coolant adds over flow and inlet temperature, on the few directions in which it varies."""
 
     def film(flow: float, inlet: float) -> tuple[Array, float, float]:
         point = replace(nominal, coolant_flow=flow, coolant_inlet_temperature=inlet + ZERO_CELSIUS_K)
-        return fast.channel.film(_at_wall(point, wall_rise), {})
+        return fast.channel.film(_at_wall(point, wall_rise), effects.factors, effects.changes(point))
 
     def values(flow: float, inlet: float) -> Array:
         cells, rate, friction = film(flow, inlet)
@@ -341,6 +369,12 @@ def _coolant_table(fast: FastModel, nominal: OperatingPoint, wall_rise: Array | 
         lambda at: values(at, inlet), *(flow * share for share in FLOW_SHARES), tolerance=TOLERANCE
     )
     inlets = refined_axis(lambda at: values(flow, at), *_inlet_range(fast.spec), tolerance=TOLERANCE)
+    if flows.size * inlets.size > MOST_POINTS:
+        raise SpecError(
+            "coolant",
+            f"its film changes so sharply that a table would need {flows.size * inlets.size} points.",
+            "Export the machine without the effect or correlation that jumps; simulate takes it.",
+        )
     shapes = _shapes(fast)
     sample = _coolant_sampler(fast, film)
     base = sample(flow, inlet)

@@ -6,11 +6,14 @@ import numpy as np
 
 from spindle_fem.errors import SpecError
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
+from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import LARGEST_STEP
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.studies.export.effect_export import ExportedEffects, heat_powers
 from spindle_fem.studies.export.state_space import (
     CELSIUS,
+    CONSTANT,
     EXACT,
     USUAL_TEMPERATURE,
     ModelInput,
@@ -19,14 +22,12 @@ from spindle_fem.studies.export.state_space import (
     header_of,
     modal_basis,
     power_load_arrays,
+    unit_of_input,
 )
-from spindle_fem.units import ZERO_CELSIUS_K, registry
-
-# How units of inputs are written where they have these dimensions.
-USUAL_UNITS = ("", "W", "rad/s", "N", "N*m", "A", "V", "m/s", "m**3/s", "Pa")
+from spindle_fem.units import ZERO_CELSIUS_K
 
 
-def network_state_space(fast: FastModel, name: str) -> StateSpace:
+def network_state_space(fast: FastModel, name: str, effects: ActiveEffects = NO_EFFECTS) -> StateSpace:
     """State space of a network's fast model, as the definition has it.
 
     Parameters
@@ -38,27 +39,31 @@ def network_state_space(fast: FastModel, name: str) -> StateSpace:
     ------
     SpecError
         A network that nothing drives.
+    FaultsError
+        Effects that an exported model cannot hold.
     """
-    network = fast.network
-    inputs = _inputs(network)
+    network, held = fast.network, ExportedEffects(fast, effects)
+    inputs = network_inputs(network)
     if not inputs:
         raise SpecError(
             "network", "has no input to be driven by.", "Let an input drive a source or a boundary."
         )
     position = {item.name: number for number, item in enumerate(inputs)}
+    scales, _ = fast.inputs.friction_loads(np.ones((1, len(network.source_names))), held.factors)
     loads = [
         PowerLoad(
             f"source.{source}",
             "W",
             -1 if driven is None else position[driven],
-            float(gain),
+            float(gain * scale),
             float(exponent),
             ZERO_CELSIUS_K if driven is not None and inputs[position[driven]].unit == CELSIUS else 0.0,
         )
-        for source, driven, gain, exponent in zip(
+        for source, driven, gain, scale, exponent in zip(
             network.source_names,
             network.source_input,
             network.source_gain,
+            scales[0],
             network.source_exponent,
             strict=True,
         )
@@ -71,8 +76,14 @@ def network_state_space(fast: FastModel, name: str) -> StateSpace:
             network.boundary_names, network.boundary_input, network.boundary_temperature, strict=True
         )
     ]
-    storage = fast.storage({})
-    operators = fast.operators(OperatingPoint(*[np.nan] * 5), {})
+    added = heat_powers(held, inputs)
+    nothing = [PowerLoad(CONSTANT, "1", -1)] if held.sensors else []
+    loads += [*(load for _, load in added), *nothing]
+    storage = fast.storage(held.factors, held.capacities)
+    nowhere = OperatingPoint(*[np.nan] * 5)
+    operators = fast.operators(
+        nowhere, held.factors, changes=held.changes(nowhere), conductances=held.conductances
+    )
     modes = modal_basis(storage, operators.conduction)
     header = header_of(
         name,
@@ -82,18 +93,24 @@ def network_state_space(fast: FastModel, name: str) -> StateSpace:
         dict.fromkeys(fast.channels, CELSIUS),
         {load.name: load.unit for load in loads},
     )
+    header["notes"] += held.notes
+    more = [*(fast.model.place(place) for place, _ in added), *(np.zeros(fast.model.size) for _ in nothing)]
+    entering = np.array(more).reshape(-1, fast.model.size).T
+    output = operators.outputs @ modes
+    direct = np.pad(operators.output_inputs, ((0, 0), (0, len(more))))
+    held.read(fast.channels, [load.name for load in loads], output, direct)
     arrays = power_load_arrays(loads) | {
         # Rounding apart, a diagonal matrix.
         "conduction": np.diag(np.diag(modes.T @ operators.conduction @ modes)),
-        "load": modes.T @ operators.loads,
-        "output": operators.outputs @ modes,
-        "feedthrough": operators.output_inputs,
+        "load": modes.T @ np.hstack((operators.loads, entering)),
+        "output": output,
+        "feedthrough": direct,
         "uniform": modes.T @ storage @ fast.model.one,
     }
     return StateSpace(header, arrays)
 
 
-def _inputs(network: ThermalNetwork) -> list[ModelInput]:
+def network_inputs(network: ThermalNetwork) -> list[ModelInput]:
     """Inputs in the network's order; a temperature where one drives a boundary."""
     return [
         ModelInput(name, CELSIUS, USUAL_TEMPERATURE)
@@ -111,21 +128,3 @@ def _source_input(network: ThermalNetwork, name: str) -> ModelInput:
     whole = all(float(network.source_exponent[number]).is_integer() for number in followed)
     turning = unit == "rad/s"
     return ModelInput(name, unit or "1", 0.0, None if whole and not turning else 0.0, magnitude=turning)
-
-
-def unit_of_input(gain_unit: str, exponent: float) -> str:
-    """SI unit of an input whose power times a gain is a heat; empty for a pure number.
-
-    >>> unit_of_input("W/(rad/s)**1.5", 1.5)
-    'rad/s'
-    """
-    units = registry()
-    known = units.Quantity(1.0, gain_unit or "dimensionless")
-    wanted = ((units.Quantity(1.0, "W") / known) ** (1.0 / exponent)).to_base_units()
-    for unit in USUAL_UNITS:
-        # Dimensions with rounded exponents.
-        own = units.Quantity(1.0, unit or "dimensionless").to_base_units()
-        ratio = (wanted / own).dimensionality
-        if all(abs(power) < 1e-9 for power in dict(ratio).values()):
-            return unit
-    return f"{wanted.units:~C}"

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import HeatSource, MachineSpec, SourceTable
 from spindle_fem.operation.source_terms import SOURCE_PREFIX, table_heat
-from spindle_fem.studies.export.network_export import unit_of_input
-from spindle_fem.studies.export.state_space import CELSIUS, ModelInput, PowerLoad
+from spindle_fem.studies.export.state_space import CELSIUS, ModelInput, PowerLoad, unit_of_input
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from spindle_fem.studies.export.portable_model import SCHEMA, PortableModel
+from spindle_fem.units import registry
 
 Array = NDArray[np.float64]
 
@@ -18,6 +19,10 @@ Array = NDArray[np.float64]
 USUAL_TEMPERATURE = 20.0
 EXACT, TR_BDF2 = "exact", "TR-BDF2"
 CELSIUS = "degC"
+# A load that is 1.
+CONSTANT = "constant"
+# How units of inputs are written where they have these dimensions.
+USUAL_UNITS = ("", "W", "rad/s", "N", "N*m", "A", "V", "m/s", "m**3/s", "Pa")
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,3 +139,21 @@ def header_of(
         "table_inputs": {},
         "notes": [],
     }
+
+
+def unit_of_input(gain_unit: str, exponent: float) -> str:
+    """SI unit of an input whose power times a gain is a heat; empty for a pure number.
+
+    >>> unit_of_input("W/(rad/s)**1.5", 1.5)
+    'rad/s'
+    """
+    units = registry()
+    known = units.Quantity(1.0, gain_unit or "dimensionless")
+    wanted = ((units.Quantity(1.0, "W") / known) ** (1.0 / exponent)).to_base_units()
+    for unit in USUAL_UNITS:
+        # Dimensions with rounded exponents.
+        own = units.Quantity(1.0, unit or "dimensionless").to_base_units()
+        ratio = (wanted / own).dimensionality
+        if all(abs(power) < 1e-9 for power in dict(ratio).values()):
+            return unit
+    return f"{wanted.units:~C}"
