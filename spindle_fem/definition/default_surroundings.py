@@ -12,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from spindle_fem.definition.bearing_types import BearingType
 from spindle_fem.definition.circuit_tables import CircuitFilm
+from spindle_fem.definition.completion import tables_of
 from spindle_fem.definition.drawn_tables import part_geometry, ring_geometries, surface_definition
 from spindle_fem.definition.exchange_tables import JointGroup, Surface, raceway_surfaces
 from spindle_fem.definition.solid_tables import Part, SetBearing
@@ -95,8 +96,7 @@ def _drawn(content: Mapping[str, Any]) -> _Drawn | None:
     for circuit in _sound(CircuitFilm, content.get("film")):
         surfaces += map(surface_definition, circuit.walls)
     types = content.get("bearing_types")
-    groups = content.get("bearing_set")
-    for group in groups if isinstance(groups, list) else ():
+    for group in tables_of(content.get("bearing_set")):
         named = types.get(str(group.get("bearing_type"))) if isinstance(types, Mapping) else None
         for kind in _sound(BearingType, [named]):
             for bearing in _sound(SetBearing, group.get("bearing")):

@@ -86,7 +86,7 @@ def _spacers(
         return
     if not is_known_material(material, content.get("materials")):
         return
-    with contextlib.suppress(SpindleFemError, TypeError, ValueError, AttributeError):
+    with contextlib.suppress(SpindleFemError, TypeError, ValueError, AttributeError, KeyError):
         gaps = _gaps([row["z"] for row in rows])
         known = {part.get("name") for part in parts if isinstance(part, Mapping)}
         rings = {

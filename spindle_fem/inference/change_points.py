@@ -99,7 +99,14 @@ def find_changes(gram: Array, data: Array, spread: float, most: int = MOST_CHANG
 def _evidence(scaled: Array, along: Array, chosen: Sequence[int]) -> float:
     """Logarithm of the evidence of steps at some instants over none."""
     matrix = scaled[np.ix_(chosen, chosen)] + np.eye(len(chosen))
-    lower = np.linalg.cholesky(matrix)
+    try:
+        lower = np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        # Steps that read alike within rounding; none of its own values is below 1.
+        values, vectors = np.linalg.eigh(matrix)
+        values = np.maximum(values, 1.0)
+        right = vectors.T @ along[list(chosen)]
+        return 0.5 * float(right**2 @ (1.0 / values)) - 0.5 * float(np.log(values).sum())
     right = np.linalg.solve(lower, along[list(chosen)])
     return 0.5 * float(right @ right) - float(np.log(np.diag(lower)).sum())
 

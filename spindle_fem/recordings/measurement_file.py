@@ -213,10 +213,17 @@ def _cut(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
     >>> list(_cut(["# Date  Time   T 1", " 2026-03-11 07:58:12   20.5"], " "))
     [['Date Time', 'T', '1'], ['2026-03-11 07:58:12', '20.5']]
     """
-    if separator == BLANKS:
-        kept = (_DATE_OR_NAME.sub("\\1\u00a0", " ".join(line.lstrip("#% \t").split())) for line in lines)
-        return ([cell.replace("\u00a0", " ") for cell in row] for row in csv.reader(kept, delimiter=BLANKS))
-    return ([cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator))
+    blanks = separator == BLANKS
+    if blanks:
+        lines = (_DATE_OR_NAME.sub("\\1\u00a0", " ".join(line.lstrip("#% \t").split())) for line in lines)
+    rows = csv.reader(lines, delimiter=separator)
+    try:
+        for row in rows:
+            yield [cell.replace("\u00a0", " ") if blanks else cell.strip() for cell in row]
+    except csv.Error as error:
+        raise RecordingError(
+            f"line {rows.line_num}", f"cannot be cut into cells: {error}.", "Is a quote left open?"
+        ) from error
 
 
 def _decoded(content: bytes, path: Path) -> tuple[str, str, list[str]]:

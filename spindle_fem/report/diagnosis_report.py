@@ -45,6 +45,7 @@ from spindle_fem.report.diagnosis_words import (
 )
 from spindle_fem.report.figure_style import save_png
 from spindle_fem.report.read_against_predicted import before_after
+from spindle_fem.results.dataset import load_netcdf
 from spindle_fem.results.output_folder import read_content, replace_text
 
 if TYPE_CHECKING:
@@ -121,9 +122,7 @@ def _read_data(path: Path) -> xr.Dataset | None:
     """Dataset of the folder; None where the recording said too little to make one."""
     if not path.is_file():
         return None
-    import xarray as xr
-
-    data = xr.load_dataset(path)
+    data = load_netcdf(path)
     if data.attrs.get("schema") != DATA_SCHEMA:
         raise BadInputError(
             str(path), f"schema {data.attrs.get('schema')!r} is not known.", f"Allowed: {DATA_SCHEMA}."

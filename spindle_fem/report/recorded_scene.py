@@ -13,6 +13,7 @@ from spindle_fem.errors import BadInputError
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.report.machine_scene import table_times
 from spindle_fem.report.viewed_scene import Curve
+from spindle_fem.results.dataset import load_netcdf
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -116,8 +117,6 @@ def read_course(path: Path, command: str) -> Course:
     BadInputError
         There is no such file, or it is none of the command's.
     """
-    import xarray as xr
-
     if not path.is_file():
         raise BadInputError(
             str(path),
@@ -125,7 +124,7 @@ def read_course(path: Path, command: str) -> Course:
             f"Run spindle-fem {command} again.",
         )
     try:
-        return Course(xr.load_dataset(path, engine="h5netcdf"))
+        return Course(load_netcdf(path))
     except (OSError, ValueError, KeyError) as error:
         raise BadInputError(
             str(path), f"cannot be read ({error}).", f"Run spindle-fem {command} again."

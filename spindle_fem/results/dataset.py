@@ -173,18 +173,33 @@ def read_dataset(path: str | Path, *, group: str | None = None) -> xr.Dataset:
     BadInputError
         There is no such file, it is no NetCDF, or its schema is not known.
     """
-    import xarray as xr
-
     if not Path(path).is_file():
         raise BadInputError(str(path), "there is no such file.", "Give the folder of a finished run.")
     try:
-        dataset = xr.load_dataset(path, group=group, engine="h5netcdf")
-    except (OSError, ValueError) as error:
+        dataset = load_netcdf(path, group)
+    except (OSError, ValueError, KeyError) as error:
         raise BadInputError(str(path), f"cannot be read ({error}).", "Run again to write it anew.") from error
     schema = dataset.attrs.get("schema")
     if group is None and schema != RESULT_SCHEMA:
         raise BadInputError(str(path), f"schema is {schema!r}.", f'Known: "{RESULT_SCHEMA}".')
     return dataset
+
+
+def load_netcdf(path: str | Path, group: str | None = None) -> xr.Dataset:
+    """Dataset of a file, in memory.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        It is no NetCDF, or spoilt.
+    """
+    import h5py
+    import xarray as xr
+
+    # Where attributes cannot be read, h5netcdf leaves half a file behind, which tells of its end.
+    with h5py.File(path) as file:
+        dict(file.attrs)
+    return xr.load_dataset(path, group=group, engine="h5netcdf")
 
 
 def _celsius_map(values: Mapping[str, float]) -> dict[str, float]:

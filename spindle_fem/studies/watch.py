@@ -140,12 +140,17 @@ def watch_recording(
     for fresh in lines:
         window.add(fresh)
         if watched is None and _may_begin(window, how.warm_up):
-            watched = _begin(machine, how, _smooth(window), calibration, progress)
+            first = _smooth(window)
+            watched = first and _begin(machine, how, first, calibration, progress)
         if watched is not None:
             yield from told.of(_follow(watched, window), window)
     last = _smooth(window)
     if watched is None:
-        if last is None or window.waiting.size < 3 or (how.warm_up and not _may_begin(window, how.warm_up)):
+        if last is None:
+            raise RecordingError(
+                str(recording), f"has no reading with every input in {window.waiting.size} rows."
+            )
+        if window.waiting.size < 3 or (how.warm_up and not _may_begin(window, how.warm_up)):
             raise RecordingError(
                 str(recording), f"ends after {window.waiting.size} rows.", "Too few to begin a watch."
             )

@@ -1,10 +1,13 @@
 """Faults that spoilt definitions have shown (`make hardening`): each is refused with a reason now."""
 
+import numpy as np
 import pytest
+import tomli_w
 
 from spindle_fem.commands.checked_machine import load_buildable
-from spindle_fem.definition.load import read_toml
-from spindle_fem.errors import SpecError
+from spindle_fem.definition.load import find_machine, read_toml
+from spindle_fem.errors import SpecError, SpindleFemError
+from spindle_fem.inference.change_points import _evidence
 from spindle_fem.physics.bearings.bearing_tables import read_document
 from tests.support.valid_definition import VALID
 
@@ -39,3 +42,27 @@ def test_sets_of_bearings_are_not_assembled_of_faulty_materials(tmp_path):
 
 def test_oil_thinner_than_its_law_of_temperature_is_refused(tmp_path):
     assert "kinematic_viscosity_100" in refused(tmp_path, '"5 mm**2/s"', '"0.2 mm**2/s"')
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda tables: tables["bearing_set"][1]["bearing"][1].pop("z"), "bearing_set"),
+        (lambda tables: tables["bearing_set"][1].pop("name"), "bearing_set"),
+        (lambda tables: tables["bearing_set"].__setitem__(0, [1, "two"]), "bearing_set"),
+        (lambda tables: tables["part"][0]["segment"][0].update(outer_diameter="60 parsec"), "1 km"),
+    ],
+)
+def test_what_rules_complete_may_be_spoilt(tmp_path, change, told):
+    tables = read_toml(find_machine("router_spindle"))
+    change(tables)
+    file = tmp_path / "spoilt.toml"
+    file.write_text(tomli_w.dumps(tables), encoding="utf-8")
+    with pytest.raises(SpindleFemError, match=told):
+        load_buildable(file, ())
+
+
+def test_steps_that_read_alike_within_rounding_have_an_evidence():
+    answers = np.array([[1e14, 0.5], [1e14, 0.5], [0.3, 0.1]])
+    evidence = _evidence(answers @ answers.T, answers @ [1.0, 1.0], [0, 1])
+    assert np.isfinite(evidence)

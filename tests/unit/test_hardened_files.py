@@ -1,6 +1,7 @@
 """Faults that kills, full disks and spoilt folders have shown (`make hardening`)."""
 
 import errno
+import gc
 import io
 import json
 import os
@@ -13,9 +14,10 @@ import pytest
 import xarray as xr
 
 from spindle_fem import cache
-from spindle_fem.errors import BadInputError, MeshTagError, NoSpaceError, of_system
+from spindle_fem.errors import BadInputError, MeshTagError, NoSpaceError, RecordingError, of_system
 from spindle_fem.machine.meshing.mesh_cache import load_npz
-from spindle_fem.results.dataset import write_dataset
+from spindle_fem.recordings.measurement_file import read_measurement
+from spindle_fem.results.dataset import load_netcdf, write_dataset
 from spindle_fem.results.output_folder import (
     MARKER,
     output_folder,
@@ -23,6 +25,8 @@ from spindle_fem.results.output_folder import (
     replace_bytes,
     whole_file,
 )
+from spindle_fem.studies.watch import Watching, watch_recording
+from validation.hardening.material import PUMP, pump_recording, write_recording
 
 
 @dataclass
@@ -169,3 +173,32 @@ def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
     with whole_file(file) as partial:
         partial.write_text("new")
     assert [item.read_text() for item in tmp_path.iterdir()] == ["new"]
+
+
+def test_a_file_whose_attributes_are_spoilt_is_refused_once(tmp_path, capsys):
+    file = tmp_path / "result.nc"
+    write_dataset(xr.Dataset({"x": ("n", np.arange(3.0))}, attrs={"schema": "s" * 300}), file)
+    content = bytearray(file.read_bytes())
+    for place in range(48, 1200, 16):
+        content[place] ^= 0xFF
+    file.write_bytes(bytes(content))
+    with pytest.raises((OSError, ValueError, KeyError, RuntimeError)):
+        load_netcdf(file)
+    gc.collect()
+    assert not capsys.readouterr().err
+
+
+def test_a_quote_that_is_left_open_is_told_with_its_line(tmp_path):
+    file = tmp_path / "data.csv"
+    file.write_text("t,T\n" + "0,1\n" * 5 + '5,"' + "6,1\n" * 40_000)
+    with pytest.raises(RecordingError, match="quote"):
+        read_measurement(file)
+
+
+def test_a_watch_without_an_input_ends_with_a_reason(tmp_path):
+    manifest, table = pump_recording()
+    table["room"] = np.nan
+    file = write_recording(tmp_path, (manifest, table), "made")
+    how = Watching(warm_up=2400.0, until_end=True)
+    with pytest.raises(RecordingError, match="every input"):
+        list(watch_recording(PUMP, file, how))

@@ -25,6 +25,9 @@ from spindle_fem.machine.geometry.faces import (
 )
 from spindle_fem.machine.geometry.part_shapes import PartGeometry, SurfaceDefinition
 
+# Lengths beyond which nothing is drawn, nm.
+LARGEST = 10**12
+
 
 @dataclass(frozen=True, slots=True)
 class MeridianMap:
@@ -65,8 +68,8 @@ class MeridianMap:
         r_values = {value for box in boxes for value in box[3:5]} | {0}
         for surface in surfaces:
             for box in surface.where:
-                z_values.update(to_nanometres(value) for value in box.z or ())
-                r_values.update(max(0, to_nanometres(value)) for value in box.r or ())
+                z_values.update(_within(to_nanometres(value), -LARGEST) for value in box.z or ())
+                r_values.update(_within(to_nanometres(value), 0) for value in box.r or ())
         z_lines = np.array(sorted(z_values), dtype=np.int64)
         r_lines = np.array(sorted(r_values), dtype=np.int64)
         owner = np.full((len(z_lines) + 1, len(r_lines) + 1), VOID, dtype=np.int32)
@@ -248,6 +251,11 @@ class MeridianMap:
         return labels
 
 
+def _within(nanometres: int, least: int) -> int:
+    """A bound of what a box picks, at the ends of what there can be."""
+    return max(least, min(nanometres, LARGEST))
+
+
 def _check_segment(part: str, bounds: list[int], faults: list[GeometryError]) -> bool:
     z_start, z_end, inner, outer = bounds
     where = f'part "{part}"'
@@ -259,6 +267,11 @@ def _check_segment(part: str, bounds: list[int], faults: list[GeometryError]) ->
                 f"r {in_millimetres(inner)} to {in_millimetres(outer)} has no thickness.",
                 "Allowed: z and r that grow.",
             )
+        )
+        return False
+    if max(map(abs, bounds)) > LARGEST:
+        faults.append(
+            GeometryError(where, f"a segment ends {max(bounds) / 1e9:.3g} m away.", "Allowed: up to 1 km.")
         )
         return False
     if inner < 0:
