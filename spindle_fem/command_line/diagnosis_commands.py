@@ -64,8 +64,9 @@ def diagnose(
         return
     from spindle_fem.commands.console import print_diagnosis, stages
     from spindle_fem.commands.diagnose_command import diagnose as diagnose_machine
+    from spindle_fem.commands.usual_time import DIAGNOSIS_SHARES
 
-    with stages(not as_json) as tell:
+    with stages(not as_json, DIAGNOSIS_SHARES) as tell:
         content = diagnose_machine(
             machine,
             recordings,

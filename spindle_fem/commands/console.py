@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -410,21 +410,33 @@ def print_transient(content: dict[str, Any], folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def stages(show: bool) -> Iterator[Any]:
-    """Stage names and the time since the start on the terminal while they run, and in the log."""
+def stages(show: bool, shares: Mapping[str, float] | None = None) -> Iterator[Any]:
+    """Stage names and the time since the start on the terminal while they run, and in the log.
+
+    Parameters
+    ----------
+    shares : mapping of str to float
+        Of the whole time, by stage: what has usually passed when it begins; time left follows from it.
+    """
     console = Console(stderr=True)
     if not show or Verbosity.quiet or Verbosity.verbose or not console.is_terminal:
         yield LOGGER.info
         return
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    from spindle_fem.commands.usual_time import TimeLeft
+
+    shown_stage = TextColumn("{task.description}", markup=False)
+    columns = (SpinnerColumn(), shown_stage, TimeElapsedColumn(), TimeLeft())
     with Progress(*columns, console=console, transient=True) as shown:
-        task = shown.add_task("starting", total=None)
+        task = shown.add_task("starting", total=None, begun=0.0, share=0.0)
 
         def tell(stage: str) -> None:
             LOGGER.info(stage)
-            shown.update(task, description=f"{stage} ...")
+            found = {}
+            if stage in (shares or {}):
+                found = {"begun": shown.tasks[task].elapsed or 0.0, "share": shares[stage]}
+            shown.update(task, description=f"{stage} ...", **found)
 
         yield tell
 

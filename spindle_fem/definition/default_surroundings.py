@@ -12,7 +12,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from spindle_fem.definition.bearing_types import BearingType
 from spindle_fem.definition.circuit_tables import CircuitFilm
-from spindle_fem.definition.completion import tables_of
 from spindle_fem.definition.drawn_tables import part_geometry, ring_geometries, surface_definition
 from spindle_fem.definition.exchange_tables import JointGroup, Surface, raceway_surfaces
 from spindle_fem.definition.solid_tables import Part, SetBearing
@@ -96,7 +95,10 @@ def _drawn(content: Mapping[str, Any]) -> _Drawn | None:
     for circuit in _sound(CircuitFilm, content.get("film")):
         surfaces += map(surface_definition, circuit.walls)
     types = content.get("bearing_types")
-    for group in tables_of(content.get("bearing_set")):
+    groups = content.get("bearing_set")
+    for group in groups if isinstance(groups, list) else ():
+        if not isinstance(group, Mapping):
+            continue
         named = types.get(str(group.get("bearing_type"))) if isinstance(types, Mapping) else None
         for kind in _sound(BearingType, [named]):
             for bearing in _sound(SetBearing, group.get("bearing")):

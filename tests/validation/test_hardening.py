@@ -41,6 +41,11 @@ def test_what_counts_as_a_fault(status, err, seconds, outcome):
     assert judge(Ended(status, seconds, seconds, 100.0, "", err), (2,))[0] == outcome
 
 
+def test_whole_commands_beside_spoilt_inputs_have_their_time_but_no_more_memory():
+    assert judge(Ended(0, 31.0, 31.0, 100.0, "", "", patient=True), (2,))[0] == ACCEPTED
+    assert judge(Ended(0, 31.0, 31.0, 3000.0, "", "", patient=True), (2,))[0] == FAULT
+
+
 def test_the_page_has_every_family_and_every_fault():
     record = Record("definitions", 1, ["wu_tan_2016"])
     record.fault("traceback: KeyError")

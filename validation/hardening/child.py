@@ -45,6 +45,8 @@ class Ended:
         Largest resident memory.
     stopped : str
         Why it was stopped from outside; empty when it ended by itself.
+    patient : bool
+        Whether it was given a patience in place of the limits of a case: a whole command, not a spoilt input.
     """
 
     status: int
@@ -54,6 +56,7 @@ class Ended:
     out: str
     err: str
     stopped: str = ""
+    patient: bool = False
 
 
 @dataclass(slots=True)
@@ -208,7 +211,9 @@ def _watch(child: int, started: float, folder: Path, around: Surroundings) -> En
     _end_group(child)
     out, err = (path.read_bytes().decode("utf-8", "replace") for path in _output_files(folder))
     seconds, peak = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0
-    return Ended(os.waitstatus_to_exitcode(code), seconds, wall, peak, out, err, stopped)
+    return Ended(
+        os.waitstatus_to_exitcode(code), seconds, wall, peak, out, err, stopped, around.patience_s is not None
+    )
 
 
 def _reason_to_stop(child: int, wall: float, around: Surroundings) -> str:

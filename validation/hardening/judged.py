@@ -6,7 +6,7 @@ import re
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from .child import MOST_MB, Ended
+from .child import MOST_MB, MOST_SECONDS, Ended
 
 ACCEPTED, REFUSED, FAULT = "accepted", "refused", "fault"
 # Of a refusal: the error's name with where, what and how to fix, or a usage error of the parser.
@@ -89,7 +89,8 @@ def judge(ended: Ended, refusals: tuple[int, ...]) -> tuple[str, str]:
         return FAULT, f"traceback: {_last_line(ended.err)}"
     if ended.status < 0:
         return FAULT, f"ended by signal {-ended.status}"
-    if ended.peak_MB > MOST_MB:
+    too_long = ended.seconds > MOST_SECONDS and not ended.patient
+    if too_long or ended.peak_MB > MOST_MB:
         return FAULT, f"took {ended.seconds:.0f} s, {ended.peak_MB:.0f} MB"
     if ended.status == 0:
         return ACCEPTED, ""
