@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.coolant_misdescriptions import coolant_misdescriptions
 from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.gap_misdescriptions import gap_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
@@ -28,6 +29,7 @@ Provider = Callable[[Predictor], Iterable[Misdescription]]
 
 PROVIDERS: tuple[Provider, ...] = (
     heat_misdescriptions,
+    coolant_misdescriptions,
     structural_misdescriptions,
     mounting_misdescriptions,
     network_misdescriptions,

@@ -42,6 +42,8 @@ BRIDGE_SIGMA = 0.5
 CONDUCTIVITY_SIGMA = 0.05
 # Time by which a sensor in its hole, or in the stream, answers later than what it touches, s.
 RESPONSE_SIGMA = 10.0
+# Coolant that stood in hoses and channel before a recording, beside what flows then, K.
+STANDING_COOLANT_SIGMA = 3.0
 # Share by which laws of the catalogue miss what they explain: a slow error in proportion, while searching.
 LAW_INEXACT = 0.03
 # A network of a few nodes is a coarse picture: its slow error as multiples of the larger of the noise and

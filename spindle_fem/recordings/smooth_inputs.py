@@ -28,6 +28,10 @@ LAGS = 20
 FEWEST = 60
 # Median of the square of a standard normal number.
 MEDIAN_OF_SQUARE = 0.4549
+# Differences count no more than this many of their usual size: a jump is not noise.
+USUAL_SIZES = 3.0
+# Readings that differ by less than this are the same, K.
+SAME = 1e-9
 # Readings at most, to either side; weights below exp(-4) do not count.
 LONGEST_REACH, NEGLIGIBLE = 60, 4.0
 # A level that differs by more than the walk and the noise explain lies beyond a jump.
@@ -39,9 +43,9 @@ SLOWEST = 1.0e-3
 def walk_and_noise(values: Array) -> tuple[float, float]:
     """Variance of a random walk's step and of the white noise on it, jumps apart.
 
-    From the medians of squared differences over 1 to 20 readings, which are
-    ``0.4549 (lag * step + 2 * noise)`` for normal ones; the few that a jump
-    makes large do not move a median.
+    From the squared differences over 1 to 20 readings, whose mean is ``lag * step + 2 * noise``. Each counts
+    no more than a few times their median, or the square of the last digit where most readings are the same,
+    so that jumps do not matter.
 
     Parameters
     ----------
@@ -63,7 +67,15 @@ def walk_and_noise(values: Array) -> tuple[float, float]:
     True
     """
     lags = np.arange(1, min(LAGS, len(values) // 3) + 1)
-    squares = np.array([np.median((values[lag:] - values[:-lag]) ** 2) for lag in lags]) / MEDIAN_OF_SQUARE
+    apart = np.abs(np.diff(values))
+    digit = np.min(apart, where=apart > SAME, initial=np.inf)
+    if not np.isfinite(digit):
+        return 0.0, 0.0
+    squares = np.empty(len(lags))
+    for index, lag in enumerate(lags):
+        found = (values[lag:] - values[:-lag]) ** 2
+        usual = max(np.median(found) / MEDIAN_OF_SQUARE, digit**2)
+        squares[index] = np.mean(np.minimum(found, USUAL_SIZES**2 * usual))
     # A difference of one reading has the most independent samples.
     slope, offset = np.polyfit(lags, squares, 1, w=1.0 / lags)
     return max(float(slope), 0.0), max(0.5 * float(offset), 0.0)

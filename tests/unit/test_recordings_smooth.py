@@ -43,6 +43,18 @@ def test_a_jump_stays_where_it_is(walk):
     assert left.std() < 0.45 * (read - true).std()
 
 
+def test_noise_is_seen_through_a_coarse_display():
+    # Most neighbours read the same: a bath at 15.03 degC, of which the display shows 15.0 or 15.1.
+    generator = np.random.default_rng(1)
+    true = 288.18 + 0.01 * np.sin(np.linspace(0.0, 6.0, 1400))
+    read = np.round(true + 0.03 * generator.standard_normal(1400), 1)
+    step, noise = walk_and_noise(read)
+    assert np.sqrt(noise) == pytest.approx((read - true).std(), rel=0.25)
+    left = smoothed(read, step, noise) - true
+    assert (left - left.mean()).std() < 0.35 * (read - true).std()
+    assert walk_and_noise(np.full(100, 288.1)) == (0.0, 0.0)
+
+
 def test_noise_shrinks_and_a_clean_series_stays(walk):
     true, read = walk
     step, noise = walk_and_noise(read)

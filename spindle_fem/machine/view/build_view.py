@@ -94,7 +94,7 @@ def view_of(names: MachineNames, recording: Recording) -> MachineView:
         walls=walls,
         fluids=fluids,
         probes=dict(zip(recording.temperature_names, recording.probes, strict=True)),
-        outlets=_outlets(spec, recording),
+        outlets=outlet_channels(spec, recording),
         speed_inputs=dict.fromkeys((*sets, *heat, "shaft"), ("speed",)),
         input_scale={name: float(np.nanmax(np.abs(values))) for name, values in inputs.items()},
         capacity=_capacities(spec, layout),
@@ -282,7 +282,8 @@ def _reynolds(channel: ChannelFlow | None, flow: Array, inlet: Array) -> tuple[f
     return (min(values), max(values))
 
 
-def _outlets(spec: MachineSpec, recording: Recording) -> tuple[str, ...]:
+def outlet_channels(spec: MachineSpec, recording: Recording) -> tuple[str, ...]:
+    """Temperature channels of a recording that read where coolant leaves."""
     outlets = {probe.name for probe in spec.probe if probe.kind == "coolant_outlet"}
     return tuple(
         channel
