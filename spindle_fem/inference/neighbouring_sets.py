@@ -47,17 +47,24 @@ def exchanged(search: Search) -> None:
     The linearised screening misjudges a large effect, so that the right one
     may not have passed it. Unrecorded heat in intervals fits almost anything:
     it is tried at other spots, and beside other effects any effect that
-    follows a law is tried in its place.
+    follows a law is tried in its place. Where it follows a recorded quantity it
+    is tried at other spots too.
     """
     tasks: list[Task] = []
+    own = {effect.name for effect in search.interval_effects}
     for hypothesis in [h for h in search.ranked() if h.fit.candidates][: tuned.SETS_EXCHANGED]:
         for member in hypothesis.fit.candidates:
             rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
             if search.in_intervals(member):
                 tasks += at_other_spots(search, hypothesis.fit, member, rest)
-                own = {effect.name for effect in search.interval_effects}
-                tasks += _with_laws(search, rest, lambda c, own=own, rest=rest: bool(rest) or c.effect in own)
+                tasks += _with_laws(search, rest, lambda c, rest=rest: bool(rest) or c.effect in own)
             else:
+                if member.effect in own:
+                    tasks += _with_laws(
+                        search,
+                        rest,
+                        lambda c, member=member: c.effect in own and c.component != member.component,
+                    )
                 places = {member.component, *_groups_of(search, member.component)}
                 tasks += _with_laws(
                     search,

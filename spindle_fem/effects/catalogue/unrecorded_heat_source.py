@@ -35,9 +35,9 @@ class UnrecordedHeatSource(UnrecordedEffect):
         group="Way out",
         law=(
             "heat u(t - b) - u(t - e) with first-order edges in intervals, or heat with a power m of a "
-            "recorded quantity"
+            "recorded quantity above an onset q₁"
         ),
-        size="heat ± 0.2 Q; τ 200 s ×/÷ e^0.7; edges ± 300 s; m 1 ± 0.3",
+        size="heat ± 0.2 Q; τ 200 s ×/÷ e^0.7; edges ± 300 s; m 1 ± 0.3; q₁ 0 + 0.3 of the largest q",
         acts_on="every place heat may come from",
         states={"heat": "W"},
         makes=Makes("warmer", probe="SP04", at="housing"),

@@ -14,7 +14,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate, IntervalEffect, Intervals, Reported
+from spindle_fem.effects.framework.effect import (
+    Candidate,
+    IntervalEffect,
+    Intervals,
+    Reported,
+    quantity,
+    stated,
+)
 from spindle_fem.effects.framework.laws import Complex, linear, power, relaxed, rows, shape, switched
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
 from spindle_fem.effects.framework.spread import Spread
@@ -33,6 +40,9 @@ TOUCHING = 1e-6
 # Widths or lags after which an edge is over.
 FAR = 40.0
 FOLLOWING = "following"
+# Onset of a followed law at most, as a share of the largest value that was recorded, and that from which a
+# search begins too; one less than the least share is none in words.
+HIGHEST_ONSET, BEGUN_ONSET, LEAST_ONSET = 0.95, 0.5, 0.05
 # Share of its beginning at which a pulse after a change counts as over.
 PULSE_ENDS = 0.05
 Array = NDArray[np.float64]
@@ -171,10 +181,11 @@ class InIntervals:
 
 
 class Followed:
-    """As large as a power of a recorded quantity, ``(q / q0)^m``, or as its changes, with a lag.
+    """As large as a power of a recorded quantity above an onset, or as its changes, with a lag.
 
-    Changes are those of the square: the energy that acceleration and braking
-    turn over. A recording begins with what it was at rest.
+    ``((q - q1) / (q0 - q1))^m``, nothing below ``q1``: a seal that touches, a seat that opens. Changes are
+    those of the square: the energy that acceleration and braking turn over. A recording begins with what it
+    was at rest.
     """
 
     n_states = 1
@@ -183,13 +194,19 @@ class Followed:
         self.follows, self._changes = (quantity.input,), quantity.changes
         self._levels = np.array(quantity.levels)
         # Fixed: a definition keeps what its law refers to.
-        reference = TermParameter("reference", quantity.highest, 0.0, quantity.unit)
-        exponent = () if quantity.changes else (linear("exponent", 1.0, 0.3, low=0.2, high=4.0),)
-        self.parameters = (_lag(), *exponent, reference)
+        highest = quantity.highest
+        reference = TermParameter("reference", highest, 0.0, quantity.unit)
+        law = (
+            linear("exponent", 1.0, 0.3, low=0.2, high=4.0),
+            linear("onset", 0.0, 0.3 * highest, quantity.unit, low=0.0, high=HIGHEST_ONSET * highest),
+        )
+        self.parameters = (_lag(), *(() if quantity.changes else law), reference)
 
     def _target(self, context: TermContext) -> Complex:
-        relative = np.abs(context.inputs[self.follows[0]]) / context.parameters["reference"]
-        return relative**2 if self._changes else power(relative, context.parameters["exponent"])
+        quantity, own = np.abs(context.inputs[self.follows[0]]), context.parameters
+        if self._changes:
+            return (quantity / own["reference"]) ** 2
+        return power((quantity - own["onset"]) / (own["reference"] - own["onset"]), own["exponent"])
 
     def share(self, context: TermContext) -> Complex:
         """How far it is on, (k,)."""
@@ -199,7 +216,7 @@ class Followed:
         return np.where(apart.real < 0.0, -apart, apart)
 
     def mean_share(self, own: Mapping[str, float]) -> float:
-        """Mean of the share while it is on in the recording that the quantity is known of.
+        """Mean of the share while the quantity is on in the recording that it is known of.
 
         Of changes: while a pulse is above ``PULSE_ENDS`` of what it begins with.
         """
@@ -209,7 +226,8 @@ class Followed:
         if self._changes:
             of_pulse = (1.0 - PULSE_ENDS) / np.log(1.0 / PULSE_ENDS)
             return float(of_pulse * np.mean(self._levels) / own["reference"] ** 2)
-        return float(np.mean((self._levels / own["reference"]) ** own["exponent"]))
+        above = np.maximum(self._levels - own["onset"], 0.0) / (own["reference"] - own["onset"])
+        return float(np.mean(above ** own["exponent"]))
 
     def advance(self, context: TermContext, step: float | Array) -> Complex:
         """Lagging quantity, (1, k)."""
@@ -340,6 +358,9 @@ class UnrecordedEffect(IntervalEffect):
         spread = Spread(self.acts_on(machine, spot), machine.sides.get(spot, ()), machine.focal.get(spot, ""))
         link, source = self.link(machine, spot), self.source(machine, spot)
         term = self.term(machine, self.term_name(spot, own), spread, on, form, link or source)
+        starts: tuple[dict[str, float], ...] = ({},)
+        if quantity is not None and not quantity.changes:
+            starts = ({}, {"onset": BEGUN_ONSET * quantity.highest})
         nominal = machine.conductance[link] if link else machine.source_heat.get(source)
         found = self.candidate(
             machine.component(spot),
@@ -347,6 +368,7 @@ class UnrecordedEffect(IntervalEffect):
             amplitude=term.parameters[0].name,
             reference=self.usual(machine, form),
             form=machine.form(spot, own),
+            starts=starts,
             constants={"nominal": nominal} if nominal else None,
         )
         parameter = f"gain.{source}" if source else ""
@@ -381,6 +403,10 @@ class UnrecordedEffect(IntervalEffect):
         for name in ("exponent", *(item.name for item in term.spread.parameters)):
             if name in own:
                 found[name] = Reported(own[name], "")
+        if own.get("onset", 0.0) > LEAST_ONSET * own.get("reference", np.inf):
+            found["onset"] = stated(
+                next(item for item in term.parameters if item.name == "onset"), own["onset"]
+            )
         return found
 
 
@@ -408,6 +434,8 @@ def when_words(candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         law = f"the {name.replace('_', ' ')}"
         if "exponent" in reported:
             law += f" with the power {reported['exponent'].value:.1f}"
+        if "onset" in reported:
+            law += f" above {quantity(reported['onset'])}"
         return f" on average while on, following {law} as no effect of the catalogue does"
     count = sum(item.name.startswith("start_") for item in candidate.parameters.values())
     return f" in {'one interval' if count == 1 else f'{count} intervals'} that no recorded input explains"
