@@ -65,7 +65,7 @@ def exchanged(search: Search) -> None:
                         rest,
                         lambda c, member=member: c.effect in own and c.component != member.component,
                     )
-                places = {member.component, *_groups_of(search, member.component)}
+                places = _beside(search, member.component)
                 tasks += _with_laws(
                     search,
                     rest,
@@ -101,6 +101,15 @@ def at_other_spots(search: Search, fit: Fit, member: Candidate, rest: tuple[Cand
         if identity((*rest, candidate)) not in search.found:
             tasks.append(search.task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found}))
     return tasks
+
+
+def _beside(search: Search, component: str) -> set[str]:
+    """A component, the sets it belongs to, and in a network a node's links and a link's nodes."""
+    found = {component, *_groups_of(search, component)}
+    if search.view.kind == "network":
+        nodes = set(component.split("|"))
+        found |= {c.component for c in search.candidates if nodes & set(c.component.split("|"))}
+    return found
 
 
 def _groups_of(search: Search, component: str) -> list[str]:
