@@ -118,7 +118,8 @@ def _fitted(
     begins from its values. In two rounds when None.
     """
     use = [~heldout_stamps(item)[0] for item in machine.calibration]
-    predictor = Predictor(machine.fast, machine.calibration, use, machine.effects)
+    unseen = machine.unseen[len(machine.recordings) :]
+    predictor = Predictor(machine.fast, machine.calibration, use, machine.effects, unseen=unseen)
     predictor = with_misdescriptions(predictor, misdescriptions_of(predictor))
     slow = expected_slow_error(predictor) if known is None else known.slow
     problem = Problem(predictor, known_before(predictor), slow, predictor.observations)
@@ -138,7 +139,6 @@ def _fitted(
             seen,
             [item.at(told[item.recording][:, item.channel]) for item in seen],
             fit.values,
-            machine.unseen[len(machine.recordings) :],
         )
         for seen in (predictor.observations, predictor.heldout)
     )

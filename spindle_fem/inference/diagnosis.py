@@ -130,9 +130,10 @@ def diagnose_recordings(
     workers = Workers(min(thread_count(), MOST_WORKERS)) if workers is None else workers
     recordings, calibration = machine.recordings, machine.calibration
     chosen = [heldout_stamps(item, heldout) for item in recordings]
-    predictor = Predictor(fast, recordings, [~mask for mask, _ in chosen], machine.effects)
+    seen, unseen = machine.unseen[: len(recordings)], machine.unseen[len(recordings) :]
+    predictor = Predictor(fast, recordings, [~mask for mask, _ in chosen], machine.effects, unseen=seen)
     progress("diagnosis: calibration" if calibration else "diagnosis: what is known")
-    earlier = Predictor(fast, calibration, effects=machine.effects) if calibration else None
+    earlier = Predictor(fast, calibration, effects=machine.effects, unseen=unseen) if calibration else None
     directions = misdescriptions_of(predictor)
     predictor = with_misdescriptions(predictor, directions)
     if earlier is not None:
@@ -180,8 +181,7 @@ def diagnose_recordings(
         predictor = with_misdescriptions(predictor, directions, best.fit.values, best.fit.candidates)
     final = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
-    unseen = machine.unseen[: len(recordings)]
-    refitted = _refit(final, found, workers, overlapping, _Readings(final, final, unseen), coarseness)
+    refitted = _refit(final, found, workers, overlapping, _Readings(final, final), coarseness)
     # Nothing missing is the likelier of what directions do about its own run and about that of the set.
     plain = Problem(unchanged, belief, slow, predictor.observations)
     own = plain.fit((), empty.fit.values)
@@ -189,7 +189,7 @@ def diagnose_recordings(
     if after.misfit_with_prior < own.misfit_with_prior:
         unchanged, plain, own = predictor, final, after
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
-    readings = _Readings(final, plain, unseen, lambda fit: told_states(search, final, fit))
+    readings = _Readings(final, plain, lambda fit: told_states(search, final, fit))
     refitted = with_own_noise(final, plain, readings.kept(refitted))
     refitted = [replace(h, heldout=readings.heldout_misfit(h.fit)) for h in refitted]
     clock.lap("final fits")
@@ -259,8 +259,6 @@ class _Readings:
     ----------
     final, plain : Problem
         With effects, and with nothing missing.
-    unseen : sequence of (n_sources,) ndarray
-        As :func:`left_over_noise` takes it.
     follow : callable
         Hidden states of a fit as all readings tell them, as :func:`told_states` gives them.
     """
@@ -269,11 +267,10 @@ class _Readings:
         self,
         final: Problem,
         plain: Problem,
-        unseen: Sequence[Array] = (),
         follow: Callable[[Fit], Mapping[str, Told]] = lambda fit: {},
     ) -> None:
         self._plant, self._unchanged = final.predictor, plain.predictor
-        self._slow, self._unseen = final.slow, unseen
+        self._slow = final.slow
         self._whiteners = [Whitener(item.bins, final.slow) for item in self._plant.heldout]
         self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
@@ -290,14 +287,14 @@ class _Readings:
     def left(self, fit: Fit) -> float:
         """Root mean square of what a fit leaves of single readings over their noise, all channels alike."""
         plant = self._plant
-        return left_over_noise(plant, plant.observations, self._of(fit), fit.values, self._unseen)
+        return left_over_noise(plant, plant.observations, self._of(fit), fit.values)
 
     def beyond(self, fit: Fit) -> float:
         """Likewise of held-out readings; what switches is on there as all readings tell it."""
         plant = self._plant
         if not plant.heldout:
             return 0.0
-        return left_over_noise(plant, plant.heldout, self._heldout(fit), fit.values, self._unseen)
+        return left_over_noise(plant, plant.heldout, self._heldout(fit), fit.values)
 
     def heldout_misfit(self, fit: Fit) -> float | None:
         """Minus twice the logarithm of their likelihood but for a constant, with the best set's error."""

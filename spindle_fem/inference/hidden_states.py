@@ -84,6 +84,7 @@ def readings_about(
         slopes = np.linalg.solve(root.T, by.reshape(-1, by.shape[2]).T).T.reshape(by.shape)
     usable = recording.usable & (True if everything else predictor.use[number][:, None])
     owner = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), recording.times)
+    slow = [problem.slow.of(channel) for channel in range(usable.shape[1])]
     residual = np.full((len(grid), usable.shape[1]), np.nan)
     variance = np.ones_like(residual)
     for channel in range(usable.shape[1]):
@@ -100,8 +101,8 @@ def readings_about(
         variance[1:],
         np.ascontiguousarray(slopes[1:]),
         np.diff(grid),
-        problem.slow.sigma,
-        problem.slow.time,
+        np.array([item.sigma for item in slow]),
+        np.array([item.time for item in slow]),
     )
 
 

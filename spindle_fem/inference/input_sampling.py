@@ -53,15 +53,7 @@ def sampling_errors(network: ThermalNetwork, power: Array) -> Array:
     Source: Gelb (1974), Applied Optimal Estimation, section 3.7.
     """
     n = network.n_nodes
-    matrix = np.zeros((n, n))
-    for first, second, value in zip(
-        network.link_first, network.link_second, network.link_conductance, strict=True
-    ):
-        for one, other in ((first, second), (second, first)):
-            if one < n:
-                matrix[one, one] += value
-                if other < n:
-                    matrix[one, other] -= value
+    matrix = network.conductance_matrix()[:n, :n]
     heated = np.zeros(n)
     np.add.at(heated, network.source_node, network.source_gain**2 * power)
     # A network that nothing cools has no stationary state: the least leak gives it one.
@@ -71,12 +63,16 @@ def sampling_errors(network: ThermalNetwork, power: Array) -> Array:
     return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
+def own_times(network: ThermalNetwork) -> Array:
+    """In which every node settles by itself, (n_nodes,) s."""
+    return network.capacity / np.maximum(np.diag(network.conductance_matrix())[: network.n_nodes], 1e-12)
+
+
 def left_over_noise(
     predictor: Predictor,
     observations: Sequence[Observation],
     told: Sequence[Array],
     factors: Mapping[str, float],
-    unseen: Sequence[Array] = (),
 ) -> float:
     """Robust root mean square of single readings less what is told, over their noise, all channels alike.
 
@@ -89,13 +85,11 @@ def left_over_noise(
         At the bins of every observation.
     factors : mapping of str to float
         Fitted factors of a network's parameters.
-    unseen : sequence of (n_sources,) ndarray
-        :func:`unseen_power` of every recording of a network; none: sensors alone are noisy.
     """
     beside = []
     if predictor.is_network:
         network = predictor.fast.inputs.moved(factors)
-        beside = [sampling_errors(network, power) for power in unseen]
+        beside = [sampling_errors(network, power) for power in predictor.unseen]
     ratios = []
     for item, values in zip(observations, told, strict=True):
         recording = predictor.recordings[item.recording]

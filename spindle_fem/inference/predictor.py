@@ -95,6 +95,8 @@ class Predictor:
         Inputs over time that are known already.
     same_within : float
         Operating points whose coefficients differ by less than this share have the same operators.
+    unseen : sequence of (n_sources,) ndarray
+        Of a network, for every recording: :func:`spindle_fem.inference.input_sampling.unseen_power`.
     """
 
     def __init__(
@@ -108,8 +110,9 @@ class Predictor:
         at_stamps: bool = False,
         drives: Sequence[Drive] | None = None,
         same_within: float = 0.0,
+        unseen: Sequence[Array] = (),
     ) -> None:
-        self.fast, self.effects = fast, effects
+        self.fast, self.effects, self.unseen = fast, effects, tuple(unseen)
         self.same_within, self.step, self.at_stamps = same_within, step, at_stamps
         self.recordings = tuple(recordings)
         self.use = tuple(np.ones(r.times.size, dtype=bool) for r in recordings) if use is None else tuple(use)
@@ -168,6 +171,7 @@ class Predictor:
             step=self.step,
             drives=self.drives,
             same_within=same_within,
+            unseen=self.unseen,
         )
         return found.misdescribed_like(self)
 

@@ -14,6 +14,7 @@ from spindle_fem.inference.calibration import coordinate_of
 from spindle_fem.inference.coordinate_names import DIRECTIONS, PROBE_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import THETA_BOUND, Belief, Coordinate, Fit, Problem, huber
+from spindle_fem.inference.input_sampling import own_times, sampling_errors
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
@@ -24,8 +25,8 @@ Array = NDArray[np.float64]
 RADIAL = f".{DIRECTIONS[0]}"
 RADIAL_SIGMA = float(np.hypot(tuned.PROBE_PLACE_SIGMA, tuned.COMMON_RADIAL_SIGMA))
 EXPECTED_SLOW = SlowError(tuned.EXPECTED_SLOW_SIGMA, tuned.EXPECTED_SLOW_TIME)
-# Correlation times that are tried for a network, from a few readings to this share of its recording.
-NETWORK_TIMES = 5
+# Correlation times that are tried for a network, from that between readings to this share of its recording.
+NETWORK_TIMES = 6
 LONGEST_SHARE = 0.1
 
 
@@ -101,11 +102,26 @@ def known_before(predictor: Predictor) -> Belief:
 
 
 def expected_slow_error(predictor: Predictor) -> SlowError:
-    """Slow error before any fit."""
+    """Slow error before any fit.
+
+    Of a node that a rarely read input heats, also what that did between its readings.
+    """
     if not predictor.is_network:
         return EXPECTED_SLOW
     unit, times = _network_scales(predictor)
-    return SlowError(unit, times[len(times) // 2])
+    usual = SlowError(unit, times[len(times) // 2])
+    if not predictor.unseen:
+        return usual
+    network = predictor.fast.inputs.moved({})
+    beside = np.max([sampling_errors(network, power) for power in predictor.unseen], axis=0)
+    settled = own_times(network)
+    channels = {}
+    for recording in predictor.recordings:
+        for channel, probe in enumerate(recording.probes):
+            node = predictor.fast.inputs.channels.index(probe)
+            time = settled[node] if beside[node] > unit else usual.time
+            channels[channel] = SlowError(float(np.hypot(unit, beside[node])), float(time))
+    return SlowError.each(channels)
 
 
 def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
@@ -196,7 +212,7 @@ def _network_scales(predictor: Predictor) -> tuple[float, list[float]]:
     duration = float(np.median([r.times[-1] - r.times[0] for r in predictor.recordings]))
     spacing = float(np.median([np.median(np.diff(item.bins.times)) for item in predictor.observations]))
     noise = float(np.median([sigma for r in predictor.recordings for sigma in r.sigma]))
-    shortest = min(4.0 * spacing, 0.5 * LONGEST_SHARE * duration)
+    shortest = min(spacing, 0.5 * LONGEST_SHARE * duration)
     times = np.geomspace(shortest, LONGEST_SHARE * duration, NETWORK_TIMES)
     return max(noise, tuned.NETWORK_SHARE_OF_RISE * float(np.median(moved))), times.tolist()
 

@@ -47,7 +47,7 @@ class SlowError:
     time: float = 1500.0
     channels: tuple[tuple[int, float, float], ...] = ()
 
-    def of(self, channel: int) -> SlowError:
+    def of(self, channel: int | None) -> SlowError:
         """That of one channel."""
         for number, sigma, time in self.channels:
             if number == channel:
@@ -295,8 +295,9 @@ def slow_errors_of(
             size_of = 2.0 * whitener.log_root_determinant + size(whitener(values)).sum(axis=0)
             row[keys.index(own)] += size_of
         if prior is not None:
-            held = [place for place, key in enumerate(keys) if key is COMMON or key >= 0]
-            row[held] += (np.log(slow.sigma / prior.sigma) / prior_width) ** 2
+            for place, key in enumerate(keys):
+                if key is COMMON or key >= 0:
+                    row[place] += (np.log(slow.sigma / prior.of(key).sigma) / prior_width) ** 2
     best, least = found.argmin(axis=0), found.min(axis=0).sum(axis=0)
     told = [_joined({key: choices[best[i, fit]] for i, key in enumerate(keys)}) for fit in range(fits)]
     return list(zip(told, least.tolist(), strict=True))

@@ -158,8 +158,9 @@ def _bare(fit: Fit, candidate: Candidate) -> tuple[dict[str, float], tuple[Candi
 def settle_best(search: Search) -> None:
     """Follow the state of the best set again, about a fit that holds its other effects too.
 
-    Also as another effect at the same spot: whether heat or cooling switches shows in how its power follows
-    temperatures, which what else is missing hides while a state is first looked for.
+    Also without each of the others, and as another effect at the same spot: whether heat or cooling switches
+    shows in how its power follows temperatures, which what else is missing hides while a state is first
+    looked for.
     """
     fit = search.ranked()[0].fit
     for candidate in fit.candidates:
@@ -168,6 +169,10 @@ def settle_best(search: Search) -> None:
             again = course_about(search, fit, place, candidate, course)
             if again is not None:
                 settle(search, fit, place, again, candidate)
+                for other in fit.candidates:
+                    if other is not candidate:
+                        rest, values = without(fit, other)
+                        settle(search, search.problem.fit(rest, values), place, again, candidate)
                 twin = _twin(search, fit, place, candidate, tuned.FAIR_SHARE * again.log_evidence)
                 if twin is not None:
                     settle(search, fit, *twin, candidate)

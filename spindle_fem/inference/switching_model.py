@@ -80,7 +80,7 @@ class Readings:
     slopes : (T, c, p) ndarray, [K]
         By coordinates whose departures have a unit normal distribution.
     steps : (T,) ndarray, [s]
-    slow_sigma, slow_time : float, [K], [s]
+    slow_sigma, slow_time : (c,) ndarray, [K], [s]
         Slow error of each channel.
     """
 
@@ -88,8 +88,8 @@ class Readings:
     variance: Array
     slopes: Array
     steps: Array
-    slow_sigma: float
-    slow_time: float
+    slow_sigma: Array
+    slow_time: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +167,7 @@ class ReadingFilter:
     """Filter for slow errors and coordinates; its gains do not depend on the course of a state."""
 
     def __init__(self, readings: Readings) -> None:
-        kept = np.exp(-readings.steps / readings.slow_time)
+        kept = np.exp(-readings.steps[:, None] / readings.slow_time)
         known = np.isfinite(readings.residual)
         slopes = np.ascontiguousarray(readings.slopes)
         gain, total = _gains(known, readings.variance, slopes, kept, readings.slow_sigma**2)
@@ -296,17 +296,17 @@ def _gains(known, variance, slopes, kept, slow):
     gain, total = np.zeros((steps, channels, m)), np.ones((steps, channels))
     covariance = np.zeros((m, m))
     for j in range(channels):
-        covariance[j, j] = slow
+        covariance[j, j] = slow[j]
     for j in range(channels, m):
         covariance[j, j] = 1.0
     row = np.zeros(m)
     for t in range(steps):
         for j in range(channels):
             for i in range(m):
-                covariance[j, i] *= kept[t]
+                covariance[j, i] *= kept[t, j]
             for i in range(m):
-                covariance[i, j] *= kept[t]
-            covariance[j, j] += slow * (1.0 - kept[t] ** 2)
+                covariance[i, j] *= kept[t, j]
+            covariance[j, j] += slow[j] * (1.0 - kept[t, j] ** 2)
         for j in range(channels):
             if not known[t, j]:
                 continue
@@ -336,7 +336,7 @@ def _innovations(values, known, slopes, kept, gain, total):
     found = np.zeros_like(values)
     for t in range(steps):
         for j in range(channels):
-            mean[j] *= kept[t]
+            mean[j] *= kept[t, j]
         for j in range(channels):
             if not known[t, j]:
                 continue
@@ -409,7 +409,7 @@ def _follow(
                     if s == 1:
                         next_state[c, i] += size * entering[t, i]
                 for i in range(m):
-                    next_mean[c, i] = mean[h, i] * kept[t] if i < channels else mean[h, i]
+                    next_mean[c, i] = mean[h, i] * kept[t, i] if i < channels else mean[h, i]
                 gained = 0.0
                 for j in range(channels):
                     if not known[t, j]:

@@ -51,7 +51,8 @@ def readings(answer: LinearAnswer, on: np.ndarray, size: float, generator: np.ra
     noisy = found + 0.7 + 0.2 * generator.standard_normal((STEPS, 1))
     noisy[100:130] = np.nan
     slopes = np.ones((STEPS, 1, 1))
-    return Readings(noisy, np.full((STEPS, 1), 0.04), slopes, np.full(STEPS, STEP), 0.02, 1800.0)
+    slow = np.array([0.02]), np.array([1800.0])
+    return Readings(noisy, np.full((STEPS, 1), 0.04), slopes, np.full(STEPS, STEP), *slow)
 
 
 def overlap(one: np.ndarray, other: np.ndarray) -> float:
