@@ -374,6 +374,12 @@ def test_heat_follows_a_power_of_what_was_recorded_with_a_lag():
     assert heat[-1] == pytest.approx(20.0, rel=1e-9)
 
 
+def test_heat_above_an_onset_begins_there_and_is_whole_at_the_reference():
+    law = {"heat": 80.0, "exponent": 1.0, "lag": 600.0, "onset": 100.0}
+    ends = [marched(heat_following(), np.full(400, value), **law)[-1] for value in (90.0, 150.0, 200.0)]
+    assert ends == pytest.approx([0.0, 40.0, 80.0], rel=1e-9)
+
+
 def test_heat_follows_changes_of_the_squared_speed_up_and_down_alike():
     series = np.concatenate((np.full(300, 200.0), np.full(300, 100.0)))
     heat = marched(heat_following(changes=True), series, step=20.0, heat=80.0, lag=600.0)
@@ -385,8 +391,10 @@ def test_heat_follows_changes_of_the_squared_speed_up_and_down_alike():
 
 def test_the_size_of_a_law_is_its_mean_while_on():
     levels = (200.0, 100.0, 100.0, 50.0)
-    own = {"reference": 200.0, "exponent": 2.0}
+    own = {"reference": 200.0, "exponent": 2.0, "onset": 0.0}
     assert heat_following(levels=levels).on.mean_share(own) == pytest.approx((1.0 + 0.5 + 0.0625) / 4.0)
+    above = heat_following(levels=levels).on.mean_share(own | {"onset": 100.0})
+    assert above == pytest.approx((1.0 + 0.0 + 0.0) / 4.0)
     # A pulse of 600 s that is followed down to a twentieth, by quadrature.
     time = np.linspace(0.0, 600.0 * np.log(20.0), 200_001)
     pulse = np.trapezoid(np.exp(-time / 600.0), time) / time[-1]

@@ -39,7 +39,7 @@ PULSES, STEPS, STATES = "pulses", "steps", "states"
 TOUCHING = 1e-6
 # Widths or lags after which an edge is over.
 FAR = 40.0
-FOLLOWING = "following"
+FOLLOWING, ONSET = "following", "onset"
 # Onset of a followed law at most, as a share of the largest value that was recorded, and that from which a
 # search begins too; one less than the least share is none in words.
 HIGHEST_ONSET, BEGUN_ONSET, LEAST_ONSET = 0.95, 0.5, 0.05
@@ -198,7 +198,7 @@ class Followed:
         reference = TermParameter("reference", highest, 0.0, quantity.unit)
         law = (
             linear("exponent", 1.0, 0.3, low=0.2, high=4.0),
-            linear("onset", 0.0, 0.3 * highest, quantity.unit, low=0.0, high=HIGHEST_ONSET * highest),
+            linear(ONSET, 0.0, 0.3 * highest, quantity.unit, low=0.0, high=HIGHEST_ONSET * highest),
         )
         self.parameters = (_lag(), *(() if quantity.changes else law), reference)
 
@@ -206,7 +206,7 @@ class Followed:
         quantity, own = np.abs(context.inputs[self.follows[0]]), context.parameters
         if self._changes:
             return (quantity / own["reference"]) ** 2
-        return power((quantity - own["onset"]) / (own["reference"] - own["onset"]), own["exponent"])
+        return power((quantity - own[ONSET]) / (own["reference"] - own[ONSET]), own["exponent"])
 
     def share(self, context: TermContext) -> Complex:
         """How far it is on, (k,)."""
@@ -226,7 +226,7 @@ class Followed:
         if self._changes:
             of_pulse = (1.0 - PULSE_ENDS) / np.log(1.0 / PULSE_ENDS)
             return float(of_pulse * np.mean(self._levels) / own["reference"] ** 2)
-        above = np.maximum(self._levels - own["onset"], 0.0) / (own["reference"] - own["onset"])
+        above = np.maximum(self._levels - own[ONSET], 0.0) / (own["reference"] - own[ONSET])
         return float(np.mean(above ** own["exponent"]))
 
     def advance(self, context: TermContext, step: float | Array) -> Complex:
@@ -360,7 +360,7 @@ class UnrecordedEffect(IntervalEffect):
         term = self.term(machine, self.term_name(spot, own), spread, on, form, link or source)
         starts: tuple[dict[str, float], ...] = ({},)
         if quantity is not None and not quantity.changes:
-            starts = ({}, {"onset": BEGUN_ONSET * quantity.highest})
+            starts = ({}, {ONSET: BEGUN_ONSET * quantity.highest})
         nominal = machine.conductance[link] if link else machine.source_heat.get(source)
         found = self.candidate(
             machine.component(spot),
@@ -403,11 +403,9 @@ class UnrecordedEffect(IntervalEffect):
         for name in ("exponent", *(item.name for item in term.spread.parameters)):
             if name in own:
                 found[name] = Reported(own[name], "")
-        if own.get("onset", 0.0) > LEAST_ONSET * own.get("reference", np.inf):
-            found["onset"] = stated(
-                next(item for item in term.parameters if item.name == "onset"), own["onset"]
-            )
-        return found
+        return found | {
+            item.name: stated(item, own[item.name]) for item in term.parameters if item.name == ONSET
+        }
 
 
 def followed_name(candidate: Candidate) -> str:
@@ -434,8 +432,10 @@ def when_words(candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         law = f"the {name.replace('_', ' ')}"
         if "exponent" in reported:
             law += f" with the power {reported['exponent'].value:.1f}"
-        if "onset" in reported:
-            law += f" above {quantity(reported['onset'])}"
+        onset = reported.get(ONSET)
+        reference = next((p for p in candidate.parameters.values() if p.name == "reference"), None)
+        if onset is not None and onset.value > LEAST_ONSET * stated(reference, reference.value).value:
+            law += f" above {quantity(onset)}"
         return f" on average while on, following {law} as no effect of the catalogue does"
     count = sum(item.name.startswith("start_") for item in candidate.parameters.values())
     return f" in {'one interval' if count == 1 else f'{count} intervals'} that no recorded input explains"
