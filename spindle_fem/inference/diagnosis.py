@@ -22,6 +22,7 @@ from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.input_sampling import left_over_noise
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
+from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import (
@@ -31,7 +32,7 @@ from spindle_fem.inference.prepared_problem import (
     with_inexact_laws,
     with_own_noise,
 )
-from spindle_fem.inference.reading_noise import Whitener
+from spindle_fem.inference.reading_noise import ChannelBins, Whitener
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.state_search import Told, told_states
@@ -190,7 +191,7 @@ def diagnose_recordings(
         unchanged, plain, own = predictor, final, after
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
     readings = _Readings(final, plain, lambda fit: told_states(search, final, fit))
-    refitted = with_own_noise(final, plain, readings.kept(refitted))
+    refitted = with_own_noise(plain, readings.residuals, readings.kept(refitted))
     refitted = [replace(h, heldout=readings.heldout_misfit(h.fit)) for h in refitted]
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
@@ -287,14 +288,20 @@ class _Readings:
     def left(self, fit: Fit) -> float:
         """Root mean square of what a fit leaves of single readings over their noise, all channels alike."""
         plant = self._plant
-        return left_over_noise(plant, plant.observations, self._of(fit), fit.values)
+        return left_over_noise(plant, plant.observations, self._followed(fit, plant.observations), fit.values)
+
+    def residuals(self, fit: Fit) -> list[tuple[ChannelBins, Array]]:
+        """Predicted less read, K, averaged over the bins of every observation that was fitted."""
+        seen = self._plant.observations
+        told = self._followed(fit, seen)
+        return [(item.bins, values - item.values) for item, values in zip(seen, told, strict=True)]
 
     def beyond(self, fit: Fit) -> float:
         """Likewise of held-out readings; what switches is on there as all readings tell it."""
         plant = self._plant
         if not plant.heldout:
             return 0.0
-        return left_over_noise(plant, plant.heldout, self._heldout(fit), fit.values)
+        return left_over_noise(plant, plant.heldout, self._followed(fit, plant.heldout), fit.values)
 
     def heldout_misfit(self, fit: Fit) -> float | None:
         """Minus twice the logarithm of their likelihood but for a constant, with the best set's error."""
@@ -303,18 +310,21 @@ class _Readings:
         return sum(
             float(np.sum(huber(white(item.values - told))))
             for item, white, told in zip(
-                self._plant.heldout, self._whiteners, self._heldout(fit), strict=True
+                self._plant.heldout, self._whiteners, self._followed(fit, self._plant.heldout), strict=True
             )
         )
 
-    def _heldout(self, fit: Fit) -> list[Array]:
-        """What held-out readings should be; what switches is on there as all readings tell it."""
+    def _followed(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
+        """What readings should be; what switches is on as all readings tell it, held-out ones included.
+
+        Where a state is not known within a held-out block, the readings after it miss its heat.
+        """
         plant, states = self._plant, self.states(fit)
         told = self._told(fit)
         if states:
             own = tuple(states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates)
             told = [plant.predict(n, fit.values, own).temperature for n in range(len(plant.recordings))]
-        return [item.at(told[item.recording][:, item.channel]) for item in plant.heldout]
+        return [item.at(told[item.recording][:, item.channel]) for item in seen]
 
     def states(self, fit: Fit) -> Mapping[str, Told]:
         """Hidden states of a fit."""
@@ -338,7 +348,9 @@ class _Readings:
         """Root mean square error of held-out readings over their noise."""
         errors = [
             np.mean((predicted - item.values) ** 2) / item.bins.white**2
-            for item, predicted in zip(self._plant.heldout, self._heldout(fit), strict=True)
+            for item, predicted in zip(
+                self._plant.heldout, self._followed(fit, self._plant.heldout), strict=True
+            )
         ]
         return float(np.sqrt(np.mean(errors))) if errors else 0.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,9 +18,11 @@ from spindle_fem.inference.input_sampling import own_times, sampling_errors
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.reading_noise import SlowError, likely_slow_error, slow_errors_of
+from spindle_fem.inference.reading_noise import ChannelBins, SlowError, likely_slow_error, slow_errors_of
 
 Array = NDArray[np.float64]
+# Of the bin means of every observation, [K].
+Residuals = list[tuple[ChannelBins, Array]]
 
 RADIAL = f".{DIRECTIONS[0]}"
 RADIAL_SIGMA = float(np.hypot(tuned.PROBE_PLACE_SIGMA, tuned.COMMON_RADIAL_SIGMA))
@@ -157,7 +159,11 @@ def with_inexact_laws(problem: Problem, fit: Fit) -> Problem:
     )
 
 
-def with_own_noise(final: Problem, plain: Problem, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+def with_own_noise(
+    plain: Problem,
+    residuals: Callable[[Fit], list[tuple[ChannelBins, Array]]],
+    hypotheses: Sequence[Hypothesis],
+) -> list[Hypothesis]:
     """Each hypothesis with the slow error that is most probable under it.
 
     How large the error is that nobody explains is as unknown as the parameters: held at what the best set
@@ -165,18 +171,20 @@ def with_own_noise(final: Problem, plain: Problem, hypotheses: Sequence[Hypothes
 
     Parameters
     ----------
-    final, plain : Problem
-        With effects, and with nothing missing.
+    plain : Problem
+        With nothing missing.
+    residuals : callable
+        What a fit leaves of every observation, as :meth:`Problem.binned_residuals` has it.
     """
-    choices = _slow_choices(final.predictor)
+    choices = _slow_choices(plain.predictor)
     fits = [item.fit for item in hypotheses]
     for index, fit in enumerate(fits):
         # Nothing missing is fitted anew: what the others explain it must take for error.
-        slow = plain.slow if fit.candidates else likely_slow_error(plain.binned_residuals(fit), **choices)
+        slow = plain.slow if fit.candidates else likely_slow_error(residuals(fit), **choices)
         if slow != plain.slow:
             own = Problem(plain.predictor, plain.belief, slow, plain.observations)
             fits[index] = own.fit((), fit.values)
-    left = [(final if fit.candidates else plain).binned_residuals(fit) for fit in fits]
+    left = [residuals(fit) for fit in fits]
     together = [
         (own[0][0], np.column_stack([values for _, values in own])) for own in zip(*left, strict=True)
     ]
