@@ -119,7 +119,7 @@ def _fitted(
     """
     use = [~heldout_stamps(item)[0] for item in machine.calibration]
     unseen = machine.unseen[len(machine.recordings) :]
-    predictor = Predictor(machine.fast, machine.calibration, use, machine.effects, unseen=unseen)
+    predictor = Predictor(machine.fast, machine.calibration, use, machine.effects).with_unseen(unseen)
     predictor = with_misdescriptions(predictor, misdescriptions_of(predictor))
     slow = expected_slow_error(predictor) if known is None else known.slow
     problem = Problem(predictor, known_before(predictor), slow, predictor.observations)

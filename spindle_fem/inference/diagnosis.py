@@ -132,9 +132,11 @@ def diagnose_recordings(
     recordings, calibration = machine.recordings, machine.calibration
     chosen = [heldout_stamps(item, heldout) for item in recordings]
     seen, unseen = machine.unseen[: len(recordings)], machine.unseen[len(recordings) :]
-    predictor = Predictor(fast, recordings, [~mask for mask, _ in chosen], machine.effects, unseen=seen)
+    predictor = Predictor(fast, recordings, [~mask for mask, _ in chosen], machine.effects).with_unseen(seen)
     progress("diagnosis: calibration" if calibration else "diagnosis: what is known")
-    earlier = Predictor(fast, calibration, effects=machine.effects, unseen=unseen) if calibration else None
+    earlier = None
+    if calibration:
+        earlier = Predictor(fast, calibration, effects=machine.effects).with_unseen(unseen)
     directions = misdescriptions_of(predictor)
     predictor = with_misdescriptions(predictor, directions)
     if earlier is not None:

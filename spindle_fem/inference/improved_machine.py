@@ -9,12 +9,38 @@ from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import write_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.registry import definition_entry
-from spindle_fem.inference.coordinate_names import FIRST_ORDER, OF_ONE_RECORDING
+from spindle_fem.inference.coordinate_names import (
+    FIRST_ORDER,
+    MISDESCRIBED_IN_PREFIX,
+    MISDESCRIBED_PREFIX,
+    OF_ONE_RECORDING,
+)
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import candidate_values
+from spindle_fem.inference.hypothesis_fit import Belief, Fit, Problem
 from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.prepared_problem import slow_error_of
 from spindle_fem.model.lumped.written_network import value_in_definition
 from spindle_fem.units import Uncertain
+
+
+def _without_directions(diagnosis: Diagnosis) -> Fit:
+    """The chosen set on the machine as its definition can be written."""
+    if not diagnosis.predictor.misdescribed:
+        return diagnosis.final
+    predictor, belief = diagnosis.predictor.misdescribed_by((), {}), diagnosis.calibrated.belief
+    of_directions = (MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)
+    kept = [i for i, item in enumerate(belief.coordinates) if not item.name.startswith(of_directions)]
+    covariance = np.linalg.inv(belief.root.T @ belief.root)[np.ix_(kept, kept)]
+    root = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    known = Belief(tuple(belief.coordinates[i] for i in kept), belief.mean[kept], root)
+    slow, fit = diagnosis.calibrated.slow, diagnosis.final
+    # What directions took up is slow error now: the second fit knows how large.
+    for _ in range(2):
+        problem = Problem(predictor, known, slow, predictor.observations)
+        fit = problem.fit(fit.candidates, fit.values)
+        slow = slow_error_of(problem, fit)
+    return fit
 
 
 def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
@@ -22,9 +48,10 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
 
     Parameters keep what is left of their uncertainty. Directions of misdescription
     that a key of the definition stands for are put right; where a probe sits
-    within its hole is left as the definition has it.
+    within its hole is left as the definition has it. No key stands for those of
+    a network: its parameters are fitted once more, without them.
     """
-    fit = diagnosis.final
+    fit = _without_directions(diagnosis) if machine.is_network else diagnosis.final
     values = fit.values
     entries = tuple(
         EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.effects.framework.effect import Candidate, Reading
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.inference.coordinate_names import (
@@ -31,6 +30,7 @@ from spindle_fem.inference.drive_steps import coarse_drive, even_drive
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.observations import Observation, observe
 from spindle_fem.inference.prediction import Prediction
+from spindle_fem.inference.priors import Prior, priors_of
 from spindle_fem.inference.recording_gaps import (
     gap_pieces,
     hidden_forcing,
@@ -43,7 +43,6 @@ from spindle_fem.model.reduced.drive import Drive, drive_of_recording, inputs_at
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.run_start import Start
-from spindle_fem.operation.coefficient_table import INNER_SHARE
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
@@ -52,29 +51,6 @@ Array = NDArray[np.float64]
 STEP = 60.0
 # A network's recordings last minutes or months: longest bin [s], and number of bins of a recording.
 LONGEST_BIN, BINS = 600.0, 300
-# A share of heat stays below one.
-LARGEST_SHARE = 0.999
-
-
-@dataclass(frozen=True, slots=True)
-class Prior:
-    """One uncertain parameter.
-
-    Attributes
-    ----------
-    value : float
-        Most likely value before the data, in ``unit``.
-    sigma_log : float
-        One standard deviation of the natural logarithm.
-    highest : float
-        Factor on the value that cannot be passed; 1/0.5 for a share of one half.
-    """
-
-    name: str
-    value: float
-    sigma_log: float
-    unit: str
-    highest: float = np.inf
 
 
 class Predictor:
@@ -95,8 +71,6 @@ class Predictor:
         Inputs over time that are known already.
     same_within : float
         Operating points whose coefficients differ by less than this share have the same operators.
-    unseen : sequence of (n_sources,) ndarray
-        Of a network, for every recording: :func:`spindle_fem.inference.input_sampling.unseen_power`.
     """
 
     def __init__(
@@ -110,9 +84,8 @@ class Predictor:
         at_stamps: bool = False,
         drives: Sequence[Drive] | None = None,
         same_within: float = 0.0,
-        unseen: Sequence[Array] = (),
     ) -> None:
-        self.fast, self.effects, self.unseen = fast, effects, tuple(unseen)
+        self.fast, self.effects = fast, effects
         self.same_within, self.step, self.at_stamps = same_within, step, at_stamps
         self.recordings = tuple(recordings)
         self.use = tuple(np.ones(r.times.size, dtype=bool) for r in recordings) if use is None else tuple(use)
@@ -133,6 +106,7 @@ class Predictor:
         ]
         self._slopes: dict[tuple[str, int], Array] = {}
         self.misdescribed: tuple[Misdescription, ...] = ()
+        self.unseen: tuple[Array, ...] = ()
         self._columns: dict[tuple[int, str], Array] = {}
         self._stacked: dict[int, tuple[list[str], Array]] = {}
         self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
@@ -171,9 +145,20 @@ class Predictor:
             step=self.step,
             drives=self.drives,
             same_within=same_within,
-            unseen=self.unseen,
         )
-        return found.misdescribed_like(self)
+        return found.misdescribed_like(self).with_unseen(self.unseen)
+
+    def with_unseen(self, power: Sequence[Array]) -> Predictor:
+        """The same knowing what rarely read inputs of each recording leave open.
+
+        Parameters
+        ----------
+        power : sequence of (n_sources,) ndarray
+            :func:`spindle_fem.inference.input_sampling.unseen_power`.
+        """
+        found = copy.copy(self)
+        found.unseen = tuple(power)
+        return found
 
     def misdescribed_by(
         self, directions: Sequence[Misdescription], columns: Mapping[tuple[int, str], Array]
@@ -200,19 +185,7 @@ class Predictor:
     # ------------------------------------------------------------------ what is uncertain
     def uncertain(self) -> tuple[Prior, ...]:
         """The machine's uncertain parameters."""
-        if self.is_network:
-            known = self.fast.network.parameters
-            return tuple(Prior(p.name, p.value, p.sigma_log, p.unit) for p in known if p.sigma_log > 0.0)
-        return tuple(
-            Prior(
-                item.name,
-                item.value,
-                item.sigma_log,
-                item.unit,
-                LARGEST_SHARE / item.value if item.name == INNER_SHARE else np.inf,
-            )
-            for item in uncertain_parameters(self.fast.spec)
-        )
+        return priors_of(self.fast)
 
     def starts(self) -> tuple[Prior, ...]:
         """Uncertain temperatures at the start of each recording of a network."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from spindle_fem.inference.observations import observe
 from spindle_fem.inference.prediction import Prediction
-from spindle_fem.inference.predictor import Prior
+from spindle_fem.inference.priors import Prior
 
 NAMES = ("level", "slope")
 
