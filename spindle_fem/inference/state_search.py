@@ -160,22 +160,51 @@ def settle_best(search: Search) -> None:
 
     Also without each of the others, and as another effect at the same spot: whether heat or cooling switches
     shows in how its power follows temperatures, which what else is missing hides while a state is first
-    looked for.
+    looked for. What the best set has in intervals may be a state that was hidden so far.
     """
     fit = search.ranked()[0].fit
     for candidate in fit.candidates:
-        if len(fit.candidates) > 1 and search.is_hidden_state(candidate):
-            place, course, _ = search.courses[candidate.amplitude]
-            again = course_about(search, fit, place, candidate, course)
-            if again is not None:
-                settle(search, fit, place, again, candidate)
-                for other in fit.candidates:
-                    if other is not candidate:
-                        rest, values = without(fit, other)
-                        settle(search, search.problem.fit(rest, values), place, again, candidate)
-                twin = _twin(search, fit, place, candidate, tuned.FAIR_SHARE * again.log_evidence)
-                if twin is not None:
-                    settle(search, fit, *twin, candidate)
+        if search.is_hidden_state(candidate):
+            if len(fit.candidates) > 1:
+                _settle_again(search, fit, candidate)
+        elif search.in_intervals(candidate) and search.problem.predictor.is_network:
+            _settle_intervals(search, fit, candidate)
+
+
+def _settle_again(search: Search, fit: Fit, candidate: Candidate) -> None:
+    """The state of a set once more, beside all and beside all but one of its other effects, and as a twin."""
+    place, course, _ = search.courses[candidate.amplitude]
+    again = course_about(search, fit, place, candidate, course)
+    if again is None:
+        return
+    settle(search, fit, place, again, candidate)
+    for other in fit.candidates:
+        if other is not candidate:
+            rest, values = without(fit, other)
+            settle(search, search.problem.fit(rest, values), place, again, candidate)
+    twin = _twin(search, fit, place, candidate, tuned.FAIR_SHARE * again.log_evidence)
+    if twin is not None:
+        settle(search, fit, *twin, candidate)
+
+
+def _settle_intervals(search: Search, fit: Fit, candidate: Candidate) -> None:
+    """A state in the stead of an effect in intervals."""
+    number = candidate.recording or 0
+    place = next(
+        item
+        for item in state_places(search)
+        if (item.effect.name, item.pattern.spot, item.recording)
+        == (candidate.effect, candidate.component, number)
+    )
+    rest, values = without(fit, candidate)
+    base = BaseRun(search.problem.predictor, number, values, rest)
+    readings = ReadingFilter(readings_about(search.problem, fit, number, candidate))
+    best = max(_courses(search, base, readings, place), key=lambda course: course.log_evidence, default=None)
+    if best is not None:
+        settle(search, fit, place, best, candidate)
+        # Laws may have stood in for what intervals miss of the state.
+        if rest:
+            settle(search, search.problem.fit(), place, best)
 
 
 def _twin(
