@@ -27,8 +27,8 @@ from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuan
 from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
 
-# Width of the edges where the lag is short, s.
-EDGE_WIDTH = 20.0
+# Width of the edges where the lag is short: at most, s, and as a share of the shortest interval or pause.
+EDGE_WIDTH, EDGE_SHARE = 20.0, 0.1
 # 1 σ of an edge that a search found, s, and of the factors that one interval has beside the common size: of
 # intervals of one size, and of steps that each have their own.
 EDGE_SIGMA = 300.0
@@ -102,9 +102,12 @@ class InIntervals:
             for number in range(1, self._number)
             if intervals[number][0] <= intervals[number - 1][1] + TOUCHING
         }
+        lengths = np.diff([value for _, value in self._named(intervals)])
+        shortest = np.min(lengths, where=lengths > TOUCHING, initial=np.inf)
+        self._width = min(EDGE_WIDTH, EDGE_SHARE * float(shortest))
         if course == STATES:
             edges = [linear(name, value, 0.0, "s") for name, value in self._named(intervals)]
-            self.parameters = (shape("lag", EDGE_WIDTH, 0.0, "s"), *edges)
+            self.parameters = (shape("lag", self._width, 0.0, "s"), *edges)
             return
         jitter = STEP_SIGMA if course == STEPS else JITTER
         usual = sizes or (1.0,) * self._number
@@ -115,7 +118,7 @@ class InIntervals:
             # As many free numbers as levels: the first stands to the common size as it is.
             factors[0] = replace(factors[0], sigma=0.0)
         # A level that changes is another state of the machine, at once: its lag is that of the masses.
-        lag = shape("lag", EDGE_WIDTH, 0.0, "s") if course == STEPS else _lag()
+        lag = shape("lag", self._width, 0.0, "s") if course == STEPS else _lag()
         self.parameters = (lag, *self._free_edges(intervals), *factors)
 
     def _named(self, intervals: Intervals) -> list[tuple[str, float]]:
@@ -134,7 +137,7 @@ class InIntervals:
         for position, (name, value) in enumerate(named):
             before = named[position - 1][1] if position else value - 4.0 * EDGE_SIGMA
             after = named[position + 1][1] if position + 1 < len(named) else value + 4.0 * EDGE_SIGMA
-            sigma = min(EDGE_SIGMA, max(0.45 * min(value - before, after - value), EDGE_WIDTH))
+            sigma = min(EDGE_SIGMA, max(0.45 * min(value - before, after - value), self._width))
             low, high = value - 0.45 * (value - before), value + 0.45 * (after - value)
             found.append(linear(name, value, sigma, "s", low=low, high=high))
         return found
@@ -153,10 +156,10 @@ class InIntervals:
         width = max(time.size, np.size(lag))
         time = np.broadcast_to(time, (width,))
         found = np.zeros(width, dtype=complex)
-        reach = FAR * max(EDGE_WIDTH, float(np.max(np.real(lag))))
+        reach = FAR * max(self._width, float(np.max(np.real(lag))))
         for number, (start, end) in enumerate(self.edges(own), 1):
             # Far from an interval nothing is left of it.
-            first, last = np.min(np.real(start)) - FAR * EDGE_WIDTH, np.max(np.real(end)) + reach
+            first, last = np.min(np.real(start)) - FAR * self._width, np.max(np.real(end)) + reach
             rows = np.flatnonzero((time > first) & (time < last))
             if rows.size == 0:
                 continue
@@ -164,7 +167,7 @@ class InIntervals:
                 np.broadcast_to(value, (width,))[rows]
                 for value in (start, end, lag, own.get(f"factor_{number}", 1.0))
             )
-            found[rows] += factor * switched(time[rows], begin, stop, slow, EDGE_WIDTH)
+            found[rows] += factor * switched(time[rows], begin, stop, slow, self._width)
         return found
 
     def factors(self, own: Mapping[str, float]) -> list[float]:
