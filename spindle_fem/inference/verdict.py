@@ -347,11 +347,13 @@ def _predicts(
     """Whether a set tells held-out readings better than chance does.
 
     A coarse picture leaves more than noise, so that likelihoods make too much of it: of a network what is
-    left of readings counts, of those that were fitted too, and sensors' white noise hides less of it.
+    left of readings counts, of those that were fitted too, and sensors' white noise hides less of it. Where
+    nothing missing leaves no more than the noise, by directions far from what is believed of them, less does
+    not count.
     """
     if chosen.heldout is None or empty.heldout is None:
         return True
-    if coarseness > 1.0:
+    if coarseness > 1.0 and max(left(empty.fit), beyond(empty.fit)) > 1.0:
         lower = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
         return lower and left(chosen.fit) <= left(empty.fit)
     return 0.5 * (empty.heldout - chosen.heldout) / tuned.GAIN_DIVISOR >= tuned.LEAST_HELDOUT_GAIN

@@ -235,11 +235,14 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_not_named():
     assert not verdict(*same).chosen.fit.candidates
     # the picture that a network gives is coarser: what is left of single readings counts
     for share, told in ((0.5, "missing_physics"), (0.99, "consistent")):
-        left = {"beyond": lambda fit, share=share: share if fit.candidates else 1.0}
+        left = {"beyond": lambda fit, share=share: 1.5 * share if fit.candidates else 1.5}
         assert verdict(*better, coarseness=2.0, **left).verdict == told
-    worse = {"left": lambda fit: 1.1 if fit.candidates else 1.0}
-    better_later = {"beyond": lambda fit: 0.5 if fit.candidates else 1.0}
+    worse = {"left": lambda fit: 1.6 if fit.candidates else 1.5}
+    better_later = {"beyond": lambda fit: 0.75 if fit.candidates else 1.5}
     assert verdict(*better, coarseness=2.0, **better_later, **worse).verdict == "consistent"
+    # less than the noise is no better than the noise
+    within = dict.fromkeys(("left", "beyond"), lambda fit: 1.0 if fit.candidates else 0.8)
+    assert verdict(*better, coarseness=2.0, **within).verdict == "missing_physics"
     # where readings leave far more than noise, nothing that is known explains it
     assert verdict(*same, left=lambda fit: 3.0).verdict == "unexplained"
 
