@@ -30,6 +30,8 @@ EXPECTED_SLOW = SlowError(tuned.EXPECTED_SLOW_SIGMA, tuned.EXPECTED_SLOW_TIME)
 # Correlation times that are tried for a network, from that between readings to this share of its recording.
 NETWORK_TIMES = 6
 LONGEST_SHARE = 0.1
+# Fits to calibration recordings: slow error and what directions do follow from the one before.
+CALIBRATION_ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,13 +242,13 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
         return Calibrated(known_before(predictor), expected_slow_error(predictor), None)
     slow, fit = expected_slow_error(earlier), None
     prior = known_before(earlier)
-    for _ in range(2):
+    for _ in range(CALIBRATION_ROUNDS):
+        if fit is not None:
+            # What directions do is told about the numbers that were fitted.
+            earlier = with_misdescriptions(earlier, earlier.misdescribed, fit.values)
         problem = Problem(earlier, prior, slow, earlier.observations)
         fit = problem.fit((), None if fit is None else fit.values)
         slow = slow_error_of(problem, fit)
-        if earlier.is_network:
-            # Its numbers are guesses: what directions do is told about those that were fitted.
-            earlier = with_misdescriptions(earlier, earlier.misdescribed, fit.values)
     # Channels that only the diagnosed recordings have stay as they were known before.
     belief = known_before(predictor)
     place = {c.name: index for index, c in enumerate(fit.coordinates)}
