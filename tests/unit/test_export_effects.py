@@ -13,6 +13,7 @@ from spindle_fem.model.reduced.defined_effects import ActiveEffects
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.preload_mechanics import machine_view
+from spindle_fem.studies.export.effect_export import ExportedEffects
 from spindle_fem.studies.export.geometry_export import geometry_state_space
 from spindle_fem.studies.export.network_export import network_state_space
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -90,6 +91,29 @@ def held_effects(fast, drive, candidates, export):
 @pytest.mark.parametrize("names", [{"heat_scale", "drive_heat", "sensor_gain"}])
 def test_effects_agree_with_simulate(fast, names):
     assert held_by_spindle(fast, lambda effect: effect in names) == names
+
+
+def test_films_over_the_reynolds_number_are_refused_and_fouled_ones_held(fast):
+    view = machine_view(fast.names, at_the_defined_point(fast.spec))
+    films = [with_size(item) for item in candidates_for(view) if item.effect == "coolant_film"]
+    reasons = {item.form: refusal(item, lambda own: ExportedEffects(fast, own)) for item in films}
+    assert {form for form, reason in reasons.items() if "steps of a kelvin" in reason} == {
+        "curvature",
+        "transition",
+    }
+    assert reasons["fouling"] == ""
+
+
+def test_fouled_film_agrees_with_simulate_while_the_inlet_moves(fast):
+    times = np.arange(0.0, 2400.0, 30.0)
+    drive = drive_of(times, np.full(times.size, 3000.0), inlet=290.15 + 4.0 * np.sin(times / 400.0))
+    view = machine_view(fast.names, at_the_defined_point(fast.spec))
+    fouled = [
+        item for item in candidates_for(view) if (item.effect, item.form) == ("coolant_film", "fouling")
+    ]
+    assert held_effects(
+        fast, drive, fouled, lambda effects: geometry_state_space(fast, "lumped", 4500.0 * RPM, effects)
+    ) == {"coolant_film"}
 
 
 @pytest.mark.slow

@@ -32,6 +32,8 @@ TIMES = np.array([0.0, 20.0, 700.0, 9000.0, 2.0e5])
 WANDERING = np.array([290.0, 341.0, 303.0, 318.0, 296.0])
 # What sensors that are asked find around them, K; other inputs have no part in a reading.
 AROUND = 293.15
+# Points whose coolant alone differs, at which films are asked whether they follow it.
+COOLANTS = tuple(OperatingPoint(100.0, 1000.0, AROUND, inlet, 3e-4) for inlet in (283.15, 293.15, 303.15))
 # Of readings, K; of heat between the points of a table.
 EXACT, TOLERANCE = 1e-9, 5e-5
 
@@ -188,6 +190,11 @@ def _needs(candidate: Candidate) -> str:
             return "follows a column of a recording that drives nothing else"
         if any(place.startswith(FLUID_PREFIX) for place in term.heat_places):
             return "shifts the temperature of one fluid, which is no load of the model"
+        if _follows_coolant(term):
+            return (
+                "follows the Reynolds number as it moves with the inlet temperature, which simulate takes in "
+                "steps of a kelvin: the two would be some millikelvin apart"
+            )
         if term.heat_places and _tells_time(term):
             return "follows the clock of one recording"
     reading = candidate.reading
@@ -200,6 +207,13 @@ def _needs(candidate: Candidate) -> str:
     if np.abs(told - ZERO_CELSIUS_K - expected).max() > EXACT:
         return "follows the clock of one recording, or what its sensor read before"
     return ""
+
+
+def _follows_coolant(term: Term) -> bool:
+    """Whether factors on coefficients change with the coolant's inlet temperature."""
+    values = term.values({})
+    first, *others = (term.operating_factor(point, values) for point in COOLANTS)
+    return any(other != first for other in others)
 
 
 class _AnyInput(dict):
