@@ -21,7 +21,7 @@ from spindle_fem.inference.findings import predictions_at_stamps, states_of
 from spindle_fem.inference.full_model_check import AUTO, OFF, full_model_errors, nothing_run, require_choice
 from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.next_measurement import next_measurement
-from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine
+from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine, with_growth
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.parallel import thread_count
@@ -115,7 +115,7 @@ def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
     read = [recording_of(item) for item in asked.recordings]
     earlier = [recording_of(item) for item in asked.calibrate]
     opened = open_machine(asked.machine, overrides, read, earlier, heldout=asked.heldout, progress=tell)
-    opened = refined(opened)
+    opened = with_growth(refined(opened))
     with output_folder(asked.folder) as place:
         drawn = None
         reason = says_too_little(opened)

@@ -283,8 +283,12 @@ class _Readings:
         """Root mean square of the difference over the noise, in the channel where it is largest."""
         largest = 0.0
         for item, first, second in zip(self._plant.observations, self._of(one), self._of(other), strict=True):
-            noise = np.hypot(self._plant.recordings[item.recording].sigma[item.channel], self._slow.sigma)
-            largest = max(largest, float(np.sqrt(np.mean((first - second) ** 2))) / float(noise))
+            slow = self._slow.of(item.bins.key).sigma if item.bins.is_relative else self._slow.sigma
+            noise = np.hypot(self._plant.recordings[item.recording].sigma[item.channel], slow)
+            apart = first - second
+            if item.bins.is_relative:
+                apart = apart - apart.mean()
+            largest = max(largest, float(np.sqrt(np.mean(apart**2))) / float(noise))
         return largest
 
     def left(self, fit: Fit) -> float:

@@ -12,6 +12,7 @@ from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDE
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import (
     channel_errors,
+    displacement_errors,
     findings_of,
     noise_level,
     predictions_at_stamps,
@@ -54,6 +55,7 @@ def diagnosis_content(
             "detected": judgement.verdict != "consistent",
             "p_value": judgement.p_value,
             "channels": channel_errors(predictor, before),
+            "displacements": displacement_errors(predictor, before),
             **where.to_json(),
         },
         "findings": findings,
@@ -75,6 +77,7 @@ def diagnosis_content(
                 for recording, use in zip(predictor.recordings, predictor.use, strict=True)
             ],
             "channels_after": channel_errors(predictor, after),
+            "displacements_after": displacement_errors(predictor, after),
         },
         "improved_model": "improved_machine.toml",
         "machine_parameters": _machine_parameters(diagnosis),
@@ -137,7 +140,9 @@ def unexplained_content(opened: DiagnosedMachine, reason: str) -> dict[str, Any]
     channels = [
         {"channel": name, "rmse_K": None, "noise_K": float(sigma), "max_K": None}
         for recording in opened.recordings
-        for name, sigma in zip(recording.temperature_names, recording.sigma, strict=True)
+        for name, sigma in list(zip(recording.temperature_names, recording.sigma, strict=True))[
+            : recording.temperature_count
+        ]
     ]
     nothing = {"train_rmse_K": None, "heldout_rmse_K": None}
     return {

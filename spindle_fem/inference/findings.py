@@ -151,55 +151,73 @@ def states_of(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def predictions_at_stamps(predictor: Predictor, fit: Fit) -> list[Array]:
-    """What every channel of every recording should read at its own stamps, (N, c) K."""
+    """What every channel of every recording should read at its own stamps, (N, c) K.
+
+    Displacements, in µm, count from where their sensor was set, as well as the readings tell.
+    """
     found = []
     for number, recording in enumerate(predictor.recordings):
+        kelvins = recording.temperature_count
         on_grid = predictor.predict(number, fit.values, fit.candidates).temperature
         grid = predictor.drives[number].grid
         columns = [np.interp(recording.times, grid, column) for column in on_grid.T]
-        found.append(np.array(columns).T)
+        told = np.array(columns).T
+        apart = np.where(recording.usable, recording.temperature - told, np.nan)[:, kelvins:]
+        told[:, kelvins:] += [np.nanmean(own) if np.isfinite(own).any() else 0.0 for own in apart.T]
+        found.append(told)
     return found
 
 
 def rmse(predictor: Predictor, predicted: Sequence[Array], *, heldout: bool) -> float:
-    """Root mean square error over all channels of all recordings, K; NaN without readings."""
+    """Root mean square error over all temperatures of all recordings, K; NaN without readings."""
     total, number = 0.0, 0
     for recording, use, values in zip(predictor.recordings, predictor.use, predicted, strict=True):
         chosen = recording.usable & (~use if heldout else use)[:, None]
-        error = (values - recording.temperature)[chosen]
+        count = recording.temperature_count
+        error = (values[:, :count] - recording.temperature[:, :count])[chosen[:, :count]]
         total += float(error @ error)
         number += error.size
     return float(np.sqrt(total / number)) if number else float("nan")
 
 
 def noise_level(predictor: Predictor) -> float:
-    """Root mean square noise of a reading over all channels, K: declared, rounding included."""
+    """Root mean square noise of a reading over all temperatures, K: declared, rounding included."""
     variances = []
     for recording in predictor.recordings:
-        for channel in range(len(recording.temperature_names)):
+        for channel in range(recording.temperature_count):
             variances.append(channel_noise(predictor, recording, channel) ** 2)
     return float(np.sqrt(np.mean(variances)))
 
 
 def channel_noise(predictor: Predictor, recording, channel: int) -> float:
-    """Noise of a reading of one channel, K."""
+    """Noise of a reading of one channel, K, of a displacement µm."""
     rounding = recording.noise[channel].resolution / np.sqrt(12.0)
     return float(np.hypot(recording.sigma[channel], rounding))
 
 
 def channel_errors(predictor: Predictor, predicted: Sequence[Array]) -> list[dict[str, Any]]:
-    """Error of every channel of every recording."""
+    """Error of every temperature of every recording."""
+    return _errors(predictor, predicted, "K")
+
+
+def displacement_errors(predictor: Predictor, predicted: Sequence[Array]) -> list[dict[str, Any]]:
+    """Error of every displacement of every recording, but for where its sensor was set."""
+    return _errors(predictor, predicted, "um")
+
+
+def _errors(predictor: Predictor, predicted: Sequence[Array], unit: str) -> list[dict[str, Any]]:
     several = len(predictor.recordings) > 1
     rows = []
     for recording, values in zip(predictor.recordings, predicted, strict=True):
-        for channel, name in enumerate(recording.temperature_names):
+        count, every = recording.temperature_count, len(recording.temperature_names)
+        for channel in range(count) if unit == "K" else range(count, every):
             usable = recording.usable[:, channel]
             error = values[usable, channel] - recording.temperature[usable, channel]
             row = {
-                "channel": name,
-                "rmse_K": float(np.sqrt(np.mean(error**2))) if error.size else None,
-                "noise_K": channel_noise(predictor, recording, channel),
-                "max_K": float(np.abs(error).max()) if error.size else None,
+                "channel": recording.temperature_names[channel],
+                f"rmse_{unit}": float(np.sqrt(np.mean(error**2))) if error.size else None,
+                f"noise_{unit}": channel_noise(predictor, recording, channel),
+                f"max_{unit}": float(np.abs(error).max()) if error.size else None,
             }
             rows.append(row | ({"recording": recording.name} if several else {}))
     return rows

@@ -172,7 +172,7 @@ def options_for(predictor: Predictor) -> TransientOptions:
     levels = [
         channel_noise(predictor, recording, channel)
         for recording in predictor.recordings
-        for channel in range(len(recording.temperature_names))
+        for channel in range(recording.temperature_count)
     ]
     noise = float(np.clip(min(levels), QUIETEST, LOUDEST))
     return TransientOptions(
@@ -227,7 +227,7 @@ def _both_fits(
             "seconds": full.seconds,
         }
         reduced = predictions_at_stamps(predictor, fits[name])
-        apart[name] = [a - b for a, b in zip(full.predicted, reduced, strict=True)]
+        apart[name] = [a - b[:, : a.shape[1]] for a, b in zip(full.predicted, reduced, strict=True)]
     supplied = any(n.startswith(FIRST_ORDER) for fit in fits.values() for n in fit.values)
     return {
         "mesh": mesh,
@@ -369,16 +369,17 @@ def _run(
 
 
 def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient) -> Array:
-    """What the channels tell of a full run, on the grid of the reduced model, (G + 1, c) K."""
-    told = np.column_stack([run.reading(probe) for probe in predictor.recordings[number].probes])
-    told = predictor.read(number, predictor.effects.candidates, {}, told) + _first_order(
-        predictor, number, fit
-    )
+    """What the temperature channels tell of a full run, on the grid of the reduced model, (G + 1, c) K."""
+    recording = predictor.recordings[number]
+    count = recording.temperature_count
+    told = np.column_stack([run.reading(probe) for probe in recording.probes[:count]])
+    told = predictor.read(number, predictor.effects.candidates, {}, told)
+    told = told + _first_order(predictor, number, fit, count)
     return predictor.read(number, _acting(fit.candidates, number), fit.values, told)
 
 
-def _first_order(predictor: Predictor, number: int, fit: Fit) -> Array | float:
-    """What the places of the probes and the gaps change, before the fit's own sensor effects, K."""
+def _first_order(predictor: Predictor, number: int, fit: Fit, count: int) -> Array | float:
+    """What the places of the probes and the gaps change before the fit's own sensor effects, (G + 1, n) K."""
     if not any(name.startswith(FIRST_ORDER) for name in fit.values):
         return 0.0
     bare = [replace(item, reading=None) for item in fit.candidates]
@@ -387,7 +388,7 @@ def _first_order(predictor: Predictor, number: int, fit: Fit) -> Array | float:
     values = {name: value for name, value in fit.values.items() if name not in of_readings}
     plain = {name: value for name, value in values.items() if not name.startswith(FIRST_ORDER)}
     moved, still = (predictor.predict(number, item, bare).temperature for item in (values, plain))
-    return moved - still
+    return (moved - still)[:, :count]
 
 
 def _differences(predictor: Predictor, apart: Mapping[str, Sequence[Array]]) -> list[Mapping[str, Any]]:
@@ -404,5 +405,5 @@ def _differences(predictor: Predictor, apart: Mapping[str, Sequence[Array]]) -> 
             },
         }
         for number, recording in enumerate(predictor.recordings)
-        for column, name in enumerate(recording.temperature_names)
+        for column, name in enumerate(recording.temperature_names[: recording.temperature_count])
     ]

@@ -179,7 +179,9 @@ def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
                 f"share by which {material} conducts better",
                 Conductivity(material),
             )
-    channels = dict.fromkeys(name for item in predictor.recordings for name in item.temperature_names)
+    channels = dict.fromkeys(
+        name for item in predictor.recordings for name in item.temperature_names[: item.temperature_count]
+    )
     for channel in channels:
         yield Misdescription(
             f"response.{channel}",

@@ -87,7 +87,8 @@ def readings_about(
     slow = [problem.slow.of(channel) for channel in range(usable.shape[1])]
     residual = np.full((len(grid), usable.shape[1]), np.nan)
     variance = np.ones_like(residual)
-    for channel in range(usable.shape[1]):
+    # Where a displacement's sensor was set is open: it tells no state by its level.
+    for channel in range(recording.temperature_count):
         rows = np.flatnonzero(usable[:, channel])
         left = recording.temperature[rows, channel]
         left = left - np.interp(recording.times[rows], grid, model[:, channel])

@@ -74,7 +74,7 @@ def left_over_noise(
     told: Sequence[Array],
     factors: Mapping[str, float],
 ) -> float:
-    """Robust root mean square of single readings less what is told, over their noise, all channels alike.
+    """Robust root mean square of single readings less what is told, over their noise, all temperatures alike.
 
     Sensors of a machine with geometry also have the slow error that is expected of them before any fit; of
     a network's, ``sigma`` is all that is known.
@@ -92,6 +92,8 @@ def left_over_noise(
         beside = [sampling_errors(network, power) for power in predictor.unseen]
     ratios = []
     for item, values in zip(observations, told, strict=True):
+        if item.bins.is_relative:
+            continue
         recording = predictor.recordings[item.recording]
         thinned = recording.defects.thinned
         each = 1.0 if thinned is None else thinned.rows / thinned.bins

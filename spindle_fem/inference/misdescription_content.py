@@ -58,7 +58,7 @@ def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]
     for number, recording in enumerate(predictor.recordings):
         column = predictor.column_of(number, item.coordinate)
         if column is not None:
-            moved = np.abs(value * column).max(axis=0)
+            moved = np.abs(value * column[:, : recording.temperature_count]).max(axis=0)
             if moved.max() > largest:
                 largest = float(moved.max())
                 channel = recording.temperature_names[int(np.argmax(moved))]

@@ -374,7 +374,7 @@ def _scores(predictor: Predictor, fit: Fit, number: int) -> list[tuple[Array, Ar
     predicted = predictor.predict(number, fit.values, fit.candidates).temperature
     window = window_of(predictor.recordings[number])
     found = []
-    for channel in range(predicted.shape[1]):
+    for channel in range(predictor.recordings[number].temperature_count):
         own = [
             o
             for o in (*predictor.observations, *predictor.heldout)
@@ -472,7 +472,7 @@ def band_words(names: Sequence[str]) -> str:
 def separating_temperature(recording: Recording, inside: NDArray[np.bool_]) -> str:
     """``above 31 °C at SP01`` where that tells the stamps inside from those outside; else empty."""
     best, words = tuned.SEPARATES, ""
-    for column, name in enumerate(recording.temperature_names):
+    for column, name in enumerate(recording.temperature_names[: recording.temperature_count]):
         usable = recording.usable[:, column]
         hot, cold = inside & usable, ~inside & usable
         if min(hot.sum(), cold.sum()) < 10:

@@ -201,10 +201,10 @@ def evaluate(
             *beside_probes(tuple(doubted), predictor.fast.model.probe_names),
             *reachable_places(predictor.fast.spec, predictor.fast.model.place_names),
         )
-    white = np.append(recording.sigma, np.full(len(places), float(np.median(recording.sigma))))
+    count, read = len(recording.temperature_names), recording.temperature_count
+    white = np.append(recording.sigma, np.full(len(places), float(np.median(recording.sigma[:read]))))
     step = float(np.median(np.diff(recording.times)))
     names = (*recording.temperature_names, *(place.words for place in places))
-    count = len(recording.temperature_names)
     options: list[Option] = []
     failed = []
     for trial in trials_of(predictor, diagnosis.view):
@@ -220,7 +220,7 @@ def evaluate(
             for sigma in white
         ]
         for position in (None, *range(len(places))):
-            chosen = [*range(count), *([] if position is None else [count + position])]
+            chosen = [*range(read), *([] if position is None else [count + position])]
             place = None if position is None else places[position]
             options.append(_option(trial, place, answers, fits, weights, chosen, noise, names))
     return options, failed

@@ -28,6 +28,7 @@ from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.operation.preload_mechanics import machine_view
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
+from spindle_fem.recordings.displaced_readings import with_displacements
 from spindle_fem.recordings.smooth_inputs import without_input_noise
 from spindle_fem.recordings.thin import thinned_recording
 
@@ -162,6 +163,22 @@ def _open_network(
         (*notes, *more, *averaged),
         tuple(unseen_power(network, item) for item in (*smooth, *smooth_earlier)),
     )
+
+
+def with_growth(machine: DiagnosedMachine) -> DiagnosedMachine:
+    """The machine with displacements among the readings that are to be explained, where it has geometry.
+
+    The view stays that of the temperatures: what is usual and what ails sensors is asked of them alone.
+    """
+    if machine.is_network:
+        return machine
+    own, earlier = (
+        tuple(with_displacements(item) for item in items)
+        for items in (machine.recordings, machine.calibration)
+    )
+    for recording in (*own, *earlier):
+        machine.fast.require_channels(recording.probes, recording.source)
+    return replace(machine, recordings=own, calibration=earlier)
 
 
 def with_network(machine: DiagnosedMachine, spec: NetworkMachineSpec) -> DiagnosedMachine:

@@ -222,7 +222,7 @@ class Predictor:
         model = self.fast.model
         if not model.probe_gradients.size:
             return ()
-        read = {probe for recording in self.recordings for probe in recording.probes}
+        read = {probe for item in self.recordings for probe in item.probes[: item.temperature_count]}
         return tuple(
             f"{PROBE_PREFIX}{probe}.{direction}"
             for probe in model.probe_names

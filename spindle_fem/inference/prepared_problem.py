@@ -108,10 +108,13 @@ def known_before(predictor: Predictor) -> Belief:
 def expected_slow_error(predictor: Predictor) -> SlowError:
     """Slow error before any fit.
 
-    Of a node that a rarely read input heats, also what that did between its readings.
+    Of a displacement it is what expansion coefficients leave of growth; of a node that a rarely read input
+    heats, also what that did between its readings.
     """
     if not predictor.is_network:
-        return EXPECTED_SLOW
+        sigma, time = tuned.DISPLACEMENT_SLOW_SIGMA, tuned.EXPECTED_SLOW_TIME
+        keys = dict.fromkeys(item.bins.key for item in predictor.observations if item.bins.is_relative)
+        return replace(EXPECTED_SLOW, channels=tuple((key, sigma, time) for key in keys))
     unit, times = _network_scales(predictor)
     usual = SlowError(unit, times[len(times) // 2])
     if not predictor.unseen:
@@ -141,21 +144,22 @@ def with_inexact_laws(problem: Problem, fit: Fit) -> Problem:
     """
     left: dict[int, list[Array]] = {}
     for bins, values in problem.binned_residuals(fit):
-        left.setdefault(bins.channel, []).append(values)
+        # The constant of a displacement is free.
+        left.setdefault(bins.key, []).append(values - values.mean() if bins.is_relative else values)
     return replace(
         problem,
         slow=SlowError.each(
             {
-                channel: replace(
-                    problem.slow.of(channel),
+                key: replace(
+                    problem.slow.of(key),
                     sigma=float(
                         np.hypot(
-                            problem.slow.of(channel).sigma,
+                            problem.slow.of(key).sigma,
                             tuned.LAW_INEXACT * np.sqrt(np.mean(np.concatenate(values) ** 2)),
                         )
                     ),
                 )
-                for channel, values in left.items()
+                for key, values in left.items()
             }
         ),
     )
@@ -200,7 +204,10 @@ def with_own_noise(
 def _slow_choices(predictor: Predictor) -> dict[str, Any]:
     """What the slow error is chosen from, as :func:`likely_slow_error` takes it."""
     if not predictor.is_network:
-        return {"prior": EXPECTED_SLOW, "sigmas": tuned.SLOW_SIGMAS, "times": tuned.SLOW_TIMES}
+        displaced = any(item.bins.is_relative for item in predictor.observations)
+        # None of the larger ones is likely of a temperature before any reading.
+        sigmas = tuned.SLOW_SIGMAS + (tuned.DISPLACEMENT_SLOW_SIGMAS if displaced else ())
+        return {"prior": EXPECTED_SLOW, "sigmas": sigmas, "times": tuned.SLOW_TIMES}
     unit, times = _network_scales(predictor)
     return {
         "prior": expected_slow_error(predictor),

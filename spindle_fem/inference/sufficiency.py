@@ -26,7 +26,7 @@ def says_too_little(machine: DiagnosedMachine) -> str:
     """
     reasons = []
     for recording in machine.recordings:
-        if not recording.temperature_names:
+        if not recording.temperature_count:
             return f'"{recording.name}" has no channel of role "temperature": there is nothing to explain.'
         usable = int(recording.usable.sum(axis=0).max(initial=0))
         if usable < FEWEST_READINGS:

@@ -25,6 +25,9 @@ PROBE_PLACE_SIGMA, COMMON_RADIAL_SIGMA = 0.3e-3, 0.8e-3
 # Error that neighbouring readings share, of logger, sensor and model: expected size [K] and correlation time
 # [s] with geometry, and the values among which the likelihood chooses.
 EXPECTED_SLOW_SIGMA, EXPECTED_SLOW_TIME = 0.045, 1500.0
+# Slow error expected of a displacement, µm: 1 % of a growth of some 30 µm, and sizes beside
+# those of temperatures among which the likelihood chooses. (Judgement.)
+DISPLACEMENT_SLOW_SIGMA, DISPLACEMENT_SLOW_SIGMAS = 0.3, (0.3, 0.7, 1.5, 3.0)
 SLOW_SIGMAS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13)
 SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
 # Friction within a gap beyond what the inputs beside it say, one standard deviation as a share of the

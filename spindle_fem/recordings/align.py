@@ -119,6 +119,11 @@ class Recording:
     unseen_changes: tuple[tuple[str, float, float], ...] = ()
 
     @property
+    def temperature_count(self) -> int:
+        """Leading columns of the readings that are temperatures; any others are displacements, in µm."""
+        return sum(name not in self.displacement_names for name in self.temperature_names)
+
+    @property
     def usable(self) -> NDArray[np.bool_]:
         """Readings that carry no flag, ``(N, c)``."""
         return self.flags == 0

@@ -156,9 +156,12 @@ def write_simulated(
 
     Parameters
     ----------
+    predicted : (N, c) ndarray
+        Temperatures [K], then any displacements that stand among the recording's readings [µm].
     displacements : (N, d) ndarray, optional, [m]
     """
-    frame = pd.DataFrame(predicted - ZERO_CELSIUS_K, columns=list(recording.temperature_names))
+    zero = np.where(np.arange(predicted.shape[1]) < recording.temperature_count, ZERO_CELSIUS_K, 0.0)
+    frame = pd.DataFrame(predicted - zero, columns=list(recording.temperature_names[: predicted.shape[1]]))
     if displacements is not None and displacements.size:
         frame[list(recording.displacement_names)] = 1e6 * displacements
     times = recording.times

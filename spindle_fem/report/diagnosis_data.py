@@ -14,6 +14,7 @@ from spindle_fem.inference.next_measurement import hypothesis_words
 from spindle_fem.inference.verdict import rank
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import operating_conditions
+from spindle_fem.recordings.displaced_readings import without_displacements
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequ
     """
     import xarray as xr
 
-    recordings = diagnosis.predictor.recordings
+    recordings = [without_displacements(item) for item in diagnosis.predictor.recordings]
     variables: dict[str, Any] = {}
     variables |= _readings(diagnosis, before, after)
     variables |= _inputs(recordings)
@@ -88,13 +89,13 @@ def _joined(
     found = []
     for item, own in zip(recordings, values, strict=True):
         table = np.full((item.times.size, len(names)), empty, dtype=dtype)
-        table[:, [names.index(name) for name in item.temperature_names]] = own
+        table[:, [names.index(name) for name in item.temperature_names]] = own[:, : item.temperature_count]
         found.append(table)
     return np.concatenate(found)
 
 
 def _readings(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Array]) -> dict[str, Any]:
-    recordings = diagnosis.predictor.recordings
+    recordings = [without_displacements(item) for item in diagnosis.predictor.recordings]
     names = _channels(recordings)
     celsius = {"units": "degC"}
     sigma = np.full((len(recordings), len(names)), np.nan)

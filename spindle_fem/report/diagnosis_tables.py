@@ -117,7 +117,25 @@ def channel_table(content: Mapping[str, Any]) -> list[Table]:
         fixed("largest before / K", "max_K", 2),
         fixed("largest after / K", "max_after", 2),
     )
-    return [table_of(fields, items, "Root mean square and largest error of every channel.")]
+    tables = [table_of(fields, items, "Root mean square and largest error of every channel.")]
+    if grown := content["mismatch"].get("displacements"):
+        after = content["fit"]["displacements_after"]
+        moved = [
+            {**first, "rmse_after": second["rmse_um"], "max_after": second["max_um"]}
+            for first, second in zip(grown, after, strict=True)
+        ]
+        fields = (
+            *recording_fields(grown),
+            words("sensor", "channel"),
+            fixed("before / µm", "rmse_um", 3),
+            fixed("after / µm", "rmse_after", 3),
+            fixed("noise / µm", "noise_um", 3),
+            fixed("largest before / µm", "max_um", 2),
+            fixed("largest after / µm", "max_after", 2),
+        )
+        caption = "Error of every displacement, but for where its sensor was set."
+        tables.append(table_of(fields, moved, caption))
+    return tables
 
 
 def set_tables(content: Mapping[str, Any]) -> list[Any]:
