@@ -11,17 +11,36 @@ import pytest
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import DisplacementSensor
+from spindle_fem.effects.registry import candidates_for
+from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import calibrate
+from spindle_fem.inference.diagnosis import diagnose_recordings
+from spindle_fem.inference.findings import (
+    channel_errors,
+    displacement_errors,
+    noise_level,
+    predictions_at_stamps,
+    rmse,
+)
+from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.opened_machine import DiagnosedMachine, with_growth
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, expected_slow_error, known_before
+from spindle_fem.inference.prepared_problem import calibrate as calibrate_machine
 from spindle_fem.inference.reading_noise import (
     SlowError,
     Whitener,
     channel_bins,
     likely_slow_error,
 )
+from spindle_fem.machine.view.build_view import view_of
+from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.displaced_readings import with_displacements
+from spindle_fem.recordings.compare import write_simulated
+from spindle_fem.recordings.displaced_readings import with_displacements, without_displacements
+from spindle_fem.report.diagnosis_tables import channel_table
 from tests.support.lumped_spindle import lumped_model
 
 MANIFEST = """schema = "spindle-fem/recording/1"
@@ -166,3 +185,108 @@ def test_a_displacement_tells_of_the_shaft(tmp_path):
     films = {name: item["shaft_end_films"] for name, item in found.items()}
     assert films["with"].low < TRUTH["shaft_end_films"] * films["with"].prior < films["with"].high
     assert films["with"].sigma_log < 0.6 * films["without"].sigma_log
+
+
+# -------------------------------------------------------------- diagnosis
+DRIVE_HEAT = 465.0
+
+
+@pytest.fixture(scope="module")
+def heated(tmp_path_factory):
+    """A machine opened on what sensors read while its drive heats the shaft's end; the drive's heat."""
+    folder = tmp_path_factory.mktemp("heated")
+    fast = nose_machine()
+    model = fast.model
+    near = tuple(f"near.{name}" for name in model.probe_names)
+    model = replace(
+        model,
+        probe_gradients=np.zeros((len(model.probe_names), 2, model.size)),
+        place_names=(*model.place_names, *near),
+        places=np.vstack((model.places, model.probes)),
+    )
+    fast = fast_spindle(model, fast.spec)
+    blank = nose_recording(folder, {name: np.full(RUN.size, 20.0) for name in ("SP01", "SP05", "S1")})
+    view = view_of(fast.names, blank)
+    heat = next(c for c in candidates_for(view) if (c.effect, c.form) == ("drive_heat", "lag"))
+    predictor = Predictor(fast, [with_displacements(blank)])
+    on_grid = predictor.predict(0, {heat.amplitude: DRIVE_HEAT}, (heat,)).temperature
+    told = np.array([np.interp(RUN, predictor.drives[0].grid, column) for column in on_grid.T]).T
+    told = told + 0.1 * np.random.default_rng(5).normal(size=told.shape)
+    readings = {"SP01": told[:, 0] - 273.15, "SP05": told[:, 1] - 273.15, "S1": told[:, 2] + 57.0}
+    recording = nose_recording(folder, readings)
+    return DiagnosedMachine("nose", fast.spec, fast, NO_EFFECTS, view, (recording,), ()), heat
+
+
+def test_a_displacement_narrows_what_is_known_of_heat_in_the_shaft(heated):
+    opened, heat = heated
+    width, gain = [], []
+    for machine in (opened, with_growth(opened)):
+        predictor = Predictor(machine.fast, machine.recordings)
+        known = calibrate_machine(None, predictor)
+        problem = Problem(predictor, known.belief, known.slow, predictor.observations)
+        fit = problem.fit((heat,))
+        low, high = fit.interval(heat.amplitude, 1.645)
+        assert low < DRIVE_HEAT < high
+        width.append(high - low)
+        gain.append(problem.fit().misfit_with_prior - fit.misfit_with_prior)
+    assert width[1] < 0.5 * width[0]
+    assert gain[1] > 5.0 * gain[0]
+
+
+def test_displacements_are_told_apart_from_temperatures(heated):
+    """Errors in kelvins, directions of sensors and what is usual leave them out; files have them in µm."""
+    opened = with_growth(heated[0])
+    predictor = Predictor(opened.fast, opened.recordings)
+    recording = opened.recordings[0]
+    assert without_displacements(recording).temperature_names == ("SP01", "SP05")
+    fit = Problem(predictor, known_before(predictor), EXPECTED_SLOW, predictor.observations).fit()
+    told = predictions_at_stamps(predictor, fit)
+    far = [told[0] + [0.0, 0.0, 1000.0]]
+    assert rmse(predictor, far, heldout=False) == rmse(predictor, told, heldout=False)
+    assert noise_level(predictor) == pytest.approx(0.1, rel=1e-4)
+    assert [row["channel"] for row in channel_errors(predictor, told)] == ["SP01", "SP05"]
+    (row,) = displacement_errors(predictor, told)
+    assert (row["channel"], row["noise_um"]) == ("S1", pytest.approx(0.1, rel=1e-4))
+    apart = told[0][:, 2] - recording.temperature[:, 2]
+    assert np.mean(apart) == pytest.approx(0.0, abs=1e-6)
+    assert row["rmse_um"] == pytest.approx(np.std(apart))
+    directions = [item.name for item in heat_misdescriptions(predictor)]
+    assert "response.SP05" in directions
+    assert "response.S1" not in directions
+    assert not any(".S1." in name for name in predictor.displacements())
+    assert "S1" not in opened.view.channels
+
+
+def test_predictions_are_written_in_the_units_of_their_channels(heated, tmp_path):
+    recording = with_growth(heated[0]).recordings[0]
+    write_simulated(tmp_path / "after.csv", recording, np.tile([300.0, 301.0, 12.5], (RUN.size, 1)))
+    written = pd.read_csv(tmp_path / "after.csv")
+    assert written.iloc[0][["SP01", "SP05", "S1"]].tolist() == pytest.approx([26.85, 27.85, 12.5])
+
+
+def test_a_displacement_expects_an_error_of_its_own_size(heated):
+    predictor = Predictor(heated[0].fast, with_growth(heated[0]).recordings)
+    slow = expected_slow_error(predictor)
+    key = next(item.bins.key for item in predictor.observations if item.bins.is_relative)
+    assert slow.of(key).sigma == tuned.DISPLACEMENT_SLOW_SIGMA
+    assert (slow.sigma, slow.of(0).sigma) == (EXPECTED_SLOW.sigma, EXPECTED_SLOW.sigma)
+
+
+def test_the_report_tells_of_displacements_in_micrometres():
+    error = {"channel": "S1", "rmse_um": 1.5, "noise_um": 0.1, "max_um": 4.0}
+    content = {
+        "mismatch": {"channels": [], "displacements": [error]},
+        "fit": {"channels_after": [], "displacements_after": [error | {"rmse_um": 0.2, "max_um": 0.5}]},
+    }
+    _, grown = channel_table(content)
+    assert "before / µm" in str(grown.columns)
+    assert "0.200" in str(grown.rows)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_with_displacements_names_the_drive(heated):
+    """From the recording to the judgement."""
+    done = diagnose_recordings(with_growth(heated[0]))
+    assert [(c.effect, c.component) for c in done.final.candidates] == [("drive_heat", "drive_end")]
+    (row,) = displacement_errors(done.predictor, predictions_at_stamps(done.predictor, done.final))
+    assert row["rmse_um"] < 0.15
