@@ -9,6 +9,9 @@ from spindle_fem.definition.machine_spec import BallBearingType, BearingSet, Bea
 from spindle_fem.definition.solid_tables import SetBearing
 from spindle_fem.errors import SpecError, SpindleFemError
 
+# An interference beyond this share of the diameter yields the ring (Harris: about 1e-3 at most)
+LARGEST_FIT = 2.0e-3
+
 
 def seat_diameter(
     spec: MachineSpec, kind: BearingType, bearing: SetBearing, side: Literal["inner", "outer"]
@@ -33,12 +36,19 @@ def seat_diameter(
 
 
 def seat_faults(spec: MachineSpec, group: BearingSet, kind: BallBearingType) -> Iterator[SpindleFemError]:
-    """Rings of a set with a fit that sit on nothing, or looser than their bearing."""
+    """Rings of a set with a fit that sit on nothing, looser than their bearing or tighter than they bear."""
     play = kind.play
-    for key, clearance in (
-        ("inner_interference", -group.fit.inner_interference),
-        ("outer_clearance", group.fit.outer_clearance),
+    for key, clearance, diameter in (
+        ("inner_interference", -group.fit.inner_interference, kind.bore_diameter),
+        ("outer_clearance", group.fit.outer_clearance, kind.outer_diameter),
     ):
+        if -clearance > LARGEST_FIT * diameter:
+            yield SpecError(
+                f"bearing_set.{group.name}.fit.{key}",
+                f"the ring has {-clearance * 1e6:.0f} µm of interference on its seat of "
+                f"{diameter * 1e3:g} mm, which makes it yield.",
+                f"Allowed: up to {LARGEST_FIT * diameter * 1e6:.0f} µm on the diameter.",
+            )
         if clearance > play:
             yield SpecError(
                 f"bearing_set.{group.name}.fit.{key}",

@@ -52,7 +52,7 @@ def fit_table(content: Mapping[str, Any]) -> Table:
         fixed("held-out readings / K", lambda model: fit[model]["heldout_rmse_K"], 3),
         fixed("held out / noise", over_noise, 2),
     )
-    caption = f"Root mean square error over all channels; held out: {fit['heldout']}."
+    caption = f"Root mean square error over all temperature channels; held out: {fit['heldout']}."
     return table_of(fields, ("before", "after"), caption)
 
 

@@ -92,6 +92,15 @@ def test_wetted_share_sets_the_way_of_heat_through_the_grease() -> None:
             "rear.fit.inner_interference: the ring has 60 µm",
         ),
         (
+            ["bearing_set.front.fit.inner_interference=300 um"],
+            "bearing_set.front.fit.inner_interference: the ring has 300 µm of interference on its seat of "
+            "140 mm, which makes it yield. Allowed: up to 280 µm on the diameter.",
+        ),
+        (
+            ["bearing_set.rear.fit.outer_clearance=-400 um"],
+            "bearing_set.rear.fit.outer_clearance: the ring has 400 µm of interference",
+        ),
+        (
             ["heat.thermal_preload=true", "materials.cast_iron.thermal_expansion=0 1/K"],
             "materials.cast_iron.thermal_expansion: it is 0, but heat.thermal_preload follows",
         ),

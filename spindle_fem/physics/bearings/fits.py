@@ -17,14 +17,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq
 
+from spindle_fem.definition.bearing_seats import LARGEST_FIT
 from spindle_fem.errors import GeometryError, SpecError
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_DENSITY, BearingGeometry
 from spindle_fem.physics.bearings.hertz import contact_polynomials
 from spindle_fem.physics.bearings.rings import STEEL, Annulus, RingLaw, SeatMaterial
 from spindle_fem.physics.bearings.seat_contact import SeatBodies
 
-# An interference beyond this share of the diameter yields the ring (Harris: about 1e-3 at most)
-_LARGEST_FIT = 2.0e-3
 # rad; where the contact angle of a mounted bearing is looked for
 _ANGLES = (1.0e-3, 0.5 * math.pi - 1.0e-6)
 # m; seats that yield together have settled
@@ -244,9 +243,9 @@ def fit_faults(geometry: BearingGeometry, fits: RingFits) -> list[tuple[str, str
         ("outer_clearance", geometry.outer_diameter),
     ):
         value = getattr(fits, key)
-        if not abs(value) <= _LARGEST_FIT * diameter:
+        if not abs(value) <= LARGEST_FIT * diameter:
             what = f"{value * 1e6:g} µm on {diameter * 1e3:g} mm is no fit."
-            rule = f"Allowed: ± {_LARGEST_FIT * diameter * 1e6:.0f} µm on the diameter."
+            rule = f"Allowed: ± {LARGEST_FIT * diameter * 1e6:.0f} µm on the diameter."
             faults.append((key, what, rule))
     return faults
 
