@@ -39,7 +39,20 @@ class CoefficientTable:
     names: tuple[str, ...]
 
     def base(self, point: OperatingPoint) -> dict[str, float]:
-        """Every coefficient at an operating point, SI; only films and gaps depend on it."""
+        """Every coefficient at an operating point, SI; only films and gaps depend on it.
+
+        Raises
+        ------
+        SpecError
+            A bearing whose ball row follows its contacts: its conductance changes with load and speed.
+        """
+        for group in self.spec.bearing_set:
+            if group.ball_row.kind != "constant":
+                raise SpecError(
+                    f"bearing_set.{group.name}.ball_row",
+                    f'kind "{group.ball_row.kind}" has no constant conductance for the reduced model.',
+                    'Give kind = "constant" with a conductance.',
+                )
         return linear_coefficients(self.spec, point, self.contacts, self.gap_radii)
 
     def capacities(self) -> dict[str, float]:
@@ -91,22 +104,8 @@ def build_coefficient_table(
     contacts: Iterable[str],
     gap_radii: Mapping[str, tuple[float, float]],
 ) -> CoefficientTable:
-    """Coefficients of a machine whose contacts and gaps are known.
-
-    Raises
-    ------
-    SpecError
-        A bearing whose ball row follows its contacts: its conductance would
-        change with load and speed.
-    """
+    """Coefficients of a machine whose contacts and gaps are known."""
     names = tuple(contacts)
-    for group in spec.bearing_set:
-        if group.ball_row.kind != "constant":
-            raise SpecError(
-                f"bearing_set.{group.name}.ball_row",
-                f'kind "{group.ball_row.kind}" has no constant conductance for the reduced model.',
-                'Give kind = "constant" with a conductance.',
-            )
     groups = coefficient_groups(spec, names)
     known = dict.fromkeys(name for entry in groups.values() for name in entry)
     for group, bearing in spec.bearings:

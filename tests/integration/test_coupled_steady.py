@@ -270,3 +270,18 @@ def test_contacts_need_one_group_each(recorded):
     assert (
         'the contact "F1.inner_ring|shaft" is claimed by inner_ring_seats and front_outer_ring_seats' in text
     )
+
+
+def test_effects_act_where_balls_follow_their_contacts(reference, reference_result, tmp_path):
+    text = 'schema = "spindle-fem/machine/1"\nname = "more"\nbase = "wu_tan_2016"\n[[effect]]\n'
+    text += 'effect = "heat_scale"\ncomponent = "front_bearings"\nparameters = {"heat.front" = 1.5}\n'
+    (tmp_path / "more.toml").write_text(text, encoding="utf-8")
+    spec = load_machine(tmp_path / "more.toml", ["mesh.preset=coarse", "mesh.order=1"])
+    assert spec.bearing_set[0].ball_row.kind == "contact"
+    more = solve_prepared(dataclasses.replace(reference, spec=spec))
+    heat, usual = (
+        sum(bearing.heat for name, bearing in found.bearings.items() if name.startswith("F"))
+        for found in (more, reference_result)
+    )
+    # warmer grease takes some of it back
+    assert 1.1 * usual < heat < 1.5 * usual

@@ -7,7 +7,7 @@ import tomli_w
 from spindle_fem.commands.checked_machine import load_buildable
 from spindle_fem.definition.load import find_machine, read_toml
 from spindle_fem.errors import SpecError, SpindleFemError
-from spindle_fem.inference.change_points import _evidence
+from spindle_fem.inference.change_points import _beside, _evidence
 from spindle_fem.physics.bearings.bearing_tables import read_document
 from tests.support.valid_definition import VALID
 
@@ -66,3 +66,8 @@ def test_steps_that_read_alike_within_rounding_have_an_evidence():
     answers = np.array([[1e14, 0.5], [1e14, 0.5], [0.3, 0.1]])
     evidence = _evidence(answers @ answers.T, answers @ [1.0, 1.0], [0, 1])
     assert np.isfinite(evidence)
+
+
+def test_what_huge_steps_that_read_alike_leave_is_a_number():
+    left = _beside(np.full((40, 40), 2.0**100), np.full(40, 2.0**50), [10, 20])
+    assert all(np.isfinite(part).all() for part in left)

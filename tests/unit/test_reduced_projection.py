@@ -132,7 +132,7 @@ def test_a_parameter_scales_its_group_and_only_that(table):
 def test_what_has_no_constant_coefficient_is_refused():
     spec = load_machine("wu_tan_2016")
     with pytest.raises(SpecError, match=r"bearing_set.front.ball_row.*no constant conductance"):
-        build_coefficient_table(spec, build_assembly(spec).joint_names, RADII)
+        build_coefficient_table(spec, build_assembly(spec).joint_names, RADII).base(OperatingPoint.of(spec))
     machine = SimpleNamespace(spec=None, operators=None, joint_conductance={"A|B": np.inf, "B|C": 1.0})
     with pytest.raises(SpecError, match=r"A\|B is .perfect.*Give a large conductance"):
         build_mesh_model(machine)

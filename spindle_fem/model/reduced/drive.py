@@ -22,13 +22,13 @@ Array = NDArray[np.float64]
 
 # Of the channel's film at constant Nusselt number: 0.02 % a kelvin and 0.3 % a per cent. Where it follows
 # viscosity, about 1 % a kelvin.
-INLET_BIN = 1.0
+INLET_BIN = 0.25
 FLOW_BIN = 0.01
 SPEED_BIN = 2.0e-3
-MOST_CLASSES = 60
+MOST_CLASSES = 120
 # Walls of the channel whose mean differs by less share a film where films follow the wall, K; that many
 # classes more at most.
-WALL_BIN, MOST_WALLS = 0.5, 200
+WALL_BIN, MOST_WALLS = 0.25, 200
 LARGEST_STEP = 60.0
 MOST_STEP_SIZES = 200
 

@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from spindle_fem.errors import BadInputError
 from spindle_fem.studies.export import portable_model
 from spindle_fem.studies.export.functional_mockup import write_functional_mockup
-from spindle_fem.studies.export.portable_model import GAMMA, STAGE_WEIGHT, START_WEIGHT
+from spindle_fem.studies.export.portable_model import (
+    CLOSE,
+    GAMMA,
+    MOST_ROUNDS,
+    SLOPE_STEP,
+    STAGE_WEIGHT,
+    START_WEIGHT,
+)
 from spindle_fem.studies.export.state_space import EXACT, StateSpace
 
 Array = NDArray[np.float64]
@@ -84,12 +91,6 @@ def python_source(space: StateSpace) -> str:
 
 
 def _write_c(space: StateSpace, path: Path) -> list[Path]:
-    if space.header["feedback_tables"]:
-        raise BadInputError(
-            str(path),
-            "has friction or films that follow temperatures, which the C form does not.",
-            "Export .py, .fmu, .npz or .json; or heat by table, constant ball rows and films.",
-        )
     header_file = path.with_suffix(".h")
     names = {"source_file": path.name, "header_file": header_file.name}
     environment = Environment(
@@ -127,7 +128,17 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
     for end, none in ends.items():
         kept[f"input_{end}"] = np.array([none if i[end] is None else i[end] for i in header["inputs"]])
     load_input = kept.pop("load_input").astype(int)
-    tables, weights = _c_tables(header, kept)
+    tables = _c_tables(header, kept)
+    feedback = {"feedbacks": 0, "followed": len(header["feedback_tables"])}
+    if feedback["followed"]:
+        feedback |= {
+            "feedbacks": len(kept["feedback.column"]),
+            "feedback_column": kept.pop("feedback.column").astype(int),
+            "feedback_table": _table_of(tables, space.arrays["feedback.column"]),
+            "slope_step": SLOPE_STEP,
+            "close": CLOSE,
+            "most_rounds": MOST_ROUNDS,
+        }
     plain = {key: [{**i, "name": _plain(i["name"])} for i in header[key]] for key in ("inputs", "outputs")}
     return {
         "machine": _plain(header["machine"]),
@@ -144,7 +155,9 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
         "arrays": {name.replace(".", "_"): values for name, values in kept.items()},
         "tables": tables,
         "most_axes": max((len(table["grids"]) for table in tables), default=1),
-        "weights": max(weights, 1),
+        "weights": max(1, _columns(tables, "operator")),
+        "factors": _columns(tables, "feedback"),
+        **feedback,
         "gamma": GAMMA,
         "diagonal": 0.5 * GAMMA,
         "stage_weight": STAGE_WEIGHT,
@@ -152,25 +165,38 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
     }
 
 
-def _c_tables(header: Mapping[str, Any], kept: Mapping[str, Array]) -> tuple[list[dict[str, Any]], int]:
-    """Tables as the template has them, and how many weights the operators have."""
-    found, first = [], {True: kept["load_gain"].size, False: 0}
+def _c_tables(header: Mapping[str, Any], kept: Mapping[str, Array]) -> list[dict[str, Any]]:
+    """Tables as the template has them: what they give, and which of its entries is their first."""
+    kinds = {name: kind for kind in ("load", "operator", "feedback") for name in header[f"{kind}_tables"]}
+    first = {"load": kept["load_gain"].size, "operator": 0, "feedback": 0}
+    found = []
     for name, inputs in header["table_inputs"].items():
-        of_loads = name in header["load_tables"]
+        kind = kinds[name]
         *sizes, columns = kept[f"{name}.values"].shape
         found.append(
             {
                 "name": name,
-                "of_loads": of_loads,
+                "kind": kind,
                 "inputs": inputs,
                 "grids": [f"{name}_axis{axis}" for axis in range(len(inputs))],
                 "sizes": sizes,
                 "columns": columns,
-                "first": first[of_loads],
+                "first": first[kind],
             }
         )
-        first[of_loads] += columns
-    return found, first[False]
+        first[kind] += columns
+    return found
+
+
+def _table_of(tables: list[dict[str, Any]], column: Array) -> Array:
+    """Which of the feedback tables each heat's column is in."""
+    ends = np.cumsum([table["columns"] for table in tables if table["kind"] == "feedback"])
+    return np.searchsorted(ends, column, side="right")
+
+
+def _columns(tables: list[dict[str, Any]], kind: str) -> int:
+    """How many entries the tables of a kind give together."""
+    return sum(table["columns"] for table in tables if table["kind"] == kind)
 
 
 def _numbers(values: Array) -> str:

@@ -48,6 +48,8 @@ class FeedbackTable:
         What each heat warms, and the temperature that it is proportional to.
     load : list of d mappings of load to float
         And the loads that it is proportional to.
+    read : (d, p) ndarray or None
+        What each adds to the outputs where these are read; nothing where None.
     """
 
     sense: Array
@@ -59,6 +61,7 @@ class FeedbackTable:
     out: Array
     into: Array
     load: list[dict[str, float]]
+    read: Array | None = None
 
 
 def film_heat_of(fast: FastModel) -> FilmHeat | None:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
-from spindle_fem.effects.framework.term import CHANNEL_FILM
-from spindle_fem.errors import SpecError
-from spindle_fem.model.reduced.class_operators import NO_CHANGES
-from spindle_fem.model.reduced.coolant_maps import CoolantMaps, coolant_maps
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
-from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD, WarmedPoint
+from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.standard_inputs import standard_inputs
+from spindle_fem.studies.export.coolant_export import (
+    WALL_TOLERANCE,
+    CoolantOperators,
+    WallRise,
+    coolant_table,
+    wall_feedback,
+)
 from spindle_fem.studies.export.effect_export import ExportedEffects, heat_tables
 from spindle_fem.studies.export.feedback_export import (
     SURROUNDINGS_RANGE,
@@ -26,7 +26,7 @@ from spindle_fem.studies.export.feedback_export import (
     feedback_tables,
     film_heat_of,
 )
-from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
+from spindle_fem.studies.export.operator_tables import PARTS, changes_at, speed_table
 from spindle_fem.studies.export.source_export import source_loads
 from spindle_fem.studies.export.state_space import (
     CELSIUS,
@@ -51,34 +51,6 @@ INLET_RANGE = (-10.0, 20.0)
 OWN_WARMING = 2.0
 # Largest thrust, in the larger of the definition's and the heat table's reference.
 THRUST_SHARE = 2.0
-# Of coefficients, between the points of a table.
-TOLERANCE = 5e-5
-# Of the coolant's operators, left out with the directions in which they hardly vary.
-LEFT_OUT = 1e-7
-# Points of the coolant's table.
-MOST_POINTS = 3000
-PARTS = ("conduction", "load", "output", "feedthrough")
-
-
-@dataclass(frozen=True, slots=True)
-class OperatorTable:
-    """Matrices whose sum, weighted by a table over inputs, is added to those of the nominal point.
-
-    Attributes
-    ----------
-    inputs : tuple of str
-        The table's axes.
-    axes : tuple of ndarray
-    values : (n, ..., m) ndarray
-        Weights.
-    parts : mapping of str to (m, ., .) ndarray
-        ``conduction``, ``load``, ``output``, ``feedthrough``, on the fast model's own unknowns and loads.
-    """
-
-    inputs: tuple[str, ...]
-    axes: tuple[Array, ...]
-    values: Array
-    parts: dict[str, Array]
 
 
 def geometry_state_space(
@@ -86,8 +58,8 @@ def geometry_state_space(
 ) -> StateSpace:
     """State space of a fast model.
 
-    A film that follows the channel's wall is no table over inputs: it is taken with the wall as far above
-    the inlet as it settles at the definition's operating point, where the film counts.
+    A film that follows the channel's wall is taken with the wall as far above the inlet as it settles at the
+    definition's operating point; what it changes beyond follows the wall's mean temperature.
 
     Parameters
     ----------
@@ -103,24 +75,14 @@ def geometry_state_space(
         Effects that an exported model cannot hold.
     """
     held = ExportedEffects(fast, effects)
-    space, modes = _state_space(fast, name, highest_speed, held, None)
-    if fast.channel is None or not fast.channel.film_follows_wall:
-        return space
-    model = space.model()
-    model.settle({})
-    wall = fast.channel.walls((modes @ model.state)[None])[0] + ZERO_CELSIUS_K
-    inlet = OperatingPoint.of(fast.spec).coolant_inlet_temperature
-    space, _ = _state_space(fast, name, highest_speed, held, wall - inlet)
-    space.header["notes"].append(
-        "the coolant's film is that of a wall as far above the inlet as at the definition's operating point"
-    )
-    return space
+    follows = fast.channel is not None and fast.channel.film_follows_wall
+    return _state_space(fast, name, highest_speed, held, WallRise.of(fast) if follows else None)
 
 
 def _state_space(
-    fast: FastModel, name: str, highest_speed: float, effects: ExportedEffects, wall_rise: Array | None
-) -> tuple[StateSpace, Array]:
-    """State space, and the fast model's unknowns of its modes; ``wall_rise`` as :func:`_at_wall` has it."""
+    fast: FastModel, name: str, highest_speed: float, effects: ExportedEffects, wall: WallRise | None
+) -> StateSpace:
+    """State space; films in the channel follow its wall where one is given."""
     spec = fast.spec
     nominal = OperatingPoint.of(spec)
     film_heat = film_heat_of(fast)
@@ -129,9 +91,11 @@ def _state_space(
     effect_tables = heat_tables(effects, inputs)
     inputs += sources.inputs
     position = {item.name: number for number, item in enumerate(inputs)}
-    tables = {"speed": _speed_table(fast, effects, nominal, highest_speed)}
+    tables = {"speed": speed_table(fast, effects, nominal, highest_speed)}
+    coolant = CoolantOperators(fast, effects, nominal, wall)
     if fast.channel is not None:
-        tables["coolant"] = _coolant_table(fast, effects, nominal, wall_rise)
+        ends = _flow_range(nominal), _inlet_range(spec)
+        tables["coolant"] = coolant_table(coolant, coolant.axes(*ends))
     tables = {key: table for key, table in tables.items() if table.values.shape[-1]}
     # Loads that are inputs or constants come first, those of tables behind.
     n_heat, n_load = len(fast.heat_places), len(fast.load_names)
@@ -150,9 +114,9 @@ def _state_space(
     # The constant load drives nothing by itself.
     warmed = np.array([np.zeros(fast.model.size), *(fast.model.place(place) for place in places)]).T
     operators = fast.operators(
-        _at_wall(nominal, wall_rise),
+        nominal if wall is None else coolant.at_wall(nominal),
         effects.factors,
-        changes=_changes(fast, effects, nominal),
+        changes=changes_at(fast, effects, nominal),
         conductances=effects.conductances,
     )
     storage = fast.storage(effects.factors, effects.capacities)
@@ -202,29 +166,28 @@ def _state_space(
         add_table(key, "operator_tables", table.axes, [position[item] for item in table.inputs], table.values)
     effects.read(fast.channels, list(loads), arrays["output"], arrays["feedthrough"])
     followed = feedback_tables(fast, CONSTANT, highest_speed, effects)
+    if wall is not None:
+        followed.append(wall_feedback(coolant, coolant.axes(*ends, WALL_TOLERANCE)))
     for number, table in enumerate(followed):
         numbers = [len(inputs) + number, *(position[item] for item in table.inputs)]
         add_table(f"follows{number}", "feedback_tables", table.axes, numbers, table.values)
     if followed:
-        arrays |= _feedback_arrays(followed, modes, list(loads))
-    return StateSpace(header, arrays), modes
+        arrays |= _feedback_arrays(followed, modes, list(loads), len(fast.channels))
+        for sensor, line in effects.sensors:
+            arrays["feedback.read"][:, fast.channels.index(sensor)] *= line.gain
+    return StateSpace(header, arrays)
 
 
-def _at_wall(point: OperatingPoint, wall_rise: Array | None) -> OperatingPoint:
-    """A point at which the channel's wall is so far above the inlet, cell by cell [K]; at it where None."""
-    if wall_rise is None:
-        return point
-    own = {name: getattr(point, name) for name in OperatingPoint.__slots__}
-    return WarmedPoint(**own, channel_wall=point.coolant_inlet_temperature + wall_rise)
-
-
-def _feedback_arrays(tables: list[FeedbackTable], modes: Array, loads: list[str]) -> dict[str, Array]:
+def _feedback_arrays(
+    tables: list[FeedbackTable], modes: Array, loads: list[str], outputs: int
+) -> dict[str, Array]:
     """Arrays of all heats that follow temperatures, one behind the other."""
 
     def rows(weights: list[dict[str, float]]) -> Array:
         return np.array([[own.get(name, 0.0) for name in loads] for own in weights])
 
     first = np.cumsum([0, *(table.values.shape[-1] for table in tables)])
+    none = [np.zeros((len(table.column), outputs)) for table in tables]
     columns = [table.column + start for table, start in zip(tables, first, strict=False)]
     return {
         "feedback.sense": np.array([table.sense for table in tables]) @ modes,
@@ -233,13 +196,10 @@ def _feedback_arrays(tables: list[FeedbackTable], modes: Array, loads: list[str]
         "feedback.out": np.concatenate([table.out for table in tables]) @ modes,
         "feedback.into": np.concatenate([table.into for table in tables]) @ modes,
         "feedback.load": rows([own for table in tables for own in table.load]),
+        "feedback.read": np.concatenate(
+            [zero if table.read is None else table.read for table, zero in zip(tables, none, strict=True)]
+        ),
     }
-
-
-def _changes(fast: FastModel, effects: ExportedEffects, point: OperatingPoint) -> dict[str, float]:
-    """Factors on coefficients at a point: effects, and ball rows whose contacts follow speed and thrust."""
-    film_heat = film_heat_of(fast)
-    return effects.changes(point, NO_CHANGES if film_heat is None else film_heat.operating_factor(point, {}))
 
 
 def _inputs(fast: FastModel, highest_speed: float) -> list[ModelInput]:
@@ -253,7 +213,7 @@ def _inputs(fast: FastModel, highest_speed: float) -> list[ModelInput]:
         "thrust": tuple(thrusts),
         "ambient": SURROUNDINGS_RANGE if follows else (None, None),
         "coolant_inlet": _inlet_range(spec),
-        "coolant_flow": tuple(usual["coolant_flow"] * share for share in FLOW_SHARES),
+        "coolant_flow": _flow_range(OperatingPoint.of(spec)),
     }
     found = []
     for name, unit in zip(STANDARD, UNITS, strict=True):
@@ -262,6 +222,12 @@ def _inputs(fast: FastModel, highest_speed: float) -> list[ModelInput]:
         default = round(usual[name] - ZERO_CELSIUS_K, 9) if unit == CELSIUS else usual[name]
         found.append(ModelInput(name, unit, default, *ranges[name], magnitude=name == "speed"))
     return found
+
+
+def _flow_range(point: OperatingPoint) -> tuple[float, float]:
+    """Flows about a point's, m³/s."""
+    low, high = (point.coolant_flow * share for share in FLOW_SHARES)
+    return low, high
 
 
 def _inlet_range(spec: MachineSpec) -> tuple[float, float]:
@@ -308,111 +274,3 @@ def _heat_table(
     if any(table.thrust_coefficient.values()):
         return ("speed", "thrust"), (speeds, thrusts), heat
     return ("speed",), (speeds,), heat[:, 0]
-
-
-def _speed_table(
-    fast: FastModel, effects: ExportedEffects, nominal: OperatingPoint, highest: float
-) -> OperatorTable:
-    """Coefficients that follow the speed, ball rows also the thrust, each with its own matrices."""
-    names = [name for name in fast.model.coefficient_names if name != CHANNEL_FILM]
-
-    def at(speed: float, thrust: float = nominal.thrust) -> Array:
-        point = replace(nominal, speed=speed, thrust=thrust)
-        found = fast.coefficients(point, effects.factors, _changes(fast, effects, point))
-        return np.array([found[name] for name in names])
-
-    inputs, axes = ("speed",), (refined_axis(at, 0.0, highest, TOLERANCE),)
-    film_heat = film_heat_of(fast)
-    if film_heat is not None and film_heat.friction_map.thrust.size > 1:
-        ends = film_heat.friction_map.thrust[[0, -1]].tolist()
-        inputs, axes = (
-            ("speed", "thrust"),
-            (*axes, refined_axis(lambda thrust: at(0.5 * highest, thrust), *ends, TOLERANCE)),
-        )
-    values = values_on(at, axes)
-    base = at(nominal.speed)
-    every = values.reshape(-1, len(names))
-    moving = np.flatnonzero(np.any(every != base, axis=0))
-    parts: dict[str, list[Array]] = {part: [] for part in PARTS}
-    factors = effects.factors
-    own = fast.coefficients(nominal, factors)
-    for row in moving:
-        # Twice the coefficient less once: its own share of the operators.
-        point, value = nominal, own[names[row]]
-        if value == 0.0:
-            turning = float(axes[0][np.argmax(np.abs(every[:: every.shape[0] // axes[0].size, row]))])
-            point = replace(nominal, speed=turning)
-            value = fast.coefficients(point, factors)[names[row]]
-        change = fast.change(point, factors, ({names[row]: 2.0}, {names[row]: 1.0}), ({}, {}))
-        matrices = (change.conduction, change.loads, change.outputs, change.output_inputs)
-        for part, matrix in zip(PARTS, matrices, strict=True):
-            parts[part].append(matrix / value)
-    stacked = {part: np.array(matrices) for part, matrices in parts.items()}
-    return OperatorTable(inputs, axes, values[..., moving] - base[moving], stacked)
-
-
-def _coolant_table(
-    fast: FastModel, effects: ExportedEffects, nominal: OperatingPoint, wall_rise: Array | None
-) -> OperatorTable:
-    """What the coolant adds over flow and inlet temperature, on the few directions in which it varies."""
-
-    def film(flow: float, inlet: float) -> tuple[Array, float, float]:
-        point = replace(nominal, coolant_flow=flow, coolant_inlet_temperature=inlet + ZERO_CELSIUS_K)
-        return fast.channel.film(_at_wall(point, wall_rise), effects.factors, effects.changes(point))
-
-    def values(flow: float, inlet: float) -> Array:
-        cells, rate, friction = film(flow, inlet)
-        return np.array([cells.mean(), rate, friction])
-
-    flow, inlet = nominal.coolant_flow, nominal.coolant_inlet_temperature - ZERO_CELSIUS_K
-    flows = refined_axis(
-        lambda at: values(at, inlet), *(flow * share for share in FLOW_SHARES), tolerance=TOLERANCE
-    )
-    inlets = refined_axis(lambda at: values(flow, at), *_inlet_range(fast.spec), tolerance=TOLERANCE)
-    if flows.size * inlets.size > MOST_POINTS:
-        raise SpecError(
-            "coolant",
-            f"its film changes so sharply that a table would need {flows.size * inlets.size} points.",
-            "Export the machine without the effect or correlation that jumps; simulate takes it.",
-        )
-    shapes = _shapes(fast)
-    sample = _coolant_sampler(fast, film)
-    base = sample(flow, inlet)
-    ends = np.cumsum([np.prod(shape) for shape in shapes])
-    # Heats, loads and temperatures count alike.
-    scale = np.concatenate(
-        [np.full(part.shape, np.linalg.norm(part) or 1.0) for part in np.split(base, ends[:-1])]
-    )
-    rows = np.array([(sample(a, b) - base) / scale for a in flows for b in inlets])
-    squares, directions = np.linalg.eigh(rows @ rows.T)
-    kept = squares > LEFT_OUT**2 * len(rows)
-    # Orthonormal directions of the operators, and every sample's coordinates along them.
-    basis = (directions[:, kept].T @ rows) / np.sqrt(squares[kept])[:, None]
-    weights = (rows @ basis.T).reshape(flows.size, inlets.size, -1)
-    split = np.split(basis * scale, ends[:-1], axis=1)
-    parts = {part: own.reshape(-1, *shape) for part, own, shape in zip(PARTS, split, shapes, strict=True)}
-    return OperatorTable(("coolant_flow", "coolant_inlet"), (flows, inlets), weights, parts)
-
-
-def _shapes(fast: FastModel) -> tuple[tuple[int, int], ...]:
-    size, n_load, n_out = fast.model.size, len(fast.load_names), len(fast.channels)
-    return (size, size), (size, n_load), (n_out, size), (n_out, n_load)
-
-
-def _coolant_sampler(
-    fast: FastModel, film: Callable[[float, float], tuple[Array, float, float]]
-) -> Callable[[float, float], Array]:
-    """Everything that the coolant adds at a flow [m³/s] and inlet [°C], one behind the other."""
-    inlet, friction = (fast.load_names.index(name) for name in ("coolant_inlet", "coolant_friction"))
-    outlets = [row for row, probe in enumerate(fast.spec.probe) if probe.kind == "coolant_outlet"][:1]
-
-    def sample(flow: float, temperature: float) -> Array:
-        maps: CoolantMaps = coolant_maps(fast.model, *film(flow, temperature))
-        conduction, load, output, feedthrough = (np.zeros(shape) for shape in _shapes(fast))
-        conduction += maps.conduction
-        load[:, inlet], load[:, friction] = maps.inlet_load, maps.constant_load
-        output[outlets], feedthrough[outlets, inlet] = maps.outlet, maps.outlet_inlet
-        feedthrough[outlets, friction] = maps.outlet_constant
-        return np.concatenate([part.ravel() for part in (conduction, load, output, feedthrough)])
-
-    return sample

@@ -10,7 +10,7 @@ time. With ``scheme = "TR-BDF2"`` ``K``, ``B``, ``C`` and ``D`` follow the input
 
     K = K_0 + a_1 K_1 + a_2 K_2 + ...
 
-with ``a_i`` from tables, and steps are of second order and L-stable. Friction, ball rows and natural
+with ``a_i`` from tables, and steps are of second order and L-stable. Friction, ball rows and
 films that follow temperatures add heats ``a(s, inputs) (in x + drive w)`` with ``s`` a temperature of the
 machine; their values at the end of a step are found by Newton's method. Temperatures are in °C, all else in
 the units that the model names.
@@ -205,7 +205,11 @@ class PortableModel:
         """Every output at this moment, (p,)."""
         values = self._usable(inputs)
         _, _, output, feedthrough = self.matrices(values)
-        return output @ self.state + feedthrough @ self.loads(values)
+        loads = self.loads(values)
+        found = output @ self.state + feedthrough @ loads
+        if self.header["feedback_tables"]:
+            found = found + self.arrays["feedback.read"].T @ self._feedback(values, loads, self.state)[0]
+        return found
 
     def step(self, seconds, inputs, inputs_after=None):
         """Go on by some seconds, with inputs held, or going straight to those after.

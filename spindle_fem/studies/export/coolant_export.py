@@ -1,0 +1,267 @@
+"""The coolant of an exported model: operators over flow and inlet, films that follow the wall."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from spindle_fem.errors import SpecError
+from spindle_fem.model.reduced.coolant_maps import coolant_maps
+from spindle_fem.model.reduced.drive import STANDARD, WarmedPoint, make_drive
+from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.reduced_transient import TransientRun
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.recordings.standard_inputs import standard_inputs
+from spindle_fem.studies.export.effect_export import ExportedEffects
+from spindle_fem.studies.export.feedback_export import FeedbackTable
+from spindle_fem.studies.export.interpolation_axes import refined_axis
+from spindle_fem.studies.export.operator_tables import PARTS, OperatorTable
+from spindle_fem.units import ZERO_CELSIUS_K
+
+Array = NDArray[np.float64]
+
+# Of films and coefficients, between the points of a table.
+TOLERANCE = 5e-5
+# Of the coolant's operators, left out with the directions in which they hardly vary.
+LEFT_OUT = 1e-7
+# Of squares of samples, what rounding leaves.
+ROUND_OFF = 1e-15
+# Points of the coolant's table; samples that its directions are taken from.
+MOST_POINTS, MOST_SAMPLES = 3000, 300
+# Mean rises of the channel's wall above the inlet, K: where films are worked out, and points of the table.
+RISES, RISE_AXIS = np.linspace(-15.0, 30.0, 10), np.linspace(-15.0, 30.0, 46)
+# What the wall changes is a small part of the film: fewer flows and directions do.
+WALL_TOLERANCE, WALL_LEFT_OUT = 2e-3, 3e-6
+# Least mean of a wall's rise, as a share of its largest, by which it can be scaled.
+LEAST_MEAN = 0.2
+# After which no wall moves any more, s.
+SETTLED = 3.0 * 86400.0
+
+
+@dataclass(frozen=True, slots=True)
+class WallRise:
+    """How the channel's wall lies above the inlet: a profile along the cells, scaled by its mean.
+
+    Attributes
+    ----------
+    profile : (n_cells,) ndarray
+        Of mean 1.
+    usual : float, [K]
+        Mean rise about which films are taken.
+    sense : (r,) ndarray
+        Mean temperature of the wall from the fast model's unknowns.
+    """
+
+    profile: Array
+    usual: float
+    sense: Array
+
+    @classmethod
+    def of(cls, fast: FastModel) -> WallRise:
+        """As it is after days at the definition's operating point."""
+        point = OperatingPoint.of(fast.spec)
+        inputs = standard_inputs(fast.spec)
+        values = np.array([[inputs[name] for name in STANDARD]] * 2)
+        held = np.ones(len(STANDARD), dtype=bool)
+        drive = make_drive(np.array([0.0, SETTLED]), STANDARD, values, held)
+        states, _ = TransientRun(fast, drive, {}, (), fast.own_terms(drive)).march(point.ambient_temperature)
+        area = fast.model.cell_area.ravel()
+        rise = fast.channel.walls(states[-1:])[0] - point.coolant_inlet_temperature
+        mean = float(area @ rise / area.sum())
+        even = abs(mean) <= LEAST_MEAN * np.abs(rise).max()
+        profile = np.ones(rise.size) if even else rise / mean
+        return cls(profile, mean, fast.model.cell_load.sum(axis=0) / area.sum())
+
+
+@dataclass(frozen=True, slots=True)
+class CoolantOperators:
+    """What the coolant adds to a fast model's operators.
+
+    Attributes
+    ----------
+    wall : WallRise or None
+        None where films do not follow the wall, or to have it at the inlet's temperature.
+    """
+
+    fast: FastModel
+    effects: ExportedEffects
+    nominal: OperatingPoint
+    wall: WallRise | None
+
+    def film(self, flow: float, inlet: float, rise: float | None = None) -> tuple[Array, float, float]:
+        """Film of each cell, capacity rate and friction heat at a flow [m³/s], inlet [°C], mean rise [K]."""
+        point = replace(self.nominal, coolant_flow=flow, coolant_inlet_temperature=inlet + ZERO_CELSIUS_K)
+        if self.wall is not None:
+            point = self.at_wall(point, rise)
+        return self.fast.channel.film(point, self.effects.factors, self.effects.changes(point))
+
+    def at_wall(self, point: OperatingPoint, rise: float | None = None) -> WarmedPoint:
+        """A point with the wall above the inlet by a mean rise [K], the usual one where None."""
+        mean = self.wall.usual if rise is None else rise
+        own = {name: getattr(point, name) for name in OperatingPoint.__slots__}
+        coolant = coolant_by_name(self.fast.spec.coolant.fluid)
+        wall = point.coolant_inlet_temperature + mean * self.wall.profile
+        known = coolant.lowest_temperature, coolant.highest_temperature
+        return WarmedPoint(**own, channel_wall=np.clip(wall, *known))
+
+    def _shapes(self) -> tuple[tuple[int, int], ...]:
+        size, n_load, n_out = self.fast.model.size, len(self.fast.load_names), len(self.fast.channels)
+        return (size, size), (size, n_load), (n_out, size), (n_out, n_load)
+
+    def sample(self, flow: float, inlet: float, rise: float | None = None) -> Array:
+        """Everything that the coolant adds, as :data:`PARTS` one behind the other."""
+        fast = self.fast
+        driven, friction = (fast.load_names.index(name) for name in ("coolant_inlet", "coolant_friction"))
+        outlets = [row for row, probe in enumerate(fast.spec.probe) if probe.kind == "coolant_outlet"][:1]
+        maps = coolant_maps(fast.model, *self.film(flow, inlet, rise))
+        conduction, load, output, feedthrough = (np.zeros(shape) for shape in self._shapes())
+        conduction += maps.conduction
+        load[:, driven], load[:, friction] = maps.inlet_load, maps.constant_load
+        output[outlets], feedthrough[outlets, driven] = maps.outlet, maps.outlet_inlet
+        feedthrough[outlets, friction] = maps.outlet_constant
+        return np.concatenate([part.ravel() for part in (conduction, load, output, feedthrough)])
+
+    def parts(self, rows: Array) -> dict[str, Array]:
+        """Matrices (m, ., .) by part of rows as :meth:`sample` has them."""
+        shapes = self._shapes()
+        ends = np.cumsum([np.prod(shape) for shape in shapes])
+        split = np.split(rows, ends[:-1], axis=1)
+        return {part: own.reshape(-1, *shape) for part, own, shape in zip(PARTS, split, shapes, strict=True)}
+
+    def scale(self, row: Array) -> Array:
+        """What the entries of a sample are divided by so that heats, loads and temperatures count alike."""
+        ends = np.cumsum([np.prod(shape) for shape in self._shapes()])
+        split = np.split(row, ends[:-1])
+        return np.concatenate([np.full(part.shape, np.linalg.norm(part) or 1.0) for part in split])
+
+    def axes(
+        self, flows: tuple[float, float], inlets: tuple[float, float], tolerance: float = TOLERANCE
+    ) -> tuple[Array, Array]:
+        """Flows [m³/s] and inlet temperatures [°C] between which films are straight lines.
+
+        Parameters
+        ----------
+        flows, inlets : (low, high)
+        tolerance : float, [-]
+
+        Raises
+        ------
+        SpecError
+            A film that needs too many.
+        """
+        flow, inlet = (
+            self.nominal.coolant_flow,
+            self.nominal.coolant_inlet_temperature - ZERO_CELSIUS_K,
+        )
+
+        def values(flow: float, inlet: float) -> Array:
+            cells, rate, friction = self.film(flow, inlet)
+            return np.array([cells.mean(), rate, friction])
+
+        found = (
+            refined_axis(lambda at: values(at, inlet), *flows, tolerance),
+            refined_axis(lambda at: values(flow, at), *inlets, tolerance),
+        )
+        points = found[0].size * found[1].size
+        if points > MOST_POINTS:
+            raise SpecError(
+                "coolant",
+                f"its film changes so sharply that a table would need {points} points.",
+                "Export the machine without the effect or correlation that jumps; simulate takes it.",
+            )
+        return found
+
+
+def coolant_table(coolant: CoolantOperators, axes: tuple[Array, Array]) -> OperatorTable:
+    """What the coolant adds over flow and inlet temperature, on the few directions in which it varies."""
+    nominal = coolant.nominal
+    base = coolant.sample(nominal.coolant_flow, nominal.coolant_inlet_temperature - ZERO_CELSIUS_K)
+    scale = coolant.scale(base)
+    places = list(product(*axes))
+    basis, weights = _directions(lambda place: (coolant.sample(*place) - base) / scale, places, LEFT_OUT)
+    values = weights.reshape(*(axis.size for axis in axes), -1)
+    return OperatorTable(("coolant_flow", "coolant_inlet"), axes, values, coolant.parts(basis * scale))
+
+
+def _directions(
+    sample: Callable[[tuple[float, ...]], Array], places: list[tuple[float, ...]], left_out: float
+) -> tuple[Array, Array]:
+    """Orthonormal directions (m, n) of samples (n,) at places, and each place's coordinates along them."""
+    every = max(1, -(-len(places) // MOST_SAMPLES))
+    chosen = np.array([sample(place) for place in places[::every]])
+    squares, vectors = np.linalg.eigh(chosen @ chosen.T)
+    kept = squares > max(left_out**2 * len(chosen), ROUND_OFF * squares[-1])
+    basis = (vectors[:, kept].T @ chosen) / np.sqrt(squares[kept])[:, None]
+    if every == 1:
+        return basis, chosen @ basis.T
+    return basis, np.array([basis @ sample(place) for place in places])
+
+
+def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> FeedbackTable:
+    """What the film in the channel changes where its wall is not as far above the inlet as usual.
+
+    The change of conduction and loads is written as heats, each proportional to one combination of
+    unknowns and loads: the singular vectors of the directions in which the operators vary. The outlet's
+    change joins them as one that warms nothing and is read.
+
+    Parameters
+    ----------
+    axes : tuple of ndarray
+        Flows and inlet temperatures of the table.
+    """
+    fast, wall, nominal = coolant.fast, coolant.wall, coolant.nominal
+    usual = coolant.sample(nominal.coolant_flow, nominal.coolant_inlet_temperature - ZERO_CELSIUS_K)
+    scale = coolant.scale(usual)
+    at_usual = {place: coolant.sample(*place) for place in product(*axes)}
+
+    def change(place: tuple[float, ...]) -> Array:
+        rise, *driven = place
+        return (coolant.sample(*driven, rise) - at_usual[tuple(driven)]) / scale
+
+    basis, weights = _directions(change, list(product(RISES, *axes)), WALL_LEFT_OUT)
+    coarse = weights.reshape(RISES.size, *(axis.size for axis in axes), -1)
+    values = PchipInterpolator(RISES, coarse)(RISE_AXIS)
+    parts = coolant.parts(basis * scale)
+    loads = [fast.load_names.index(name) for name in ("coolant_inlet", "coolant_friction")]
+    size = fast.model.size
+    column, out, into, load, read = [], [], [], [], []
+
+    def add(direction: int, warmed: Array, weighted: Array, shown: Array) -> None:
+        column.append(direction)
+        out.append(warmed)
+        into.append(weighted[:size])
+        load.append({fast.load_names[k]: float(v) for k, v in zip(loads, weighted[size:], strict=True)})
+        read.append(shown)
+
+    heat = coolant.parts(usual[None])
+    least = WALL_LEFT_OUT * np.linalg.norm(heat["conduction"])
+    largest = np.abs(weights).max(axis=0)
+    for direction in range(len(basis)):
+        entering = np.hstack((-parts["conduction"][direction], parts["load"][direction][:, loads]))
+        left, strength, right = np.linalg.svd(entering, full_matrices=False)
+        for k in np.flatnonzero(strength * largest[direction] > least):
+            add(direction, strength[k] * left[:, k], right[k], np.zeros(len(fast.channels)))
+        for row in np.flatnonzero(np.any(parts["output"][direction] != 0.0, axis=1)):
+            shown = np.eye(len(fast.channels))[row]
+            told = np.concatenate(
+                (parts["output"][direction][row], parts["feedthrough"][direction][row, loads])
+            )
+            add(direction, np.zeros(size), told, shown)
+    return FeedbackTable(
+        wall.sense,
+        {"coolant_inlet": -1.0},
+        ("coolant_flow", "coolant_inlet"),
+        (RISE_AXIS, *axes),
+        values,
+        np.array(column),
+        np.array(out),
+        np.array(into),
+        load,
+        np.array(read),
+    )
