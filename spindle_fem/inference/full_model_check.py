@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import COVARIATE
-from spindle_fem.errors import EnergyBalanceError, SpecError, SpindleFemError, WorkerDiedError
+from spindle_fem.errors import SpecError, SpindleFemError, WorkerDiedError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, FIRST_ORDER
 from spindle_fem.inference.diagnosis import Diagnosis
@@ -35,7 +35,7 @@ from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_transient import simulate_full, start_at
 from spindle_fem.solvers.mesh_terms import Physics
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
-from spindle_fem.solvers.transient_records import MachineTransient, TransientOptions
+from spindle_fem.solvers.transient_records import MachineTransient, TransientOptions, balanced
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -156,13 +156,8 @@ def full_model_errors(
                 mesh, f"It would take some {steps} time steps a fit; --full-model coarse runs them."
             )
         mesh = COARSE
-    finer = replace(options, coupling_tolerance=tuned.FINER_COUPLING * options.coupling_tolerance)
     try:
-        try:
-            return _both_fits(diagnosis, machine, mesh, options, keep, progress)
-        except EnergyBalanceError:
-            # How exact a step's fixed point has to be for the balance depends on what heats and cools.
-            return _both_fits(diagnosis, machine, mesh, finer, keep, progress)
+        return balanced(lambda asked: _both_fits(diagnosis, machine, mesh, asked, keep, progress), options)
     except SpindleFemError as error:
         return nothing_run(mesh, f"It could not be run: {error}")
 

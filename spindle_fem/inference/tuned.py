@@ -208,8 +208,6 @@ SEPARATES, MOSTLY = 0.9, 0.6
 # duty cycle of the recorded spindle with 75 jumps, readings stay within a fifth of the noise of those at
 # far smaller values: compare ``full_model.differences`` of ``spindle-fem diagnose --full-model coarse``.)
 STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 10.0, 0.1, 2.0
-# Factor on the coupling's tolerance where a run's balance asks for less.
-FINER_COUPLING = 0.25
 
 # ------------------------------------------------------ watch (python -m validation.watch_delay)
 # Time over which what readings taught of the machine's coordinates is forgotten again, s: errors of structure

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import SpecError
+from spindle_fem.errors import EnergyBalanceError, SpecError
 from spindle_fem.model.mesh.linear_solvers import Method
 from spindle_fem.model.mesh.step_control import StepControl
 from spindle_fem.model.mesh.thermal_state import ThermalState
@@ -19,6 +20,9 @@ ENERGY_TOLERANCE = 1.0e-8
 # The coolant is marched along walls that are known to the coupling tolerance. Tens of kelvin drive the heat
 # there, so each kelvin of it changes what they give by less than this share.
 ENERGY_PER_KELVIN = 0.1
+# Factor on the coupling's tolerance where a run's balance asks for less, and runs at most: where water cools,
+# tenths of a kelvin drive the heat.
+FINER_COUPLING, MOST_TRIES = 0.25, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,8 @@ class TransientOptions:
     method : {"direct", "multigrid"} or None
         Of the linear solver; by size when None. A factor serves steps of one
         size, a multigrid hierarchy also those twice as long.
+    imbalance : float or None, [-]
+        Heat that may be missing in the run; what the coupling's tolerance leaves when None.
     """
 
     error: float = 0.05
@@ -56,6 +62,7 @@ class TransientOptions:
     input_resolution: float = TEMPERATURE_RESOLUTION
     trust_contraction: bool = False
     method: Method | None = None
+    imbalance: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("error", "coupling_tolerance", "first_step", "input_resolution"):
@@ -85,10 +92,31 @@ class TransientOptions:
     @property
     def energy_tolerance(self) -> float:
         """Largest relative difference of heat stored, in and out, the coolant's enthalpy included."""
-        return max(ENERGY_TOLERANCE, ENERGY_PER_KELVIN * self.coupling_tolerance)
+        return self.imbalance or max(ENERGY_TOLERANCE, ENERGY_PER_KELVIN * self.coupling_tolerance)
 
 
 DEFAULT_OPTIONS = TransientOptions()
+Found = TypeVar("Found")
+
+
+def balanced(run: Callable[[TransientOptions], Found], options: TransientOptions) -> Found:
+    """What a run gives, coupled more exactly as long as its heat balance asks for that.
+
+    How exact the fixed point of a step has to be for the balance depends on what heats and cools; the
+    balance is held to what the options ask for throughout.
+
+    Raises
+    ------
+    EnergyBalanceError
+        The balance of the most exact run is still open.
+    """
+    for _ in range(MOST_TRIES - 1):
+        try:
+            return run(options)
+        except EnergyBalanceError:
+            finer = FINER_COUPLING * options.coupling_tolerance
+            options = replace(options, coupling_tolerance=finer, imbalance=options.energy_tolerance)
+    return run(options)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_transient import Watch, simulate_full, start_at
 from spindle_fem.solvers.prepared_machine import prepare_machine
-from spindle_fem.solvers.transient_records import TransientOptions
+from spindle_fem.solvers.transient_records import TransientOptions, balanced
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
@@ -102,14 +102,17 @@ def fields_of_recording(
         return False
 
     look(start)
-    simulate_full(
-        machine,
-        inputs,
-        sample_times=inputs.times[-1:],
-        start=start,
-        options=OPTIONS,
-        physics=physics_of(machine),
-        watch=Watch(look, tuple(time for time in kept if time > start.time), progress),
+    balanced(
+        lambda options: simulate_full(
+            machine,
+            inputs,
+            sample_times=inputs.times[-1:],
+            start=start,
+            options=options,
+            physics=physics_of(machine),
+            watch=Watch(look, tuple(time for time in kept if time > start.time), progress),
+        ),
+        OPTIONS,
     )
     found = {time: field for time, field in kept.items() if field is not None}
     return RecordedFields(machine.mesh, np.array(list(found)), np.array(list(found.values())))

@@ -32,6 +32,7 @@ from spindle_fem.solvers.machine_transient import (
 from spindle_fem.solvers.mesh_terms import Physics
 from spindle_fem.solvers.prepared_machine import prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
+from spindle_fem.solvers.transient_records import balanced
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.transient_study import run_study, study_of, time_to_stay_within
 
@@ -397,6 +398,19 @@ def test_impossible_options_are_refused(bad):
 def test_what_the_energy_may_miss_goes_with_the_coupling():
     assert TransientOptions().energy_tolerance == 1.0e-8
     assert TransientOptions(coupling_tolerance=1.0e-2).energy_tolerance == pytest.approx(1.0e-3)
+
+
+def test_a_run_is_coupled_more_exactly_until_it_keeps_the_balance_that_was_asked_for():
+    tried = []
+
+    def run(options):
+        tried.append((options.coupling_tolerance, options.energy_tolerance))
+        if 0.3 * options.coupling_tolerance > options.energy_tolerance:
+            raise EnergyBalanceError("transient", "heat is lost.")
+        return "done"
+
+    assert balanced(run, TransientOptions(coupling_tolerance=1.0e-2)) == "done"
+    assert tried == [(1.0e-2, 1.0e-3), (2.5e-3, 1.0e-3)]
 
 
 @pytest.mark.slow
