@@ -92,23 +92,25 @@ def find_changes(gram: Array, data: Array, spread: float, most: int = MOST_CHANG
                 break
     if not chosen:
         return None
-    matrix = scaled[np.ix_(chosen, chosen)] + np.eye(len(chosen))
-    return Changes(tuple(chosen), spread * np.linalg.solve(matrix, along[chosen]), best)
+    root = _root(scaled, chosen)
+    return Changes(tuple(chosen), spread * root.T @ (root @ along[chosen]), best)
+
+
+def _root(scaled: Array, chosen: Sequence[int]) -> Array:
+    """``W`` with ``Wᵀ W`` the inverse of the precision of steps at some instants, (m, m).
+
+    None of the precision's own values is below 1, whatever rounding leaves of steps that read alike.
+    """
+    values, vectors = np.linalg.eigh(scaled[np.ix_(chosen, chosen)] + np.eye(len(chosen)))
+    return (vectors / np.sqrt(np.maximum(values, 1.0))).T
 
 
 def _evidence(scaled: Array, along: Array, chosen: Sequence[int]) -> float:
     """Logarithm of the evidence of steps at some instants over none."""
-    matrix = scaled[np.ix_(chosen, chosen)] + np.eye(len(chosen))
-    try:
-        lower = np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        # Steps that read alike within rounding; none of its own values is below 1.
-        values, vectors = np.linalg.eigh(matrix)
-        values = np.maximum(values, 1.0)
-        right = vectors.T @ along[list(chosen)]
-        return 0.5 * float(right**2 @ (1.0 / values)) - 0.5 * float(np.log(values).sum())
-    right = np.linalg.solve(lower, along[list(chosen)])
-    return 0.5 * float(right @ right) - float(np.log(np.diag(lower)).sum())
+    root = _root(scaled, chosen)
+    right = root @ along[list(chosen)]
+    # The determinant of the root is that of the precision to the power of -1/2.
+    return 0.5 * float(right @ right) + 0.5 * float(np.log((root**2).sum(axis=1)).sum())
 
 
 def _beside(scaled: Array, along: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
@@ -116,13 +118,14 @@ def _beside(scaled: Array, along: Array, chosen: Sequence[int]) -> tuple[Array, 
     if not chosen:
         return scaled, along
     own = list(chosen)
-    solved = np.linalg.solve(scaled[np.ix_(own, own)] + np.eye(len(own)), scaled[own])
-    return scaled - scaled[own].T @ solved, along - solved.T @ along[own]
+    root = _root(scaled, own)
+    turned = root @ scaled[own]
+    return scaled - turned.T @ turned, along - turned.T @ (root @ along[own])
 
 
 def _best_one(scaled: Array, along: Array, chosen: Sequence[int]) -> list[int]:
     matrix, right = _beside(scaled, along, chosen)
-    own = 1.0 + np.diag(matrix)
+    own = 1.0 + np.maximum(np.diag(matrix), 0.0)
     gain = 0.5 * right**2 / own - 0.5 * np.log(own)
     gain[~_apart(len(along), chosen)] = -np.inf
     return [int(np.argmax(gain))] if np.isfinite(gain).any() else []

@@ -7,15 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.optimize import lsq_linear
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
+from spindle_fem.errors import ConvergenceError
 from spindle_fem.inference.hypothesis_fit import OUTLIER_SIGMAS, Fit, Problem
 
 Array = NDArray[np.float64]
 
 # Distance from a bound within which a coordinate is at it, in standard deviations of its prior.
 NEAR = 1e-6
+# Rounds in which all may change sides although they do not get fewer.
+PATIENCE = 3
+# Rounds for each coordinate; some ten in all are usual.
+MOST_ROUNDS = 50
 
 
 def _pressed(fit: Fit, downhill: Array) -> NDArray[np.bool_]:
@@ -71,6 +75,55 @@ class Box:
         return bool(np.any((free < self.low - NEAR) | (free > self.high + NEAR)))
 
 
+def bounded_minimum(hessian: Array, downhill: Array, low: Array, high: Array) -> Array:
+    """Where ``x H x / 2 - g x`` is least between bounds, (n,).
+
+    All coordinates that are beyond a bound, or held at one that they would leave, change sides at once;
+    where that no longer makes them fewer, the last one alone, which ends for every positive definite ``H``.
+
+    Parameters
+    ----------
+    hessian : (n, n) ndarray
+        Positive definite.
+    downhill, low, high : (n,) ndarray
+        Bounds may be infinite or equal.
+
+    Raises
+    ------
+    ConvergenceError
+        Rounding keeps coordinates changing sides.
+
+    Source: Júdice & Pires (1994), Computers & Operations Research 21, 587-596.
+
+    >>> hessian, downhill = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([3.0, 3.0])
+    >>> bounded_minimum(hessian, downhill, np.zeros(2), np.array([0.5, 9.0]))
+    array([0.5 , 1.25])
+    """
+    side, steepness = np.zeros(len(downhill), dtype=int), np.diag(hessian)
+    fewest, patience = len(downhill) + 1, PATIENCE
+    found = np.empty(len(downhill))
+    for _ in range(MOST_ROUNDS * len(downhill)):
+        free = side == 0
+        found[~free] = np.where(side < 0, low, high)[~free]
+        right = downhill[free] - hessian[np.ix_(free, ~free)] @ found[~free]
+        found[free] = cho_solve(cho_factor(hessian[np.ix_(free, free)]), right) if free.any() else right
+        # by how much a coordinate that is held would move by itself
+        pull = (downhill - hessian @ found) / steepness
+        below, above = free & (found < low - NEAR), free & (found > high + NEAR)
+        leaving = ((side < 0) & (pull > NEAR)) | ((side > 0) & (pull < -NEAR))
+        wrong = np.flatnonzero(below | above | (leaving & (low < high)))
+        if not wrong.size:
+            return np.clip(found, low, high)
+        if wrong.size < fewest:
+            fewest, patience = wrong.size, PATIENCE
+        elif patience:
+            patience -= 1
+        else:
+            wrong = wrong[-1:]
+        side[wrong] = above[wrong].astype(int) - below[wrong]
+    raise ConvergenceError("screening", "rounding leaves no least value between bounds.")
+
+
 @dataclass(frozen=True, slots=True)
 class BoxedColumns:
     """Inner products of columns with a box's Jacobian, among themselves and with its residual."""
@@ -100,11 +153,8 @@ class BoxedColumns:
         right = np.concatenate((self.box.downhill, self.with_residual[own]))
         low = np.concatenate((self.box.low, np.where(one_sided[own], 0.0, -np.inf)))
         high = np.concatenate((self.box.high, np.full(len(own), np.inf)))
-        lower = np.linalg.cholesky(matrix)
-        target = solve_triangular(lower, right, lower=True)
-        # No room between bounds: numbers that are fixed.
-        found = lsq_linear(lower.T, target, (low, np.maximum(high, low + NEAR)), method="bvls")
-        return self.box.cost - float(target @ target) + 2.0 * float(found.cost)
+        move = bounded_minimum(matrix, right, low, high)
+        return self.box.cost + float(move @ (matrix @ move)) - 2.0 * float(right @ move)
 
 
 @dataclass(frozen=True, slots=True)

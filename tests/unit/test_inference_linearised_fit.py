@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import lsq_linear, minimize
 
-from spindle_fem.inference.linearised_fit import Box, BoxedColumns
+from spindle_fem.inference.linearised_fit import Box, BoxedColumns, bounded_minimum
 
 READINGS, COORDINATES, COLUMNS = 60, 4, 5
 
@@ -52,3 +52,18 @@ def test_the_least_cost_within_bounds_is_the_true_one(room, members):
 def test_bounds_matter_only_where_they_hold_something_back():
     assert problem(0.3)[0].matters
     assert not problem(50.0)[0].matters
+
+
+def test_a_bounded_minimum_is_the_one_of_a_slower_method():
+    rng = np.random.default_rng(5)
+    for size in (2, 9, 30):
+        root = rng.normal(size=(size + 5, size)) * 10.0 ** rng.uniform(-2.0, 2.0, size)
+        hessian = root.T @ root + 1e-3 * np.eye(size)
+        downhill = 10.0 * rng.normal(size=size)
+        low, high = -rng.uniform(0.0, 2.0, size), rng.uniform(0.0, 2.0, size)
+        lower = np.linalg.cholesky(hessian)
+        slow = lsq_linear(lower.T, np.linalg.solve(lower, downhill), (low, high), method="bvls").x
+        quick = bounded_minimum(hessian, downhill, low, high)
+        value, other = (0.5 * at @ hessian @ at - downhill @ at for at in (quick, slow))
+        assert value <= other + 1e-9 * abs(other)
+        assert np.all((quick >= low) & (quick <= high))
