@@ -36,6 +36,10 @@ class SpindleFemError(Exception):
         text = f"{self.where}: {self.what}" if self.where else self.what
         return f"{text} {self.how_to_fix}".rstrip()
 
+    def as_plain(self) -> dict[str, str]:
+        """For JSON."""
+        return {"where": self.where, "what": self.what, "how_to_fix": self.how_to_fix}
+
 
 class BadInputError(SpindleFemError):
     """The user's input cannot be used; exit status 2."""
@@ -119,6 +123,10 @@ class CheckFailedError(SpindleFemError):
 
 class RecordingError(BadInputError):
     """A recording or its manifest cannot be used."""
+
+
+class MissingColumnError(RecordingError):
+    """A data file does not have a column that its manifest names."""
 
 
 class PathError(BadInputError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,11 +19,16 @@ if TYPE_CHECKING:
     from spindle_fem.recordings.align import Recording
 
 
-def recording_of(recording: str | Path | Recording) -> Recording:
-    """A recording as it is, or read from its folder or manifest."""
+def recording_of(
+    recording: str | Path | Recording, machine: str | Path, overrides: Iterable[str] = ()
+) -> Recording:
+    """A recording as it is, or read from its folder or manifest for a machine."""
+    if not isinstance(recording, (str, Path)):
+        return recording
     from spindle_fem.recordings.align import read_recording
+    from spindle_fem.recordings.faults_beside import known_names
 
-    return read_recording(recording) if isinstance(recording, (str, Path)) else recording
+    return read_recording(recording, names=partial(known_names, machine, overrides))
 
 
 def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:
@@ -31,6 +37,7 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
     from spindle_fem.operation.assembled_sets import assembled_set, require_known_friction
+    from spindle_fem.operation.operating_limits import require_possible_operation
 
     overrides = tuple(overrides)
 
@@ -66,7 +73,7 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
         if spec.heat is not None:
             require_known_friction(spec)
 
-    checks = (fits_together, rubs_by_a_known_law, has_possible_effects)
+    checks = (fits_together, require_possible_operation, rubs_by_a_known_law, has_possible_effects)
     return load_machine(machine, overrides, checks=checks)
 
 

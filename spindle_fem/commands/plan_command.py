@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ from spindle_fem.inference.planned_test import (
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.machine.view.usual_sizes import short_unit
 from spindle_fem.recordings.align import Recording, read_recording
+from spindle_fem.recordings.faults_beside import known_names
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
 from spindle_fem.units import TEMPERATURE_UNIT, ZERO_CELSIUS_K, to_si
@@ -147,6 +149,7 @@ def planned_measurement(
     ``compare`` says whether other tests are simulated too.
     """
     overrides = tuple(overrides)
+    names = partial(known_names, machine, overrides)
     given = dict(_input(text) for text in inputs)
     name, _, length = str(test).partition(":")
     standard = name in STANDARD_TESTS
@@ -167,7 +170,7 @@ def planned_measurement(
         asked, words = recording_of(conditions, schedule, chosen), schedule.name
         full = {name: _shown(value, conditions.units[name]) for name, value in conditions.usual.items()}
     else:
-        read = read_recording(test)
+        read = read_recording(test, names=names)
         if given:
             raise SpecError(
                 "input", "belongs to a standard test.", "Leave it out: the recording has its own."
@@ -178,7 +181,7 @@ def planned_measurement(
     compared = min(seconds, LONGEST_COMPARED)
     schedules = conditions.family(compared) if compare else []
     recordings = [asked, *(recording_of(conditions, item, chosen) for item in schedules)]
-    earlier = [read_recording(path) for path in calibrate]
+    earlier = [read_recording(path, names=names) for path in calibrate]
     opened = open_machine(machine, overrides, recordings, earlier, progress=progress)
     # Usual sizes of effects, and of a network's errors, follow from what the sensors would read.
     opened = open_machine(machine, overrides, as_predicted(opened, recordings), earlier, progress=progress)

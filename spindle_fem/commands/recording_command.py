@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from spindle_fem.errors import BadInputError
-from spindle_fem.recordings.align import read_recording
+from spindle_fem.errors import BadInputError, RecordingError, SpindleFemError
+from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.column_roles import MachineNames
 from spindle_fem.recordings.draft_recording import (
     DATA_NAME,
@@ -16,6 +18,7 @@ from spindle_fem.recordings.draft_recording import (
     draft_recording,
     manifest_text,
 )
+from spindle_fem.recordings.draft_seal import require_as_drafted, sealed
 from spindle_fem.recordings.manifest import DRIVES_UNITS
 from spindle_fem.report.recording_picture import draw_recording
 from spindle_fem.results.output_folder import output_folder, replace_text
@@ -49,13 +52,19 @@ def draft(
     Raises
     ------
     SpindleFemError
+        The files make no recording, or the folder holds one that somebody has changed: nothing is written.
     """
+    given = [Path(file) for file in files]
+    _require_apart(given, Path(folder))
+    require_as_drafted(Path(folder) / MANIFEST_NAME, Path(folder) / DATA_NAME)
     names = None if machine is None else machine_names(machine)
-    drafted = draft_recording([Path(file) for file in files], names, zone=zone)
-    with output_folder(folder) as place:
-        replace_text(place / DATA_NAME, data_text(drafted))
-        replace_text(place / MANIFEST_NAME, manifest_text(drafted))
-        recording = read_recording(place / MANIFEST_NAME)
+    drafted = draft_recording(given, names, zone=zone)
+    data = data_text(drafted)
+    texts = {DATA_NAME: data, MANIFEST_NAME: sealed(manifest_text(drafted), data)}
+    recording = _read_back(texts, given)
+    with output_folder(folder, own=frozenset({MANIFEST_NAME, PICTURE_NAME})) as place:
+        for name, text in texts.items():
+            replace_text(place / name, text)
         draw_recording(place / PICTURE_NAME, recording)
     unsure = [f"{g.channel.column}: {g.unsure}" for g in drafted.channels if g.unsure]
     return {
@@ -66,6 +75,28 @@ def draft(
         "defects": recording.defects.to_json(),
         "defects_text": recording.defects.lines(),
     }
+
+
+def _require_apart(files: list[Path], folder: Path) -> None:
+    """Refuse to write over what is drafted from."""
+    written = {(folder / name).resolve() for name in (DATA_NAME, MANIFEST_NAME, PICTURE_NAME)}
+    for file in files:
+        if file.resolve() in written:
+            raise BadInputError(str(file), "would be written over.", "Give another folder with -o.")
+
+
+def _read_back(texts: dict[str, str], files: list[Path]) -> Recording:
+    """The recording that texts make, read before any of them stands where it was asked for."""
+    with TemporaryDirectory() as stage:
+        for name, text in texts.items():
+            (Path(stage) / name).write_text(text, encoding="utf-8", newline="")
+        try:
+            return read_recording(Path(stage) / MANIFEST_NAME)
+        except SpindleFemError as error:
+            what = str(error).replace(f"{Path(stage) / MANIFEST_NAME}: ", "").replace(stage + os.sep, "")
+            raise RecordingError(
+                ", ".join(map(str, files)), f"makes no recording that can be used: {what}"
+            ) from error
 
 
 def show(recording: str | Path, file: str | Path) -> list[str]:

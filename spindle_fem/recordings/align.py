@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import RecordingError, did_you_mean
+from spindle_fem.errors import FaultsError, MissingColumnError, RecordingError, did_you_mean
 from spindle_fem.recordings.channel_checks import (
     PLAUSIBLE_KELVIN,
     ChannelNoise,
@@ -21,8 +22,15 @@ from spindle_fem.recordings.channel_checks import (
     temperature_flags,
 )
 from spindle_fem.recordings.defects import ChannelDefects, DefectReport, Gap
+from spindle_fem.recordings.faults_beside import KnownNames, faults_beside, manifest_for
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.recordings.manifest import Channel, ColumnUnit, Manifest, conversions, load_manifest
+from spindle_fem.recordings.manifest import (
+    Channel,
+    ColumnUnit,
+    Manifest,
+    conversions,
+    find_manifest,
+)
 from spindle_fem.recordings.read_data import RawTable, read_table
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -195,7 +203,12 @@ class Recording:
         return [str(np.datetime_as_string(origin + offset, unit="s")) + "Z" for offset in offsets]
 
 
-def read_recording(path: str | Path, *, long_gap: float | None = None) -> Recording:
+def read_recording(
+    path: str | Path,
+    *,
+    long_gap: float | None = None,
+    names: Callable[[], KnownNames] | None = None,
+) -> Recording:
     """Read a recording and find its defects.
 
     Parameters
@@ -206,16 +219,25 @@ def read_recording(path: str | Path, *, long_gap: float | None = None) -> Record
         Gaps longer than this begin a new segment, in which a network starts
         again from its readings. Default: half an hour or 60 median steps,
         whichever is longer.
+    names : callable, optional
+        Names of the machine that it is for: a manifest with faults is then told those that it does not have.
 
     Raises
     ------
     FaultsError
-        The manifest, every fault at once.
+        The manifest, every fault at once, with the columns that its data do not have.
     RecordingError
         The data cannot be used: file, line and column.
     """
-    manifest, data = load_manifest(path)
-    return align(manifest, read_table(data, manifest), source=str(path), long_gap=long_gap)
+    manifest, data = manifest_for(path, names)
+    try:
+        table = read_table(data, manifest)
+    except MissingColumnError as error:
+        beside = faults_beside(path, names)
+        if len(beside) > 1:
+            raise FaultsError(str(find_manifest(path)), beside) from error
+        raise
+    return align(manifest, table, source=str(path), long_gap=long_gap)
 
 
 def _require_length(times: Array, source: str) -> None:

@@ -2,61 +2,37 @@
 
 from __future__ import annotations
 
-import difflib
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spindle_fem.errors import UnitError
+from spindle_fem.recordings.column_words import (
+    OUTLET_WORDS,
+    USUAL_UNITS,
+    by_meaning,
+    drives_by_words,
+    near,
+    same,
+    says,
+    says_other_quantity,
+    says_place,
+    says_temperature,
+    within,
+)
 from spindle_fem.recordings.manifest import DRIVES_UNITS, Channel, column_unit
 from spindle_fem.units import registry
 
-# What names of columns say in the languages of machine builders. Words are looked for as whole words, one
-# after another where there are several, and longer ones within compounds.
-WORDS = {
-    "ambient": ("ambient", "umgebung", "raum", "room", "halle", "hall", "luft", "air", "env"),
-    "coolant_inlet": ("inlet", "vorlauf", "zulauf", "supply", "eintritt", "coolant in", "oil in", "öl ein"),
-    "coolant_flow": ("flow", "durchfluss", "volumenstrom", "durchfluß"),
-    "speed": ("speed", "drehzahl", "rpm", "vitesse", "n"),
-    "thrust": ("thrust", "axialkraft", "axialforce", "vorspannkraft"),
-}
-_OUTLET_WORDS = ("outlet", "rücklauf", "auslauf", "austritt", "return", "coolant out", "oil out", "öl aus")
-_TEMPERATURE_WORDS = ("temp", "temperatur", "temperature", "tc", "pt100", "thermo", "therm")
-# Units that names without one usually mean, of quantities that a network is free to take in any unit.
-_USUAL_UNITS = {
-    "rpm": WORDS["speed"],
-    "percent": ("load", "auslastung", "last", "override"),
-    "l/min": WORDS["coolant_flow"],
-    "N*m": ("torque", "drehmoment", "moment"),
-    "A": ("current", "strom"),
-    "degC": (*_TEMPERATURE_WORDS, *WORDS["ambient"], *WORDS["coolant_inlet"]),
-    "W": ("power", "leistung", "heat"),
-}
-_UNITS = {"speed": "rpm", "ambient": "degC", "coolant_inlet": "degC", "coolant_flow": "l/min", "thrust": "N"}
-# German words of places on machines, for probes that are named in English.
-_ENGLISH = {
-    "front": ("vorn", "vorne", "vorderes", "vorderer", "vordere"),
-    "rear": ("hinten", "hinteres", "hinterer", "hintere"),
-    "bearing": ("lager", "wälzlager"),
-    "housing": ("gehäuse",),
-    "casing": ("gehäuse",),
-    "flange": ("flansch",),
-    "shaft": ("welle",),
-    "spindle": ("spindel",),
-    "nose": ("nase", "spindelnase"),
-    "headstock": ("spindelstock", "spindelkasten"),
-    "stator": ("ständer",),
-    "winding": ("wicklung",),
-    "drive": ("antrieb",),
-    "oil": ("öl",),
-    "cover": ("deckel",),
-    "bed": ("bett",),
-    "body": ("körper",),
-}
-_CLOSE = 0.72
+_UNITS = {"speed": "rpm", "coolant_flow": "l/min", "thrust": "N"}
 # Readings of sensors on machines, degC.
 _PLAUSIBLE = (-40.0, 250.0)
+# The same where only the place says that it is a temperature.
+_ON_MACHINES = (-30.0, 150.0)
+# Readings in kelvin of the same sensors, above all that are plausible in °C.
+_KELVIN = (250.0, 425.0)
+# Band in which a value stands still: of its range, and of its largest size.
+_STILL, _STILL_OF_SIZE = 0.02, 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,44 +78,88 @@ def guess_channel(
     taken : set of str
         Inputs and probes that earlier columns have; what is chosen is added.
     """
+    present = values[np.isfinite(values)]
+    guess = _guess(name, unit, values, machine, taken)
+    doubt = _doubt_of_size(guess.channel.unit, present)
+    return replace(guess, unsure="; ".join(filter(None, [guess.unsure, doubt])))
+
+
+def _guess(
+    name: str, unit: str, values: np.ndarray, machine: MachineNames, taken: set[str]
+) -> GuessedChannel:
     inputs = dict(DRIVES_UNITS) if machine.inputs is None else machine.inputs
-    dimension = _dimension(unit)
     present = values[np.isfinite(values)]
     named = machine.probes + machine.sensors
-    probe = _same(name, named) or _within(name, named)
+    probe = same(name, named) or within(name, named)
     if probe and probe not in taken:
         return _read(name, unit, probe, "named as the machine has it", "", machine, taken)
-    drives = _same(name, tuple(inputs)) or _by_words(name, inputs)
-    if drives and inputs[drives] != "K" and not unit and _says_temperature(name):
-        drives = ""
+    drives = same(name, tuple(inputs)) or _said_input(name, unit, inputs, present)
     if drives and drives not in taken and _agrees(unit, inputs[drives]):
         return _input(name, unit, drives, inputs, present, taken)
     if "speed" in inputs and "speed" not in taken and unit == "rpm":
         return _input(name, unit, "speed", inputs, present, taken, "the only speed so far")
-    warm = dimension == "[temperature]" or (not unit and _says_temperature(name) and _plausible(present))
-    doubt = ""
-    if not warm and not unit and not drives and _moves_like_temperature(values) and _looks_like_sensor(name):
-        warm, doubt = True, "no unit is stated: size and slow course are those of a temperature"
+    warm, doubt = _dimension(unit) == "[temperature]", ""
+    if not unit and not drives:
+        warm, doubt = _warm_without_unit(name, values)
     if not warm:
         why = "drives nothing that is known by this name and unit" if unit else "neither name nor unit tells"
-        return GuessedChannel(Channel(column=name, role="covariate", unit=unit or None), why)
-    if warm and not unit:
-        doubt = doubt or "no unit is stated: taken as °C"
-    if len(machine.outlets) == 1 and machine.outlets[0] not in taken and _says(name, _OUTLET_WORDS):
+        doubt = _doubt_of_input(drives, unit, inputs) if drives not in taken else ""
+        return GuessedChannel(Channel(column=name, role="covariate", unit=unit or None), why, doubt)
+    unit = unit or _temperature_unit(present)
+    if len(machine.outlets) == 1 and machine.outlets[0] not in taken and says(name, OUTLET_WORDS):
         return _read(
             name, unit, machine.outlets[0], "the coolant's outlet by its name", doubt, machine, taken
         )
     if not named:
         doubt = "; ".join(filter(None, [doubt, "no machine given: probe named after the column"]))
         return _read(name, unit, name, "a temperature", doubt, machine, taken)
-    meant = _by_meaning(name, tuple(item for item in machine.probes if item not in taken))
-    near = [item for item in _near(name, machine.probes) if item not in taken]
-    if meant or near:
-        reason = f'"{meant}" by what the name means' if meant else f'"{near[0]}" only resembles the name'
+    meant = by_meaning(name, tuple(item for item in machine.probes if item not in taken))
+    close = [item for item in near(name, machine.probes) if item not in taken]
+    if meant or close:
+        reason = f'"{meant}" by what the name means' if meant else f'"{close[0]}" only resembles the name'
         doubt = "; ".join(filter(None, [doubt, f"probe {reason}"]))
-        return _read(name, unit, meant or near[0], "a temperature", doubt, machine, taken)
-    doubt = f"a temperature that no probe of the machine is named after (probes: {', '.join(machine.probes)})"
-    return GuessedChannel(Channel(column=name, role="covariate", unit=unit or "degC"), "a temperature", doubt)
+        return _read(name, unit, meant or close[0], "a temperature", doubt, machine, taken)
+    no_probe = f"no probe of the machine is named after it (probes: {', '.join(machine.probes)})"
+    doubt = "; ".join(filter(None, [doubt, no_probe]))
+    return GuessedChannel(Channel(column=name, role="covariate", unit=unit), "a temperature", doubt)
+
+
+def _said_input(name: str, unit: str, inputs: dict[str, str], present: np.ndarray) -> str:
+    """The input of which a name has a word; without a unit name and size must not say otherwise."""
+    drives = drives_by_words(name, inputs)
+    if not drives or unit:
+        return drives
+    if inputs[drives] == "K":
+        fits = not says_other_quantity(name) and (_between(present, *_PLAUSIBLE) or _like_kelvin(present))
+    else:
+        fits = not says_temperature(name)
+    return drives if fits else ""
+
+
+def _warm_without_unit(name: str, values: np.ndarray) -> tuple[bool, str]:
+    """Whether a column without a unit is taken for a temperature, and the doubt about that."""
+    present = values[np.isfinite(values)]
+    taken = f"taken as {'K' if _like_kelvin(present) else '°C'}"
+    if says_temperature(name) and (_between(present, *_PLAUSIBLE) or _like_kelvin(present)):
+        return True, f"no unit is stated: {taken}"
+    if says_place(name) and (_between(present, *_ON_MACHINES) or _like_kelvin(present)):
+        return True, f"no unit is stated: the name is of a place, the size of a temperature, {taken}"
+    if _moves_like_temperature(values) and _looks_like_sensor(name):
+        return True, "no unit is stated: size and slow course are those of a temperature"
+    return False, ""
+
+
+def _doubt_of_input(drives: str, unit: str, inputs: dict[str, str]) -> str:
+    """Why a column that is named like an input is none."""
+    if not drives or not unit or _agrees(unit, inputs[drives]):
+        return ""
+    if inputs[drives] == "rad/s" and _dimension(unit) == _dimension("Hz"):
+        return (
+            f"named like a speed, but {unit} is not taken for one: it may count turns, or periods of a "
+            'current. Turns a second are role = "input", drives = "speed", unit = "turn/s" '
+            "(rpm = 60 times the turns a second)"
+        )
+    return f'named like "{drives}", but {unit} is no unit of it'
 
 
 def _read(
@@ -165,96 +185,64 @@ def _input(
     doubt: str = "",
 ) -> GuessedChannel:
     if not unit:
-        usual = next((item for item, words in _USUAL_UNITS.items() if _says(name, words)), "W")
-        unit = _UNITS.get(drives, "degC" if inputs[drives] == "K" else inputs[drives] or usual)
+        usual = next((item for item, words in USUAL_UNITS.items() if says(name, words)), "W")
+        unit = _UNITS.get(drives, inputs[drives] or usual)
+        unit = _temperature_unit(present) if inputs[drives] == "K" else unit
         doubt = "; ".join(filter(None, [doubt, f"no unit is stated: taken as {unit}"]))
-    # set values stand still and jump; measured ones hardly ever repeat
-    held = present.size > 2 and float(np.mean(np.diff(present) == 0.0)) > 0.5
-    hold = "previous" if held and inputs[drives] != "K" else "linear"
+    hold = "previous" if _stands_still(present) and inputs[drives] != "K" else "linear"
     taken.add(drives)
     channel = Channel(column=name, role="input", drives=drives, unit=unit, hold=hold)
     why = "stands still between jumps" if hold == "previous" else "changes steadily"
     return GuessedChannel(channel, f"by its name; {why}", doubt)
 
 
-def _plain(text: str) -> str:
-    return re.sub(r"[^a-z0-9äöüß]+", "", text.lower())
-
-
-def _same(name: str, allowed: tuple[str, ...]) -> str:
-    return next((item for item in allowed if _plain(item) == _plain(name)), "")
-
-
-def _within(name: str, allowed: tuple[str, ...]) -> str:
-    """The longest allowed name whose words stand one after another in a name, where it is the only one."""
-    words = _words(name)
-    found: dict[int, list[str]] = {}
-    for item in allowed:
-        parts = _words(item)
-        places = range(len(words) - len(parts) + 1)
-        if parts and any(words[at : at + len(parts)] == parts for at in places):
-            found.setdefault(len(parts), []).append(item)
-    longest = found[max(found)] if found else []
-    return longest[0] if len(longest) == 1 else ""
-
-
-def _by_meaning(name: str, allowed: tuple[str, ...]) -> str:
-    """The allowed name with the most words, all of which a German name has, where it is the only one."""
-    said = set(_words(name))
-
-    def is_said(word: str) -> bool:
-        return word in said or not said.isdisjoint(_ENGLISH.get(word, ()))
-
-    found = [item for item in allowed if _words(item) and all(is_said(word) for word in _words(item))]
-    most = max((len(_words(item)) for item in found), default=0)
-    longest = [item for item in found if len(_words(item)) == most]
-    return longest[0] if len(longest) == 1 else ""
-
-
-def _words(name: str) -> list[str]:
-    return re.findall(r"[a-z0-9äöüß]+", name.lower())
-
-
-def _near(name: str, allowed: tuple[str, ...]) -> list[str]:
-    plain = {_plain(item): item for item in allowed}
-    return [plain[item] for item in difflib.get_close_matches(_plain(name), plain, 1, _CLOSE)]
-
-
-def _by_words(name: str, inputs: dict[str, str]) -> str:
-    return next((drives for drives in inputs if _says(name, WORDS.get(drives, ()))), "")
-
-
-def _says(name: str, known: tuple[str, ...]) -> bool:
-    words = re.findall(r"[a-zäöüß]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
-    line = f" {' '.join(words)} "
-    return any(f" {item} " in line or any(_compounds(item, word) for word in words) for item in known)
-
-
-def _compounds(known: str, word: str) -> bool:
-    """Whether a word is a compound of a known one, such as Raumtemperatur."""
-    return (len(known) > 4 and known in word) or (len(known) == 4 and word.startswith(known))
-
-
-def _says_temperature(name: str) -> bool:
-    words = re.split(r"[^a-z]+", name.lower())
-    return any(word.startswith(known) for word in words for known in _TEMPERATURE_WORDS if word)
-
-
 def _looks_like_sensor(name: str) -> bool:
     return bool(re.fullmatch(r"(?:[A-Za-z]{1,4}[ _]?\d{1,3}|T[ _]\w+)", name))
 
 
-def _plausible(present: np.ndarray) -> bool:
+def _stands_still(present: np.ndarray) -> bool:
+    """Whether an input stays most of the time within a small band between its jumps, as set values do."""
+    if present.size < 3:
+        return False
+    band = max(_STILL * float(np.ptp(present)), _STILL_OF_SIZE * float(np.abs(present).max()))
+    starts = np.flatnonzero(np.abs(np.diff(present, prepend=np.inf)) > band)
+    sizes = np.diff(starts, append=present.size)
+    ranges = np.maximum.reduceat(present, starts) - np.minimum.reduceat(present, starts)
+    return bool(sizes[(sizes > 2) & (ranges <= band)].sum() > 0.5 * present.size)
+
+
+def _between(present: np.ndarray, least: float, most: float) -> bool:
     if present.size == 0:
         return False
     low, high = np.percentile(present, [5.0, 95.0])
-    return bool(_PLAUSIBLE[0] < low and high < _PLAUSIBLE[1])
+    return bool(least < low and high < most)
+
+
+def _like_kelvin(present: np.ndarray) -> bool:
+    return _between(present, *_KELVIN)
+
+
+def _temperature_unit(present: np.ndarray) -> str:
+    """Unit of a temperature that states none, by its size."""
+    return "K" if _like_kelvin(present) else "degC"
+
+
+def _doubt_of_size(unit: str | None, present: np.ndarray) -> str:
+    """What is odd about the size of a temperature in its unit."""
+    if unit not in ("degC", "K") or not present.size:
+        return ""
+    low, high = np.percentile(present, [5.0, 95.0])
+    if unit == "degC" and _like_kelvin(present):
+        return f'readings of {low:.0f} to {high:.0f} look like kelvin: unit = "K"?'
+    if unit == "K" and _between(present, *_ON_MACHINES):
+        return f'readings of {low:.0f} to {high:.0f} look like °C: unit = "degC"?'
+    return ""
 
 
 def _moves_like_temperature(values: np.ndarray) -> bool:
     """Plausible in size, and steps from row to row small beside what is passed through in all."""
     present = values[np.isfinite(values)]
-    if present.size < 10 or not _plausible(present) or np.ptp(present) == 0.0:
+    if present.size < 10 or not _between(present, *_PLAUSIBLE) or np.ptp(present) == 0.0:
         return False
     return bool(
         np.median(present) > 5.0 and np.percentile(np.abs(np.diff(present)), 95.0) < 0.2 * np.ptp(present)

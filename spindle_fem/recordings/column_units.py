@@ -26,6 +26,7 @@ _WRITINGS = {
     "min^-1": "rpm",
     "min⁻¹": "rpm",
     "u/min": "rpm",
+    "upm": "rpm",
     "rpm": "rpm",
     "%": "percent",
     "l/min": "l/min",
@@ -44,7 +45,36 @@ _WRITINGS = {
 }
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s+(?:/|in)\s+(?P<unit>\S+(?: C)?)$")
+_GLUED = re.compile(r"^(?P<name>.*\w)(?P<unit>[°º]\s?[CFcf])$")
+# Behind a name and a blank only writings stand for units that no word of a name is written like.
+_NO_WORDS = frozenset(
+    {writing for writing in _WRITINGS if not writing.isascii() or not writing.replace(" ", "").isalpha()}
+    | {"degc", "degf", "deg c", "grad c", "grad celsius", "celsius", "rpm", "upm", "lpm"}
+)
+_NO_WORDS_AS_WRITTEN = frozenset({"kN", "kW", "Nm", "mm", "mbar", "bar", "Hz", "kHz", "m/s", "mm/s", "mA"})
+_CELSIUS = re.compile(r"^(?P<name>(?:[Tt]|[Tt]emp\w*)[_ ].*\w)_(?P<unit>C)$")
 _UNDERSCORE = re.compile(r"^(?P<name>.*\w)_(?P<unit>degC|degF|rpm|K|s|ms|W|kW|N|kN|bar|l_min|um|mm|percent)$")
+
+
+# Format words that stand where columns of dates and clocks would have a unit, German, French and English.
+_DATE_FORM = r"(?:[tdj]{1,2}|m{1,4}|[jya]{2,4})(?:[-./ ](?:[tdj]{1,2}|m{1,4}|[jya]{2,4})){1,2}"
+_SECOND_FORM = r"(?:s{1,2}|sek|sec)(?:[.,:](?:0|[a-z]){1,9})?"
+_CLOCK_FORM = rf"(?:h{{1,2}}|std):(?:m{{1,2}}|min)(?::{_SECOND_FORM})?(?: ?(?:am/pm|tt))?"
+_TIME_FORM = re.compile(rf"(?:{_DATE_FORM})?(?:[t ,;]*(?:{_CLOCK_FORM}))?", re.IGNORECASE)
+
+
+def is_time_form(text: str) -> bool:
+    """Whether a cell says how dates or clocks are written.
+
+    >>> [is_time_form(cell) for cell in ("TT.MM.JJJJ", "[hh:mm:ss,000]", "YYYY-MM-DD HH:MM", "min", "")]
+    [True, True, True, False, False]
+    """
+    plain = _bare(text)
+    return bool(plain) and _TIME_FORM.fullmatch(plain) is not None
+
+
+def _bare(text: str) -> str:
+    return text.strip().strip("[]()").strip()
 
 
 def unit_of_text(text: str) -> str:
@@ -53,7 +83,7 @@ def unit_of_text(text: str) -> str:
     >>> unit_of_text("[°C]"), unit_of_text("U/min"), unit_of_text("Spindel")
     ('degC', 'rpm', '')
     """
-    plain = text.strip().strip("[]()").strip().replace("º", "°").replace("° ", "°")
+    plain = _bare(text).replace("º", "°").replace("° ", "°")
     known = _WRITINGS.get(plain.lower())
     if known:
         return known
@@ -69,11 +99,24 @@ def unit_of_text(text: str) -> str:
 def without_unit(name: str) -> tuple[str, str]:
     """A column's name and the unit within it, empty where there is none.
 
-    >>> without_unit("Temp vorn [°C]"), without_unit("n / min-1"), without_unit("SP01")
-    (('Temp vorn', 'degC'), ('n', 'rpm'), ('SP01', ''))
+    >>> without_unit("Temp vorn [°C]"), without_unit("n / min-1"), without_unit("Lager vorne °C")
+    (('Temp vorn', 'degC'), ('n', 'rpm'), ('Lager vorne', 'degC'))
+    >>> without_unit("T_Ruecklauf_C"), without_unit("SP01"), without_unit("Temp min")
+    (('T_Ruecklauf', 'degC'), ('SP01', ''), ('Temp min', ''))
     """
-    for form in (_BRACKETS, _SLASH, _UNDERSCORE):
+    for form in (_BRACKETS, _SLASH, _UNDERSCORE, _CELSIUS, _GLUED):
         match = form.match(name.strip())
         if match and match["name"] and (unit := unit_of_text(match["unit"].replace("l_min", "l/min"))):
             return match["name"], unit
+    words = name.split()
+    for number in (2, 1):
+        last, plain = " ".join(words[-number:]), " ".join(words[:-number]).rstrip(" ,:;-")
+        if plain and _is_no_word(last):
+            return plain, unit_of_text(last)
     return name.strip(), ""
+
+
+def _is_no_word(text: str) -> bool:
+    """Whether a text behind a name can be nothing but its unit."""
+    plain = text.replace("º", "°").replace("° ", "°")
+    return plain.lower() in _NO_WORDS or plain in _NO_WORDS_AS_WRITTEN

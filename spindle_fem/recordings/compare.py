@@ -20,7 +20,7 @@ ALL = "all"
 
 @dataclass(frozen=True, slots=True)
 class ErrorRow:
-    """Errors of one channel in one operating condition, predicted minus read.
+    """Errors of one channel in one operating condition, read minus predicted.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Comparison:
     Attributes
     ----------
     residual : (N, c) float64 ndarray, [K]
-        Predicted minus read; NaN where the reading is missing or flagged.
+        Read minus predicted; NaN where the reading is missing or flagged.
     rows : tuple of ErrorRow
         Condition "all" first for each channel, with NaN where nothing was read;
         other conditions without readings are left out.
@@ -94,7 +94,7 @@ def compare(recording: Recording, predicted: NDArray[np.float64]) -> Comparison:
         )
     if not np.all(np.isfinite(predicted)):
         raise RecordingError(recording.name, "the prediction is not finite.")
-    residual = np.where(recording.usable, predicted - recording.temperature, np.nan)
+    residual = np.where(recording.usable, recording.temperature - predicted, np.nan)
     conditions = operating_conditions(recording)
     rows: list[ErrorRow] = []
     for column, channel in enumerate(recording.temperature_names):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,10 @@ from spindle_fem.units import registry
 RPM = 2.0 * np.pi / 60.0
 ROUND_STEPS_RPM = (50.0, 100.0, 200.0, 250.0, 500.0, 1000.0, 2000.0, 2500.0, 5000.0, 10000.0)
 MOST_BANDS = 6
+# Edges are moved by the first of these shares of a band that keeps them off the speeds that are held; a speed
+# within EDGE_SHARE of a band from an edge is on it.
+EDGE_SHIFTS = (0.0, 0.5, 0.25, 0.75, 0.4, 0.6, 0.2, 0.8, 0.1, 0.9, 0.3, 0.7)
+EDGE_SHARE = 0.05
 # Below this share of its largest value an input counts as off.
 OFF_SHARE = 0.005
 TREND_SHARE = 0.05
@@ -76,10 +81,29 @@ def _speed_bands(speed: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:
     if largest == 0.0:
         return bands
     width = next((step for step in ROUND_STEPS_RPM if largest <= MOST_BANDS * step), largest / MOST_BANDS)
-    for low in np.arange(0.0, largest, width):
-        inside = ~still & (speed > low * (1.0 + 1.0e-6)) & (speed <= (low + width) * (1.0 + 1.0e-6))
-        bands[f"{low:g}-{low + width:g} rpm"] = inside
+    edges = _edges(speed[~still], largest, width)
+    for low, high in pairwise(edges):
+        inside = ~still & (speed > low * (1.0 + 1.0e-6)) & (speed <= high * (1.0 + 1.0e-6))
+        bands[f"{low:g}-{high:g} rpm"] = inside
     return bands
+
+
+def _edges(speed: NDArray[np.float64], largest: float, width: float) -> list[float]:
+    """Edges of bands of one width from 0 on; the first is narrower where held speeds would lie on them.
+
+    >>> _edges(np.array([1999.0, 2001.0, 3999.0, 4001.0]), 4001.0, 1000.0)
+    [0.0, 500.0, 1500.0, 2500.0, 3500.0, 4500.0]
+    """
+    on_edge = [
+        np.mean(np.abs((speed / width - shift + 0.5) % 1.0 - 0.5) <= EDGE_SHARE) for shift in EDGE_SHIFTS
+    ]
+    best = int(np.argmin(on_edge))
+    # While a speed only drifts through its range no edges are better than round ones.
+    shift = EDGE_SHIFTS[best] if on_edge[best] < 0.5 * on_edge[0] else 0.0
+    first = round(shift * width, 9)
+    count = int(np.ceil(round((largest - first) / width, 9)))
+    found = [first + width * number for number in range(max(count, 0) + 1)]
+    return found if first == 0.0 else [0.0, *found]
 
 
 def _trends(recording: Recording) -> dict[str, NDArray[np.bool_]]:

@@ -81,6 +81,7 @@ def draft_recording(
             "Give files whose times are all stamps, or all counted in one unit.",
         )
     joined = pd.concat([piece.data for piece in pieces], ignore_index=True)
+    _require_times(joined["time"], pieces)
     unsure = [text for piece in pieces for text in piece.unsure]
     if any(list(piece.data.columns) != list(pieces[0].data.columns) for piece in pieces):
         joined = joined.sort_values("time", kind="stable", ignore_index=True)
@@ -98,12 +99,7 @@ def draft_recording(
         for column in joined.columns[1:]
     ]
     if not any(guess.channel.role == "temperature" for guess in channels):
-        raise RecordingError(
-            ", ".join(str(piece.path) for piece in pieces),
-            f"no column could be told to be a temperature of the machine (columns: "
-            f"{', '.join(joined.columns[1:])}).",
-            f"Name columns after probes ({', '.join(names.probes) or 'any name where no machine is given'}).",
-        )
+        raise _no_temperature(", ".join(str(piece.path) for piece in pieces), channels, names)
     return DraftedRecording(
         name=pieces[0].path.name.split(".")[0],
         sources=tuple(piece.path.name for piece in pieces),
@@ -116,9 +112,53 @@ def draft_recording(
     )
 
 
+def _no_temperature(where: str, channels: list[GuessedChannel], machine: MachineNames) -> RecordingError:
+    """What is missing for a recording of which no column is read by a probe."""
+    columns = ", ".join(guess.channel.column for guess in channels)
+    left = [guess.channel for guess in channels if guess.channel.role == "covariate"]
+    warm = ", ".join(channel.column for channel in left if channel.unit in ("degC", "degF", "K"))
+    if warm:
+        return RecordingError(
+            where,
+            f"no column could be told to be read by a probe of the machine (temperatures: {warm}; "
+            f"columns: {columns}).",
+            f"Name columns after probes ({', '.join(machine.probes)}), or leave --machine out: each "
+            "temperature is then its own probe.",
+        )
+    named = (
+        f"after a probe ({', '.join(machine.probes)}) or as what it is" if machine.probes else "as what it is"
+    )
+    return RecordingError(
+        where,
+        f"no column could be told to be a temperature (columns: {columns}).",
+        "A temperature needs a unit ([°C] behind its name, or in a row below the names) or to be named "
+        f"{named}, such as Temp 1.",
+    )
+
+
+def _require_times(times: pd.Series, pieces: list[_Piece]) -> None:
+    """Refuse times that do not tell rows apart, in the words of the files that were given."""
+    if times.nunique() > 1:
+        return
+    where = ", ".join(str(piece.path) for piece in pieces)
+    columns = pieces[0].time_columns
+    taken = " and ".join(f'"{name}"' for name in columns)
+    what = f"column{'s' * (len(columns) > 1)} {taken} {'were' if len(columns) > 1 else 'was'} taken for "
+    what += "date and clock" if len(columns) > 1 else "the time"
+    if len(times) < 2 or not times.notna().any():
+        number = int(times.notna().sum())
+        raise RecordingError(
+            where, f"has {number} row{'s' * (number != 1)} with a time ({what}).", "At least two are needed."
+        )
+    raise RecordingError(
+        where, f"has the same time in all {len(times)} rows ({what}).", "Times must grow from row to row."
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class _Piece:
     path: Path
+    time_columns: tuple[str, ...]
     data: pd.DataFrame
     time_unit: str | None
     units: dict[str, str]
@@ -153,7 +193,9 @@ def _piece(path: Path, zone: str | None) -> _Piece:
     found.insert(0, f"time from {' and '.join(time.columns)}{_of_unit(time)}")
     data = pd.DataFrame(columns)
     empty = data.isna().all(axis=1)
-    return _Piece(path, data[~empty], time.unit, units, tuple(found), tuple(unsure), tuple(lost))
+    return _Piece(
+        path, time.columns, data[~empty], time.unit, units, tuple(found), tuple(unsure), tuple(lost)
+    )
 
 
 def _plain_name(name: str) -> str:

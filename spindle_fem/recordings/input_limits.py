@@ -7,16 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.errors import FaultsError, RecordingError, SpindleFemError
+from spindle_fem.errors import FaultsError, RecordingError, SpindleFemError, did_you_mean
+from spindle_fem.physics.bearings.highest_speed import highest_speed
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.standard_inputs import standard_inputs
 from spindle_fem.units import ZERO_CELSIUS_K
 
-# Speed times pitch diameter that no rolling bearing runs at, m·rad/s: 5 million mm/min. On a rig, ball
-# bearings of 120 mm bore (pitch diameter 155 mm) ran at 25,000 rpm, 3.9 million: Zaretsky, Bamberger and
-# Signer (1974), NASA TN D-7837.
-HIGHEST_PITCH_SPEED = 5.0e3 * 2.0 * np.pi / 60.0
 # Air about machines, K: what industrial electronics beside them is made for.
 USUAL_AMBIENT = (233.15, 358.15)
 _RPM = 30.0 / np.pi
@@ -29,14 +26,25 @@ def require_possible_inputs(spec: MachineSpec, recording: Recording) -> tuple[st
     ------
     RecordingError or FaultsError
         Every input that is unknown, a speed that is not given or no rolling bearing reaches, a flow below
-        zero.
+        zero; with them, every probe that is unknown.
     """
     faults = list(_faults(spec, recording))
+    if faults:
+        faults += _unknown_probes(spec, recording)
     if len(faults) == 1:
         raise faults[0]
     if faults:
         raise FaultsError(recording.source, faults)
     return tuple(_unusual(spec, recording))
+
+
+def _unknown_probes(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError]:
+    known = tuple(item.name for item in (*spec.probe, *spec.displacement_sensor))
+    for probe in recording.probes:
+        if probe not in known:
+            yield RecordingError(
+                recording.source, f'reads "{probe}", no probe of the machine.', did_you_mean(probe, known)
+            )
 
 
 def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError]:
@@ -53,13 +61,13 @@ def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError
             source, "no channel drives the speed.", 'Add an input channel with drives = "speed".'
         )
     pitch = max((spec.bearing_types[group.bearing_type].pitch for group in spec.bearing_set), default=0.0)
-    fastest = max(np.abs(_ends(recording, "speed")))
-    if fastest * pitch > HIGHEST_PITCH_SPEED:
+    fastest, highest = max(np.abs(_ends(recording, "speed"))), highest_speed(pitch)
+    if fastest > highest:
         yield RecordingError(
             source,
             f'column "{_column(recording, "speed")}" (speed) reaches {fastest * _RPM:.0f} rpm.',
             f"No rolling bearing of {1e3 * pitch:.0f} mm pitch diameter runs above "
-            f"{HIGHEST_PITCH_SPEED / pitch * _RPM:.0f} rpm; is the unit right?",
+            f"{highest * _RPM:.0f} rpm; is the unit right?",
         )
     lowest = _ends(recording, "coolant_flow")[0]
     if lowest < 0.0:

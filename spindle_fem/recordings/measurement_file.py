@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from spindle_fem.errors import RecordingError
-from spindle_fem.recordings.column_units import unit_of_text, without_unit
+from spindle_fem.recordings.column_units import is_time_form, unit_of_text, without_unit
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".asc", ".dat")
 EXCEL_SUFFIXES = (".xlsx", ".xlsm")
@@ -289,7 +289,7 @@ def _table(
     widths = [len(row) for row in rows[body:] if any(row)]
     width = max(set(widths), key=widths.count)
     heading = [number for number in range(body) if sum(bool(cell) for cell in rows[number]) > width / 2]
-    unit_rows = [n for n in heading if all(unit_of_text(c) for c in rows[n] if c.strip("-[]() "))]
+    unit_rows = [n for n in heading if _holds_units(rows[n])]
     named = [number for number in heading if number not in unit_rows]
     if not named:  # letters such as t, n, T are units too, and names where nothing else is
         named, unit_rows = unit_rows[:1], unit_rows[1:]
@@ -319,6 +319,12 @@ def _table(
         unsure.append(f"{word}s with fewer cells than the others, the missing ones counted as empty: {short}")
     cells = pd.DataFrame([(row + [""] * width)[:width] for row in whole], columns=names, dtype=object)
     return _named(path, cells, units, body + 1, found, unsure)
+
+
+def _holds_units(row: list[str]) -> bool:
+    """Whether every filled cell is a unit, or says how a date or a clock is written."""
+    filled = [cell for cell in row if cell.strip("-[]() ")]
+    return all(is_time_form(cell) or unit_of_text(cell) for cell in filled)
 
 
 def _first_of_body(rows: list[list[str]]) -> int | None:

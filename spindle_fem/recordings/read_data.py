@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from spindle_fem.errors import RecordingError, did_you_mean
-from spindle_fem.recordings.manifest import Manifest, time_scale
+from spindle_fem.errors import MissingColumnError, RecordingError, did_you_mean
+from spindle_fem.recordings.manifest import DATA_SUFFIXES, Manifest, time_scale
 from spindle_fem.recordings.numbers_in_text import decimal_sign, numbers_of
 
 MAX_LISTED_CELLS = 5
@@ -115,7 +115,7 @@ def require_columns(data: Path, manifest: Manifest, present: list[str]) -> None:
     missing = [name for name in required_columns(manifest) if name not in present]
     if missing:
         listing = ", ".join(f'"{name}"' for name in missing)
-        raise RecordingError(
+        raise MissingColumnError(
             f"{data}: line 1" if not data.name.endswith(".parquet") else str(data),
             f"has no column {listing}.",
             did_you_mean(missing[0], present),
@@ -123,6 +123,18 @@ def require_columns(data: Path, manifest: Manifest, present: list[str]) -> None:
     twice = [name for name in required_columns(manifest) if present.count(name) > 1]
     if twice:
         raise RecordingError(f"{data}: line 1", f'names the column "{twice[0]}" twice.')
+
+
+def columns_of(data: Path) -> list[str] | None:
+    """Columns that a data file names, None where it cannot be read or is of another kind."""
+    if not data.is_file() or not data.name.endswith(DATA_SUFFIXES):
+        return None
+    try:
+        if data.name.endswith(".parquet"):
+            return [str(name) for name in pd.read_parquet(data).reset_index().columns]
+        return names_of_header(_bytes(data).partition(b"\n")[0].decode("utf-8"))[0]
+    except (RecordingError, OSError, ValueError, ImportError):
+        return None
 
 
 def _read_parquet(data: Path, manifest: Manifest) -> pd.DataFrame:

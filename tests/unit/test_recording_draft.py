@@ -9,6 +9,7 @@ from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.column_roles import MachineNames, guess_channel
 from spindle_fem.recordings.draft_recording import data_text, draft_recording, manifest_text
+from spindle_fem.recordings.manifest import column_unit
 
 MACHINE = MachineNames(
     probes=("SP01", "SP02"), inputs={"speed": "rad/s", "ambient": "K", "coolant_inlet": "K"}
@@ -249,3 +250,122 @@ def test_recorded_quantities_of_heat_sources_are_inputs(tmp_path):
     assert names.inputs["motor_power"] == names.inputs["heat.rotor"] == "W"
     guess = guess_channel("motor power", "kW", 1.0 + np.arange(12) % 2, names, set())
     assert (guess.channel.drives, guess.channel.unit) == ("motor_power", "kW")
+
+
+@pytest.mark.parametrize("preamble", ["", "Gerät;Prüfstand Süd\r\nBearbeiter;Müller\r\n\r\n"])
+@pytest.mark.parametrize(
+    "units",
+    [
+        "TT.MM.JJJJ;hh:mm:ss,000;1/min;°C;°C",
+        ";hh:mm:ss,000;1/min;°C;°C",
+        "TT.MM.JJJJ;hh:mm:ss;1/min;°C;°C",
+        "[tt.mm.jjjj];[HH:MM:SS];[1/min];[°C];[°C]",
+        "YYYY-MM-DD;hh:mm;rpm;degC;degC",
+        "DD.MM.YYYY;-;1/min;°C;°C",
+    ],
+)
+def test_format_words_are_units_of_dates_and_clocks(tmp_path, preamble, units):
+    rows = [
+        f"{stamp:%d.%m.%Y;%H:%M:%S},250;{speed};{warm:.1f};20.0"
+        for stamp, warm, speed in zip(TIMES, WARM, SPEED, strict=True)
+    ]
+    drafted = draft(
+        tmp_path, preamble + "\r\n".join(["Datum;Uhrzeit;Drehzahl;SP01;Raumtemperatur", units, *rows])
+    )
+    assert roles(drafted) == {"Drehzahl": "speed", "SP01": "SP01", "Raumtemperatur": "ambient"}
+    assert [guess.channel.unit for guess in drafted.channels] == ["rpm", "degC", "degC"]
+
+
+def test_a_format_word_above_a_clock_alone_is_a_unit(tmp_path):
+    rows = [f"{stamp:%H:%M:%S};{warm:.1f};21" for stamp, warm in zip(TIMES, WARM, strict=True)]
+    drafted = draft(tmp_path, "\n".join(["Zeit;SP01;n", "[hh:mm:ss];[°C];[1/min]", *rows]))
+    assert roles(drafted) == {"SP01": "SP01", "n": "speed"}
+
+
+@pytest.mark.parametrize(
+    "heads",
+    [
+        "Lager vorne °C;Raumtemperatur °C;Drehzahl 1/min",
+        "Lager vorne [°C];Raumtemperatur in °C;Drehzahl U/min",
+        "Lager vorne Außenring;Raumtemperatur;Drehzahl",
+        "Lager vorne;Raum;Drehzahl",
+    ],
+)
+def test_units_beside_names_or_none_at_all(tmp_path, heads):
+    rows = [
+        f"{s:%d.%m.%Y %H:%M:%S};{w:.1f};{21.5 + w / 100:.1f};{n}"
+        for s, w, n in zip(TIMES, WARM, SPEED, strict=True)
+    ]
+    text = "\n".join([f"Zeit;{heads}", *rows])
+    drafted = draft(tmp_path, text, machine=None)
+    assert list(roles(drafted).values()) == [drafted.channels[0].channel.column, "ambient", "speed"]
+    assert [guess.channel.unit for guess in drafted.channels] == ["degC", "degC", "rpm"]
+    stated = "1/min" in heads or "U/min" in heads
+    assert all(("no unit" in guess.unsure) != stated for guess in drafted.channels)
+    drafted = draft(tmp_path, text, machine=MachineNames(("FRONT", "REAR"), (), MACHINE.inputs))
+    assert list(roles(drafted).values()) == ["FRONT", "ambient", "speed"]
+
+
+@pytest.mark.parametrize("column", ["Lager vorne Kraft", "Lagerschwingung", "Antriebsstrom", "Luftdruck"])
+def test_other_quantities_without_units_are_no_temperatures(column):
+    guess = guess_channel(column, "", WARM, MachineNames(), set())
+    assert guess.channel.role == "covariate"
+    assert guess.channel.unit is None
+
+
+def test_a_speed_in_hertz_is_marked_with_what_to_do(tmp_path):
+    guess = guess_channel("Drehzahl", "Hz", SPEED / 60.0, MACHINE, set())
+    assert guess.channel.role == "covariate"
+    assert "Hz is not taken" in guess.unsure
+    assert "rpm = 60 times" in guess.unsure
+    assert column_unit("turn/s", "speed").scale == pytest.approx(60.0 * column_unit("rpm", "speed").scale)
+
+
+@pytest.mark.parametrize(("unit", "shift", "other"), [("degC", 273.15, "K"), ("K", 0.0, "degC")])
+@pytest.mark.parametrize("column", ["SP01", "Umgebung", "Rest"])
+def test_units_that_do_not_fit_the_size_are_marked(column, unit, shift, other):
+    assert f'unit = "{other}"?' in guess_channel(column, unit, WARM + shift, MACHINE, set()).unsure
+    assert "look like" not in guess_channel(column, other, WARM + shift, MACHINE, set()).unsure
+    assert guess_channel("Temp 1", "", WARM + shift, MACHINE, set()).channel.unit == other
+
+
+def test_refusals_without_a_probe_say_what_would_help(tmp_path):
+    rows = "".join(f"{i},{w:.2f},{w + 1:.2f}\n" for i, w in enumerate(WARM))
+    with pytest.raises(
+        RecordingError, match=r"temperatures: Temp1, Temp2; .* SP02\), or leave --machine out"
+    ):
+        draft(tmp_path, f"time_s,Temp1,Temp2\n{rows}")
+    with pytest.raises(RecordingError, match=r"needs a unit \(\[°C\] behind its name") as caught:
+        draft(tmp_path, f"time_s,A,B\n{rows}", machine=None)
+    assert "any name" not in str(caught.value)
+    with pytest.raises(RecordingError, match=r"needs a unit .* after a probe \(SP01, SP02\)") as caught:
+        draft(tmp_path, f"time_s,A,B\n{rows}")
+    assert "--machine" not in str(caught.value)
+
+
+@pytest.mark.parametrize("column", ["T_Ruecklauf_C", "Kuehlmittel Ruecklauf [degC]", "Rücklauf"])
+def test_umlauts_may_be_spelt_with_two_letters(tmp_path, column):
+    rows = "".join(f"{i};{w:.2f}\n" for i, w in enumerate(WARM))
+    drafted = draft(tmp_path, f"time_s;{column}\n{rows}", machine=machine_names("recorded_spindle"))
+    assert list(roles(drafted).values()) == ["COOLANT_OUT"]
+    assert drafted.channels[0].channel.unit == "degC"
+    names = MachineNames(("housing", "shaft"), (), MACHINE.inputs)
+    assert guess_channel("Gehaeuse", "degC", WARM, names, set()).channel.probe == "housing"
+
+
+def test_steps_with_jitter_hold_and_what_changes_steadily_does_not():
+    rng, time = np.random.default_rng(3), np.arange(400.0)
+    steps = np.repeat([0.0, 1500.0, 3000.0, 800.0], 100)
+    courses = {
+        "steps": (steps + rng.integers(-1, 2, 400), "previous"),
+        "constant": (3000.0 + rng.integers(-1, 2, 400), "previous"),
+        "ramp": (10.0 * time, "linear"),
+        "slow": (3000.0 * (1.0 - np.exp(-time / 100.0)), "linear"),
+        "wave": (2000.0 + 1000.0 * np.sin(time / 3.0), "linear"),
+        "noise": (8.0 + rng.normal(0.0, 0.3, 400), "linear"),
+    }
+    found = {
+        name: guess_channel("speed", "rpm", values, MACHINE, set()).channel.hold
+        for name, (values, _) in courses.items()
+    }
+    assert found == {name: hold for name, (_, hold) in courses.items()}

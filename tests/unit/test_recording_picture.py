@@ -62,3 +62,13 @@ def test_names_with_dollar_signs_and_units_are_shown(figure):
     assert figure.axes[0].get_title(loc="left") == "a $x_ b (probe SP01)"
     assert figure.axes[2].get_ylabel() == "W"
     assert max(figure.axes[2].lines[0].get_ydata()) == 2000.0
+
+
+@pytest.mark.parametrize("pause", [0, 5000])
+def test_the_key_names_gaps_where_there_are_some(tmp_path, pause):
+    rows = [f"{10 * k + pause * (k > 70)},{20.0 + 0.1 * (k % 7):.1f},21.0,{k % 3}" for k in range(100)]
+    (tmp_path / "data.csv").write_text("\n".join(["time,a $x_ b,nothing,power", *rows]))
+    (tmp_path / "recording.toml").write_text(MANIFEST)
+    drawn = recording_figure(read_recording(tmp_path))
+    named = [text.get_text() for text in drawn.legends[0].get_texts()]
+    assert ("gap or nothing read" in named) == bool(pause)

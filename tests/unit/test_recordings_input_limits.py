@@ -59,3 +59,11 @@ def test_every_input_that_cannot_be_is_told_at_once(spec):
     assert len(caught.value.faults) == 4
     for text in ('drives "spindle"', 'drives "force"', "no channel drives the speed", "falls to -6 l/min"):
         assert text in told
+
+
+def test_unknown_probes_are_told_beside_unknown_inputs(spec):
+    sound = recorded(spec)
+    names = ("ambiente", *sound.input_names[1:])
+    faulty = replace(sound, input_names=names, probes=("FORNT", *sound.probes[1:]))
+    with pytest.raises(FaultsError, match=r'drives "ambiente".*\n.*\n.*reads "FORNT"'):
+        require_possible_inputs(spec, faulty)

@@ -4,6 +4,8 @@ import pytest
 
 from scripts import manifest_page
 from spindle_fem.errors import FaultsError, RecordingError, SpecError, UnitError
+from spindle_fem.recordings.align import read_recording
+from spindle_fem.recordings.faults_beside import KnownNames, known_names
 from spindle_fem.recordings.manifest import column_unit, find_manifest, load_manifest
 
 TEXT = """
@@ -114,6 +116,47 @@ def test_every_fault_at_once(folder):
     assert len(caught.value.faults) == 3
 
 
+def test_columns_and_names_of_the_machine_are_told_beside_other_faults(folder):
+    rewrite(folder, 'unit = "rpm"', 'unit = "upm"')
+    rewrite(folder, 'column = "speed"', 'column = "sped"')
+    rewrite(folder, 'drives = "speed"', 'drives = "sped"')
+    rewrite(folder, 'probe = "SP01"', 'probe = "PS01"')
+    with pytest.raises(FaultsError) as caught:
+        read_recording(folder)
+    assert places(caught) == ["channel[2].unit", "channel[2].column"]
+    known = KnownNames(("SP01",), ("speed",), ("speed",), False)
+    of_machine = ["channel[1].probe", "channel[2].drives", "channel"]
+    with pytest.raises(FaultsError) as caught:
+        read_recording(folder, names=lambda: known)
+    assert places(caught) == ["channel[2].unit", "channel[2].column", *of_machine]
+    rewrite(folder, 'unit = "upm"', 'unit = "rpm"')
+    with pytest.raises(FaultsError, match=r'"sped" is not in data.csv. Did you mean "speed"') as caught:
+        read_recording(folder, names=lambda: known)
+    assert places(caught) == ["channel[2].column", *of_machine]
+
+
+def test_a_faulty_machine_hides_no_fault_of_a_recording(folder):
+    def refused():
+        raise SpecError("machine", "is faulty.")
+
+    rewrite(folder, 'unit = "rpm"', 'unit = "upm"')
+    with pytest.raises(FaultsError, match="upm") as caught:
+        read_recording(folder, names=refused)
+    assert len(caught.value.faults) == 1
+
+
+def test_the_names_that_machines_of_both_kinds_know():
+    spindle, motor = known_names("recorded_spindle"), known_names("bench_motor")
+    assert "COOLANT_OUT" in spindle.probes
+    assert (spindle.needed, spindle.takes_others) == (("speed",), False)
+    assert set(motor.probes) == {"winding", "stator_body"}
+    assert set(motor.needed) == {"ambient", "electrical_power"}
+
+
+def places(caught):
+    return [fault.where.rpartition(": ")[2] for fault in caught.value.faults]
+
+
 def test_contradictions_are_told_beside_keys_that_are_no_keys(folder):
     rewrite(folder, "sigma = 0.1", "sigm = 0.1")
     rewrite(folder, 'unit = "s"', 'unit = "m"')
@@ -122,8 +165,13 @@ def test_contradictions_are_told_beside_keys_that_are_no_keys(folder):
     rewrite(folder, 'schema = "spindle-fem/recording/1"\n', "")
     with pytest.raises(FaultsError) as caught:
         load_manifest(folder)
-    places = [fault.where.rpartition(": ")[2] for fault in caught.value.faults]
-    assert sorted(places) == ["channel[1].sigm", "channel[2].hold", "channel[3].hold", "schema", "time.unit"]
+    assert sorted(places(caught)) == [
+        "channel[1].sigm",
+        "channel[2].hold",
+        "channel[3].hold",
+        "schema",
+        "time.unit",
+    ]
 
 
 def test_two_channels_cannot_drive_the_same(folder):

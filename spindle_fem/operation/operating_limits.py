@@ -1,0 +1,52 @@
+"""An operating point held against what its machine can take, before anything is solved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.physics.bearings.highest_speed import highest_speed
+from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.units import ZERO_CELSIUS_K
+
+_RPM = 30.0 / math.pi
+
+
+def require_possible_operation(spec: MachineSpec) -> None:
+    """Refuse what no such machine runs at.
+
+    Raises
+    ------
+    SpecError or FaultsError
+        A speed that no rolling bearing of these diameters reaches, a coolant beyond its known properties.
+    """
+    faults = list(_faults(spec))
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        raise FaultsError(spec.name, faults)
+
+
+def _faults(spec: MachineSpec) -> Iterator[SpecError]:
+    # Of a definition with other faults, tables may be missing and bearings of no known type.
+    types = [spec.bearing_types.get(group.bearing_type) for group in spec.bearing_set]
+    pitch = max((kind.pitch for kind in types if kind is not None), default=0.0)
+    if spec.operation is not None and abs(spec.operation.speed) > highest_speed(pitch):
+        yield SpecError(
+            "operation.speed",
+            f"{_RPM * spec.operation.speed:.0f} rpm.",
+            f"No rolling bearing of {1e3 * pitch:.0f} mm pitch diameter runs above "
+            f"{_RPM * highest_speed(pitch):.0f} rpm; is the unit right?",
+        )
+    if spec.coolant is not None:
+        coolant, inlet = coolant_by_name(spec.coolant.fluid), spec.coolant.inlet_temperature
+        low, high = coolant.lowest_temperature, coolant.highest_temperature
+        if not low <= inlet <= high:
+            yield SpecError(
+                "coolant.inlet_temperature",
+                f"{inlet - ZERO_CELSIUS_K:.4g} °C.",
+                f"Properties of {coolant.name} are known from {low - ZERO_CELSIUS_K:.4g} to "
+                f"{high - ZERO_CELSIUS_K:.4g} °C.",
+            )

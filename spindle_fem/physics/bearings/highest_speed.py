@@ -1,0 +1,18 @@
+"""Speed that no rolling bearing of a diameter runs at."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Speed times pitch diameter, m·rad/s: 5 million mm/min. On a rig, ball bearings of 120 mm bore (pitch
+# diameter 155 mm) ran at 25,000 rpm, 3.9 million: Zaretsky, Bamberger and Signer (1974), NASA TN D-7837.
+_PITCH_SPEED = 5.0e3 * 2.0 * np.pi / 60.0
+
+
+def highest_speed(pitch_diameter: float) -> float:
+    """Speed that no rolling bearing of a pitch diameter [m] reaches, rad/s; infinite for none.
+
+    >>> round(highest_speed(0.1) * 30.0 / np.pi)
+    50000
+    """
+    return _PITCH_SPEED / pitch_diameter if pitch_diameter else np.inf

@@ -1,0 +1,133 @@
+"""What a faulty manifest names beside its other faults that its data or the machine do not have."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from spindle_fem.definition.load import find_machine, load_machine, read_definition, read_toml
+from spindle_fem.definition.network_load import is_network_machine, load_network_machine
+from spindle_fem.errors import FaultsError, RecordingError, SpindleFemError, did_you_mean
+from spindle_fem.recordings.manifest import DRIVES_UNITS, Manifest, find_manifest, load_manifest
+from spindle_fem.recordings.read_data import columns_of
+
+
+@dataclass(frozen=True, slots=True)
+class KnownNames:
+    """What recordings of a machine may name.
+
+    Attributes
+    ----------
+    probes : tuple of str
+        Probes, or nodes of a network.
+    inputs, needed : tuple of str
+        What may be driven, and what must be.
+    takes_others : bool
+        Whether inputs that drive nothing are left out, as a network does.
+    """
+
+    probes: tuple[str, ...]
+    inputs: tuple[str, ...]
+    needed: tuple[str, ...]
+    takes_others: bool
+
+
+def known_names(machine: str | Path, overrides: Iterable[str] = ()) -> KnownNames:
+    """Names of a machine, with geometry or a ``[network]``.
+
+    Raises
+    ------
+    SpindleFemError
+    """
+    if is_network_machine(read_definition(find_machine(machine))):
+        tables = load_network_machine(machine, overrides).network
+        named = [item.temperature for item in tables.boundary if isinstance(item.temperature, str)]
+        named += [source.input for source in tables.source if source.input is not None]
+        inputs = tuple(dict.fromkeys(named))
+        return KnownNames(tuple(node.name for node in tables.node), inputs, inputs, True)
+    spec = load_machine(machine, overrides)
+    inputs = (*DRIVES_UNITS, *spec.source_inputs)
+    return KnownNames(tuple(probe.name for probe in spec.probe), inputs, ("speed",), False)
+
+
+def manifest_for(
+    path: str | Path, names: Callable[[], KnownNames] | None = None, *, growing: bool = False
+) -> tuple[Manifest, Path]:
+    """As :func:`~spindle_fem.recordings.manifest.load_manifest`, with :func:`faults_beside` its faults.
+
+    Raises
+    ------
+    FaultsError or RecordingError
+    """
+    try:
+        return load_manifest(path, growing=growing)
+    except FaultsError as error:
+        raise FaultsError(error.where, [*error.faults, *faults_beside(path, names)]) from error
+
+
+def faults_beside(
+    recording: str | Path, names: Callable[[], KnownNames] | None = None
+) -> tuple[SpindleFemError, ...]:
+    """Columns of a manifest that its data do not have, and names that a machine does not have.
+
+    Parameters
+    ----------
+    names : callable, optional
+        Of the machine; asked only here, where the recording is refused anyway.
+    """
+    manifest = find_manifest(recording)
+    content = read_toml(manifest)
+    found = list(_columns(content, manifest))
+    if names is not None:
+        # what is wrong with the machine itself has messages of its own
+        with contextlib.suppress(SpindleFemError):
+            found += _names(content, names())
+    return tuple(type(f)(f"{manifest}: {f.where}", f.what, f.how_to_fix) for f in found)
+
+
+def _columns(content: dict[str, Any], manifest: Path) -> Iterator[SpindleFemError]:
+    data = content.get("data")
+    present = columns_of(manifest.parent / data) if isinstance(data, str) else None
+    if present is None:
+        return
+    time = content.get("time")
+    named = [("time", time)] if isinstance(time, dict) else []
+    for where, table in (*named, *_channels(content)):
+        column = table.get("column")
+        if isinstance(column, str) and column not in present:
+            yield RecordingError(
+                f"{where}.column", f'"{column}" is not in {data}.', did_you_mean(column, present)
+            )
+
+
+def _names(content: dict[str, Any], names: KnownNames) -> Iterator[SpindleFemError]:
+    driven = []
+    for where, table in _channels(content):
+        probe, drives = table.get("probe"), table.get("drives")
+        if table.get("role") == "temperature" and isinstance(probe, str) and probe not in names.probes:
+            yield RecordingError(
+                f"{where}.probe", f'"{probe}" is no probe of the machine.', did_you_mean(probe, names.probes)
+            )
+        if not isinstance(drives, str):
+            continue
+        driven.append(drives)
+        if not names.takes_others and drives not in names.inputs and not drives.startswith("heat."):
+            yield RecordingError(
+                f"{where}.drives",
+                f'"{drives}" drives nothing in this machine.',
+                did_you_mean(drives, (*names.inputs, "heat.NAME")),
+            )
+    for name in names.needed:
+        if name not in driven:
+            yield RecordingError(
+                "channel", f'none drives "{name}", which the machine needs.', did_you_mean(name, driven)
+            )
+
+
+def _channels(content: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    tables = content.get("channel")
+    listed = tables if isinstance(tables, list) else []
+    return [(f"channel[{n}]", table) for n, table in enumerate(listed, 1) if isinstance(table, dict)]
