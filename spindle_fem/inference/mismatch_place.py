@@ -17,7 +17,7 @@ from spindle_fem.inference.hypothesis_fit import Fit, candidate_coordinates
 from spindle_fem.inference.missing_heat import Explanation, shares, stretches
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
-from spindle_fem.inference.verdict import counted
+from spindle_fem.inference.verdict import counted, kind_of
 from spindle_fem.machine.view.meridian_places import centre_of
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import Conditions, operating_conditions
@@ -282,10 +282,10 @@ def heat_condition(explanations: Sequence[Explanation], spot: str, predictor: Pr
 
 
 def main_component(diagnosis: Diagnosis) -> str:
-    """Component of the finding that changes the readings most, of the kind that the verdict names."""
+    """Component of the finding that changes the readings most: physics before parameters, sensors last."""
     candidates = diagnosis.final.candidates
-    kind = diagnosis.judgement.verdict
-    own = [c for c in candidates if c.kind == kind] or list(candidates)
+    kind = kind_of(candidates)
+    own = [c for c in candidates if c.kind == kind]
     if len(own) < 2:
         return own[0].component if own else ""
     change = {id(c): change_without(diagnosis.predictor, diagnosis.final, c) for c in own}

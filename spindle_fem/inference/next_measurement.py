@@ -117,7 +117,9 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
             "where": EXISTING,
             "quantity": "temperature",
             "condition": AGAIN,
-            "why": "No other explanation came near: another recording would test this one.",
+            "why": "No explanation came near: another recording would tell whether it comes again."
+            if diagnosis.judgement.verdict == "unexplained"
+            else "No other explanation came near: another recording would test this one.",
             "expected_information": 0.0,
             "between": [hypothesis_words(item.fit) for item in rivals],
             "options": [],
@@ -140,7 +142,8 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
         "where": best.sensor if best.place is not None else f"{EXISTING}, above all {best.channel}",
         "quantity": "temperature",
         "condition": best.trial.name,
-        "why": why(best, between, decided) + timed_words([item.fit for item in rivals]),
+        "why": why(best, between, lead_words(diagnosis, decided))
+        + timed_words([item.fit for item in rivals]),
         "expected_information": best.information,
         "between": between,
         "options": [
@@ -160,7 +163,7 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def rivals_of(diagnosis: Diagnosis) -> tuple[list[Ranked], Array, bool]:
-    """Explanations to tell apart, their probabilities, and whether the data had already decided."""
+    """Explanations to tell apart, their probabilities, and whether only one was left."""
     judgement = diagnosis.judgement
     found = [judgement.chosen, *judgement.alternatives][:MOST_HYPOTHESES]
     decided = len(found) < 2
@@ -349,8 +352,15 @@ def timed_words(fits: Sequence[Fit]) -> str:
     return " Unrecorded heat or cooling is taken to come and go as it did in the recording." if timed else ""
 
 
-def why(option: Option, between: Sequence[str], decided: bool) -> str:
-    """The reason in a sentence or two with numbers."""
+def lead_words(diagnosis: Diagnosis, decided: bool) -> str:
+    """How far the data are from an answer already; empty where several explanations are left."""
+    if diagnosis.judgement.verdict == "unexplained":
+        return "Nothing explains the recording; this would tell apart what comes nearest. "
+    return "The data have decided; this would confirm it. " if decided else ""
+
+
+def why(option: Option, between: Sequence[str], lead: str) -> str:
+    """The reason in a sentence or two with numbers, after what leads to it."""
     digits = 1 if abs(option.difference) >= 0.2 else 2
     levels = [f"{value - ZERO_CELSIUS_K:.{digits}f} °C" for value in option.levels]
     at = option.channel if option.place is None else "the new sensor"
@@ -360,7 +370,6 @@ def why(option: Option, between: Sequence[str], decided: bool) -> str:
         f"{abs(option.difference) / option.spread:.1f} times what noise and unknown parameters leave "
         f"({option.spread:.2g} K)."
     )
-    lead = "The data have decided; this would confirm it. " if decided else ""
     if option.information < HARDLY:
         lead += "No single test tells these apart well; this one does it best. "
     tail = f" Expected to tell {option.information:.2f} of {np.log2(len(between)):.2f} bits."

@@ -321,8 +321,9 @@ def judge(
         before = left(empty.fit)
         verdict = "unexplained"
         reason = (
-            f"the best set leaves {rest:.1f} times the noise of the readings, where {before:.1f} times was "
-            f"left without it: it explains {100.0 * (1.0 - (rest / before) ** 2):.0f} % of the mismatch"
+            f"the best set leaves {rest:.1f} times what the errors expected of sensors allow (noise with its "
+            f"slow part, robust root mean square of fitted readings), where {before:.1f} times was left "
+            f"without it: it explains {100.0 * (1.0 - (rest / before) ** 2):.0f} % of the mismatch"
         )
     return Judgement(
         verdict,

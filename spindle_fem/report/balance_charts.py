@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
+from numpy.typing import NDArray
 
 from spindle_fem.report.figure_style import (
     BODY_COLOURS,
@@ -38,23 +39,25 @@ def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
     sinks = {name: value for name, value in energy.heat_out.items() if value > 0.0}
     sources = dict(sorted(sources.items(), key=lambda item: -item[1]))
     sinks = dict(sorted(sinks.items(), key=lambda item: -item[1]))
-    figure = new_figure(632.0)
-    axes = pixel_axes(figure, 24.0, 100.0, 1552.0, 520.0)
-    axes.axis("off")
-    axes.set(xlim=(0.0, 1552.0), ylim=(520.0, 0.0))
+    body = 410.0
     total = max(sum(sources.values()), sum(sinks.values()))
+    # As high as the longer side needs, so that no band is pressed onto its neighbours.
+    height = max(520.0, *(float(_room(side, body, total).sum()) for side in (sources, sinks)))
+    figure = new_figure(height + 112.0)
+    axes = pixel_axes(figure, 24.0, 100.0, 1552.0, height)
+    axes.axis("off")
+    axes.set(xlim=(0.0, 1552.0), ylim=(height, 0.0))
     set_title(
         figure,
         "Where the heat comes from and where it goes",
         f"{energy.heat_in:.1f} W put in; imbalance {energy.imbalance_relative:.1e} of it.",
     )
     if total <= 0.0:
-        axes.text(776.0, 260.0, "No heat flows.", ha="center", va="center")
+        axes.text(776.0, 0.5 * height, "No heat flows.", ha="center", va="center")
         return figure
-    body = 410.0
     _bands(axes, sources, body, total, left=True)
     _bands(axes, sinks, body, total, left=False)
-    top = 0.5 * (520.0 - body)
+    top = 0.5 * (height - body)
     axes.add_patch(
         Rectangle(
             (710.0, top), 132.0, body * sum(sources.values()) / total, facecolor="#c9d2da", linewidth=0.0
@@ -71,13 +74,21 @@ def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
     return figure
 
 
+def _room(flows: Mapping[str, float], body: float, total: float) -> NDArray[np.float64]:
+    """Height that each band takes at its outer end with its text, px."""
+    if total <= 0.0:
+        return np.zeros(len(flows))
+    return np.maximum(np.array(list(flows.values())) / total * body + 8.0, 32.0)
+
+
 def _bands(axes: Axes, flows: Mapping[str, float], body: float, total: float, *, left: bool) -> None:
     if not flows:
         return
     heights = np.array(list(flows.values())) / total * body
-    top = 0.5 * (520.0 - body)
+    height = max(axes.get_ylim())
+    top = 0.5 * (height - body)
     at_body = top + np.cumsum(heights) - 0.5 * heights
-    at_end = spread(at_body, np.maximum(heights + 8.0, 32.0), 0.0, 520.0)
+    at_end = spread(at_body, _room(flows, body, total), 0.0, height)
     near, far = (710.0, 480.0) if left else (842.0, 1072.0)
     middle = 0.5 * (near + far)
     palette = (CYCLE[1], CYCLE[4]) if left else (CYCLE[0], CYCLE[5])
@@ -215,12 +226,12 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
     order = np.argsort(coolant.position, kind="stable")
     place = coolant.position[order]
     turns = coolant.angle[order] / (2.0 * math.pi)
-    left = pixel_axes(figure, 90.0, 130.0, 680.0, 400.0)
+    left = pixel_axes(figure, 120.0, 130.0, 630.0, 400.0)
     left.plot(place, coolant.wall_temperature[order] - ZERO_CELSIUS_K, color=CYCLE[1], label="wall")
     left.plot(place, coolant.bulk_temperature[order] - ZERO_CELSIUS_K, color=CYCLE[0], label="coolant (bulk)")
     left.set(xlabel="length along the channel / m", ylabel=TEMPERATURE_LABEL, title="Coolant and wall")
     left.legend(loc="best")
-    right = pixel_axes(figure, 890.0, 130.0, 680.0, 400.0)
+    right = pixel_axes(figure, 915.0, 130.0, 655.0, 400.0)
     inside = np.ones(place.size, dtype=bool)
     if ports and place.size > 2:
         inside = (place > place.min()) & (place < place.max())

@@ -20,6 +20,8 @@ _CUSTOMARY = {
     "degC": ("°C", 1.0),
 }
 _OPEN = ("operation", "coolant", "channel", "heat")
+# Mark of what is given without one.
+UNMARKED = "U"
 _HIDDEN = ("marks", "schema", "name", "title", "description")
 
 
@@ -145,7 +147,7 @@ def _rows(
     prefix: str,
     path: str,
     unset: Collection[str],
-    inherited: str = "",
+    inherited: str = UNMARKED,
     *,
     skip_name: bool = False,
 ) -> list[dict[str, Any]]:
@@ -156,7 +158,7 @@ def _rows(
         if key == "marks" or (skip_name and key == "name"):
             continue
         label = prefix + key.replace("_", " ")
-        mark = "" if path + key in unset else marks.get(key, marks.get("default", ""))
+        mark = "" if path + key in unset else marks.get(key, marks.get("default", UNMARKED))
         if _is_tables(value):
             for index, item in enumerate(value):
                 inner = f"{label}, {item.get('name', index + 1)}: "

@@ -149,7 +149,7 @@ def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Fi
     set_title(
         figure,
         f"{data['recording'].values[number]}: missing heat over time",
-        "If heat were missing at this place only; positive heats. Band: 90 % interval.",
+        "If heat were missing at this place only; below zero heat is drawn away. Band: 90 % interval.",
     )
     return figure
 

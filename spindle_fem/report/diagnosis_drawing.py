@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 # As thick as a wall is drawn, m.
 WALL = 3.0e-3
 PLAIN = "#e9ecef"
+DOUBTED = "#c1121f"
 BAR_LABEL = "evidence for heat missing here, in % of the best place's"
 
 
@@ -49,7 +51,11 @@ def explained_shares(data: xr.Dataset) -> dict[str, float]:
 
 @styled
 def located_on_machine(
-    data: xr.Dataset, spec: MachineSpec, component: str, assembly: AssemblyGeometry | None = None
+    data: xr.Dataset,
+    spec: MachineSpec,
+    component: str,
+    sensors: Sequence[str] = (),
+    assembly: AssemblyGeometry | None = None,
 ) -> Figure | None:
     """Half section with its spots coloured by how well heat there explains the residual; None without spots.
 
@@ -59,17 +65,22 @@ def located_on_machine(
         As ``diagnosis.nc`` has it.
     component : str
         What is outlined: where the mismatch is; may be empty.
+    sensors : sequence of str
+        Probes whose readings the diagnosis doubts; their names are marked.
     """
     if "spot" not in data:
         return None
-    notes = "Circles: the neighbourhood of each probe. Grey: not asked."
+    notes = "Circles: about each probe. Grey: not asked."
     if component and regions_of(spec, component):
-        notes += f" Framed in orange: where the diagnosis puts it ({component.replace('_', ' ')})."
+        notes += f" Orange frame: where the diagnosis puts it ({component.replace('_', ' ')})."
+    if any(probe.kind == "point" and probe.name in sensors for probe in spec.probe):
+        notes += " Red names: sensors that it doubts."
     figure = places_on_machine(
         explained_shares(data),
         ColourBar(FILM_MAP.reversed(), 0.0, 100.0, BAR_LABEL),
         spec,
         framed=component,
+        doubted=sensors,
         assembly=assembly,
     )
     set_title(figure, "Where missing heat would explain the readings", notes)
@@ -83,6 +94,7 @@ def places_on_machine(
     spec: MachineSpec,
     *,
     framed: str = "",
+    doubted: Sequence[str] = (),
     assembly: AssemblyGeometry | None = None,
 ) -> Figure:
     """Half section with places coloured by a value each, and the names of the probes; without a title.
@@ -93,6 +105,8 @@ def places_on_machine(
         By place, as :func:`regions_of` takes it.
     framed : str
         Component that is outlined.
+    doubted : sequence of str
+        Probes whose names are red.
     """
     assembly = build_assembly(spec) if assembly is None else assembly
     z_low, z_high, outside = extent(assembly)
@@ -143,13 +157,14 @@ def places_on_machine(
             )
         )
     axes.axhline(0.0, color=MUTED, linewidth=0.9, dashes=(12, 3, 2, 3))
-    _label_probes(axes, spec, reach, scale)
+    _label_probes(axes, spec, (reach, scale), doubted)
     draw_colour_bar(pixel_axes(figure, 420.0, total - 92.0, 760.0, 20.0), bar)
     return figure
 
 
-def _label_probes(axes, spec: MachineSpec, reach: float, scale: float) -> None:
-    """Names of point probes above the section, with leaders."""
+def _label_probes(axes: Axes, spec: MachineSpec, height: tuple[float, float], doubted: Sequence[str]) -> None:
+    """Names of point probes above the section, with leaders; ``height``: largest radius, px a mm."""
+    reach, scale = height
     probes = [probe for probe in spec.probe if probe.kind == "point"]
     if not probes:
         return
@@ -165,7 +180,9 @@ def _label_probes(axes, spec: MachineSpec, reach: float, scale: float) -> None:
         lift = reach + 26.0 / scale
         axes.plot([at[0], centre], [at[1], lift], color=INK, linewidth=0.7, clip_on=False, zorder=6)
         axes.plot(*at, marker="o", markersize=3.6, markerfacecolor="white", markeredgecolor=INK, zorder=7)
-        axes.text(centre, lift + 4.0 / scale, probe.name, ha="center", va="bottom", fontsize=9.0)
+        colour = DOUBTED if probe.name in doubted else INK
+        name = axes.text(centre, lift + 4.0 / scale, probe.name, ha="center", va="bottom", fontsize=9.0)
+        name.set(color=colour, fontweight="bold" if probe.name in doubted else "normal")
 
 
 @styled

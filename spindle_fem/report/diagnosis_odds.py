@@ -11,8 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from spindle_fem.effects.framework.effect import capital
 from spindle_fem.report.diagnosis_charts import NORMAL_90
 from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, pixel_axes, set_title, styled
+from spindle_fem.report.parameter_words import parameter_words, worth_showing
 from spindle_fem.report.read_against_predicted import HELD
 
 if TYPE_CHECKING:
@@ -62,13 +64,13 @@ def set_probabilities(data: xr.Dataset) -> Figure:
     set_title(
         figure,
         "Which explanations the data leave",
-        "Each set fitted with the machine's uncertain parameters. Misfit: residual in units of its noise.",
+        "Fitted with the machine's own parameters. Misfit: of whitened residuals, 1 if only error is left.",
     )
     return figure
 
 
 @styled
-def finding_intervals(findings: Sequence[Mapping[str, Any]]) -> Figure | None:
+def finding_intervals(findings: Sequence[Mapping[str, Any]], what: str = "what was found") -> Figure | None:
     """Value and 90 % interval of every parameter of the findings; None where there are none."""
     rows = [
         (item, name, value)
@@ -98,7 +100,7 @@ def finding_intervals(findings: Sequence[Mapping[str, Any]]) -> Figure | None:
         unit = str(value["unit"]).replace("degC", "°C")
         text = f"{_short(middle)} {unit}  [{_short(low)}, {_short(high)}]"
         figure.text(1300.0 / 1600.0, y, text, va="center", fontsize=9.0)
-    set_title(figure, "What was found, in numbers", "Dot: most probable value; bar: 90 % interval.")
+    set_title(figure, f"{capital(what)}, in numbers", "Dot: most probable value; bar: 90 % interval.")
     return figure
 
 
@@ -112,12 +114,18 @@ def machine_parameters(data: xr.Dataset) -> Figure | None:
     names = [str(n) for n in data["parameter"].values] if "parameter" in data else []
     if not names:
         return None
+    shown = worth_showing(data["parameter_fitted"].values, data["parameter_fitted_sigma"].values)
+    left_out = len(names) - len(shown)
+    data = data.isel(parameter=shown)
+    names = [names[i] for i in shown]
     known, known_sigma = data["parameter_known"].values, data["parameter_known_sigma"].values
     fitted, fitted_sigma = data["parameter_fitted"].values, data["parameter_fitted_sigma"].values
-    row = 40.0
+    recordings = [str(n) for n in data["recording"].values]
+    labels = [textwrap.fill(parameter_words(name, recordings), WRAPPED) for name in names]
+    row = 18.0 + 24.0 * max(label.count("\n") + 1 for label in labels)
     top, foot = 150.0, 80.0
     figure = new_figure(top + row * len(names) + foot)
-    left = min(60.0 + 10.4 * max(len(n) for n in names), 620.0)
+    left = 60.0 + 12.2 * max(len(line) for label in labels for line in label.split("\n"))
     axes = pixel_axes(figure, left, top, 1600.0 - left - 330.0, row * len(names))
     axes.axvspan(-NORMAL_90, NORMAL_90, color=HELD, linewidth=0.0, zorder=0)
     axes.axvline(0.0, color=MUTED, linewidth=0.8)
@@ -132,11 +140,17 @@ def machine_parameters(data: xr.Dataset) -> Figure | None:
         handles.append(bars)
         texts.append("after the calibration recordings")
     bars = axes.errorbar(
-        fitted, at + 0.17, xerr=NORMAL_90 * fitted_sigma, fmt="o", color=CYCLE[0], markersize=4.5, linewidth=2
+        fitted,
+        at + 0.17 * calibrated,
+        xerr=NORMAL_90 * fitted_sigma,
+        fmt="o",
+        color=CYCLE[0],
+        markersize=4.5,
+        linewidth=2,
     )
     handles.append(bars)
     texts.append("after the diagnosed recordings")
-    axes.set_yticks(at, [name.replace("_", " ") for name in names])
+    axes.set_yticks(at, labels)
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.set_xlabel("shift from nominal in prior standard deviations")
@@ -149,11 +163,10 @@ def machine_parameters(data: xr.Dataset) -> Figure | None:
     figure.legend(
         handles, texts, ncols=3, loc="upper left", bbox_to_anchor=(15.0 / width, 1.0 - 82.0 / height)
     )
-    set_title(
-        figure,
-        "The machine's own parameters",
-        "Value and 90 % interval; the prior holds a shift beyond the grey band with less than 10 %.",
-    )
+    notes = "Value and 90 % interval; the prior holds a shift beyond the grey band with less than 10 %."
+    if left_out:
+        notes += f" {left_out} more stayed as they were, or were told less."
+    set_title(figure, "The machine's own parameters", notes)
     return figure
 
 

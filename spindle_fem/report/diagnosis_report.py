@@ -33,6 +33,7 @@ from spindle_fem.report.diagnosis_tables import (
     fit_table,
     misdescription_blocks,
     next_blocks,
+    parameter_tables,
     place_tables,
     set_tables,
     where_text,
@@ -41,6 +42,9 @@ from spindle_fem.report.diagnosis_words import (
     VERDICTS,
     checks,
     confidence_words,
+    found_words,
+    place_named,
+    sensors_named,
     verdict_sentence,
 )
 from spindle_fem.report.figure_style import save_png
@@ -55,7 +59,7 @@ CAPTIONS = {
     "before_after": "Readings, model before and after, and what each leaves; shaded: not fitted.",
     "residual_map": "Root mean square residual by channel and condition, before and after.",
     "sets": "Probability of every set of effects that was fitted to the end.",
-    "findings": "Parameters of what was found, with 90 % intervals.",
+    "findings": "Parameters of the findings, with 90 % intervals.",
     "parameters": "The machine's own uncertain parameters, prior against posterior.",
     "where": "How well heat that is missing at one place only would explain the readings.",
     "missing_heat": "Heat over time that would explain the readings, at each credible place alone.",
@@ -144,22 +148,23 @@ def _figures(
     for recording in recordings:
         yield numbered("before_after", recording), before_after(data, recording)
     yield "residual_map", residual_map(data)
-    where = content["mismatch"]["where"]
+    sensors = sensors_named(content)
+    places = [name for name in content["mismatch"]["where"]["credible"] if name not in sensors]
     found: list[tuple[str, Figure | None]] = [
         ("sets", set_probabilities(data)),
-        ("findings", finding_intervals(content["findings"])),
+        ("findings", finding_intervals(content["findings"], found_words(content))),
         ("parameters", machine_parameters(data)),
     ]
     if content["verdict"] != "consistent":
         spec = _machine(folder)
         drawn = (
-            located_on_machine(data, spec, where["component"] or "")
+            located_on_machine(data, spec, place_named(content), sensors_named(content))
             if spec is not None
             else located_on_network(data)
         )
         found.append(("where", drawn))
         found += [
-            (numbered("missing_heat", recording), missing_heat(data, where["credible"], recording))
+            (numbered("missing_heat", recording), missing_heat(data, places, recording))
             for recording in recordings
         ]
     yield from ((name, figure) for name, figure in found if figure is not None)
@@ -220,7 +225,9 @@ def render(content: Mapping[str, Any], pictures: Mapping[str, list[Any]]) -> str
     sections += [
         Section("next", "What to measure next", next_blocks(content)),
         Section(
-            "parameters", "The machine's own parameters", of("parameters") or [Text("Nothing was fitted.")]
+            "parameters",
+            "The machine's own parameters",
+            [*of("parameters"), *parameter_tables(content)] or [Text("Nothing was fitted.")],
         ),
         Section(
             "confidence",

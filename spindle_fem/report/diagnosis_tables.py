@@ -6,8 +6,18 @@ from collections.abc import Mapping, Sequence
 from operator import itemgetter
 from typing import Any
 
+from spindle_fem.effects.framework.effect import capital
 from spindle_fem.report.block_page import Cards, Notice, Table, Text
-from spindle_fem.report.diagnosis_words import chance, kelvin, level, moment, set_words
+from spindle_fem.report.diagnosis_words import (
+    chance,
+    found_words,
+    kelvin,
+    level,
+    moment,
+    sensors_named,
+    set_words,
+)
+from spindle_fem.report.parameter_words import parameter_words
 from spindle_fem.report.table_rows import Field, fixed, plain, rounded, significant, table_of, whole, words
 
 _DEFECTS = ("spikes", "dropouts", "stuck", "implausible", "bridged", "empty_cells", "infinite")
@@ -26,7 +36,10 @@ def cards(content: Mapping[str, Any]) -> Cards:
     ]
     if content["findings"]:
         items.append(
-            {"value": chance(content.get("set_probability")), "name": "probability of what is named"}
+            {
+                "value": chance(content.get("set_probability")),
+                "name": f"probability of {found_words(content)}",
+            }
         )
     items += [
         {
@@ -41,18 +54,15 @@ def cards(content: Mapping[str, Any]) -> Cards:
 def fit_table(content: Mapping[str, Any]) -> Table:
     """Errors before and after, on fitted and held-out readings."""
     fit = content["fit"]
-
-    def over_noise(model: str) -> float | None:
-        error, noise = fit[model]["heldout_rmse_K"], fit["noise_K"]
-        return None if error is None or not noise else error / noise
-
     fields = (
         words("model", str),
         fixed("fitted readings / K", lambda model: fit[model]["train_rmse_K"], 3),
         fixed("held-out readings / K", lambda model: fit[model]["heldout_rmse_K"], 3),
-        fixed("held out / noise", over_noise, 2),
     )
-    caption = f"Root mean square error over all temperature channels; held out: {fit['heldout']}."
+    caption = (
+        f"Root mean square error over all temperature channels; held out: {fit['heldout']}. "
+        f"Noise of a reading: {kelvin(fit['noise_K'])}."
+    )
     return table_of(fields, ("before", "after"), caption)
 
 
@@ -63,8 +73,8 @@ def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:
         return []
     blocks: list[Table | Text] = []
     captions = {
-        "instead": "Would explain the recording instead of what was found, all of it together:",
-        "left_open": "As fitted with what was found:" if content["findings"] else "As fitted:",
+        "instead": f"Would explain the recording instead of {found_words(content)}, all of it together:",
+        "left_open": f"As fitted with {found_words(content)}:" if content["findings"] else "As fitted:",
     }
     for key, caption in captions.items():
         if told.get(key):
@@ -159,7 +169,7 @@ def set_tables(content: Mapping[str, Any]) -> list[Any]:
             whole("90 % interval", lambda item: f"{significant(item['low'])} to {significant(item['high'])}"),
             words("unit", lambda item: str(item["unit"]).replace("degC", "°C")),
         )
-        blocks.append(table_of(fields, parameters, "What was found."))
+        blocks.append(table_of(fields, parameters, f"{capital(found_words(content))}."))
     if intervals:
         blocks.append(table_of((*effect, *_FROM_TO), intervals, "When it is on."))
     if content["alternatives"]:
@@ -173,17 +183,50 @@ def set_tables(content: Mapping[str, Any]) -> list[Any]:
     return blocks
 
 
+def parameter_tables(content: Mapping[str, Any]) -> list[Table]:
+    """All parameters of the machine before and after; directions of its definition have their own section."""
+    rows = content.get("machine_parameters")
+    if not rows:
+        return []
+    recordings = content.get("recordings", ())
+    rows = [
+        item | {key: 1.0e3 * item[key] for key in ("prior", "value", "low", "high")} | {"unit": "mm"}
+        if item["unit"] == "m"
+        else item
+        for item in rows
+    ]
+    fields = (
+        words("parameter", lambda item: parameter_words(item["name"], recordings)),
+        rounded("before", "prior"),
+        rounded("after", "value"),
+        whole("90 % interval", lambda item: f"{significant(item['low'])} to {significant(item['high'])}"),
+        words("unit", "unit"),
+    )
+    return [table_of(fields, rows, "All of them; diagnosis.nc has the directions of the definition too.")]
+
+
 def where_text(content: Mapping[str, Any]) -> list[Text]:
     """The place in a sentence."""
-    where = content["mismatch"]["where"]
-    if not where["component"]:
-        return [Text("No place stands out.")]
-    text = f"Place: {where['component'].replace('_', ' ')}"
+    where, sensors = content["mismatch"]["where"], sensors_named(content)
+    place = where["component"]
+    centre = ""
     if where["r_mm"] is not None:
-        text += f" (centroid at r = {where['r_mm']:.0f} mm, z = {where['z_mm']:.0f} mm)"
-    others = [name.replace("_", " ") for name in where["credible"] if name != where["component"]]
-    text += f". Heat missing at {' or '.join(others)} alone would explain much of it too." if others else "."
-    return [Text(text)]
+        centre = f" (centroid at r = {where['r_mm']:.0f} mm, z = {where['z_mm']:.0f} mm)"
+    texts = []
+    if not place:
+        texts.append("No place stands out.")
+    elif place not in sensors:
+        texts.append(f"Place: {place.replace('_', ' ')}{centre}.")
+    for name in sensors:
+        own = centre if name == place else ""
+        texts.append(
+            f"Sensor {name.replace('_', ' ')}{own}: the finding is of its reading, not of heat there."
+        )
+    others = [name.replace("_", " ") for name in where["credible"] if name not in (place, *sensors)]
+    if others:
+        too = " too" if place and place not in sensors else ""
+        texts.append(f"Heat missing at {' or '.join(others)} alone would explain much of it{too}.")
+    return [Text(" ".join(texts))]
 
 
 def place_tables(content: Mapping[str, Any]) -> list[Table]:

@@ -34,6 +34,14 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
     if verdict == "unexplained" and not content["findings"]:
         reason = str(content.get("reason") or "the difference follows nothing that the catalogue holds")
         return f"The difference between recording and model is not explained: {reason.rstrip('.')}."
+    if verdict == "unexplained":
+        reason = str(content.get("reason") or "the best set leaves too much").rstrip(".")
+        statements = " ".join(item["statement"] for item in content["findings"])
+        return (
+            f"The difference between recording and model is not explained: {reason}. What comes nearest, "
+            f"and is not to be taken for the cause (probability {chance(content.get('set_probability'))}): "
+            f"“{statements}” {_improvement(fit)}"
+        )
     if verdict == "consistent":
         return (
             f"The recording agrees with the machine: what differs, {kelvin(fit['after']['heldout_rmse_K'])} "
@@ -59,6 +67,30 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
     lead = "" if verdict == "sensor" else _heat_words(content)
     probability = content.get("set_probability")
     return f"{lead}{statements} Probability {chance(probability)}. {_improvement(fit)}"
+
+
+def sensors_named(content: Mapping[str, Any]) -> list[str]:
+    """Sensors that findings hold to be wrong: their places are no places of the physics.
+
+    >>> sensors_named({"findings": [{"kind": "sensor", "component": "SP02"}]})
+    ['SP02']
+    """
+    return [item["component"] for item in content["findings"] if item.get("kind") == "sensor"]
+
+
+def place_named(content: Mapping[str, Any]) -> str:
+    """Where the mismatch is, if that is a place of the physics; else empty."""
+    place = content["mismatch"]["where"]["component"] or ""
+    return "" if place in sensors_named(content) else place
+
+
+def found_words(content: Mapping[str, Any]) -> str:
+    """What the findings are: found, or only what comes nearest.
+
+    >>> found_words({"verdict": "unexplained"}), found_words({"verdict": "sensor"})
+    ('what comes nearest', 'what was found')
+    """
+    return "what comes nearest" if content["verdict"] == "unexplained" else "what was found"
 
 
 def set_words(findings: Sequence[Mapping[str, Any]]) -> str:

@@ -10,11 +10,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from spindle_fem.report.figure_style import CYCLE, new_figure, plain_decades, save_png, styled
+from spindle_fem.report.figure_style import CYCLE, new_figure, plain_decades, save_png, set_title, styled
 
 SPEED_LABEL = "speed / rpm"
-# Lines that may hide one another, points: the first, by how much the next is narrower, the last.
-WIDEST, NARROWER, NARROWEST = 3.6, 1.1, 1.2
+HEIGHT = 690.0
+# Lines that may hide one another, points: the first and the last.
+WIDEST, NARROWEST = 4.0, 1.2
+# Style of charts in which dashes have no meaning of their own.
+GAPS = "gaps"
 
 
 def write_heat_charts(content: Mapping[str, Any], folder: Path) -> list[Path]:
@@ -31,10 +34,13 @@ def write_heat_charts(content: Mapping[str, Any], folder: Path) -> list[Path]:
     return [save_png(draw(content), folder / f"{name}.png") for name, draw in CHARTS.items()]
 
 
-def _panels(number: int, height: float = 620.0) -> tuple[Figure, Sequence[Axes]]:
-    figure = new_figure(height)
+def _panels(number: int, title: str) -> tuple[Figure, Sequence[Axes]]:
+    figure = new_figure(HEIGHT)
+    set_title(figure, title)
     axes = np.atleast_1d(figure.subplots(1, number))
-    figure.subplots_adjust(left=0.075, right=0.985, top=0.8, bottom=0.14, wspace=0.3)
+    figure.subplots_adjust(
+        left=0.075, right=0.985, top=1.0 - 186.0 / HEIGHT, bottom=90.0 / HEIGHT, wspace=0.3
+    )
     return figure, axes
 
 
@@ -62,7 +68,7 @@ def _legend(figure: Figure, axes: Axes) -> None:
         handles,
         labels,
         loc="upper left",
-        bbox_to_anchor=(0.055, 0.995),
+        bbox_to_anchor=(0.005, 1.0 - 52.0 / HEIGHT),
         ncols=6,
         columnspacing=1.4,
         handlelength=3.2,
@@ -76,15 +82,19 @@ def _lines(
     style: str = "-",
     note: str = "",
 ) -> None:
-    for index, (name, rows) in enumerate(_groups(content).items()):
+    groups = _groups(content)
+    widths = np.linspace(WIDEST, NARROWEST, len(groups)) if len(groups) > 1 else [1.8]
+    for index, (name, rows) in enumerate(groups.items()):
+        # every other one has gaps, through which a line that coincides with it is seen
+        line = (0, (5, 2)) if style == GAPS and index % 2 else style
         speeds = [row["speed_rpm"] for row in rows]
         axes.plot(
             speeds,
             [pick(row) for row in rows],
-            style,
+            linestyle="-" if line == GAPS else line,
             color=CYCLE[index % len(CYCLE)],
             # what lies under another stands out on both sides of it
-            linewidth=max(WIDEST - index * NARROWER, NARROWEST),
+            linewidth=widths[index],
             label=f"{name}{note}",
         )
 
@@ -97,7 +107,7 @@ def _finish(axes: Axes, title: str, label: str) -> None:
 @styled
 def film_thickness(content: Mapping[str, Any]) -> Figure:
     """Central film, flooded and isothermal against with thermal and starvation reduction."""
-    figure, axes = _panels(2)
+    figure, axes = _panels(2, "Lubricant film of the contacts")
     for panel, side in zip(axes, ("inner", "outer"), strict=True):
         _lines(
             panel,
@@ -115,7 +125,7 @@ def film_thickness(content: Mapping[str, Any]) -> Figure:
 @styled
 def loads_over_thrust(content: Mapping[str, Any]) -> Figure:
     """Axial load and displacement of the preloaded set over the thrust."""
-    figure, axes = _panels(2)
+    figure, axes = _panels(2, "Loads of the bearings over the thrust")
     rows = content["thrust"]
     thrust = [row["thrust_N"] for row in rows]
     for index, name in enumerate(rows[0]["bearings"] if rows else ()):
@@ -141,7 +151,7 @@ def loads_over_thrust(content: Mapping[str, Any]) -> Figure:
 @styled
 def contacts_over_speed(content: Mapping[str, Any]) -> Figure:
     """Deformations, contact angles and ellipses: inner solid, outer dashed."""
-    figure, axes = _panels(3)
+    figure, axes = _panels(3, "Contacts of the rolling elements with the rings")
     for panel, key, title, label in zip(
         axes,
         ("deformation_um", "contact_angle_deg", "semi_major_mm"),
@@ -162,7 +172,7 @@ def contacts_over_speed(content: Mapping[str, Any]) -> Figure:
 @styled
 def ball_speeds(content: Mapping[str, Any]) -> Figure:
     """Orbital and spin speed of the balls, and the forces that they cause."""
-    figure, axes = _panels(4)
+    figure, axes = _panels(4, "Motion of the rolling elements")
     for panel, key, title, label in zip(
         axes,
         ("orbital_speed_rad_s", "spin_speed_rad_s", "centrifugal_force_N", "gyroscopic_moment_Nmm"),
@@ -170,7 +180,7 @@ def ball_speeds(content: Mapping[str, Any]) -> Figure:
         ("speed / (rad/s)", "speed / (rad/s)", "force / N", "moment / N mm"),
         strict=True,
     ):
-        _lines(panel, content, lambda row, key=key: row[key])
+        _lines(panel, content, lambda row, key=key: row[key], GAPS)
         _finish(panel, title, label)
     _legend(figure, axes[0])
     return figure
@@ -179,9 +189,9 @@ def ball_speeds(content: Mapping[str, Any]) -> Figure:
 @styled
 def film_ratio(content: Mapping[str, Any]) -> Figure:
     """Film thickness ratio; from 3 on the film carries alone."""
-    figure, axes = _panels(2)
+    figure, axes = _panels(2, "How well the film separates the surfaces")
     for panel, side in zip(axes, ("inner", "outer"), strict=True):
-        _lines(panel, content, lambda row, side=side: row["contacts"][side]["lambda"])
+        _lines(panel, content, lambda row, side=side: row["contacts"][side]["lambda"], GAPS)
         panel.axhline(3.0, color="black", linewidth=0.9, linestyle=":")
         panel.annotate(
             "full film from 3", (0.99, 3.0), xycoords=("axes fraction", "data"), ha="right", va="bottom"
@@ -204,7 +214,7 @@ def merged_terms(terms: Mapping[str, float]) -> dict[str, float]:
 def heat_terms(content: Mapping[str, Any]) -> Figure:
     """Friction heat of each bearing, stacked by term."""
     groups = _groups(content)
-    figure, axes = _panels(len(groups))
+    figure, axes = _panels(len(groups), "Friction heat term by term")
     terms = {name: [merged_terms(row["terms_W"]) for row in rows] for name, rows in groups.items()}
     keys = list(dict.fromkeys(key for rows in terms.values() for row in rows for key in row))
     keys = [key for key in keys if any(row.get(key) for rows in terms.values() for row in rows)]
@@ -228,7 +238,7 @@ def heat_terms(content: Mapping[str, Any]) -> Figure:
 def heat_models(content: Mapping[str, Any]) -> Figure:
     """The same bearings by every heat model: how far they are apart."""
     groups = _groups(content)
-    figure, axes = _panels(len(groups))
+    figure, axes = _panels(len(groups), "Friction heat by every heat model")
     speeds = [row["speed_rpm"] for row in content["models"]]
     for panel, group in zip(axes, groups, strict=True):
         name = group.partition(",")[0]

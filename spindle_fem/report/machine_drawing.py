@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import hsv_to_rgb, to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spindle_fem.definition.drawn_tables import element_rows
-from spindle_fem.definition.machine_spec import Channel, MachineSpec
+from spindle_fem.definition.machine_spec import Channel, MachineSpec, Probe
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
 from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, set_title, styled
 from spindle_fem.report.leader_labels import Label, draw_labels
@@ -32,8 +33,9 @@ BALL_COLOUR = "#f2f2f2"
 _NUMBER_SIZE = 8.5
 # Letters of an entry of the legend that fit half the width.
 _MOST_LETTERS = 62
-# Room of "z / mm" at the end of the line of numbers, and from the frame to the numbers.
-_UNIT_WIDTH_PX, _NUMBER_DROP_PX = 90.0, 14.0
+# Room of "z / mm" at the end of the scale, and from the drawing to its labels and to the scale beneath them.
+_UNIT_WIDTH_PX, _LABEL_DROP_PX, _SCALE_DROP_PX = 90.0, 34.0, 96.0
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 COOLANT_COLOUR = "#f0c419"
 
 
@@ -79,6 +81,7 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
     axes.set_xlabel("")
     axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
     axes.tick_params(axis="both", labelsize=_NUMBER_SIZE, labelbottom=False)
+    axes.tick_params(axis="x", length=0.0)
     for spine in ("left", "bottom"):
         axes.spines[spine].set_visible(False)
     _draw_parts(axes, assembly)
@@ -106,10 +109,10 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
     ends = (margin, width_px - margin)
     for labels, edge, sign in (
         (_above(spec), top - 18.0, -1.0),
-        (_below(spec, assembly), top + drawing_height + 66.0, 1.0),
+        (_below(spec, assembly), top + drawing_height + _LABEL_DROP_PX, 1.0),
     ):
         draw_labels(head, labels, [pixels(*label.at) for label in labels], edge, sign, ends)
-    _draw_places(head, axes, lambda z: pixels(z, -1.03 * reach), ends[1])
+    _draw_scale(head, axes, lambda z: pixels(z, -1.03 * reach), ends[1])
     for number, (colour, text) in enumerate(legend):
         column, row = divmod(number, max(rows, 1))
         x, y = margin + 10.0 + column * 0.5 * width_px, total - 24.0 - 30.0 * (rows - 1 - row)
@@ -118,24 +121,22 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
     return figure
 
 
-def _draw_places(
-    head: Axes, axes: Axes, pixels: Callable[[float], tuple[float, float]], right: float
-) -> None:
-    """Numbers along the axis and what they are, over the leaders that cross their line."""
+def _draw_scale(head: Axes, axes: Axes, pixels: Callable[[float], tuple[float, float]], right: float) -> None:
+    """Numbers along the axis and what they are, beneath the labels so that no leader crosses them."""
     low, high = axes.get_xlim()
     texts = [(*pixels(z), f"{z:g}", "center") for z in axes.get_xticks() if low <= z <= high]
-    y = texts[0][1]
+    y = texts[0][1] + _SCALE_DROP_PX
     texts = [item for item in texts if item[0] < right - _UNIT_WIDTH_PX]
+    for x, *_ in texts:
+        head.add_line(Line2D([x, x], [y, y + 8.0], color=MUTED, linewidth=0.8))
     for x, _, text, side in [*texts, (right, y, "z / mm", "right")]:
         head.text(
             x,
-            y + _NUMBER_DROP_PX,
+            y + 12.0,
             text,
             fontsize=_NUMBER_SIZE,
             ha=side,
             va="top",
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
-            zorder=6,
         )
 
 
@@ -244,16 +245,28 @@ def _draw_bearings(axes: Axes, spec: MachineSpec) -> None:
             axes.plot(line[0], sign * line[1], color="#b00020", linewidth=0.9, zorder=5)
 
 
+def film_colour(number: int) -> str:
+    """Colour of a film by its number: none comes twice.
+
+    >>> film_colour(0), len({film_colour(number) for number in range(40)})
+    ('#0072B2', 40)
+    """
+    if number < len(CYCLE):
+        return CYCLE[number]
+    # the golden ratio keeps hues apart however many there are; darker than those of the cycle
+    return to_hex(hsv_to_rgb((_GOLDEN * (number - len(CYCLE)) % 1.0, 0.75, 0.45)))
+
+
 def _film_colours(spec: MachineSpec) -> dict[str, str]:
     surfaces: dict[str, str] = {}
     number = 0
     for film in spec.film:
         for name in film.surface:
-            surfaces[name] = CYCLE[number % len(CYCLE)]
+            surfaces[name] = film_colour(number)
         number += 1
     for gap in spec.gap:
         for name in (gap.rotating, *gap.standing):
-            surfaces[name] = CYCLE[number % len(CYCLE)]
+            surfaces[name] = film_colour(number)
         number += 1
     return surfaces
 
@@ -299,18 +312,31 @@ def _draw_films(axes: Axes, spec: MachineSpec, assembly: AssemblyGeometry) -> No
                 )
 
 
+def _probe_place(spec: MachineSpec, probe: Probe) -> tuple[float, float, float] | None:
+    """Place along the axis and radius, m, and angle, rad; of the channel's outlet its end. None elsewhere."""
+    if probe.kind == "point":
+        return probe.z, probe.r, probe.angle
+    channel = spec.channel
+    if probe.kind != "coolant_outlet" or channel is None:
+        return None
+    hand = 1.0 if channel.hand == "right" else -1.0
+    angle = hand * 2.0 * math.pi * channel.turns % (2.0 * math.pi)
+    end = channel.z_start + channel.pitch * channel.turns
+    return end, channel.inner_radius + 0.5 * channel.depth, angle
+
+
 def _above(spec: MachineSpec) -> list[Label]:
     labels = []
     for probe in spec.probe:
-        if probe.kind != "point":
+        place = _probe_place(spec, probe)
+        if place is None:
             continue
+        z, radius, angle = place
         # Out of the plane a probe is turned into the nearer half, and its angle is told.
-        side = (
-            math.copysign(1.0, round(math.cos(probe.angle), 9)) if abs(math.cos(probe.angle)) > 1e-9 else 1.0
-        )
-        away = abs(math.sin(probe.angle)) > 0.02
-        text = f"{probe.name}\nθ = {math.degrees(probe.angle):.0f}°" if away else probe.name
-        labels.append(Label(text, np.array([probe.z * MM, side * probe.r * MM])))
+        side = math.copysign(1.0, round(math.cos(angle), 9)) if abs(math.cos(angle)) > 1e-9 else 1.0
+        away = abs(math.sin(angle)) > 0.02
+        text = f"{probe.name}\nθ = {math.degrees(angle):.0f}°" if away else probe.name
+        labels.append(Label(text, np.array([z * MM, side * radius * MM])))
     for z, sign in _ports_in_plane(spec):
         if sign > 0.0:
             text = "coolant in" if abs(z - spec.channel.z_start) < 1.0e-9 else "coolant out"

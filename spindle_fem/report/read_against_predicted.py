@@ -74,7 +74,7 @@ class Course:
 
 
 def draw_course(upper: Axes, lower: Axes, course: Course, scale: float) -> None:
-    """Readings and predictions above; beneath, means of read less predicted over short times.
+    """Readings and predictions above; beneath, means of read minus predicted over short times.
 
     ``scale`` divides the times, as :func:`time_scale` gives it.
     """
@@ -125,7 +125,7 @@ def draw_legend(figure: Figure, predictions: Mapping[str, Array], band: str, *, 
 
 @styled
 def courses_figure(courses: list[Course], title: str, notes: str, band: str, start: str | None) -> Figure:
-    """Channels two in a row, each with its residual beneath; one alone takes the whole width.
+    """Channels two in a row, each with its residual beneath; one alone in its row takes the whole width.
 
     Parameters
     ----------
@@ -141,12 +141,12 @@ def courses_figure(courses: list[Course], title: str, notes: str, band: str, sta
     scale, _ = time_scale(seconds)
     columns = min(2, len(courses))
     rows = math.ceil(len(courses) / columns)
-    top, cell, foot = (178.0 if columns == 2 else 145.0), 470.0, 50.0
-    width = 655.0 if columns == 2 else 1450.0
+    top, cell, foot = (178.0 if columns == 2 else 145.0), 486.0, 50.0
     figure = new_figure(top + rows * cell + foot)
     for position, course in enumerate(courses):
         row, column = divmod(position, columns)
         left = 115.0 + 795.0 * column
+        width = 1450.0 if column == 0 and position + 1 == len(courses) else 655.0
         upper = pixel_axes(figure, left, top + row * cell, width, 235.0)
         lower = pixel_axes(figure, left, top + row * cell + 260.0, width, 130.0, sharex=upper)
         draw_course(upper, lower, course, scale)
@@ -154,8 +154,9 @@ def courses_figure(courses: list[Course], title: str, notes: str, band: str, sta
         for axes in (upper, lower):
             # Beyond the widest tick label, in every row alike.
             axes.yaxis.set_label_coords(-84.0 / width, 0.5)
-        if position + columns >= len(courses):
-            label_times(lower, start, seconds)
+        label_times(lower, start, seconds)
+        if row + 1 < rows:
+            lower.set_xlabel("")
     draw_legend(figure, first.predictions, band, held_out=any(item.held_out.any() for item in courses))
     set_title(figure, title, notes)
     return figure

@@ -87,7 +87,8 @@ def recording_figure(recording: Recording) -> Figure:
         axes.locator_params(axis="y", nbins=4)
         axes.tick_params(labelbottom=number == len(shown) - 1)
     label_times(axes, recording.start, seconds)
-    _draw_key(figure, {row[1] for row in shown}, marked)
+    gaps = any(isinstance(patch, Rectangle) for strip in figure.axes for patch in strip.patches)
+    _draw_key(figure, {row[1] for row in shown}, marked, gaps=gaps)
     left = f"; {len(rows) - len(shown)} further channels not drawn" if len(rows) > len(shown) else ""
     set_title(figure, recording.name, recording.defects.lines()[0].partition(": ")[2] + left)
     return figure
@@ -128,13 +129,14 @@ def _in_shown_unit(values: Array, unit: str) -> tuple[Array, str]:
     return registry().Quantity(values, unit).to(_READ_AS.get(label, label)).magnitude, label
 
 
-def _draw_key(figure: Figure, roles: set[str], marked: set[Flag]) -> None:
+def _draw_key(figure: Figure, roles: set[str], marked: set[Flag], *, gaps: bool) -> None:
     entries: dict[str, Line2D | Rectangle] = {
         role: Line2D([], [], color=CYCLE[number], linestyle="none", marker=".", markersize=6)
         for number, role in enumerate(_ROLES)
         if role in roles
     }
-    entries["gap or nothing read"] = Rectangle((0, 0), 1, 1, color=GAP_COLOUR)
+    if gaps:
+        entries["gap or nothing read"] = Rectangle((0, 0), 1, 1, color=GAP_COLOUR)
     for flag, (label, colour, sign) in MARKS.items():
         if flag in marked:
             entries[f"{label} (not used)"] = Line2D(

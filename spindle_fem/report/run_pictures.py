@@ -217,7 +217,7 @@ def channel_walls(renderer: SceneRenderer, result: ThermalResult) -> Figure | No
         bars,
         [labels[0] + labels[1]] * 2,
         notes=f"{coolant.flow * 6.0e4:.3g} L/min, Re = {coolant.reynolds:.0f}, {coolant.regime}; film "
-        f"{helix.min():.0f} to {helix.max():.0f} along the helix"
+        f"{helix.min():.0f} to {helix.max():.0f} W/(m²·K) along the helix"
         + (f", {film.max():.0f} in the ports" if film.max() > helix.max() else "")
         + f"; {coolant.heat:.0f} W to the coolant.",
     )

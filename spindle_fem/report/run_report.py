@@ -87,8 +87,8 @@ _OVER_SPEED_TEXT = Text(
 _MARKS_TEXT = Text(
     Markup(
         "Everything that went in, with the mark of its source: <strong>P</strong> paper, <strong>C</strong> "
-        "catalogue, <strong>A</strong> assumed; no mark: a default of the program. “± 30 %” is one standard "
-        "deviation of the logarithm."
+        "catalogue, <strong>A</strong> assumed, <strong>U</strong> given without a source; no mark: a "
+        "default of the program. “± 30 %” is one standard deviation of the logarithm."
     )
 )
 _LIMITS = (

@@ -82,7 +82,9 @@ def _channel_table(content: Mapping[str, Any]) -> Table:
         fixed("90 % interval ± / K", "interval_half_width_K", 2),
         fixed("inside / %", _inside_percent, 0),
     )
-    return table_of(fields, content["channels"], "Predicted less read; error: root mean square.")
+    return table_of(
+        fields, content["channels"], "Read minus predicted, as in the pictures; error: root mean square."
+    )
 
 
 def _inside_percent(item: Mapping[str, Any]) -> float | None:
@@ -102,14 +104,14 @@ def _condition_table(content: Mapping[str, Any]) -> Table:
             for name in (item["channel"] for item in content["channels"])
         ),
     )
-    return table_of(fields, found.items(), "Root mean square of predicted less read.")
+    return table_of(fields, found.items(), "Root mean square of read minus predicted.")
 
 
 def _picture(folder: Path, name: str) -> Any:
     title = Path(name).stem.removeprefix("residual_").replace("_", " ")
     return illustration_of(
         folder / name,
-        f"{title}: read and predicted; below, read less predicted, and the 90 % interval of a reading.",
+        f"{title}: read and predicted; below, read minus predicted, and the 90 % interval of a reading.",
     )
 
 

@@ -20,7 +20,12 @@ from spindle_fem.inference.further_tests import AGAIN, answer, reachable_places,
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.hypothesis_search import Search
-from spindle_fem.inference.mismatch_place import significant_stretches, smoothed_scores, where_of
+from spindle_fem.inference.mismatch_place import (
+    main_component,
+    significant_stretches,
+    smoothed_scores,
+    where_of,
+)
 from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged
 from spindle_fem.inference.next_measurement import (
     EXISTING,
@@ -38,7 +43,8 @@ from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.machine.view.meridian_places import centre_of
 from spindle_fem.report.diagnosis_data import diagnosis_dataset
 from spindle_fem.report.diagnosis_report import SCHEMA, draw_figures, write_diagnosis_report
-from spindle_fem.report.diagnosis_words import verdict_sentence
+from spindle_fem.report.diagnosis_tables import where_text
+from spindle_fem.report.diagnosis_words import place_named, verdict_sentence
 from tests.support.diagnosed_spindle import (
     DRY_BEARING,
     DRY_SET,
@@ -180,7 +186,7 @@ def test_missing_heat_is_found_where_and_when_it_is(heated):
     assert all(0.0 <= item.start < item.end <= TIMES[-1] for item in where.when)
     inside = sum(max(0.0, min(i.end, UNTIL) - max(i.start, FROM)) for i in where.when)
     assert inside > 0.8 * (UNTIL - FROM)
-    assert "2500-3000 rpm" in where.condition
+    assert "2750-3250 rpm" in where.condition
 
 
 def test_shares_are_probabilities(heated):
@@ -204,6 +210,26 @@ def test_a_lying_sensor_is_the_place_itself(lying):
     assert where.component == "SP02"
     assert where.radius == pytest.approx(0.096)
     assert "SP02" not in where.missing_heat
+
+
+@pytest.mark.parametrize("verdict", ["missing_physics", "ambiguous", "unexplained"])
+def test_the_place_is_of_the_physics_and_of_no_sensor(verdict):
+    heat = SimpleNamespace(kind="missing_physics", component="housing")
+    sensor = SimpleNamespace(kind="sensor", component="SP02")
+    diagnosis = SimpleNamespace(
+        final=SimpleNamespace(candidates=(sensor, heat)), judgement=SimpleNamespace(verdict=verdict)
+    )
+    assert main_component(diagnosis) == "housing"
+    findings = [{"kind": item.kind, "component": item.component} for item in (heat, sensor)]
+    where = {"component": "housing", "r_mm": 70.0, "z_mm": 180.0, "credible": ["housing", "SP02", "shaft"]}
+    content = {"findings": findings, "mismatch": {"where": where}}
+    (told,) = where_text(content)
+    assert "Place: housing (centroid at r = 70 mm" in told.text
+    assert "Sensor SP02: " in told.text
+    assert "Heat missing at shaft alone" in told.text
+    where["component"] = "SP02"
+    assert place_named(content) == ""
+    assert "Place" not in where_text(content)[0].text
 
 
 def test_where_nothing_else_can_be_tried_it_is_read_again():

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.patches import PathPatch
 from matplotlib.text import Text
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
 from spindle_fem.report import run_tables as tables
 from spindle_fem.report import table_rows
+from spindle_fem.report.balance_charts import coolant_along_channel, heat_balance
 from spindle_fem.report.clock_axis import clock_numbers
 from spindle_fem.report.crosscheck_charts import convergence_chart, speed_chart
 from spindle_fem.report.definition_tables import customary, input_groups
+from spindle_fem.report.diagnosis_drawing import DOUBTED, located_on_machine
+from spindle_fem.report.diagnosis_odds import machine_parameters
 from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of
 from spindle_fem.report.heat_charts import CHARTS
 from spindle_fem.report.leader_labels import spread
 from spindle_fem.report.machine_drawing import channel_sections, machine_drawing, part_colours
+from spindle_fem.report.read_against_predicted import Course, courses_figure
 from spindle_fem.studies.heat_study import heat_study
 
 
@@ -241,6 +248,9 @@ def test_no_label_of_heat_charts_is_clipped_and_lines_under_others_are_wider():
         widths = [line.get_linewidth() for line in axes.lines]
         assert widths == sorted(widths, reverse=True)
         assert len(set(widths)) == len(widths)
+        # a line that coincides with the one beneath lets it be seen
+        assert all(line.get_linestyle() == "--" for line in axes.lines[1::2])
+    assert all(figure.texts and figure.texts[0].get_text() for figure in figures.values())
 
 
 @pytest.mark.parametrize(
@@ -294,3 +304,116 @@ def test_no_label_of_crosscheck_charts_is_clipped_or_lies_on_a_curve():
     assert not clipped(speeds) + clipped(converging)
     (axes,) = speeds.axes
     assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
+
+
+@pytest.mark.parametrize(
+    "small", [[23.4, 23.1, 11.3, 3.2, 2.4, 1.9, 0.2, 0.1, 0.1], [0.1] * 30, [65.0, 62.0]]
+)
+def test_bands_of_heat_keep_their_widths_and_their_places(small):
+    from types import SimpleNamespace
+
+    sinks = {"coolant": 252.6, **{f"film {n}": value for n, value in enumerate(small)}}
+    heat = sum(sinks.values())
+    figure = heat_balance(
+        SimpleNamespace(heat_in_by={"F1": heat}, heat_out=sinks, heat_in=heat, imbalance_relative=0.0)
+    )
+    assert not clipped(figure)
+    (axes,) = figure.axes
+    bands = [item.get_path().vertices for item in axes.patches if isinstance(item, PathPatch)]
+    ends = sorted((at[at[:, 0] == 1072.0, 1].min(), at[at[:, 0] == 1072.0, 1].max()) for at in bands[1:])
+    widths = np.array([high - low for low, high in ends])
+    assert widths / widths.sum() == pytest.approx(np.array(list(sinks.values())) / heat, rel=1e-6)
+    assert ends[0][0] >= 0.0
+    assert ends[-1][1] <= max(axes.get_ylim())
+    assert all(low >= high for (_, high), (low, _) in itertools.pairwise(ends))
+
+
+def test_labels_of_the_coolant_are_whole():
+    from types import SimpleNamespace
+
+    along = np.linspace(0.0, 2.2, 40)
+    coolant = SimpleNamespace(
+        position=along,
+        angle=4.0 * along,
+        wall_temperature=294.0 + 0.01 * along,
+        bulk_temperature=293.2 + 0.01 * along,
+        film_coefficient=np.full(40, 8200.0),
+        film_low=np.full(40, 6000.0),
+        film_high=np.full(40, 10100.0),
+        mean_film_coefficient=8200.0,
+    )
+    assert not clipped(coolant_along_channel(coolant))
+
+
+def test_of_many_parameters_those_are_drawn_that_moved_and_in_words():
+    names = [f"jump.0.{n}" for n in range(40)] + [f"within_gap.0.{n}" for n in range(30)]
+    names += [
+        "misdescribed_in.0.standing_coolant.Kuehlwasser Ruecklauf nach dem Gehaeuse.100s",
+        "probe.FRONT.r",
+    ]
+    names += [f"misdescribed.mass.side_{n}" for n in range(30)]
+    shifts = np.array([0.0] * 69 + [3.0] * 33)
+    data = xr.Dataset(
+        {
+            "parameter_nominal": ("parameter", np.zeros(len(names))),
+            "parameter_prior_sigma": ("parameter", np.ones(len(names))),
+            "parameter_logarithmic": ("parameter", np.zeros(len(names), dtype=int)),
+            "parameter_unit": ("parameter", ["s"] * len(names)),
+            "parameter_known": ("parameter", np.zeros(len(names))),
+            "parameter_known_sigma": ("parameter", np.ones(len(names))),
+            "parameter_fitted": ("parameter", shifts),
+            "parameter_fitted_sigma": ("parameter", np.full(len(names), 0.9)),
+        },
+        coords={"parameter": names, "recording": ["measured"]},
+    )
+    figure = machine_parameters(data)
+    shown = [item.get_text().replace("\n", " ") for item in texts_of(figure)]
+    assert not clipped(figure)
+    assert figure.get_size_inches()[1] * figure.dpi < 2200.0
+    assert "heat or inlet within piece 30 of the gaps" in shown
+    assert "place of probe FRONT along the radius" in shown
+    assert not [text for text in shown if "jump" in text or "misdescribed" in text]
+    assert any("77 more" in text for text in shown)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 5])
+def test_every_channel_over_time_goes_by_the_clock_and_fills_its_row(number):
+    times = np.arange(0.0, 10800.0, 60.0)
+    read = 20.0 + times / 5000.0
+    nothing = np.zeros(times.size, dtype=bool)
+    courses = [Course(f"T{n}", times, read, {"predicted": read}, 0.1, nothing) for n in range(number)]
+    figure = courses_figure(courses, "title", "notes", "band", "2026-03-12T07:58:00Z")
+    assert not clipped(figure)
+    lowers = figure.axes[1::2]
+    assert all(any(":" in label.get_text() for label in axes.get_xticklabels()) for axes in lowers)
+    boxes = [axes.get_position() for axes in lowers]
+    lowest = min(box.y0 for box in boxes)
+    assert max(box.x1 for box in boxes if box.y0 == lowest) > 0.95
+
+
+def test_a_machine_names_its_coolant_outlet_and_no_two_films_alike():
+    spec = load_machine("motor_spindle")
+    assert [probe.kind for probe in spec.probe if probe.name == "COOLANT_OUT"] == ["coolant_outlet"]
+    figure = machine_drawing(spec)
+    assert any(item.get_text().startswith("COOLANT_OUT") for item in texts_of(figure))
+    head = figure.axes[-1]
+    legend = [line for line in head.lines if line.get_linewidth() == 3.6]
+    assert len({line.get_color() for line in legend}) == len(legend) > 8
+    # leaders end above the numbers of the scale
+    numbers = [item for item in head.texts if item.get_text().lstrip("-").isdigit()]
+    leaders = [item for item in head.texts if getattr(item, "arrow_patch", None) is not None]
+    lowest = max(item.xyann[1] for item in leaders)
+    assert numbers
+    assert all(item.get_position()[1] > lowest for item in numbers)
+
+
+def test_the_place_is_framed_and_doubted_sensors_are_red():
+    spec = load_machine("motor_spindle")
+    probe = next(item.name for item in spec.probe if item.kind == "point")
+    data = xr.Dataset({"spot_log_evidence": ("spot", [5.0, 1.0])}, coords={"spot": ["housing", "shaft"]})
+    figure = located_on_machine(data, spec, "housing", [probe])
+    assert not clipped(figure)
+    red = [item.get_text() for item in texts_of(figure) if item.get_color() == DOUBTED]
+    assert red == [probe]
+    shown = " ".join(item.get_text() for item in texts_of(figure))
+    assert "where the diagnosis puts it (housing). Red names: sensors that it doubts." in shown

@@ -1,0 +1,75 @@
+"""Words of a diagnosis follow its verdict."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from spindle_fem.commands.console import print_diagnosis
+from spindle_fem.inference.next_measurement import lead_words
+from spindle_fem.report.diagnosis_tables import cards, fit_table, set_tables
+from spindle_fem.report.diagnosis_words import verdict_sentence
+
+STATEMENT = "312 W of heat enters the housing."
+
+
+def content(verdict):
+    finding = {
+        "effect": "unrecorded_heat_source",
+        "component": "housing",
+        "kind": "missing_physics",
+        "parameters": {"heat": {"value": 312.0, "low": 128.0, "high": 683.0, "unit": "W"}},
+        "intervals": [],
+        "statement": STATEMENT,
+    }
+    return {
+        "verdict": verdict,
+        "reason": "the best set leaves 2.1 times what errors allow" if verdict == "unexplained" else "",
+        "findings": [finding],
+        "set_probability": 0.34,
+        "alternatives": [],
+        "mismatch": {
+            "p_value": 0.0001,
+            "channels": [],
+            "where": {"component": "housing", "r_mm": None, "z_mm": None, "credible": ["housing"]},
+            "missing_heat_W": {},
+        },
+        "fit": {
+            "before": {"train_rmse_K": 0.464, "heldout_rmse_K": 0.558},
+            "after": {"train_rmse_K": 0.186, "heldout_rmse_K": 0.243},
+            "noise_K": 0.075,
+            "heldout": "every 4th",
+            "full_model": {"mesh": "off", "reason": "off"},
+        },
+        "next_measurement": {"where": "SP01", "quantity": "temperature", "condition": "a step", "why": "x"},
+    }
+
+
+@pytest.mark.parametrize("verdict", ["unexplained", "missing_physics"])
+def test_findings_of_a_verdict_without_explanation_are_no_statements(verdict, capsys):
+    told = content(verdict)
+    unexplained = verdict == "unexplained"
+    sentence = verdict_sentence(told)
+    assert STATEMENT in sentence
+    assert ("is not explained: the best set leaves 2.1 times" in sentence) == unexplained
+    assert ("What comes nearest" in sentence) == unexplained
+    table = set_tables(told)[0]
+    assert table.caption == ("What comes nearest." if unexplained else "What was found.")
+    assert any("comes nearest" in item["name"] for item in cards(told).items) == unexplained
+    print_diagnosis(told, Path())
+    assert ("Comes nearest: 312 W" in capsys.readouterr().out) == unexplained
+
+
+def test_only_a_verdict_that_decides_says_that_the_data_have_decided():
+    def lead(verdict, decided):
+        return lead_words(SimpleNamespace(judgement=SimpleNamespace(verdict=verdict)), decided)
+
+    assert lead("parameter", True).startswith("The data have decided")
+    assert "decided" not in lead("unexplained", True)
+    assert lead("ambiguous", False) == ""
+
+
+def test_errors_are_told_beside_the_noise_and_by_no_second_measure():
+    table = fit_table(content("unexplained"))
+    assert "0.07 K" in table.caption or "0.08 K" in table.caption
+    assert "noise" not in str(table.columns).lower()
