@@ -12,13 +12,14 @@ import json
 import multiprocessing
 import os
 import sys
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from .child import warm
 from .families import FAMILIES, try_case
-from .judged import ACCEPTED, FAULT, REFUSED
+from .judged import ACCEPTED, FAULT, REFUSED, Record
 from .material import make_originals
 from .page import page, summarise
 
@@ -69,9 +70,9 @@ def main(arguments: list[str] | None = None) -> int:
     waiting.sort(key=lambda case: case[1] / FAMILIES[case[0]][1])
     pool = ProcessPoolExecutor(given.jobs, multiprocessing.get_context("spawn"), initializer=warm)
     with pool, (place / CASES).open("a", encoding="utf-8") as lines:
-        running = [pool.submit(try_case, *case, given.seed, place) for case in waiting]
+        running = {pool.submit(try_case, *case, given.seed, place): case for case in waiting}
         for future in as_completed(running):
-            item = future.result()
+            item = _told(future, *running[future])
             print(json.dumps(item), file=lines, flush=True)
             if item["outcome"] == FAULT:
                 print(f"{item['family']} {item['number']}: {item['reason']}", flush=True)
@@ -84,6 +85,14 @@ def main(arguments: list[str] | None = None) -> int:
             told = ", ".join(f"{item[outcome]} {outcome}" for outcome in (ACCEPTED, REFUSED, FAULT))
             print(f"{family}: {item['done']} of {item['planned']} done, {told}")
     return int(bool(found["faults"]))
+
+
+def _told(future: Future[dict[str, Any]], family: str, number: int) -> dict[str, Any]:
+    """What a case found; a trial that itself failed is a fault, and the others go on."""
+    error = future.exception()
+    if error is None:
+        return future.result()
+    return asdict(Record(family, number, outcome=FAULT, reason=f"the trial itself failed: {error!r}"))
 
 
 def _planned(given: argparse.Namespace) -> dict[str, int]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from .child import Surroundings, run_command, run_function
 from .judged import ACCEPTED, Record
-from .material import COARSE, MESH, ORIGINALS, SPINDLE
+from .material import CACHE, COARSE, MESH, ORIGINALS, SPINDLE
 from .mutations import mutated, spoilt_bytes
 
 SHARE_CACHES, SHARE_MODELS = 0.35, 0.5
@@ -28,7 +28,6 @@ COMMANDS = {
     "sweep": ("report", "again"),
     "transient": ("view", "restart"),
 }
-CACHE = "cache"
 
 
 class Poison:
@@ -125,7 +124,7 @@ def _filled(table: dict[str, object]) -> dict[str, object]:
 
 def _try_cache(record: Record, chance: random.Random, folder: Path, originals: Path) -> None:
     cache = folder / CACHE
-    shutil.copytree(originals.parent / CACHE, cache)
+    shutil.copytree(originals / CACHE, cache)
     model = next(cache.glob("reduced-*.npz"))
     if chance.random() < SHARE_MODELS:
         sound = model.read_bytes()

@@ -12,7 +12,7 @@ import numpy as np
 
 from .child import Ended, Surroundings, run_command
 from .judged import BAD_INPUT, Record
-from .material import FOLDERS, MESH, ORIGINALS, PATIENT, spent_on
+from .material import CACHE, FOLDERS, MESH, ORIGINALS, PATIENT, spent_on
 from .same_numbers import MAIN_FILES, difference
 
 # How many of each are killed; what a kill hits shares its cache or begins with an empty one.
@@ -76,7 +76,7 @@ def _command(kind: str, folder: Path, originals: Path) -> tuple[list[str], Surro
         cache.mkdir(exist_ok=True)
         return list(MESH), Surroundings({"SPINDLE_FEM_CACHE": str(cache)})
     if kind == "model cache":
-        shutil.copytree(originals.parent / "cache", cache, dirs_exist_ok=True)
+        shutil.copytree(originals / CACHE, cache, dirs_exist_ok=True)
         for entry in cache.glob("reduced-*"):
             entry.unlink()
         around = Surroundings({"SPINDLE_FEM_CACHE": str(cache)})

@@ -13,6 +13,8 @@ import numpy as np
 import pandas as pd
 import tomli_w
 
+from spindle_fem.cache import source_digest
+
 from .child import Ended, Surroundings, run_command, run_process
 
 ROOT = Path(__file__).parents[2]
@@ -20,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 SPINDLE, PUMP = str(Path(__file__).with_name("spindle.toml")), ROOT / "examples" / "pump.toml"
 COARSE = ("--set", "mesh.preset=coarse")
 STEP_S, DURATION_S = 60.0, 7200.0
-ORIGINALS, SPENT = "originals", "spent.json"
+ORIGINALS, CACHE, SPENT, MADE_BY = "originals", "cache", "spent.json", "made_by.txt"
 PATIENT = 600.0
 # To build the fast model of the spindle takes at least this long, seconds of processor.
 MODEL_SECONDS = 20.0
@@ -173,22 +175,31 @@ def make_originals(place: Path) -> Path:
     RuntimeError
         A command failed on sound input.
     """
-    folder = place / ORIGINALS
+    folder, made_by = place / ORIGINALS, source_digest("spindle_fem.cli")
+    if folder.is_dir() and _noted(folder / MADE_BY) != made_by:
+        # Meshes, models and results of other code are not those that commands give now.
+        shutil.rmtree(folder)
+        shutil.rmtree(place / CACHE, ignore_errors=True)
     folder.mkdir(parents=True, exist_ok=True)
+    (folder / MADE_BY).write_text(made_by, encoding="utf-8")
     write_recording(folder, pump_recording(), "pump")
     write_recording(folder, spindle_recording(), "spindle")
     for name, text in (("sweep", SWEEP), ("transient", TRANSIENT)):
         (folder / f"{name}.toml").write_text(tomli_w.dumps(tables(text)), encoding="utf-8")
     for name, arguments in FOLDERS.items():
-        # Changed code has models of its own, which cases are to find in the cache: they are made here.
-        whole = (folder / name).is_dir() and not (folder / name / "INCOMPLETE").exists()
-        if whole and name != "simulate_spindle":
+        if (folder / name).is_dir() and not (folder / name / "INCOMPLETE").exists():
             continue
         _sound(run_process(arguments, folder, Surroundings(patience_s=PATIENT)))
     if not (folder / SPENT).is_file():
         _sound(run_process(MESH, folder))
         _measure(folder)
+        # Cases spoil copies of the cache as it is now: definitions that are solved beside them add to it.
+        shutil.copytree(place / CACHE, folder / CACHE, dirs_exist_ok=True)
     return folder
+
+
+def _noted(file: Path) -> str:
+    return file.read_text(encoding="utf-8") if file.is_file() else ""
 
 
 def _sound(ended: Ended) -> Ended:
