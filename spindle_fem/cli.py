@@ -21,6 +21,8 @@ from spindle_fem.command_line.application import (
     say,
 )
 
+# Exit status of a command that the user ends.
+INTERRUPTED = 130
 # Modules whose commands are part of the application once they are imported.
 FAMILIES = (diagnosis_commands, recording_commands)
 
@@ -71,9 +73,15 @@ def check(
     """Validate a machine without solving; every fault at once."""
     from spindle_fem.commands.console import print_check
     from spindle_fem.commands.machine_commands import check_machine
+    from spindle_fem.errors import BadInputError
 
-    content = check_machine(machine, overrides=set_ or (), picture=picture)
-    print_json(content) if as_json else print_check(content)
+    try:
+        content = check_machine(machine, overrides=set_ or (), picture=picture)
+    except BadInputError as error:
+        if as_json:
+            print_json({"faults": [fault.as_plain() for fault in getattr(error, "faults", (error,))]})
+        raise
+    print_json(content) if as_json else print_check(content, picture)
 
 
 @app.command()
@@ -294,7 +302,7 @@ def examples(
 
 
 def main() -> None:
-    """Entry point: exit status 0 done, 2 bad input, 1 anything else."""
+    """Entry point: exit status 0 done, 2 bad input, 130 interrupted, 1 anything else."""
     from spindle_fem.errors import SpindleFemError, of_system
 
     # The solver is bound by memory: more threads only wait for one another, spinning.
@@ -302,6 +310,10 @@ def main() -> None:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
         app(standalone_mode=True)
+    except SystemExit as ended:
+        if ended.code == INTERRUPTED:
+            typer.echo("Interrupted; the same command goes on or begins again.", err=True)
+        raise
     except SpindleFemError as error:
         if State.debug:
             raise

@@ -66,7 +66,7 @@ app = typer.Typer(
     help="Thermal finite elements for grease-lubricated machine-tool spindles.",
     no_args_is_help=True,
     epilog="Exit status: 0 done, 2 bad input (the message names file, key, value and what is allowed), "
-    "1 anything else.",
+    "130 interrupted, 1 anything else.",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

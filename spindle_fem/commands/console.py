@@ -115,10 +115,9 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
     console.print(f"Report: {folder / 'report.html'}")
 
 
-def print_check(content: dict[str, Any]) -> None:
-    """What a valid machine is made of."""
+def print_check(content: dict[str, Any], picture: Path | None = None) -> None:
+    """What a valid machine is made of, and where it was drawn."""
     console = _console()
-    _print_marked(console, content["machine"], " is valid.", "bold")
     lists = [key for key, rows in content.items() if isinstance(rows, list)]
     for key in (key for key in lists if key not in ("assumed", "warnings")):
         if not content[key]:
@@ -128,6 +127,8 @@ def print_check(content: dict[str, Any]) -> None:
             table.add_row(row["name"], row.get("detail", ""))
         console.print(table)
     _print_warnings(console, content)
+    drawn = "." if picture is None else f", drawn in {picture}."
+    _print_marked(console, content["machine"], f" is valid{drawn}", "bold")
 
 
 def print_pairs(title: str, content: dict[str, Any]) -> None:
@@ -264,7 +265,8 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     if content["reason"]:
         console.print(content["reason"])
     for finding in content["findings"]:
-        console.print(f"{finding['statement']}  (set: {content['set_probability']:.2f})")
+        lead = "Comes nearest: " if content["verdict"] == "unexplained" else ""
+        console.print(f"{lead}{finding['statement']}  (set: {content['set_probability']:.2f})")
     if content["alternatives"]:
         table = _table("Not ruled out", "set", "probability")
         for item in content["alternatives"]:

@@ -112,8 +112,8 @@ def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
     overrides = tuple(asked.overrides)
     tell = asked.progress or LOGGER.info
     tell("reading")
-    read = [recording_of(item) for item in asked.recordings]
-    earlier = [recording_of(item) for item in asked.calibrate]
+    read = [recording_of(item, asked.machine, overrides) for item in asked.recordings]
+    earlier = [recording_of(item, asked.machine, overrides) for item in asked.calibrate]
     opened = open_machine(asked.machine, overrides, read, earlier, heldout=asked.heldout, progress=tell)
     opened = with_growth(refined(opened))
     with output_folder(asked.folder) as place:

@@ -42,8 +42,9 @@ def export_machine(
     """
     path = Path(output)
     write = file_writer(path)
-    read = [recording_of(item) for item in recordings]
-    space = machine_state_space(machine, tuple(overrides), read, progress)
+    overrides = tuple(overrides)
+    read = [recording_of(item, machine, overrides) for item in recordings]
+    space = machine_state_space(machine, overrides, read, progress)
     progress("writing")
     path.parent.mkdir(parents=True, exist_ok=True)
     header = space.header

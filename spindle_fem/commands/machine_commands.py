@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -135,6 +136,7 @@ def check_machine(
 
     return {
         "machine": spec.name,
+        "operation": _operation_rows(spec),
         "parts": [
             {
                 "name": part.name,
@@ -159,6 +161,20 @@ def check_machine(
             *({"code": "geometry_note", "text": note} for note in assembly.notes),
         ],
     }
+
+
+def _operation_rows(spec: MachineSpec) -> list[dict[str, str]]:
+    """What drives the machine, in customary units."""
+    point, coolant = spec.operation, spec.coolant
+    rows = {
+        "speed": f"{point.speed * 30.0 / math.pi:.6g} rpm",
+        "thrust": f"{point.thrust:.6g} N",
+        "ambient": f"{point.ambient_temperature - ZERO_CELSIUS_K:.4g} °C",
+    }
+    if coolant is not None:
+        inlet = coolant.inlet_temperature - ZERO_CELSIUS_K
+        rows["coolant"] = f"{coolant.fluid}, {6e4 * coolant.flow:.4g} L/min at {inlet:.4g} °C"
+    return [{"name": name, "detail": detail} for name, detail in rows.items()]
 
 
 def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = ()) -> dict[str, Any]:

@@ -78,8 +78,8 @@ def simulate_machine(
     overrides = tuple(overrides)
     tell = progress or LOGGER.info
     tell("reading")
-    read = recording_of(recording)
-    others = [recording_of(item) for item in calibrate]
+    read = recording_of(recording, machine, overrides)
+    others = [recording_of(item, machine, overrides) for item in calibrate]
     with output_folder(folder) as place:
         simulation = simulate_recordings(machine, read, others, overrides=overrides, progress=tell)
         keep(simulation)

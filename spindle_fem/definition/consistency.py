@@ -13,6 +13,7 @@ from spindle_fem.definition.bearing_types import BearingType
 from spindle_fem.definition.displacement_faults import displacement_faults
 from spindle_fem.definition.machine_spec import MachineSpec, Probe
 from spindle_fem.definition.schema import names_of
+from spindle_fem.definition.standard_materials import MATERIALS
 from spindle_fem.errors import SpecError, SpindleFemError, UnknownSurfaceError, did_you_mean
 
 _LISTS = (
@@ -171,13 +172,15 @@ def _duplicates(declared: Declared) -> Iterator[SpindleFemError]:
 
 def _materials(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
     materials = declared.names["materials"]
+    # Those that ship need no table: a name that is neither is told with both.
+    allowed = sorted({*materials, *MATERIALS})
     for part in spec.part:
         if part.material not in materials:
-            yield _unknown(f"part.{part.name}.material", part.material, "material", materials)
+            yield _unknown(f"part.{part.name}.material", part.material, "material", allowed)
     for name, kind in spec.bearing_types.items():
         for key in ("ring_material", f"{kind.element_word}_material"):
             if getattr(kind, key) not in materials:
-                yield _unknown(f"bearing_types.{name}.{key}", getattr(kind, key), "material", materials)
+                yield _unknown(f"bearing_types.{name}.{key}", getattr(kind, key), "material", allowed)
     # Steel's values, the defaults, are wrong by half for ceramics.
     mixed = {
         kind.element_material

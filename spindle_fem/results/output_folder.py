@@ -7,7 +7,7 @@ import json
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,9 @@ _TOLD = 200
 # Errors of the system that say nothing about what is read.
 _WRITING = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
 # What only commands of this program write: pages and figures may be anybody's, the rest is the user's.
+# A drafted recording is for its user to check and edit: no results are written beside it.
 _OWN = frozenset(
     {
-        MARKER,
         "summary.json",
         "fields.vtu",
         "result.nc",
@@ -50,14 +50,13 @@ _OWN = frozenset(
         "reduced_network.toml",
         "state_space.npz",
         "state_space.json",
-        "recording.toml",
         "simulation.nc",
     }
 )
 
 
 @contextmanager
-def output_folder(folder: str | Path) -> Iterator[Path]:
+def output_folder(folder: str | Path, *, own: Set[str] = _OWN) -> Iterator[Path]:
     """Folder that carries a file ``INCOMPLETE`` until its block ends without error.
 
     Files of an earlier run are replaced one by one; whatever else is there is
@@ -68,6 +67,8 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
     ----------
     folder : str or Path
         Made with its parents where it does not exist.
+    own : set of str
+        Files by which a folder of an earlier run is known.
 
     Raises
     ------
@@ -80,7 +81,7 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
         raise BadInputError(str(path), "is a file.", "Give a folder, new or of an earlier run.")
     if path.is_dir():
         present = {item.name for item in path.iterdir()}
-        if present and not present & _OWN:
+        if present and not present & {MARKER, *own}:
             raise BadInputError(
                 str(path),
                 f"is a folder with other content ({', '.join(sorted(present)[:3])}).",
@@ -100,7 +101,9 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
     except BaseException as error:
         # On a full disk the marker stays, without its text.
         with suppress(OSError):
-            text = f"The command did not finish: {type(error).__name__}: {error}\n"
+            reason = f"{type(error).__name__}: {error}"
+            said = "was interrupted." if isinstance(error, KeyboardInterrupt) else f"did not finish: {reason}"
+            text = f"The command {said}\n"
             marker.write_text(text, encoding="utf-8", errors="replace")
         raise
     marker.unlink(missing_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,8 @@ from spindle_fem.inference.predictor import LONGEST_BIN, STEP, Predictor
 from spindle_fem.inference.prepared_problem import Calibrated, calibrate
 from spindle_fem.inference.watched_machine import MONTH, Told, WatchedMachine
 from spindle_fem.recordings.align import Recording, read_recording
+from spindle_fem.recordings.faults_beside import known_names, manifest_for
 from spindle_fem.recordings.growing_file import follow_lines
-from spindle_fem.recordings.manifest import load_manifest
 from spindle_fem.recordings.recording_window import RecordingWindow, piece_of
 from spindle_fem.recordings.smooth_inputs import without_input_noise
 from spindle_fem.units import to_si
@@ -124,8 +125,9 @@ def watch_recording(
     ------
     SpindleFemError
     """
-    manifest, data = load_manifest(recording, growing=True)
-    calibration = [read_recording(path) for path in how.calibrate]
+    names = partial(known_names, machine, tuple(how.overrides))
+    manifest, data = manifest_for(recording, names, growing=True)
+    calibration = [read_recording(path, names=names) for path in how.calibrate]
     if how.calibrate and how.warm_up:
         raise BadInputError("--warm-up", "and --calibrate are both given.", "Give one of them.")
     if is_network_machine(read_definition(find_machine(machine))) and not (how.calibrate or how.warm_up):

@@ -8,6 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from spindle_fem import cli
 from spindle_fem.cli import app
 from spindle_fem.commands import diagnose_command
 from spindle_fem.commands.console import print_check, print_sweep
@@ -135,3 +136,55 @@ def test_a_folder_with_somebody_elses_report_is_left_alone(tmp_path):
     with pytest.raises(BadInputError, match=r"report\.html"), output_folder(tmp_path):
         pass
     assert (tmp_path / "report.html").read_text() == "mine"
+
+
+def test_a_checked_machine_tells_where_it_runs_and_what_was_drawn(command, tmp_path):
+    done = command("check", "small_two_start", "--picture", tmp_path / "machine.png")
+    assert f"is valid, drawn in {tmp_path / 'machine.png'}." in done.stdout.replace("\n", "")
+    for text in ("rpm", "L/min at"):
+        assert text in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("override", "told"),
+    [
+        ("operation.speed=90000rpm", "No rolling bearing of"),
+        ("coolant.inlet_temperature=120degC", "are known from"),
+        ("part.shaft.material=stahl", "aluminium_alloy"),
+    ],
+)
+def test_what_no_machine_runs_at_is_refused_before_it_is_solved(command, override, told):
+    done = command("check", "small_two_start", "--set", override)
+    assert done.returncode == 2
+    assert told in done.stderr
+
+
+def test_faults_are_json_where_that_is_asked_for(command):
+    done = command("check", "small_two_start", "--set", "part.shaft.material=stahl", "--json")
+    assert done.returncode == 2
+    (fault,) = json.loads(done.stdout)["faults"]
+    assert "stahl" in fault["what"]
+    assert "part.shaft.material" in fault["where"]
+
+
+def test_an_unknown_bearing_is_one_fault(command, tmp_path):
+    text = '[bearing]\ncatalogue = "7099 C"\n[operation]\nspeed = "6000 rpm"\naxial_load = "500 N"\n'
+    (tmp_path / "bearing.toml").write_text(text, encoding="utf-8")
+    done = command("bearing", tmp_path / "bearing.toml")
+    assert done.returncode == 2
+    assert "7099 C" in done.stderr
+    assert "missing" not in done.stderr
+
+
+def test_an_interrupted_command_says_so(tmp_path, monkeypatch, capsys):
+    def interrupted(**settings):
+        # as the library of the command line ends where a user does
+        raise SystemExit(130)
+
+    monkeypatch.setattr(cli, "app", interrupted)
+    with pytest.raises(SystemExit):
+        cli.main()
+    assert "Interrupted" in capsys.readouterr().err
+    with pytest.raises(KeyboardInterrupt), output_folder(tmp_path / "out"):
+        raise KeyboardInterrupt
+    assert "was interrupted" in (tmp_path / "out" / "INCOMPLETE").read_text(encoding="utf-8")

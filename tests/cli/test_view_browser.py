@@ -6,6 +6,7 @@ Pictures go to the folder that ``VIEW_PICTURES`` names, to be looked at.
 from __future__ import annotations
 
 import io
+import json
 import os
 import shutil
 from pathlib import Path
@@ -16,11 +17,16 @@ import pytest
 from spindle_fem.commands.machine_commands import run_machine
 from spindle_fem.commands.transient_command import run_transient_study
 from spindle_fem.commands.view_command import view_folder
+from tests.support.command_line import run_here
+from tests.support.documented_commands import made_recording
 
 playwright = pytest.importorskip("playwright.sync_api")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")]
 
+BESIDE = Path(__file__).resolve().parents[3] / "shared" / "recordings"
+RECORDINGS = Path(os.environ.get("SPINDLE_FEM_RECORDINGS", BESIDE))
+PUMP = Path(__file__).parents[2] / "examples" / "pump.toml"
 COARSE = ("mesh.preset=coarse", "mesh.order=1")
 STUDY = """
 schema = "spindle-fem/transient/1"
@@ -131,8 +137,6 @@ def test_a_cut_moves_and_turns(opened):
 
 
 def test_what_is_read_is_what_was_solved(opened, folders):
-    import json
-
     summary = json.loads((folders / "run" / "summary.json").read_text(encoding="utf-8"))
     page = opened("run")
     page.click("[data-view=side]")
@@ -188,3 +192,65 @@ def test_parts_can_be_hidden(opened):
     page.click("summary")
     page.locator(".view3d-parts label", has_text="housing").locator("input").uncheck()
     assert inked(seen(page, "run_without_housing")) < 0.8 * whole
+
+
+# ------------------------------------------------------------- before and after of a diagnosis
+@pytest.fixture(scope="module")
+def diagnosed(folders):
+    """Folders of a diagnosis of a spindle and of a network, and what the first one found."""
+    recording = RECORDINGS / "spindle_examples" / "example_2_heat_scale"
+    if not recording.is_dir():
+        pytest.skip("no folder of recordings")
+    earlier = recording / "calibration.toml"
+    for name, machine, given in (
+        ("diagnosed", "recorded_spindle", ["--set", "mesh.preset=coarse", "--calibrate", earlier]),
+        ("diagnosed_network", PUMP, []),
+    ):
+        measured = recording if name == "diagnosed" else folders / "pump"
+        if name != "diagnosed":
+            made_recording(measured, machine)
+        done = run_here(
+            "diagnose", str(machine), str(measured), "-o", str(folders / name), *given, cwd=folders
+        )
+        assert done.returncode == 0, done.stderr
+    return json.loads((folders / "diagnosed" / "diagnosis.json").read_text(encoding="utf-8"))
+
+
+def layers_of(page):
+    return page.locator(".view3d-layer option").all_inner_texts()
+
+
+def show(page, layer):
+    page.select_option(".view3d-layer select", label=layer)
+
+
+def test_a_diagnosis_shows_the_machine_before_and_after(opened, diagnosed):
+    page = opened("diagnosed")
+    assert diagnosed["verdict"] in ("parameter", "missing_physics")
+    assert layers_of(page)[:2] == ["before", "after"]
+    slide(page, "time", 20)
+    pictures = {}
+    for layer in layers_of(page):
+        show(page, layer)
+        pictures[layer] = seen(page, f"diagnosis_{layer.replace(' ', '_')}")
+        assert page.inner_text(".view3d-scale").startswith(layer)
+    before, after = pictures["before"], pictures["after"]
+    # one colour scale for both: what was found shows as other colours
+    assert np.mean(np.any(before != after, axis=2)) > 0.02
+    page.select_option(".view3d-layer select", label="before")
+    tag = page.locator(".view3d-names span").first
+    box, stage = tag.bounding_box(), page.locator("canvas").bounding_box()
+    click(page, (box["x"] - 9 - stage["x"]) / stage["width"], (box["y"] + 24 - stage["y"]) / stage["height"])
+    seen(page, "diagnosis_history")
+    assert page.locator(".view3d-picked li").count() == 1
+    # read, before and after
+    assert page.locator(".view3d-chart path").count() == 3
+
+
+def test_a_diagnosis_of_a_network_shows_nodes_and_links(opened, diagnosed):
+    page = opened("diagnosed_network")
+    assert {"before", "after"} <= set(layers_of(page))
+    show(page, "before")
+    assert 0.002 < inked(seen(page, "network_before")) < 0.8
+    show(page, "after")
+    seen(page, "network_after")

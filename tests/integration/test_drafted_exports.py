@@ -45,7 +45,7 @@ def german_csv(path, name):
     """Windows-1252, a preamble, date beside clock, milliseconds behind a comma, a row of units."""
     stamps, _, texts = table(name)
     lines = ["Messprotokoll;;", "Prüfstand 4;Bearbeiter: Müller", ""]
-    lines += [";".join(["Datum", "Uhrzeit", *texts]), ";".join(["", "", *UNITS])]
+    lines += [";".join(["Datum", "Uhrzeit", *texts]), ";".join(["TT.MM.JJJJ", "hh:mm:ss,000", *UNITS])]
     for stamp, row in zip(stamps, texts.to_numpy(), strict=True):
         clock = f"{stamp:%d.%m.%Y;%H:%M:%S},{stamp.microsecond // 1000:03d}"
         lines.append(";".join([clock, *row]))

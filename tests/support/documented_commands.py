@@ -227,7 +227,7 @@ def german_csv(path):
     """What a German measuring device writes: preamble, semicolons, decimal commas, dates by day, Latin-1."""
     names = ["Datum", "Uhrzeit", "Drehzahl", "Temperatur Lager vorne", "Temperatur Lager hinten"]
     names += ["Hallentemperatur", "Kühlmittel Vorlauf", "Kühlmittel Rücklauf"]
-    lines = ["Messprotokoll Frässpindel;;", "", ";".join(names), ";;1/min;°C;°C;°C;°C;°C"]
+    lines = ["Messprotokoll Frässpindel;;", "", ";".join(names), "TT.MM.JJJJ;hh:mm:ss;1/min;°C;°C;°C;°C;°C"]
     noise = np.random.default_rng(1).normal(0.0, 0.05, (TIMES.size, 5))
     for time, own in zip(TIMES, noise, strict=True):
         stamp = pd.Timestamp("2026-03-09 07:30:00") + pd.Timedelta(seconds=time)

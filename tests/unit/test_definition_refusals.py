@@ -186,7 +186,7 @@ TOGETHER = {
     "outlet with a place": ('kind = "coolant_outlet"', 'kind = "coolant_outlet"\nr = "3 mm"', SpecError, "probe.outlet.r", "is given"),
     # names of other tables
     "unknown material": ('name = "housing"\nmaterial = "steel"', 'name = "housing"\nmaterial = "stell"', SpecError, "part.housing.material", '"stell"', 'Did you mean "steel"'),
-    "unknown ring material": ('ring_material = "steel"', 'ring_material = "bronze"', SpecError, "bearing_types.7010_C.ring_material", '"bronze"', "Allowed: steel"),
+    "unknown ring material": ('ring_material = "steel"', 'ring_material = "bronze"', SpecError, "bearing_types.7010_C.ring_material", '"bronze"', "bearing_steel"),
     "unknown bearing type": ('bearing_type = "7010_C"', 'bearing_type = "7010_D"', SpecError, "bearing_set.pair.bearing_type", '"7010_D"', 'Did you mean "7010_C"'),
     "unknown part of a channel": ('[channel]\npart = "housing"', '[channel]\npart = "hosing"', SpecError, "channel.part", '"hosing"', 'Did you mean "housing"'),
     "channel in the shaft": ('[channel]\npart = "housing"', '[channel]\npart = "shaft"', SpecError, "channel.part", '"shaft" is no standing part', "outer_spacer, housing"),

@@ -118,7 +118,9 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     file, document = Path(path), read_document(path)
     faults: list[SpindleFemError] = []
     document = with_catalogue(document, str(file), faults, GEOMETRY)
-    tables = read_tables(document, str(file), faults, TABLES, REQUIRED)
+    # What an unknown bearing would have given is no fault of its own.
+    required = {**REQUIRED, "bearing": ()} if faults else REQUIRED
+    tables = read_tables(document, str(file), faults, TABLES, required)
     case = None
     if not faults:
         case = _build_case(tables, str(file), faults)

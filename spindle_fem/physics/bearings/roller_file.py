@@ -97,7 +97,9 @@ def roller_report(path: str | Path) -> dict[str, Any]:
     file = str(path)
     faults: list[SpindleFemError] = []
     document = with_catalogue(read_document(path), file, faults, _BEARING, "roller")
-    tables = read_tables(document, file, faults, _TABLES, _REQUIRED)
+    # What an unknown bearing would have given is no fault of its own.
+    required = {**_REQUIRED, "bearing": ()} if faults else _REQUIRED
+    tables = read_tables(document, file, faults, _TABLES, required)
     geometry, heat, lubricant = None, HeatOptions("palmgren"), None
     if not faults:
         bearing, operation = tables["bearing"], tables["operation"]
