@@ -26,9 +26,9 @@ def recording_of(
     if not isinstance(recording, (str, Path)):
         return recording
     from spindle_fem.recordings.align import read_recording
-    from spindle_fem.recordings.faults_beside import known_names
+    from spindle_fem.recordings.recordable_names import recordable_names
 
-    return read_recording(recording, names=partial(known_names, machine, overrides))
+    return read_recording(recording, names=partial(recordable_names, machine, overrides))
 
 
 def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:

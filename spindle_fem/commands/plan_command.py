@@ -36,7 +36,7 @@ from spindle_fem.inference.planned_test import (
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.machine.view.usual_sizes import short_unit
 from spindle_fem.recordings.align import Recording, read_recording
-from spindle_fem.recordings.faults_beside import known_names
+from spindle_fem.recordings.recordable_names import recordable_names
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
 from spindle_fem.units import TEMPERATURE_UNIT, ZERO_CELSIUS_K, to_si
@@ -149,7 +149,7 @@ def planned_measurement(
     ``compare`` says whether other tests are simulated too.
     """
     overrides = tuple(overrides)
-    names = partial(known_names, machine, overrides)
+    names = partial(recordable_names, machine, overrides)
     given = dict(_input(text) for text in inputs)
     name, _, length = str(test).partition(":")
     standard = name in STANDARD_TESTS

@@ -10,7 +10,6 @@ from typing import Any
 
 from spindle_fem.errors import BadInputError, RecordingError, SpindleFemError
 from spindle_fem.recordings.align import Recording, read_recording
-from spindle_fem.recordings.column_roles import MachineNames
 from spindle_fem.recordings.draft_recording import (
     DATA_NAME,
     MANIFEST_NAME,
@@ -19,7 +18,7 @@ from spindle_fem.recordings.draft_recording import (
     manifest_text,
 )
 from spindle_fem.recordings.draft_seal import require_as_drafted, sealed
-from spindle_fem.recordings.manifest import DRIVES_UNITS
+from spindle_fem.recordings.recordable_names import recordable_names
 from spindle_fem.report.recording_picture import draw_recording
 from spindle_fem.results.output_folder import output_folder, replace_text
 
@@ -57,7 +56,7 @@ def draft(
     given = [Path(file) for file in files]
     _require_apart(given, Path(folder))
     require_as_drafted(Path(folder) / MANIFEST_NAME, Path(folder) / DATA_NAME)
-    names = None if machine is None else machine_names(machine)
+    names = None if machine is None else recordable_names(machine)
     drafted = draft_recording(given, names, zone=zone)
     data = data_text(drafted)
     texts = {DATA_NAME: data, MANIFEST_NAME: sealed(manifest_text(drafted), data)}
@@ -120,27 +119,3 @@ def show(recording: str | Path, file: str | Path) -> list[str]:
     read = read_recording(recording)
     draw_recording(file, read)
     return read.defects.lines()
-
-
-def machine_names(machine: str | Path) -> MachineNames:
-    """Names of a machine, with geometry or a ``[network]``, that channels of a recording may stand for."""
-    from spindle_fem.commands.checked_machine import load_buildable, load_network
-    from spindle_fem.definition.load import find_machine, read_definition
-    from spindle_fem.definition.network_load import is_network_machine
-
-    if not is_network_machine(read_definition(find_machine(machine))):
-        spec = load_buildable(machine, ())
-        heat = {f"heat.{source.name}": "W" for source in spec.source}
-        # without a gain the input is the heat itself
-        heat |= {source.input: "W" if source.gain is None else "" for source in spec.source if source.input}
-        return MachineNames(
-            tuple(probe.name for probe in spec.probe),
-            tuple(sensor.name for sensor in spec.displacement_sensor),
-            {**DRIVES_UNITS, **heat},
-            tuple(probe.name for probe in spec.probe if probe.kind == "coolant_outlet"),
-        )
-    tables = load_network(machine, ()).network
-    inputs = {item.temperature: "K" for item in tables.boundary if isinstance(item.temperature, str)}
-    driven = [source.input for source in tables.source if source.input is not None]
-    known = {name: DRIVES_UNITS.get(name, "") for name in driven}
-    return MachineNames(tuple(node.name for node in tables.node), (), {**known, **inputs})

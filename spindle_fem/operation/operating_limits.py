@@ -7,11 +7,9 @@ from collections.abc import Iterator
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import FaultsError, SpecError
-from spindle_fem.physics.bearings.highest_speed import highest_speed
+from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.units import ZERO_CELSIUS_K
-
-_RPM = 30.0 / math.pi
 
 
 def require_possible_operation(spec: MachineSpec) -> None:
@@ -30,16 +28,10 @@ def require_possible_operation(spec: MachineSpec) -> None:
 
 
 def _faults(spec: MachineSpec) -> Iterator[SpecError]:
-    # Of a definition with other faults, tables may be missing and bearings of no known type.
-    types = [spec.bearing_types.get(group.bearing_type) for group in spec.bearing_set]
-    pitch = max((kind.pitch for kind in types if kind is not None), default=0.0)
-    if spec.operation is not None and abs(spec.operation.speed) > highest_speed(pitch):
-        yield SpecError(
-            "operation.speed",
-            f"{_RPM * spec.operation.speed:.0f} rpm.",
-            f"No rolling bearing of {1e3 * pitch:.0f} mm pitch diameter runs above "
-            f"{_RPM * highest_speed(pitch):.0f} rpm; is the unit right?",
-        )
+    # Of a definition with other faults, tables may be missing.
+    reason = None if spec.operation is None else too_fast(spec, spec.operation.speed)
+    if reason is not None:
+        yield SpecError("operation.speed", f"{spec.operation.speed * 30.0 / math.pi:.0f} rpm.", reason)
     if spec.coolant is not None:
         coolant, inlet = coolant_by_name(spec.coolant.fluid), spec.coolant.inlet_temperature
         low, high = coolant.lowest_temperature, coolant.highest_temperature

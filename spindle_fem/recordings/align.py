@@ -22,7 +22,7 @@ from spindle_fem.recordings.channel_checks import (
     temperature_flags,
 )
 from spindle_fem.recordings.defects import ChannelDefects, DefectReport, Gap
-from spindle_fem.recordings.faults_beside import KnownNames, faults_beside, manifest_for
+from spindle_fem.recordings.faults_beside import faults_beside, manifest_for
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.recordings.manifest import (
     Channel,
@@ -32,6 +32,7 @@ from spindle_fem.recordings.manifest import (
     find_manifest,
 )
 from spindle_fem.recordings.read_data import RawTable, read_table
+from spindle_fem.recordings.recordable_names import RecordableNames
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
@@ -207,7 +208,7 @@ def read_recording(
     path: str | Path,
     *,
     long_gap: float | None = None,
-    names: Callable[[], KnownNames] | None = None,
+    names: Callable[[], RecordableNames] | None = None,
 ) -> Recording:
     """Read a recording and find its defects.
 

@@ -22,6 +22,7 @@ from spindle_fem.recordings.column_words import (
     within,
 )
 from spindle_fem.recordings.manifest import DRIVES_UNITS, Channel, column_unit
+from spindle_fem.recordings.recordable_names import RecordableNames
 from spindle_fem.units import registry
 
 _UNITS = {"speed": "rpm", "coolant_flow": "l/min", "thrust": "N"}
@@ -36,26 +37,6 @@ _STILL, _STILL_OF_SIZE = 0.02, 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class MachineNames:
-    """Names of a machine that channels may stand for; all empty where no machine is given.
-
-    Attributes
-    ----------
-    probes, sensors : tuple of str
-        Probes or network nodes; displacement sensors.
-    inputs : dict of str to str
-        What may be driven, with its SI unit; empty where any unit will do.
-    outlets : tuple of str
-        Probes that read the coolant where it leaves.
-    """
-
-    probes: tuple[str, ...] = ()
-    sensors: tuple[str, ...] = ()
-    inputs: dict[str, str] | None = None
-    outlets: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class GuessedChannel:
     """A column as the manifest will have it, why, and what is unsure (empty where nothing is)."""
 
@@ -65,7 +46,7 @@ class GuessedChannel:
 
 
 def guess_channel(
-    name: str, unit: str, values: np.ndarray, machine: MachineNames, taken: set[str]
+    name: str, unit: str, values: np.ndarray, machine: RecordableNames, taken: set[str]
 ) -> GuessedChannel:
     """Role, unit and meaning of one column.
 
@@ -85,7 +66,7 @@ def guess_channel(
 
 
 def _guess(
-    name: str, unit: str, values: np.ndarray, machine: MachineNames, taken: set[str]
+    name: str, unit: str, values: np.ndarray, machine: RecordableNames, taken: set[str]
 ) -> GuessedChannel:
     inputs = dict(DRIVES_UNITS) if machine.inputs is None else machine.inputs
     present = values[np.isfinite(values)]
@@ -163,7 +144,7 @@ def _doubt_of_input(drives: str, unit: str, inputs: dict[str, str]) -> str:
 
 
 def _read(
-    name: str, unit: str, probe: str, why: str, doubt: str, machine: MachineNames, taken: set[str]
+    name: str, unit: str, probe: str, why: str, doubt: str, machine: RecordableNames, taken: set[str]
 ) -> GuessedChannel:
     displaced = probe in machine.sensors
     if displaced and _dimension(unit) != "[length]":

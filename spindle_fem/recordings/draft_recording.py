@@ -12,7 +12,7 @@ import pandas as pd
 import tomli_w
 
 from spindle_fem.errors import RecordingError
-from spindle_fem.recordings.column_roles import GuessedChannel, MachineNames, guess_channel
+from spindle_fem.recordings.column_roles import GuessedChannel, guess_channel
 from spindle_fem.recordings.manifest import RECORDING_SCHEMA, Channel, column_unit
 from spindle_fem.recordings.measurement_file import (
     TEXT_SUFFIXES,
@@ -21,6 +21,7 @@ from spindle_fem.recordings.measurement_file import (
     unused_name,
 )
 from spindle_fem.recordings.numbers_in_text import decimal_sign, numbers_of
+from spindle_fem.recordings.recordable_names import RecordableNames
 from spindle_fem.recordings.time_columns import FoundTime, find_time
 
 DATA_NAME, MANIFEST_NAME = "recording.csv", "recording.toml"
@@ -54,7 +55,7 @@ class DraftedRecording:
 
 
 def draft_recording(
-    files: Iterable[Path], machine: MachineNames | None = None, *, zone: str | None = None
+    files: Iterable[Path], machine: RecordableNames | None = None, *, zone: str | None = None
 ) -> DraftedRecording:
     """Draft one recording from one or several files.
 
@@ -93,7 +94,7 @@ def draft_recording(
                 raise RecordingError(
                     str(piece.path), f'column "{column}" is in {unit}, in another file in {units[column]}.'
                 )
-    names, taken = machine or MachineNames(), set[str]()
+    names, taken = machine or RecordableNames(), set[str]()
     channels = [
         guess_channel(column, units.get(column, ""), joined[column].to_numpy(float), names, taken)
         for column in joined.columns[1:]
@@ -112,7 +113,7 @@ def draft_recording(
     )
 
 
-def _no_temperature(where: str, channels: list[GuessedChannel], machine: MachineNames) -> RecordingError:
+def _no_temperature(where: str, channels: list[GuessedChannel], machine: RecordableNames) -> RecordingError:
     """What is missing for a recording of which no column is read by a probe."""
     columns = ", ".join(guess.channel.column for guess in channels)
     left = [guess.channel for guess in channels if guess.channel.role == "covariate"]

@@ -3,58 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.definition.load import find_machine, load_machine, read_definition, read_toml
-from spindle_fem.definition.network_load import is_network_machine, load_network_machine
+from spindle_fem.definition.load import read_toml
 from spindle_fem.errors import FaultsError, RecordingError, SpindleFemError, did_you_mean
-from spindle_fem.recordings.manifest import DRIVES_UNITS, Manifest, find_manifest, load_manifest
+from spindle_fem.recordings.manifest import Manifest, find_manifest, load_manifest
 from spindle_fem.recordings.read_data import columns_of
-
-
-@dataclass(frozen=True, slots=True)
-class KnownNames:
-    """What recordings of a machine may name.
-
-    Attributes
-    ----------
-    probes : tuple of str
-        Probes, or nodes of a network.
-    inputs, needed : tuple of str
-        What may be driven, and what must be.
-    takes_others : bool
-        Whether inputs that drive nothing are left out, as a network does.
-    """
-
-    probes: tuple[str, ...]
-    inputs: tuple[str, ...]
-    needed: tuple[str, ...]
-    takes_others: bool
-
-
-def known_names(machine: str | Path, overrides: Iterable[str] = ()) -> KnownNames:
-    """Names of a machine, with geometry or a ``[network]``.
-
-    Raises
-    ------
-    SpindleFemError
-    """
-    if is_network_machine(read_definition(find_machine(machine))):
-        tables = load_network_machine(machine, overrides).network
-        named = [item.temperature for item in tables.boundary if isinstance(item.temperature, str)]
-        named += [source.input for source in tables.source if source.input is not None]
-        inputs = tuple(dict.fromkeys(named))
-        return KnownNames(tuple(node.name for node in tables.node), inputs, inputs, True)
-    spec = load_machine(machine, overrides)
-    inputs = (*DRIVES_UNITS, *spec.source_inputs)
-    return KnownNames(tuple(probe.name for probe in spec.probe), inputs, ("speed",), False)
+from spindle_fem.recordings.recordable_names import RecordableNames
 
 
 def manifest_for(
-    path: str | Path, names: Callable[[], KnownNames] | None = None, *, growing: bool = False
+    path: str | Path, names: Callable[[], RecordableNames] | None = None, *, growing: bool = False
 ) -> tuple[Manifest, Path]:
     """As :func:`~spindle_fem.recordings.manifest.load_manifest`, with :func:`faults_beside` its faults.
 
@@ -69,7 +30,7 @@ def manifest_for(
 
 
 def faults_beside(
-    recording: str | Path, names: Callable[[], KnownNames] | None = None
+    recording: str | Path, names: Callable[[], RecordableNames] | None = None
 ) -> tuple[SpindleFemError, ...]:
     """Columns of a manifest that its data do not have, and names that a machine does not have.
 
@@ -103,7 +64,7 @@ def _columns(content: dict[str, Any], manifest: Path) -> Iterator[SpindleFemErro
             )
 
 
-def _names(content: dict[str, Any], names: KnownNames) -> Iterator[SpindleFemError]:
+def _names(content: dict[str, Any], names: RecordableNames) -> Iterator[SpindleFemError]:
     driven = []
     for where, table in _channels(content):
         probe, drives = table.get("probe"), table.get("drives")
@@ -114,11 +75,11 @@ def _names(content: dict[str, Any], names: KnownNames) -> Iterator[SpindleFemErr
         if not isinstance(drives, str):
             continue
         driven.append(drives)
-        if not names.takes_others and drives not in names.inputs and not drives.startswith("heat."):
+        if not names.takes_others and drives not in (names.inputs or ()) and not drives.startswith("heat."):
             yield RecordingError(
                 f"{where}.drives",
                 f'"{drives}" drives nothing in this machine.',
-                did_you_mean(drives, (*names.inputs, "heat.NAME")),
+                did_you_mean(drives, tuple(names.inputs or ())),
             )
     for name in names.needed:
         if name not in driven:

@@ -8,7 +8,7 @@ import numpy as np
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import FaultsError, RecordingError, SpindleFemError, did_you_mean
-from spindle_fem.physics.bearings.highest_speed import highest_speed
+from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.standard_inputs import standard_inputs
@@ -60,14 +60,13 @@ def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError
         yield RecordingError(
             source, "no channel drives the speed.", 'Add an input channel with drives = "speed".'
         )
-    pitch = max((spec.bearing_types[group.bearing_type].pitch for group in spec.bearing_set), default=0.0)
-    fastest, highest = max(np.abs(_ends(recording, "speed"))), highest_speed(pitch)
-    if fastest > highest:
+    fastest = max(np.abs(_ends(recording, "speed")))
+    reason = too_fast(spec, fastest)
+    if reason is not None:
         yield RecordingError(
             source,
             f'column "{_column(recording, "speed")}" (speed) reaches {fastest * _RPM:.0f} rpm.',
-            f"No rolling bearing of {1e3 * pitch:.0f} mm pitch diameter runs above "
-            f"{highest * _RPM:.0f} rpm; is the unit right?",
+            reason,
         )
     lowest = _ends(recording, "coolant_flow")[0]
     if lowest < 0.0:

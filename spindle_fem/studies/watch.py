@@ -20,8 +20,9 @@ from spindle_fem.inference.predictor import LONGEST_BIN, STEP, Predictor
 from spindle_fem.inference.prepared_problem import Calibrated, calibrate
 from spindle_fem.inference.watched_machine import MONTH, Told, WatchedMachine
 from spindle_fem.recordings.align import Recording, read_recording
-from spindle_fem.recordings.faults_beside import known_names, manifest_for
+from spindle_fem.recordings.faults_beside import manifest_for
 from spindle_fem.recordings.growing_file import follow_lines
+from spindle_fem.recordings.recordable_names import recordable_names
 from spindle_fem.recordings.recording_window import RecordingWindow, piece_of
 from spindle_fem.recordings.smooth_inputs import without_input_noise
 from spindle_fem.units import to_si
@@ -125,7 +126,7 @@ def watch_recording(
     ------
     SpindleFemError
     """
-    names = partial(known_names, machine, tuple(how.overrides))
+    names = partial(recordable_names, machine, tuple(how.overrides))
     manifest, data = manifest_for(recording, names, growing=True)
     calibration = [read_recording(path, names=names) for path in how.calibrate]
     if how.calibrate and how.warm_up:

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from spindle_fem.commands.diagnose_command import diagnose_without_report
-from spindle_fem.commands.recording_command import machine_names
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.draft_recording import data_text, draft_recording, manifest_text
+from spindle_fem.recordings.recordable_names import recordable_names
 from spindle_fem.studies.simulate import simulate_recordings
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared" / "recordings"
@@ -80,7 +80,7 @@ FORMS = {"german.csv": german_csv, "export.tsv": utf16_tsv, "messung.xlsx": exce
 def drafted(folder, form, name="recording"):
     file, place = folder / form, folder / name
     FORMS[form](file, name)
-    found = draft_recording([file], machine_names("recorded_spindle"))
+    found = draft_recording([file], recordable_names("recorded_spindle"))
     place.mkdir()
     (place / "recording.csv").write_text(data_text(found), encoding="utf-8")
     (place / "recording.toml").write_text(manifest_text(found), encoding="utf-8")

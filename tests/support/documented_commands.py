@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from spindle_fem.commands.recording_command import machine_names
 from spindle_fem.definition.load import find_machine, read_definition
 from spindle_fem.definition.network_load import is_network_machine
+from spindle_fem.recordings.recordable_names import recordable_names
 from tests.support.written_texts import manifest_text
 
 ROOT = Path(__file__).parents[2]
@@ -246,7 +246,7 @@ def made_recording(place, machine):
     place : Path
         Folder to make, or the manifest to write beside data of its own.
     """
-    names = machine_names(str(machine))
+    names = recordable_names(str(machine))
     manifest = place if place.suffix == ".toml" else place / "recording.toml"
     manifest.parent.mkdir(parents=True, exist_ok=True)
     noise = np.random.default_rng(sum(place.name.encode())).normal(0.0, 0.1, (TIMES.size, len(names.probes)))

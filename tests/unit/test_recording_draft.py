@@ -4,14 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.commands.recording_command import machine_names
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.column_roles import MachineNames, guess_channel
+from spindle_fem.recordings.column_roles import guess_channel
 from spindle_fem.recordings.draft_recording import data_text, draft_recording, manifest_text
 from spindle_fem.recordings.manifest import column_unit
+from spindle_fem.recordings.recordable_names import RecordableNames, recordable_names
 
-MACHINE = MachineNames(
+MACHINE = RecordableNames(
     probes=("SP01", "SP02"), inputs={"speed": "rad/s", "ambient": "K", "coolant_inlet": "K"}
 )
 TIMES = pd.Timestamp("2016-05-02 12:41:30") + pd.to_timedelta(10.0 * np.arange(60), unit="s")
@@ -183,7 +183,7 @@ def test_refusals_say_why(tmp_path, text, reason):
     ],
 )
 def test_names_stand_within_columns(column, means):
-    machine = MachineNames((*MACHINE.probes, "OUT", "COOLANT_OUT"), (), MACHINE.inputs)
+    machine = RecordableNames((*MACHINE.probes, "OUT", "COOLANT_OUT"), (), MACHINE.inputs)
     channel = guess_channel(column, "degC", WARM, machine, set()).channel
     assert (channel.probe or channel.drives) == means
 
@@ -193,7 +193,7 @@ def test_names_stand_within_columns(column, means):
     [("Kühlmittel Rücklauf", "COOLANT_OUT"), ("oil outlet", "COOLANT_OUT"), ("Rest", None)],
 )
 def test_the_outlet_is_told_by_its_name(column, probe):
-    names = machine_names("recorded_spindle")
+    names = recordable_names("recorded_spindle")
     taken: set[str] = set()
     guess = guess_channel(column, "degC", WARM, names, taken)
     assert (guess.channel.probe, guess.unsure == "") == (probe, probe is not None)
@@ -211,7 +211,7 @@ def test_the_outlet_is_told_by_its_name(column, probe):
     ],
 )
 def test_german_names_of_places(column, probe):
-    names = MachineNames(("FRONT", "front_bearing", "REAR_LEFT", "housing"), (), MACHINE.inputs)
+    names = RecordableNames(("FRONT", "front_bearing", "REAR_LEFT", "housing"), (), MACHINE.inputs)
     guess = guess_channel(column, "degC", WARM, names, set())
     assert guess.channel.probe == probe
     assert guess.unsure
@@ -219,7 +219,7 @@ def test_german_names_of_places(column, probe):
 
 @pytest.mark.parametrize(("source", "unit"), [("x_load", "percent"), ("main_speed", "rpm"), ("pump", "W")])
 def test_units_of_network_inputs_by_their_names(source, unit):
-    machine = MachineNames(("SP01",), (), {source: ""})
+    machine = RecordableNames(("SP01",), (), {source: ""})
     guess = guess_channel(source, "", SPEED.astype(float), machine, set())
     assert (guess.channel.unit, guess.channel.hold) == (unit, "previous")
     assert "no unit" in guess.unsure
@@ -246,7 +246,7 @@ def test_recorded_quantities_of_heat_sources_are_inputs(tmp_path):
     machine.write_text(
         'base = "small_two_start"\n[[source]]\nname = "rotor"\npart = "shaft"\ninput = "motor_power"\n'
     )
-    names = machine_names(machine)
+    names = recordable_names(machine)
     assert names.inputs["motor_power"] == names.inputs["heat.rotor"] == "W"
     guess = guess_channel("motor power", "kW", 1.0 + np.arange(12) % 2, names, set())
     assert (guess.channel.drives, guess.channel.unit) == ("motor_power", "kW")
@@ -302,13 +302,13 @@ def test_units_beside_names_or_none_at_all(tmp_path, heads):
     assert [guess.channel.unit for guess in drafted.channels] == ["degC", "degC", "rpm"]
     stated = "1/min" in heads or "U/min" in heads
     assert all(("no unit" in guess.unsure) != stated for guess in drafted.channels)
-    drafted = draft(tmp_path, text, machine=MachineNames(("FRONT", "REAR"), (), MACHINE.inputs))
+    drafted = draft(tmp_path, text, machine=RecordableNames(("FRONT", "REAR"), (), MACHINE.inputs))
     assert list(roles(drafted).values()) == ["FRONT", "ambient", "speed"]
 
 
 @pytest.mark.parametrize("column", ["Lager vorne Kraft", "Lagerschwingung", "Antriebsstrom", "Luftdruck"])
 def test_other_quantities_without_units_are_no_temperatures(column):
-    guess = guess_channel(column, "", WARM, MachineNames(), set())
+    guess = guess_channel(column, "", WARM, RecordableNames(), set())
     assert guess.channel.role == "covariate"
     assert guess.channel.unit is None
 
@@ -346,10 +346,10 @@ def test_refusals_without_a_probe_say_what_would_help(tmp_path):
 @pytest.mark.parametrize("column", ["T_Ruecklauf_C", "Kuehlmittel Ruecklauf [degC]", "Rücklauf"])
 def test_umlauts_may_be_spelt_with_two_letters(tmp_path, column):
     rows = "".join(f"{i};{w:.2f}\n" for i, w in enumerate(WARM))
-    drafted = draft(tmp_path, f"time_s;{column}\n{rows}", machine=machine_names("recorded_spindle"))
+    drafted = draft(tmp_path, f"time_s;{column}\n{rows}", machine=recordable_names("recorded_spindle"))
     assert list(roles(drafted).values()) == ["COOLANT_OUT"]
     assert drafted.channels[0].channel.unit == "degC"
-    names = MachineNames(("housing", "shaft"), (), MACHINE.inputs)
+    names = RecordableNames(("housing", "shaft"), (), MACHINE.inputs)
     assert guess_channel("Gehaeuse", "degC", WARM, names, set()).channel.probe == "housing"
 
 

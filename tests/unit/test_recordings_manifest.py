@@ -5,8 +5,8 @@ import pytest
 from scripts import manifest_page
 from spindle_fem.errors import FaultsError, RecordingError, SpecError, UnitError
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.recordings.faults_beside import KnownNames, known_names
 from spindle_fem.recordings.manifest import column_unit, find_manifest, load_manifest
+from spindle_fem.recordings.recordable_names import RecordableNames, recordable_names
 
 TEXT = """
 schema = "spindle-fem/recording/1"
@@ -124,7 +124,7 @@ def test_columns_and_names_of_the_machine_are_told_beside_other_faults(folder):
     with pytest.raises(FaultsError) as caught:
         read_recording(folder)
     assert places(caught) == ["channel[2].unit", "channel[2].column"]
-    known = KnownNames(("SP01",), ("speed",), ("speed",), False)
+    known = RecordableNames(("SP01",), inputs={"speed": "rad/s"}, needed=("speed",))
     of_machine = ["channel[1].probe", "channel[2].drives", "channel"]
     with pytest.raises(FaultsError) as caught:
         read_recording(folder, names=lambda: known)
@@ -146,7 +146,7 @@ def test_a_faulty_machine_hides_no_fault_of_a_recording(folder):
 
 
 def test_the_names_that_machines_of_both_kinds_know():
-    spindle, motor = known_names("recorded_spindle"), known_names("bench_motor")
+    spindle, motor = recordable_names("recorded_spindle"), recordable_names("bench_motor")
     assert "COOLANT_OUT" in spindle.probes
     assert (spindle.needed, spindle.takes_others) == (("speed",), False)
     assert set(motor.probes) == {"winding", "stator_body"}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from spindle_fem.definition.machine_spec import MachineSpec
+
 # Speed times pitch diameter, m·rad/s: 5 million mm/min. On a rig, ball bearings of 120 mm bore (pitch
 # diameter 155 mm) ran at 25,000 rpm, 3.9 million: Zaretsky, Bamberger and Signer (1974), NASA TN D-7837.
 _PITCH_SPEED = 5.0e3 * 2.0 * np.pi / 60.0
@@ -16,3 +18,17 @@ def highest_speed(pitch_diameter: float) -> float:
     50000
     """
     return _PITCH_SPEED / pitch_diameter if pitch_diameter else np.inf
+
+
+def too_fast(spec: MachineSpec, speed: float) -> str | None:
+    """Why the bearings of a machine cannot turn at a speed [rad/s]; None where they may or it is NaN."""
+    # Of a definition with other faults, bearings may be of no known type.
+    types = [spec.bearing_types.get(group.bearing_type) for group in spec.bearing_set]
+    pitch = max((kind.pitch for kind in types if kind is not None), default=0.0)
+    highest = highest_speed(pitch)
+    if not abs(speed) > highest:
+        return None
+    return (
+        f"No rolling bearing of {1e3 * pitch:.0f} mm pitch diameter runs above "
+        f"{highest * 30.0 / np.pi:.0f} rpm; is the unit right?"
+    )

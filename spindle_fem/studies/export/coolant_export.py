@@ -40,8 +40,8 @@ RISES, RISE_AXIS = np.linspace(-15.0, 30.0, 10), np.linspace(-15.0, 30.0, 46)
 WALL_TOLERANCE, WALL_LEFT_OUT = 2e-3, 3e-6
 # Least mean of a wall's rise, as a share of its largest, by which it can be scaled.
 LEAST_MEAN = 0.2
-# After which no wall moves any more, s.
-SETTLED = 3.0 * 86400.0
+# After which no wall moves any more, and its steps, s.
+SETTLED, SETTLING_STEP = 3.0 * 86400.0, 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,8 @@ class WallRise:
         inputs = standard_inputs(fast.spec)
         values = np.array([[inputs[name] for name in STANDARD]] * 2)
         held = np.ones(len(STANDARD), dtype=bool)
-        drive = make_drive(np.array([0.0, SETTLED]), STANDARD, values, held)
+        times = np.array([0.0, SETTLED])
+        drive = make_drive(times, STANDARD, values, held, largest_step=SETTLING_STEP)
         states, _ = TransientRun(fast, drive, {}, (), fast.own_terms(drive)).march(point.ambient_temperature)
         area = fast.model.cell_area.ravel()
         rise = fast.channel.walls(states[-1:])[0] - point.coolant_inlet_temperature
@@ -203,12 +204,12 @@ def _directions(
     return basis, np.array([basis @ sample(place) for place in places])
 
 
-def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> FeedbackTable:
+def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> FeedbackTable | None:
     """What the film in the channel changes where its wall is not as far above the inlet as usual.
 
     The change of conduction and loads is written as heats, each proportional to one combination of
     unknowns and loads: the singular vectors of the directions in which the operators vary. The outlet's
-    change joins them as one that warms nothing and is read.
+    change joins them as one that warms nothing and is read. None where the film hardly varies.
 
     Parameters
     ----------
@@ -225,6 +226,8 @@ def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Feedb
         return (coolant.sample(*driven, rise) - at_usual[tuple(driven)]) / scale
 
     basis, weights = _directions(change, list(product(RISES, *axes)), WALL_LEFT_OUT)
+    if not len(basis):
+        return None
     coarse = weights.reshape(RISES.size, *(axis.size for axis in axes), -1)
     values = PchipInterpolator(RISES, coarse)(RISE_AXIS)
     parts = coolant.parts(basis * scale)

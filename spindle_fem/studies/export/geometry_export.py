@@ -166,8 +166,8 @@ def _state_space(
         add_table(key, "operator_tables", table.axes, [position[item] for item in table.inputs], table.values)
     effects.read(fast.channels, list(loads), arrays["output"], arrays["feedthrough"])
     followed = feedback_tables(fast, CONSTANT, highest_speed, effects)
-    if wall is not None:
-        followed.append(wall_feedback(coolant, coolant.axes(*ends, WALL_TOLERANCE)))
+    of_wall = None if wall is None else wall_feedback(coolant, coolant.axes(*ends, WALL_TOLERANCE))
+    followed += [] if of_wall is None else [of_wall]
     for number, table in enumerate(followed):
         numbers = [len(inputs) + number, *(position[item] for item in table.inputs)]
         add_table(f"follows{number}", "feedback_tables", table.axes, numbers, table.values)
@@ -187,7 +187,6 @@ def _feedback_arrays(
         return np.array([[own.get(name, 0.0) for name in loads] for own in weights])
 
     first = np.cumsum([0, *(table.values.shape[-1] for table in tables)])
-    none = [np.zeros((len(table.column), outputs)) for table in tables]
     columns = [table.column + start for table, start in zip(tables, first, strict=False)]
     return {
         "feedback.sense": np.array([table.sense for table in tables]) @ modes,
@@ -197,7 +196,7 @@ def _feedback_arrays(
         "feedback.into": np.concatenate([table.into for table in tables]) @ modes,
         "feedback.load": rows([own for table in tables for own in table.load]),
         "feedback.read": np.concatenate(
-            [zero if table.read is None else table.read for table, zero in zip(tables, none, strict=True)]
+            [np.zeros((len(table.column), outputs)) if table.read is None else table.read for table in tables]
         ),
     }
 

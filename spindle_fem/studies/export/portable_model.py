@@ -12,8 +12,8 @@ time. With ``scheme = "TR-BDF2"`` ``K``, ``B``, ``C`` and ``D`` follow the input
 
 with ``a_i`` from tables, and steps are of second order and L-stable. Friction, ball rows and
 films that follow temperatures add heats ``a(s, inputs) (in x + drive w)`` with ``s`` a temperature of the
-machine; their values at the end of a step are found by Newton's method. Temperatures are in °C, all else in
-the units that the model names.
+machine, some of which are read with the outputs; their values at the end of a step are found by Newton's
+method. Temperatures are in °C, all else in the units that the model names.
 """
 
 from __future__ import annotations
