@@ -187,12 +187,14 @@ def build_patch(
     deformed = 2.0 * curvature * ball / (2.0 * curvature + 1.0)
     place = major[..., None] * across
     squared = major[..., None] ** 2
-    height = (
-        np.sqrt(deformed[..., None] ** 2 - place**2)
-        - np.sqrt(deformed[..., None] ** 2 - squared)
-        + np.sqrt(0.25 * ball[..., None] ** 2 - squared)
-    )
-    centre = (deformed - np.sqrt(deformed**2 - major**2)) + np.sqrt(0.25 * ball**2 - major**2)
+    # An ellipse wider than its ball, in a trial far from any equilibrium, has no height: NaN, then refused.
+    with np.errstate(invalid="ignore"):
+        height = (
+            np.sqrt(deformed[..., None] ** 2 - place**2)
+            - np.sqrt(deformed[..., None] ** 2 - squared)
+            + np.sqrt(0.25 * ball[..., None] ** 2 - squared)
+        )
+        centre = (deformed - np.sqrt(deformed**2 - major**2)) + np.sqrt(0.25 * ball**2 - major**2)
     # pressure is even across the ellipse: one half of the nodes, mirrored, saves half the exponentials
     half = (len(across) + 1) // 2
     strip = pressure[..., None] * np.sqrt(1.0 - across[:half] ** 2)
