@@ -158,14 +158,24 @@ def bearing(
     file: Annotated[
         Path, typer.Argument(help=r"TOML with \[bearing], \[operation] and perhaps \[lubricant].")
     ],
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the loads around each row, .png")
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--every", help="Show balls and rollers that are alike too.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """One bearing or one preloaded set, without a machine."""
-    from spindle_fem.commands.console import print_bearing
+    from spindle_fem.commands.bearing_console import print_bearing
     from spindle_fem.physics.bearings.bearing_file import bearing_report
 
     content = bearing_report(file)
-    print_json(content) if as_json else print_bearing(content)
+    if picture is not None:
+        from spindle_fem.report.bearing_chart import write_bearing_chart
+
+        write_bearing_chart(content, picture)
+    print_json(content) if as_json else print_bearing(content, every=every)
 
 
 @app.command()

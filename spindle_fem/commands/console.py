@@ -19,7 +19,7 @@ from spindle_fem.results.run_log import LOGGER
 MOST_LINES = 12
 
 
-def _console() -> Console:
+def open_console() -> Console:
     """The terminal's width, or a wide page where the output goes to a file or a pipe.
 
     Brackets stay as they are: texts hold names of tables and of the user's own.
@@ -41,7 +41,8 @@ def _print_warnings(console: Console, content: dict[str, Any]) -> None:
         _print_marked(console, warning["code"], f": {warning['text']}", "yellow")
 
 
-def _table(title: str, *columns: str) -> Table:
+def headed_table(title: str, *columns: str) -> Table:
+    """An empty table: the first column names the rows, others hold numbers."""
     table = Table(
         title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
     )
@@ -57,8 +58,8 @@ def _number(value: Any, digits: int) -> str:
 
 def print_run(summary: dict[str, Any], folder: Path) -> None:
     """Headline of a run: temperatures, bearings, balance, checks and warnings."""
-    console = _console()
-    table = _table(
+    console = open_console()
+    table = headed_table(
         "Bearings", "", "heat W", "inner °C", "outer °C", "balls °C", "difference K", "preload N", "lambda"
     )
     for name, bearing in summary["bearings"].items():
@@ -74,7 +75,7 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
         )
     console.print(table)
     if summary["probes"]:
-        probes = _table("Probes", *(["", *summary["probes"]]))
+        probes = headed_table("Probes", *(["", *summary["probes"]]))
         probes.add_row("°C", *(_number(value, 2) for value in summary["probes"].values()))
         console.print(probes)
     coolant = summary["coolant"]
@@ -117,12 +118,12 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
 
 def print_check(content: dict[str, Any], picture: Path | None = None) -> None:
     """What a valid machine is made of, and where it was drawn."""
-    console = _console()
+    console = open_console()
     lists = [key for key, rows in content.items() if isinstance(rows, list)]
     for key in (key for key in lists if key not in ("assumed", "warnings")):
         if not content[key]:
             continue
-        table = _table(key, "name", "")
+        table = headed_table(key, "name", "")
         for row in content[key]:
             table.add_row(row["name"], row.get("detail", ""))
         console.print(table)
@@ -133,7 +134,7 @@ def print_check(content: dict[str, Any], picture: Path | None = None) -> None:
 
 def print_pairs(title: str, content: dict[str, Any]) -> None:
     """A title and one line for each key."""
-    console = _console()
+    console = open_console()
     console.print(title)
     for key, value in content.items():
         console.print(f"  {key}: {value}")
@@ -141,7 +142,7 @@ def print_pairs(title: str, content: dict[str, Any]) -> None:
 
 def print_export(content: dict[str, Any]) -> None:
     """What an exported model takes and gives."""
-    console = _console()
+    console = open_console()
     console.print(
         f"wrote {', '.join(content['files'])}: {content['states']} states, {content['scheme']} steps"
     )
@@ -172,9 +173,9 @@ _HEAT_ROWS = (
 
 def print_heat(content: dict[str, Any], folder: Path | None) -> None:
     """Heat term by term, one table a bearing, one column a speed; where the report is, if there is one."""
-    console = _console()
+    console = open_console()
     for name, rows in content["bearings"].items():
-        table = _table(
+        table = headed_table(
             f"{name}, model {content['model']}", "rpm", *(f"{row['speed_rpm']:.0f}" for row in rows)
         )
         table.add_row("heat W", *(_number(row["heat_W"], 1) for row in rows), style="bold")
@@ -193,43 +194,10 @@ def print_heat(content: dict[str, Any], folder: Path | None) -> None:
         console.print(f"Report: {folder / 'report.html'}")
 
 
-_ROLLING_ELEMENT = {
-    "row": "row",
-    "azimuth_deg": "azimuth °",
-    "contact_angle_inner_deg": "inner °",
-    "contact_angle_outer_deg": "outer °",
-    "load_inner_N": "inner N",
-    "load_outer_N": "outer N",
-    "pressure_inner_GPa": "inner GPa",
-    "pressure_outer_GPa": "outer GPa",
-    "film_central_um": "film µm",
-    "lambda": "Λ",
-}
-
-
-def print_bearing(content: dict[str, Any]) -> None:
-    """Deflections and a table of balls or rollers for one bearing or each of a set."""
-    console = _console()
-    for index, bearing in enumerate(content.get("bearings", [content])):
-        scalars = {key: value for key, value in bearing.items() if not isinstance(value, (list, dict))}
-        console.print(
-            ", ".join(f"{key} {value:.5g}" for key, value in scalars.items() if isinstance(value, float))
-        )
-        balls = bearing["balls"] if "balls" in bearing else bearing["rollers"]
-        shown = (key for key in _ROLLING_ELEMENT if key in balls[0])
-        keys = [key for key in shown if any(ball[key] is not None for ball in balls)]
-        table = _table(f"bearing {index + 1}", *(_ROLLING_ELEMENT[key] for key in keys))
-        for ball in balls:
-            table.add_row(*("–" if ball[key] is None else f"{ball[key]:.4g}" for key in keys))
-        console.print(table)
-    for warning in content["warnings"]:
-        console.print(warning["text"], style="dim")
-
-
 def print_crosscheck(content: dict[str, Any], folder: Path) -> None:
     """Largest differences between network and elements."""
-    console = _console()
-    table = _table("Largest differences", "node", "network °C", "FEM °C", "difference K")
+    console = open_console()
+    table = headed_table("Largest differences", "node", "network °C", "FEM °C", "difference K")
     for node in sorted(content["nodes"], key=lambda item: -abs(item["difference_K"]))[:12]:
         table.add_row(
             node["node"],
@@ -245,8 +213,8 @@ def print_crosscheck(content: dict[str, Any], folder: Path) -> None:
 
 def print_simulation(content: dict[str, Any], folder: Path) -> None:
     """Error of every temperature channel."""
-    console = _console()
-    table = _table("Channels", "channel", "rmse K", "noise K")
+    console = open_console()
+    table = headed_table("Channels", "channel", "rmse K", "noise K")
     for channel in content["channels"]:
         table.add_row(channel["channel"], _number(channel["rmse_K"], 3), _number(channel["noise_K"], 3))
     console.print(table)
@@ -259,7 +227,7 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     """Verdict, findings, alternatives and the fit before and after."""
     from spindle_fem.report.diagnosis_words import level
 
-    console = _console()
+    console = open_console()
     mismatch, fit = content["mismatch"], content["fit"]
     _print_marked(console, content["verdict"], f"  (p {level(mismatch['p_value'])})", "bold")
     if content["reason"]:
@@ -268,13 +236,13 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
         lead = "Comes nearest: " if content["verdict"] == "unexplained" else ""
         console.print(f"{lead}{finding['statement']}  (set: {content['set_probability']:.2f})")
     if content["alternatives"]:
-        table = _table("Not ruled out", "set", "probability")
+        table = headed_table("Not ruled out", "set", "probability")
         for item in content["alternatives"]:
             names = " + ".join(f"{f['effect']} at {f['component']}" for f in item["findings"])
             table.add_row(names or "nothing", _number(item["probability"], 3))
         console.print(table)
     if fit["noise_K"] is not None:
-        table = _table("Fit", "", "fitted K", "held out K")
+        table = headed_table("Fit", "", "fitted K", "held out K")
         for name in ("before", "after"):
             table.add_row(
                 name, _number(fit[name]["train_rmse_K"], 3), _number(fit[name]["heldout_rmse_K"], 3)
@@ -296,12 +264,12 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
 
 def print_plan(content: dict[str, Any], folder: Path) -> None:
     """What a planned test tells, the best further sensors and tests."""
-    console = _console()
+    console = open_console()
     for sentence in content["summary"]:
         console.print(sentence)
     hours = f"Tests of {content['best_test']['length_s'] / 3600.0:.3g} h" if content["best_test"] else ""
     for key, title in (("sensors_in_turn", "Further sensors, one after another"), ("tests", hours)):
-        table = _table(title, "", "information bit", "seen", "told from all")
+        table = headed_table(title, "", "information bit", "seen", "told from all")
         table.columns[0].no_wrap = False
         for item in content[key]:
             table.add_row(
@@ -319,8 +287,10 @@ def print_plan(content: dict[str, Any], folder: Path) -> None:
 
 def print_diagnoses(content: dict[str, Any], folder: Path) -> None:
     """Verdict and findings of every recording, and the reasons of those that failed."""
-    console = _console()
-    table = _table("Recordings", "recording", "verdict", "findings", "probability", "before K", "after K")
+    console = open_console()
+    table = headed_table(
+        "Recordings", "recording", "verdict", "findings", "probability", "before K", "after K"
+    )
     for row in content["rows"]:
         table.add_row(
             row["recording"],
@@ -339,7 +309,7 @@ def print_diagnoses(content: dict[str, Any], folder: Path) -> None:
 
 def print_sweep(content: dict[str, Any], folder: Path) -> None:
     """How many designs were solved, which is best, and where the table is."""
-    console = _console()
+    console = open_console()
     for key, value in content.items():
         if isinstance(value, (str, int, float)) and key != "schema":
             console.print(f"{key.replace('_', ' ')}: {value}")
@@ -382,10 +352,10 @@ def print_transient(content: dict[str, Any], folder: Path) -> None:
     """Headline of a transient study: the end of every phase, and the approach to equilibrium."""
     from spindle_fem.report.transient_report import equilibrium_text
 
-    console = _console()
+    console = open_console()
     phases, equilibrium = content["phases"], content["equilibrium"]
     probes = list(phases[0]["probes_degC"])
-    table = _table(
+    table = headed_table(
         f"{content['study']}: {content['machine']}, {content['unknowns']:,} temperatures",
         "end of",
         "after h",
@@ -473,8 +443,8 @@ def designs_done(show: bool, total: int) -> Iterator[Callable[[int], None]]:
 
 def print_draft(content: dict[str, Any], folder: Path) -> None:
     """What each column was taken for, how the files were read, and what is unsure."""
-    console = _console()
-    table = _table("Channels", "column", "role", "stands for", "unit")
+    console = open_console()
+    table = headed_table("Channels", "column", "role", "stands for", "unit")
     for channel in content["channels"]:
         means = channel["probe"] or channel["drives"] or "–"
         table.add_row(channel["column"], channel["role"], means, channel["unit"] or "–")

@@ -34,6 +34,10 @@ _WIDTH = {
 _BALL_SERIES = {"719": ("9", "19", 0.60), "70": ("0", "10", 0.635), "72": ("2", "02", 0.635)}
 # Designation prefix: diameter series, dimension series, rows.
 _ROLLER_SERIES = {"N10": ("0", "10", 1), "NN30": ("0", "30", 2)}
+# Conrad bearings: the balls enter while they fill so much of the circle.
+_GROOVE_SERIES = {"60": ("0", "10", 0.60), "62": ("2", "02", 0.60)}
+_ASSEMBLY_ARC = 195.0 / 360.0
+_GROOVE_CLEARANCE = "10 um"
 _ANGLES = {"C": "15 deg", "E": "25 deg", "AC": "25 deg"}
 _BALL_STEP = 25.4 / 32.0
 _PITCH_FILL = 0.85
@@ -45,10 +49,17 @@ _ROLLER = 0.45
 _BEARING_LENGTH = 0.9
 
 _BALL = re.compile(r"(719|70|72)(\d\d)[ _]?(C|E|AC)([ _/]?HC)?", re.ASCII)
+_GROOVE = re.compile(r"(60|62)(\d\d)([ _/]?HC)?", re.ASCII)
 _ROLLERS = re.compile(r"(NN30|N10)(\d\d)(?:[ _]?K)?([ _/]?HC)?", re.ASCII)
 RULE = (
     "boundary dimensions of ISO 15; the largest ball of whole 1/32 in within 0.60 (719) or 0.635 (70, 72) "
     "of the section, on 0.85 of the pitch circle; shoulders 0.6 ball diameters from it; grooves of 0.52"
+)
+
+GROOVE_RULE = (
+    "boundary dimensions of ISO 15; the largest ball of whole 1/32 in within 0.60 of the section, as many as "
+    "fill an arc of 195 degrees and one more; shoulders 0.6 ball diameters from the pitch circle; grooves of "
+    "0.52; 10 µm of clearance as mounted"
 )
 
 ROLLER_RULE = (
@@ -68,7 +79,7 @@ PRELOAD_RULE = (
 
 SHIPPED = (
     "Bearings that ship: 719xx, 70xx, 72xx with C, E or AC, such as 7014 C, N10xx and NN30xx, such as "
-    "NN3014 K, bores 20 to 200 mm."
+    "NN3014 K, 60xx and 62xx, such as 6014, bores 20 to 200 mm."
 )
 
 
@@ -82,7 +93,11 @@ def boundary_dimensions(designation: str) -> tuple[float, float, float] | None:
     (0.07, 0.11, 0.02)
     """
     ball, roller = _BALL.fullmatch(designation), _ROLLERS.fullmatch(designation)
-    if ball:
+    groove = _GROOVE.fullmatch(designation)
+    if groove:
+        diameter_series, dimension_series, _ = _GROOVE_SERIES[groove[1]]
+        code = groove[2]
+    elif ball:
         diameter_series, dimension_series, _ = _BALL_SERIES[ball[1]]
         code = ball[2]
     elif roller:
@@ -113,9 +128,12 @@ def catalogue_bearing(designation: str) -> dict[str, Any] | None:
         return None
     ball, roller = _BALL.fullmatch(designation), _ROLLERS.fullmatch(designation)
     bore, outer, width = (1e3 * value for value in dimensions)
-    table = _balls(ball, bore, outer) if ball else _rollers(roller, bore, outer)
+    if groove := _GROOVE.fullmatch(designation):
+        table = _groove_balls(groove, bore, outer)
+    else:
+        table = _balls(ball, bore, outer) if ball else _rollers(roller, bore, outer)
     boundary = {"bore_diameter": bore, "outer_diameter": outer, "width": width}
-    given = ("contact_angle",) if ball else ("rows",)
+    given = [key for key in ("contact_angle", "rows") if key in table]
     return {
         "marks": {"default": "A", **dict.fromkeys((*boundary, *given), "C")},
         **{key: _millimetres(value) for key, value in boundary.items()},
@@ -145,24 +163,46 @@ def estimated(table: dict[str, Any]) -> str:
     if "roller_count" in table:
         size = f"{table['roller_diameter']} x {table['roller_length']}"
         return f"{table.get('rows', 1)} x {table['roller_count']} rollers of {size}; {ROLLER_RULE}"
-    return f"{table['ball_count']} balls of {table['ball_diameter']}; {RULE}"
+    rule = GROOVE_RULE if table.get("kind") == "deep_groove_ball" else RULE
+    return f"{table['ball_count']} balls of {table['ball_diameter']}; {rule}"
 
 
 def _balls(match: re.Match[str], bore: float, outer: float) -> dict[str, Any]:
     """What a ball bearing adds to its boundary (mm)."""
-    fill = _BALL_SERIES[match[1]][2]
-    ball = _BALL_STEP * math.floor(fill * 0.5 * (outer - bore) / _BALL_STEP + 1e-9)
-    pitch = 0.5 * (bore + outer)
+    ball, pitch = _ball_and_pitch(_BALL_SERIES[match[1]][2], bore, outer)
+    return {
+        "ball_count": round(_PITCH_FILL * math.pi * pitch / ball),
+        "contact_angle": _ANGLES[match[3]],
+        **_ball_sizes(ball, pitch, hybrid=bool(match[4])),
+    }
+
+
+def _groove_balls(match: re.Match[str], bore: float, outer: float) -> dict[str, Any]:
+    """What a deep-groove ball bearing adds to its boundary (mm)."""
+    ball, pitch = _ball_and_pitch(_GROOVE_SERIES[match[1]][2], bore, outer)
+    return {
+        "kind": "deep_groove_ball",
+        "ball_count": math.floor(_ASSEMBLY_ARC * math.pi / math.asin(ball / pitch) + 1.0),
+        "radial_clearance": _GROOVE_CLEARANCE,
+        **_ball_sizes(ball, pitch, hybrid=bool(match[3])),
+    }
+
+
+def _ball_and_pitch(fill: float, bore: float, outer: float) -> tuple[float, float]:
+    """Ball and pitch circle of a section, mm."""
+    return _BALL_STEP * math.floor(fill * 0.5 * (outer - bore) / _BALL_STEP + 1e-9), 0.5 * (bore + outer)
+
+
+def _ball_sizes(ball: float, pitch: float, *, hybrid: bool) -> dict[str, Any]:
+    """Keys that all ball bearings have, of sizes in mm."""
     return {
         "inner_ring_outer_diameter": _millimetres(pitch - _SHOULDER * ball),
         "outer_ring_inner_diameter": _millimetres(pitch + _SHOULDER * ball),
         "ball_diameter": _millimetres(ball),
-        "ball_count": round(_PITCH_FILL * math.pi * pitch / ball),
         "pitch_diameter": _millimetres(pitch),
-        "contact_angle": _ANGLES[match[3]],
         "groove_curvature_inner": 0.52,
         "groove_curvature_outer": 0.52,
-        "ball_material": "silicon_nitride" if match[4] else "bearing_steel",
+        "ball_material": "silicon_nitride" if hybrid else "bearing_steel",
     }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 from spindle_fem.definition.bearing_catalogue import SHIPPED
 from spindle_fem.definition.bearing_seats import seat_faults
-from spindle_fem.definition.bearing_types import BearingType, RollerBearingType
+from spindle_fem.definition.bearing_types import RollerBearingType
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
 from spindle_fem.definition.set_completion import is_known_material
 from spindle_fem.definition.standard_materials import MATERIALS
@@ -36,16 +36,17 @@ def bearing_faults(
             what = f'"{group.spacers}" is no material of this machine.'
             allowed = did_you_mean(group.spacers, (*spec.materials, *MATERIALS))
             yield SpecError(f"bearing_set.{group.name}.spacers", what, allowed)
+        yield from _single_type_faults(spec, group, types)
         kind = spec.bearing_types.get(group.bearing_type)
         if kind is None:
             continue
-        yield from _width_faults(group, kind)
+        yield from _width_faults(spec, group)
         if isinstance(kind, RollerBearingType):
             yield from _roller_set_faults(group)
         else:
             yield from _ball_set_faults(group)
             if group.fit is not None:
-                yield from seat_faults(spec, group, kind)
+                yield from seat_faults(spec, group)
     carriers = [group.name for group in spec.bearing_set if group.carries_thrust]
     if spec.bearing_set and len(carriers) != 1 and all_sound:
         yield SpecError(
@@ -59,14 +60,36 @@ def bearing_faults(
         yield from _radial_faults(spec)
 
 
-def _width_faults(group: BearingSet, kind: BearingType) -> Iterator[SpindleFemError]:
+def _single_type_faults(
+    spec: MachineSpec, group: BearingSet, types: Collection[str]
+) -> Iterator[SpindleFemError]:
+    """Types of single bearings that do not exist, or do not go with their set."""
     for bearing in group.bearing:
+        name = bearing.bearing_type
+        if name is None:
+            continue
+        where = f"bearing_set.{group.name}.bearing.{bearing.name}.bearing_type"
+        if name not in types:
+            allowed = f"{did_you_mean(name, types)} {SHIPPED}".strip()
+            yield SpecError(where, f'"{name}" is no bearing type of this machine.', allowed)
+        kinds = [spec.bearing_types.get(key) for key in (name, group.bearing_type)]
+        if any(isinstance(kind, RollerBearingType) for kind in kinds) and kinds[0] is not kinds[1]:
+            what = "cylindrical rollers stand in sets of one type."
+            yield SpecError(where, what, "Leave it out, or make a set of its own.")
+
+
+def _width_faults(spec: MachineSpec, group: BearingSet) -> Iterator[SpindleFemError]:
+    for bearing in group.bearing:
+        name = group.type_name(bearing)
+        kind = spec.bearing_types.get(name)
+        if kind is None:
+            continue
         width = bearing.z[1] - bearing.z[0]
         if abs(width - kind.width) > _TOLERANCE:
             yield SpecError(
                 f"bearing_set.{group.name}.bearing.{bearing.name}.z",
                 f"spans {width * 1e3:g} mm.",
-                f'Allowed: {kind.width * 1e3:g} mm, the width of "{group.bearing_type}".',
+                f'Allowed: {kind.width * 1e3:g} mm, the width of "{name}".',
             )
 
 

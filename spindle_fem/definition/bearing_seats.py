@@ -35,8 +35,27 @@ def seat_diameter(
     return None
 
 
-def seat_faults(spec: MachineSpec, group: BearingSet, kind: BallBearingType) -> Iterator[SpindleFemError]:
+def seat_faults(spec: MachineSpec, group: BearingSet) -> Iterator[SpindleFemError]:
     """Rings of a set with a fit that sit on nothing, looser than their bearing or tighter than they bear."""
+    found = {name: spec.bearing_types.get(name) for name in map(group.type_name, group.bearing)}
+    kinds = {name: kind for name, kind in found.items() if isinstance(kind, BallBearingType)}
+    for kind in kinds.values():
+        yield from _fit_faults(group, kind)
+    for bearing in group.bearing:
+        kind = kinds.get(group.type_name(bearing))
+        if kind is None:
+            continue
+        for side, diameter in (("inner", kind.bore_diameter), ("outer", kind.outer_diameter)):
+            if seat_diameter(spec, kind, bearing, side) is None:
+                yield SpecError(
+                    f"bearing_set.{group.name}.fit",
+                    f"the {side} ring of {bearing.name} sits on no part: none "
+                    f"has a face of {diameter * 1e3:g} mm there.",
+                    "Allowed: rings on a rotating and a standing part; or leave the fit out.",
+                )
+
+
+def _fit_faults(group: BearingSet, kind: BallBearingType) -> Iterator[SpindleFemError]:
     play = kind.play
     for key, clearance, diameter in (
         ("inner_interference", -group.fit.inner_interference, kind.bore_diameter),
@@ -56,15 +75,6 @@ def seat_faults(spec: MachineSpec, group: BearingSet, kind: BallBearingType) -> 
                 f"of the bearing itself ({play * 1e6:.0f} µm on the diameter).",
                 "Give a tighter fit, or leave the fit out.",
             )
-    for bearing in group.bearing:
-        for side, diameter in (("inner", kind.bore_diameter), ("outer", kind.outer_diameter)):
-            if seat_diameter(spec, kind, bearing, side) is None:
-                yield SpecError(
-                    f"bearing_set.{group.name}.fit",
-                    f"the {side} ring of {bearing.name} sits on no part: none "
-                    f"has a face of {diameter * 1e3:g} mm there.",
-                    "Allowed: rings on a rotating and a standing part; or leave the fit out.",
-                )
 
 
 def followed_joint_faults(spec: MachineSpec) -> Iterator[SpindleFemError]:

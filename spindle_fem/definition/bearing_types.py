@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -37,7 +37,21 @@ BallKind = choice_field(_KINDS, keep=lambda name: not has_rollers(name))
 RollerKind = choice_field(_KINDS, keep=has_rollers)
 GrooveCurvature = quantity_field("", at_least=0.505, at_most=0.6)
 PoissonRatio = quantity_field("", at_least=0.0, at_most=0.5)
+SealMoment = quantity_field("N*m", at_least=0.0, at_most=10.0)
 RadialClearance = quantity_field("m", at_least=-1.0e-4, at_most=1.0e-3)
+
+
+class Cage(SpecModel):
+    """A cage that runs on a ring's land and shears the oil between, by Petroff's law; heat model `full`."""
+
+    land_diameter: PositiveLength
+    """Of the ring's land."""
+    land_width: PositiveLength
+    """What of it guides, both sides together."""
+    clearance: PositiveLength
+    """Between cage and land, on the radius."""
+    land: Literal["inner", "outer"] = "outer"
+    """Ring that guides it."""
 
 
 class _BearingType(SpecModel):
@@ -65,6 +79,8 @@ class _BearingType(SpecModel):
     """Poisson's ratio of the rings, and of balls or rollers of the same material."""
     roughness_raceway: PositiveLength = 0.05e-6
     """Root mean square (Rq)."""
+    seal_moment: SealMoment | None = None
+    """Friction moment of the rubbing seals of one bearing, both together; their heat joins the bearing's."""
 
     @model_validator(mode="after")
     def _check(self) -> _BearingType:
@@ -137,7 +153,9 @@ class BallBearingType(_BearingType):
     ball_count: Annotated[int, Field(ge=3, le=200, strict=True)]
     """In one row."""
     contact_angle: Angle
-    """Unloaded, above 0 up to 60 degrees."""
+    """Unloaded, above 0 up to 60 degrees; of a `deep_groove_ball` it follows from `radial_clearance`."""
+    radial_clearance: PositiveLength | None = None
+    """Of a `deep_groove_ball`, on the diameter, as mounted."""
     groove_curvature_inner: GrooveCurvature
     """Groove radius over ball diameter."""
     groove_curvature_outer: GrooveCurvature
@@ -148,9 +166,14 @@ class BallBearingType(_BearingType):
     """A key of `[materials]`."""
     roughness_ball: PositiveLength = 0.01e-6
     """Root mean square (Rq)."""
+    cage: Cage | None = None
+    """How a land guides the cage, for the heat model `full`."""
 
     def _element_faults(self) -> list[Fault]:
         faults = super()._element_faults()
+        if self.radial_clearance is not None and self.kind != "deep_groove_ball":
+            what = f"a {self.kind} has a contact_angle instead."
+            faults.append(Fault("radial_clearance", what, 'Leave it out, or give kind = "deep_groove_ball".'))
         if not 0.0 < self.contact_angle <= math.radians(60.0) + 1e-9:
             faults.append(
                 Fault(
@@ -271,4 +294,4 @@ BearingType = Annotated[
     Discriminator(_elements),
 ]
 
-__all__ = ["BallBearingType", "BearingType", "RollerBearingType"]
+__all__ = ["BallBearingType", "BearingType", "Cage", "RollerBearingType"]

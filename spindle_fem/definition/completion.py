@@ -7,6 +7,7 @@ sees a complete one. What is malformed stays as it is, for validation to name.
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -84,15 +85,23 @@ def with_named_types(content: Mapping[str, Any]) -> dict[str, Any]:
         return dict(content)
     types, groups = dict(given), []
     for group in sets:
-        if isinstance(group, Mapping) and isinstance(group.get("bearing_type"), str):
-            designation = group["bearing_type"]
-            name = designation.replace(" ", "_").replace("/", "_")
-            own = types.get(name, {})
-            if bearing_catalogue.catalogue_bearing(designation) and _is_partial(own):
-                types[name] = _under({"catalogue": designation, "marks": {"default": "C"}}, own)
-            group = {**group, "bearing_type": name} if name in types else group
+        group = _with_named_type(group, types)
+        if isinstance(group, Mapping) and isinstance(group.get("bearing"), list):
+            group = {**group, "bearing": [_with_named_type(row, types) for row in group["bearing"]]}
         groups.append(group)
     return {**content, "bearing_set": groups, **({"bearing_types": types} if types else {})}
+
+
+def _with_named_type(table: Any, types: dict[str, Any]) -> Any:
+    """A set, or a bearing of it, with the name of its type, which joins the types where it ships."""
+    if not isinstance(table, Mapping) or not isinstance(table.get("bearing_type"), str):
+        return table
+    designation = table["bearing_type"]
+    name = designation.replace(" ", "_").replace("/", "_")
+    own = types.get(name, {})
+    if bearing_catalogue.catalogue_bearing(designation) and _is_partial(own):
+        types[name] = _under({"catalogue": designation, "marks": {"default": "C"}}, own)
+    return {**table, "bearing_type": name} if name in types else table
 
 
 def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
@@ -105,12 +114,27 @@ def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
         designation = table.get("catalogue") if isinstance(table, Mapping) else None
         found = bearing_catalogue.catalogue_bearing(designation) if isinstance(designation, str) else None
         if found is None:
+            types[name] = _with_angle(table)
             continue
         taken = [key for key in found if key not in table and key != "marks"]
         types[name] = _under(found, table)
         if taken:
             text = f"{designation}: {bearing_catalogue.estimated(types[name])}"
             assumed.append(Assumption(f"bearing_types.{name}", text))
+        types[name] = _with_angle(types[name])
+
+
+def _with_angle(table: Any) -> Any:
+    """A type of deep-groove bearing with the contact angle that its clearance gives."""
+    if not isinstance(table, Mapping) or "radial_clearance" not in table or "contact_angle" in table:
+        return table
+    clearance, ball = (length_of(table.get(key)) for key in ("radial_clearance", "ball_diameter"))
+    apart = [table.get(f"groove_curvature_{ring}") for ring in ("inner", "outer")]
+    if not clearance or not ball or not all(isinstance(value, float) for value in apart) or sum(apart) <= 1.0:
+        return table
+    # cos α = 1 - P_d / (2 A), as physics.bearings.bearing_geometry has it, which loads numpy
+    cosine = max(1.0 - clearance / (2.0 * (sum(apart) - 1.0) * ball), -1.0)
+    return {**table, "contact_angle": f"{math.degrees(math.acos(cosine)):.10g} deg"}
 
 
 def _is_partial(table: Any) -> bool:
@@ -135,12 +159,14 @@ def _bearing_places(content: dict[str, Any], assumed: list[Assumption]) -> None:
     for group in content.get("bearing_set") if isinstance(content.get("bearing_set"), list) else ():
         if isinstance(group, Mapping) and isinstance(group.get("bearing"), list):
             types = content.get("bearing_types")
-            kind = types.get(str(group.get("bearing_type"))) if isinstance(types, Mapping) else None
-            width = length_of(kind.get("width")) if isinstance(kind, Mapping) else None
-            # An unknown type is the one fault: its bearings have some width.
-            width = _UNKNOWN_WIDTH if width is None else width
             rows = []
             for row in group["bearing"]:
+                own = row.get("bearing_type") if isinstance(row, Mapping) else None
+                name = str(own or group.get("bearing_type"))
+                kind = types.get(name) if isinstance(types, Mapping) else None
+                width = length_of(kind.get("width")) if isinstance(kind, Mapping) else None
+                # An unknown type is the one fault: its bearings have some width.
+                width = _UNKNOWN_WIDTH if width is None else width
                 start = length_of(row.get("z")) if isinstance(row, Mapping) else None
                 if start is not None:
                     row = {**row, "z": [f"{1e3 * start:.12g} mm", f"{1e3 * (start + width):.12g} mm"]}

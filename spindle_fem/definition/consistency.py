@@ -422,7 +422,7 @@ def _sections(spec: MachineSpec, part_name: str) -> list[tuple[float, float, flo
             return [(*item.z, item.inner_diameter / 2.0, item.outer_diameter / 2.0) for item in part.segment]
     bearing_name, _, ring = part_name.rpartition(".")
     for group, bearing in spec.bearings:
-        kind: BearingType | None = spec.bearing_types.get(group.bearing_type)
+        kind: BearingType | None = spec.bearing_types.get(group.type_name(bearing))
         if bearing.name == bearing_name and kind is not None:
             inner = (kind.bore_diameter, kind.inner_ring_outer_diameter)
             outer = (kind.outer_ring_inner_diameter, kind.outer_diameter)

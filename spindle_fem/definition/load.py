@@ -288,7 +288,7 @@ def _layers_and_content(machine: str | Path, overrides: Iterable[str]) -> tuple[
     faults: list[SpindleFemError] = []
     for override in overrides:
         try:
-            content = apply_overrides(content, [override])
+            content = with_named_types(apply_overrides(content, [override]))
             path, _ = split_override(override)
             layers.append(Layer(f"--set {path}", {}, path))
         except SpecError as error:

@@ -331,7 +331,8 @@ class MachineSpec(SpecModel):
     @property
     def rolling_elements(self) -> str:
         """What its bearings roll on: "balls", "rollers" or "balls and rollers"; empty without bearings."""
-        words = {f"{self.bearing_types[group.bearing_type].element_word}s" for group in self.bearing_set}
+        names = [group.type_name(bearing) for group, bearing in self.bearings]
+        words = {f"{self.bearing_types[name].element_word}s" for name in names}
         return " and ".join(sorted(words))
 
     @property
@@ -368,7 +369,7 @@ class MachineSpec(SpecModel):
         bearing_name, _, ring = part_name.rpartition(".")
         for group, bearing in self.bearings:
             if bearing.name == bearing_name and ring in ("inner_ring", "outer_ring"):
-                return self.materials[self.bearing_types[group.bearing_type].ring_material]
+                return self.materials[self.bearing_types[group.type_name(bearing)].ring_material]
         raise KeyError(part_name)
 
 

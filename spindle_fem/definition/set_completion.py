@@ -49,6 +49,9 @@ def _preload(groups: list[Any], position: int, kind: Mapping[str, Any]) -> Itera
     if own is None:
         return
     rows = group.get("bearing")
+    if rows and any(isinstance(row, Mapping) and row.get("bearing_type") for row in rows):
+        # a class is that of equal bearings
+        return
     sides = [row.get("takes_thrust") for row in rows if isinstance(row, Mapping)] if rows else []
     numbers = [sides.count(side) for side in ("towards_rear", "towards_nose")]
     if not all(numbers):

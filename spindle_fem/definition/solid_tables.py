@@ -125,6 +125,8 @@ class SetBearing(SpecModel):
     """From and to of its rings, as long as the type is wide; or where they begin."""
     takes_thrust: Literal["towards_rear", "towards_nose"] | None = None
     """Direction of the force on the shaft that this ball bearing carries; rollers carry none."""
+    bearing_type: Annotated[str, Field(strict=True)] | None = None
+    """Where it is another than its set's: other balls, another contact angle; balls with balls only."""
 
 
 class BallRow(SpecModel):
@@ -202,6 +204,10 @@ class BearingSet(SpecModel):
     spacers: Name | None = None
     """A material: bearings that stand apart get rings between them, the parts `NAME_inner_spacer` and
     `NAME_outer_spacer` of the set NAME (numbered where there are several), unless the file has such parts."""
+
+    def type_name(self, bearing: SetBearing) -> str:
+        """Key of a bearing's type: its own, or that of the set."""
+        return self.bearing_type if bearing.bearing_type is None else bearing.bearing_type
 
     @model_validator(mode="after")
     def _check(self) -> BearingSet:

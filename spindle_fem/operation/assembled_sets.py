@@ -6,11 +6,13 @@ import math
 from typing import Literal
 
 from spindle_fem.definition.bearing_seats import seat_diameter
+from spindle_fem.definition.bearing_types import BallBearingType, Cage
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, RollerBearingType
 from spindle_fem.definition.solid_tables import Material, SetBearing
 from spindle_fem.errors import SpecError
 from spindle_fem.physics.bearings import mounting
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_EXPANSION, BearingGeometry
+from spindle_fem.physics.bearings.cage_guidance import CageGuidance
 from spindle_fem.physics.bearings.fits import FitTemperatures, RingFits, mounted_state, seated_rings
 from spindle_fem.physics.bearings.heat_model import friction_model_names
 from spindle_fem.physics.bearings.hertz import (
@@ -37,34 +39,11 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
     kind = spec.bearing_types[group.bearing_type]
     if isinstance(kind, RollerBearingType):
         return _roller_set(spec, group, kind)
-    rings, balls = spec.materials[kind.ring_material], spec.materials[kind.ball_material]
-    hybrid = kind.ball_material != kind.ring_material
-    geometry = BearingGeometry(
-        ball_diameter=kind.ball_diameter,
-        ball_count=kind.ball_count,
-        pitch_diameter=kind.pitch,
-        contact_angle=kind.contact_angle,
-        groove_curvature_inner=kind.groove_curvature_inner,
-        groove_curvature_outer=kind.groove_curvature_outer,
-        young_modulus=kind.young_modulus,
-        poisson_ratio=kind.poisson_ratio,
-        density=balls.density,
-        ball_young_modulus=balls.young_modulus if hybrid else None,
-        ball_poisson_ratio=balls.poisson_ratio if hybrid else None,
-        ring_density=rings.density,
-        thermal_expansion=rings.thermal_expansion,
-        ball_thermal_expansion=balls.thermal_expansion,
-        bore_diameter=kind.bore_diameter,
-        outer_diameter=kind.outer_diameter,
-        width=kind.width,
-        static_load_rating=kind.basic_static_load,
-        kind=kind.kind,
-    )
     mounted = mounting.BearingSet(
         bearings=tuple(
             mounting.MountedBearing(
                 bearing.name,
-                geometry,
+                ball_geometry(spec, spec.bearing_types[group.type_name(bearing)]),
                 _ORIENTATION[bearing.takes_thrust],
                 0.5 * (bearing.z[0] + bearing.z[1]),
                 _ring_fits(spec, group, bearing),
@@ -84,6 +63,35 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
     return mounted
 
 
+def ball_geometry(spec: MachineSpec, kind: BallBearingType) -> BearingGeometry:
+    """A type of ball bearing for the laws of its balls, of the machine's materials."""
+    rings, balls = spec.materials[kind.ring_material], spec.materials[kind.ball_material]
+    hybrid = kind.ball_material != kind.ring_material
+    return BearingGeometry(
+        ball_diameter=kind.ball_diameter,
+        ball_count=kind.ball_count,
+        pitch_diameter=kind.pitch,
+        contact_angle=kind.contact_angle,
+        groove_curvature_inner=kind.groove_curvature_inner,
+        groove_curvature_outer=kind.groove_curvature_outer,
+        young_modulus=kind.young_modulus,
+        poisson_ratio=kind.poisson_ratio,
+        density=balls.density,
+        ball_young_modulus=balls.young_modulus if hybrid else None,
+        ball_poisson_ratio=balls.poisson_ratio if hybrid else None,
+        ring_density=rings.density,
+        thermal_expansion=rings.thermal_expansion,
+        ball_thermal_expansion=balls.thermal_expansion,
+        bore_diameter=kind.bore_diameter,
+        outer_diameter=kind.outer_diameter,
+        width=kind.width,
+        static_load_rating=kind.basic_static_load,
+        kind=kind.kind,
+        seal_moment=kind.seal_moment,
+        cage=_cage(kind.cage),
+    )
+
+
 def require_known_friction(spec: MachineSpec) -> None:
     """Refuse a heat model that does not know the kinds of bearing of a machine.
 
@@ -91,12 +99,18 @@ def require_known_friction(spec: MachineSpec) -> None:
     ------
     SpecError
     """
-    types = (spec.bearing_types[group.bearing_type] for group in spec.bearing_set)
+    types = (spec.bearing_types[group.type_name(bearing)] for group, bearing in spec.bearings)
     known = friction_model_names(rollers=True)
     model = spec.heat.model
     if model not in (*known, "table") and any(isinstance(kind, RollerBearingType) for kind in types):
         what = f'"{model}" knows ball bearings only, and this machine has roller bearings.'
         raise SpecError("heat.model", what, f"Allowed: {', '.join((*known, 'table'))}.")
+
+
+def _cage(given: Cage | None) -> CageGuidance | None:
+    if given is None:
+        return None
+    return CageGuidance(given.land_diameter, given.land_width, given.clearance, given.land)
 
 
 def _roller_set(spec: MachineSpec, group: BearingSet, kind: RollerBearingType) -> RollerSet:
@@ -121,6 +135,7 @@ def _roller_set(spec: MachineSpec, group: BearingSet, kind: RollerBearingType) -
         outer_diameter=kind.outer_diameter,
         palmgren_lubrication_factor=kind.palmgren_f0,
         kind=kind.kind,
+        seal_moment=kind.seal_moment,
     )
     return RollerSet(
         names=tuple(bearing.name for bearing in group.bearing),
@@ -167,7 +182,7 @@ def _ring_fits(spec: MachineSpec, group: BearingSet, bearing: SetBearing) -> Rin
     """Seats of one bearing's rings; None where the set has no fit."""
     if group.fit is None:
         return None
-    kind = spec.bearing_types[group.bearing_type]
+    kind = spec.bearing_types[group.type_name(bearing)]
     shaft, shaft_bore = seat_diameter(spec, kind, bearing, "inner")
     housing, wall = seat_diameter(spec, kind, bearing, "outer")
     own = group.fit.housing_outer_diameter
@@ -192,11 +207,13 @@ def _seat_material(material: Material) -> SeatMaterial:
 
 def _seat_expansion(spec: MachineSpec, group: BearingSet, side: Literal["inner", "outer"]) -> float:
     """Thermal expansion of what carries the set, 1/K; steel's where its rings sit on no part."""
-    seat = seat_diameter(spec, spec.bearing_types[group.bearing_type], group.bearing[0], side)
+    first = group.bearing[0]
+    seat = seat_diameter(spec, spec.bearing_types[group.type_name(first)], first, side)
     return STEEL_EXPANSION if seat is None else spec.part_material(seat[0]).thermal_expansion
 
 
 def _shaft_bore(spec: MachineSpec, group: BearingSet) -> float | None:
     """Bore of the rotating part that carries the set; None under a solid shaft."""
-    seat = seat_diameter(spec, spec.bearing_types[group.bearing_type], group.bearing[0], "inner")
+    first = group.bearing[0]
+    seat = seat_diameter(spec, spec.bearing_types[group.type_name(first)], first, "inner")
     return None if seat is None else seat[1] or None

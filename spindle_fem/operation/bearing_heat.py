@@ -361,7 +361,8 @@ class BearingMechanics:
         return (mounted if expand else mounted.with_rigid_rings()), found
 
     def _ball_path(self, group: BearingSet, state: BearingState) -> BallConductance:
-        kind, grease = self.spec.bearing_types[group.bearing_type], self.spec.grease
+        bearing = next(item for item in group.bearing if item.name == state.name)
+        kind, grease = self.spec.bearing_types[group.type_name(bearing)], self.spec.grease
         return ball_conductance(
             state,
             self.lubricant,

@@ -59,7 +59,7 @@ class CoefficientTable:
         """Volumetric capacity of every material [J/(m³·K)] and capacity of every ball row [J/K]."""
         values = {f"capacity.{name}": value for name, value in material_capacities(self.spec).items()}
         for group, bearing in self.spec.bearings:
-            values[f"capacity.{bearing.name}.balls"] = ball_row_capacity(self.spec, group)
+            values[f"capacity.{bearing.name}.balls"] = ball_row_capacity(self.spec, group, bearing)
         return values
 
     def heat_groups(self, bearing: str) -> tuple[str, ...]:

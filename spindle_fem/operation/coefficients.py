@@ -20,6 +20,7 @@ from spindle_fem.definition.machine_spec import (
     MachineSpec,
     NaturalFilm,
 )
+from spindle_fem.definition.solid_tables import SetBearing
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.operation.circuits import circuit_film
 from spindle_fem.operation.loads import BearingHeat
@@ -145,9 +146,9 @@ def ball_conductances(group: BearingSet, heat: BearingHeat | None = None) -> tup
     return (np.nan, np.nan) if heat is None else (heat.conductance_inner, heat.conductance_outer)
 
 
-def ball_row_capacity(spec: MachineSpec, group: BearingSet) -> float:
+def ball_row_capacity(spec: MachineSpec, group: BearingSet, bearing: SetBearing) -> float:
     """Heat capacity of the balls or rollers of one bearing of a set, J/K."""
-    kind = spec.bearing_types[group.bearing_type]
+    kind = spec.bearing_types[group.type_name(bearing)]
     capacity = group.ball_row.capacity
     if capacity is None:
         capacity = kind.element_volume * spec.materials[kind.element_material].volumetric_heat_capacity

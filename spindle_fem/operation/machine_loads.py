@@ -202,7 +202,8 @@ class LoadsBuilder:
             value * change.factor(f"balls.{name}.{side}")
             for value, side in zip(ball_conductances(group, heat), ("inner", "outer"), strict=True)
         ]
-        capacity = ball_row_capacity(self.spec, group)
+        bearing = next(item for item in group.bearing if item.name == name)
+        capacity = ball_row_capacity(self.spec, group, bearing)
         raceways = (f"{name}.inner_raceway", f"{name}.outer_raceway")
         sectors = {
             surface: np.minimum(

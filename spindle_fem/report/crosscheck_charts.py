@@ -76,7 +76,7 @@ def _patches(
     for (group, bearing), value in zip(
         machine.spec.bearings, values[machine.n_solid : machine.air_start], strict=True
     ):
-        kind = machine.spec.bearing_types[group.bearing_type]
+        kind = machine.spec.bearing_types[group.type_name(bearing)]
         axes.scatter(
             [_MM * np.mean(bearing.z)], [sign * 0.5 * _MM * kind.pitch], c=[value], cmap=colour_map,
             norm=norm, s=70,

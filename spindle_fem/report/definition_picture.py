@@ -55,7 +55,7 @@ def _boxes(spec: MachineSpec) -> Iterator[tuple[str, Box]]:
             radii = (0.5 * segment.inner_diameter, 0.5 * segment.outer_diameter)
             yield f"{part.name}.{segment.name}", (segment.z, radii)
     for group, bearing in spec.bearings:
-        kind = spec.bearing_types.get(group.bearing_type)
+        kind = spec.bearing_types.get(group.type_name(bearing))
         if kind is not None:
             inner = (0.5 * kind.bore_diameter, 0.5 * kind.inner_ring_outer_diameter)
             outer = (0.5 * kind.outer_ring_inner_diameter, 0.5 * kind.outer_diameter)

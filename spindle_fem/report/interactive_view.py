@@ -206,7 +206,7 @@ def _balls(result: ThermalResult) -> tuple[NDArray[np.float64], ...]:
     centres, sizes = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for group, bearing in result.spec.bearings:
         warmth = result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K
-        for row in element_rows(bearing, result.spec.bearing_types[group.bearing_type]):
+        for row in element_rows(bearing, result.spec.bearing_types[group.type_name(bearing)]):
             centres.append(np.array(row.centres))
             sizes.append(np.tile([0.5 * row.ball_diameter, row.length, warmth], (row.ball_count, 1)))
     return np.concatenate(centres), *np.concatenate(sizes).T

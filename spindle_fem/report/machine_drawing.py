@@ -230,7 +230,7 @@ def _outside_radius(spec: MachineSpec, z: float) -> float:
 
 def _draw_bearings(axes: Axes, spec: MachineSpec) -> None:
     for group, bearing in spec.bearings:
-        kind = spec.bearing_types[group.bearing_type]
+        kind = spec.bearing_types[group.type_name(bearing)]
         for row in element_rows(bearing, kind):
             draw_elements(axes, row, BALL_COLOUR, linewidth=1.0)
         if bearing.takes_thrust is None:
@@ -347,7 +347,7 @@ def _above(spec: MachineSpec) -> list[Label]:
 def _below(spec: MachineSpec, assembly: AssemblyGeometry) -> list[Label]:
     labels = []
     for group, bearing in spec.bearings:
-        kind = spec.bearing_types[group.bearing_type]
+        kind = spec.bearing_types[group.type_name(bearing)]
         labels.append(Label(bearing.name, np.array([0.5 * sum(bearing.z) * MM, -0.5 * kind.pitch * MM])))
     rings = {
         f"{bearing.name}.{ring}" for _, bearing in spec.bearings for ring in ("inner_ring", "outer_ring")

@@ -141,7 +141,7 @@ def bearing_balls(spec: MachineSpec, values: Mapping[str, Mapping[str, Array]]) 
     """
     found = []
     for group, bearing in spec.bearings:
-        for row in element_rows(bearing, spec.bearing_types[group.bearing_type]):
+        for row in element_rows(bearing, spec.bearing_types[group.type_name(bearing)]):
             found += [
                 Sphere(
                     np.array(place), 0.5 * row.ball_diameter, values.get(bearing.name, {}), length=row.length

@@ -58,7 +58,7 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
     draw_field(axes, section, bar, np.arange(math.ceil(bar.low / step) * step, bar.high, step))
     for group, bearing in result.spec.bearings:
         colour = bar.colours(result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K)
-        for row in element_rows(bearing, result.spec.bearing_types[group.bearing_type]):
+        for row in element_rows(bearing, result.spec.bearing_types[group.type_name(bearing)]):
             draw_elements(axes, row, colour, linewidth=0.8)
     for probe in result.spec.probe:
         if probe.kind == "point" and abs(math.sin(probe.angle)) < 0.02:
@@ -103,7 +103,7 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
     )
     kinds = {"rotating": CYCLE[1], "standing": CYCLE[0]}
     for axes, (group, bearing) in zip(grid.flat, bearings, strict=False):
-        kind = result.spec.bearing_types[group.bearing_type]
+        kind = result.spec.bearing_types[group.type_name(bearing)]
         profile = radial_profile(section, 0.5 * sum(bearing.z))
         for name, (radius, temperature) in profile.items():
             colour = kinds["rotating" if result.mesh.rotating[name] else "standing"]

@@ -98,7 +98,7 @@ def ball_labels(result: ThermalResult) -> list[Label]:
     """Name and temperature of the balls or rollers of every bearing, at the lowest of them."""
     labels = []
     for group, bearing in result.spec.bearings:
-        kind = result.spec.bearing_types[group.bearing_type]
+        kind = result.spec.bearing_types[group.type_name(bearing)]
         warm = result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K
         labels.append(
             Label(

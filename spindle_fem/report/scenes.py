@@ -308,7 +308,7 @@ def ball_triangles(
     ]
     first = 0
     for number, (group, bearing) in enumerate(spec.bearings):
-        for row in element_rows(bearing, spec.bearing_types[group.bearing_type]):
+        for row in element_rows(bearing, spec.bearing_types[group.type_name(bearing)]):
             points, normals, faces = _unit_cylinder() if row.length else _unit_sphere()
             size = 0.5 * np.array([row.ball_diameter, row.ball_diameter, row.length or row.ball_diameter])
             centres = np.array(row.centres)

@@ -21,13 +21,14 @@ from spindle_fem.physics.bearings.bearing_set import (
     solve_bearing_set,
     uniform_temperatures,
 )
+from spindle_fem.physics.bearings.cage_guidance import CageGuidance
 from spindle_fem.physics.bearings.contact_conduction import (
     ball_conductance,
     constriction_resistance,
     contact_resistance,
 )
 from spindle_fem.physics.bearings.grease import Lubricant
-from spindle_fem.physics.bearings.heat_model import CageGuidance, ContactSeal, HeatOptions
+from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
 from spindle_fem.physics.bearings.mounting import rotation_growth
 from spindle_fem.physics.bearings.preload import unloading_thrust
@@ -221,7 +222,6 @@ def test_rotation_growth_of_a_solid_and_a_hollow_shaft() -> None:
         (lambda: HeatOptions("skff"), 'Did you mean "skf"'),
         (lambda: HeatOptions(rolling_surfaces=3), "Allowed: 1, 2."),
         (lambda: CageGuidance(0.1, 0.01, 0.0), "cage.clearance"),
-        (lambda: ContactSeal(-1.0), "seal.moment"),
     ],
 )
 def test_bad_sets_are_refused(build, message: str) -> None:
@@ -275,13 +275,13 @@ def test_warnings_of_film_and_grease() -> None:
 
 
 def test_heat_terms_of_cage_seal_and_one_rolling_surface() -> None:
-    cage, seal = CageGuidance(0.158, 0.004, 0.2e-3), ContactSeal(0.05)
+    cage = CageGuidance(0.158, 0.004, 0.2e-3)
     both = solve_bearing(
-        BEARING,
+        replace(BEARING, cage=cage, seal_moment=0.05),
         turn(3000),
         1137.2,
         lubricant=GREASE,
-        heat=HeatOptions(cage=cage, seal=seal, rolling_surfaces=1),
+        heat=HeatOptions(rolling_surfaces=1),
     )
     plain = solve_bearing(BEARING, turn(3000), 1137.2, lubricant=GREASE)
     assert both.terms_W["seal"] == pytest.approx(0.05 * turn(3000))

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import spindle_fem
-from spindle_fem.commands.console import print_bearing
+from spindle_fem.commands.bearing_console import print_bearing
 from spindle_fem.errors import FaultsError, GeometryError, SpecError
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
 from spindle_fem.physics.bearings.line_contact import half_width, line_approach, line_pressure
@@ -142,6 +142,7 @@ def test_terminal_shows_every_roller_and_what_is_missing(tmp_path: Path, monkeyp
     print_bearing(spindle_fem.bearing(file))
     shown = capsys.readouterr().out
     assert "347.1" in shown
+    assert "rating life h" in shown
     assert "…" not in shown
     assert "heat is unknown" in " ".join(shown.split())
     assert max(map(len, shown.splitlines())) <= 80

@@ -192,4 +192,4 @@ def test_rollers_are_drawn_and_store_heat(spec):
     assert (rows[0].z, rows[1].z) == pytest.approx((0.05 + 0.037 / 4, 0.05 + 0.037 * 3 / 4))
     assert rows[1].turned == pytest.approx(np.pi / 28)
     volume = 56 * np.pi / 4 * 11e-3**2 * 9.9e-3
-    assert ball_row_capacity(spec, group) == pytest.approx(volume * 7810.0 * 475.0)
+    assert ball_row_capacity(spec, group, group.bearing[0]) == pytest.approx(volume * 7810.0 * 475.0)

@@ -99,7 +99,7 @@ def build_assembly(spec: MachineSpec, *, where: str | None = None) -> AssemblyGe
     parts = [part_geometry(part) for part in spec.part]
     balls = []
     for group, bearing in spec.bearings:
-        kind = spec.bearing_types[group.bearing_type]
+        kind = spec.bearing_types[group.type_name(bearing)]
         parts += ring_geometries(bearing, kind)
         balls += element_rows(bearing, kind)
     surfaces = [surface_definition(surface) for surface in spec.all_surfaces]

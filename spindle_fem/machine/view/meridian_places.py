@@ -82,7 +82,7 @@ def centre_of(spec: MachineSpec, name: str) -> tuple[float, float] | None:
 def _of_bearings(spec: MachineSpec, name: str) -> tuple[Region, ...]:
     found = []
     for group, bearing in spec.bearings:
-        kind = spec.bearing_types[group.bearing_type]
+        kind = spec.bearing_types[group.type_name(bearing)]
         bore, outside = 0.5 * kind.bore_diameter, 0.5 * kind.outer_diameter
         if name in (bearing.name, f"{group.name}_bearings"):
             found.append(Region(tuple(bearing.z), (bore, outside)))

@@ -123,7 +123,7 @@ def _seats(spec: MachineSpec) -> tuple[Seat, ...]:
     layout = Layout(spec, set())
     found = []
     for group, bearing in spec.bearings if carries_rings(spec) else ():
-        kind = spec.bearing_types[group.bearing_type]
+        kind = spec.bearing_types[group.type_name(bearing)]
         z = tuple(bearing.z)
         for ring, carrier, seat, raceway in (
             ("inner", layout.shaft, kind.bore_diameter, kind.inner_ring_outer_diameter),

@@ -79,7 +79,7 @@ def _assembled_radial_force(spec: MachineSpec, group: BearingSet, bearing: SetBe
     if not group.preload > 0.0:
         return 0.0
     share = group.preload / sum(other.takes_thrust == bearing.takes_thrust for other in group.bearing)
-    return share / math.tan(spec.bearing_types[group.bearing_type].contact_angle)
+    return share / math.tan(spec.bearing_types[group.type_name(bearing)].contact_angle)
 
 
 def flange_back(layout: Layout) -> Face:

@@ -374,7 +374,7 @@ def _names_and_capacity(spec, partition, centres, gaps, coolant) -> tuple[tuple[
     names, capacity = list(partition.node_names), [centres.capacity]
     for group, bearing in spec.bearings:
         names.append(f"{bearing.name}.balls")
-        capacity.append(np.array([ball_row_capacity(spec, group)]))
+        capacity.append(np.array([ball_row_capacity(spec, group, bearing)]))
 
     def band_names(label: str, edges: Array) -> list[str]:
         middle = 0.5 * (edges[1:] + edges[:-1])

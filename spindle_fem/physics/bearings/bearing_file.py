@@ -14,7 +14,7 @@ from spindle_fem.errors import (
     SpecError,
     SpindleFemError,
 )
-from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry, bearing_faults
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry, angle_of_clearance, bearing_faults
 from spindle_fem.physics.bearings.bearing_keys import (
     FIT,
     GEOMETRY,
@@ -31,6 +31,7 @@ from spindle_fem.physics.bearings.bearing_tables import (
     read_tables,
     with_catalogue,
 )
+from spindle_fem.physics.bearings.cage_guidance import CageGuidance
 from spindle_fem.physics.bearings.fits import RingFits, fit_faults
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
@@ -120,6 +121,11 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     document = with_catalogue(document, str(file), faults, GEOMETRY)
     # What an unknown bearing would have given is no fault of its own.
     required = {**REQUIRED, "bearing": ()} if faults else REQUIRED
+    if not faults and _gives_clearance(document):
+        required = {
+            **REQUIRED,
+            "bearing": tuple(key for key in required["bearing"] if key != "contact_angle"),
+        }
     tables = read_tables(document, str(file), faults, TABLES, required)
     case = None
     if not faults:
@@ -131,12 +137,24 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     return case
 
 
+def _gives_clearance(document: Mapping[str, Any]) -> bool:
+    """Whether a deep-groove bearing's contact angle follows from its clearance."""
+    table = document.get("bearing")
+    return isinstance(table, dict) and "radial_clearance" in table
+
+
 def _build_case(
     tables: dict[str, dict[str, Any]], file: str, faults: list[SpindleFemError]
 ) -> BearingCase | None:
     bearing, operation = tables["bearing"], tables["operation"]
     orientations = bearing.get("arrangement", (1,))
     geometry_values = {key: value for key, value in bearing.items() if key in GEOMETRY}
+    clearance = geometry_values.pop("radial_clearance", None)
+    if clearance is not None:
+        sizes = [
+            bearing[key] for key in ("ball_diameter", "groove_curvature_inner", "groove_curvature_outer")
+        ]
+        geometry_values.setdefault("contact_angle", angle_of_clearance(clearance, *sizes))
     probe = _Unchecked(**geometry_values)
     for key, what, how_to_fix in bearing_faults(probe):
         faults.append(SpecError(f"{file}: bearing.{key}", what, how_to_fix))
@@ -159,7 +177,12 @@ def _build_case(
     heat = heat_of(tables.get("heat", {}), file, faults)
     if faults:
         return None
-    geometry = BearingGeometry(**geometry_values)
+    try:
+        cage = CageGuidance(**tables["cage"]) if "cage" in tables else None
+    except SpecError as error:
+        faults.append(SpecError(f"{file}: {error.where}", error.what, error.how_to_fix))
+        return None
+    geometry = BearingGeometry(**geometry_values, cage=cage)
     warnings: list[CodedWarning] = []
     radial, moment = operation.get("radial_load", 0.0), operation.get("moment", 0.0)
     spacing = bearing.get("spacing", bearing.get("width"))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from spindle_fem.errors import GeometryError, SpecError, did_you_mean
 from spindle_fem.physics.bearings.bearing_kind import BearingKind
 from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
+from spindle_fem.physics.bearings.cage_guidance import CageGuidance
 
 STEEL_YOUNG_MODULUS = 206.0e9
 STEEL_POISSON_RATIO = 0.3
@@ -45,8 +46,15 @@ class BearingGeometry:
         ones up to 90° pass.
     static_load_rating : float or None, [N]
         Catalogue C0; None: from the contact pressure of 4200 MPa (ISO 76).
+    dynamic_load_rating : float or None, [N]
+        Catalogue C, for the rating life; None: by ISO 281.
     kind : str
         Kind of bearing, one of ``BEARING_KINDS``.
+    seal_moment : float or None, [N m]
+        Friction moment of rubbing seals, both together (K_S1 d_s^β + K_S2 of a catalogue), 0 without.
+        None: unknown.
+    cage : CageGuidance or None
+        Land that guides the cage. None: unknown; only the heat model ``full`` needs it.
 
     Raises
     ------
@@ -76,7 +84,10 @@ class BearingGeometry:
     width: float | None = None
     shoulder_angle: float | None = None
     static_load_rating: float | None = None
+    dynamic_load_rating: float | None = None
     kind: str = "angular_contact_ball"
+    seal_moment: float | None = None
+    cage: CageGuidance | None = None
 
     def __post_init__(self) -> None:
         faults = bearing_faults(self)
@@ -88,6 +99,12 @@ class BearingGeometry:
     def catalogue(self) -> BearingKind:
         """Catalogue constants of the bearing's kind."""
         return BEARING_KINDS[self.kind]
+
+    @property
+    def rated_contact_angle(self) -> float:
+        """Contact angle with which load ratings count, rad."""
+        rated = self.catalogue.rated_contact_angle
+        return self.contact_angle if rated is None else rated
 
     @property
     def total_curvature(self) -> float:
@@ -144,13 +161,33 @@ class BearingGeometry:
         return 0.5 * math.pi if self.shoulder_angle is None else self.shoulder_angle
 
 
+def angle_of_clearance(
+    clearance: float, ball_diameter: float, groove_curvature_inner: float, groove_curvature_outer: float
+) -> float:
+    """Contact angle at which the rings of a deep-groove bearing meet without load, rad.
+
+    Parameters
+    ----------
+    clearance : float, [m]
+        On the diameter; up to twice the distance of the groove centres.
+    ball_diameter : float, [m]
+
+    Source: Harris & Kotzalas, vol. 1: cos α = 1 - P_d / (2 A).
+
+    >>> round(math.degrees(angle_of_clearance(15e-6, 12.7e-3, 0.52, 0.52)), 2)
+    9.85
+    """
+    distance = (groove_curvature_inner + groove_curvature_outer - 1.0) * ball_diameter
+    return math.acos(max(1.0 - clearance / (2.0 * distance), -1.0))
+
+
 def bearing_faults(geometry: BearingGeometry) -> list[tuple[str, str, str]]:
     """Every reason why a bearing cannot be assembled: (key, fault, what is allowed)."""
     faults: list[tuple[str, str, str]] = []
     for key in (
         "ball_diameter", "pitch_diameter", "groove_curvature_inner", "groove_curvature_outer",
         "young_modulus", "density", "ring_density", "ball_young_modulus", "bore_diameter", "outer_diameter",
-        "width", "static_load_rating",
+        "width", "static_load_rating", "dynamic_load_rating",
     ):  # fmt: skip
         value = getattr(geometry, key)
         if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -195,6 +232,8 @@ def bearing_faults(geometry: BearingGeometry) -> list[tuple[str, str, str]]:
         value = getattr(geometry, key)
         if value is not None and not 0.0 <= value < 0.5:
             faults.append((key, f"it is {value:g}.", "Allowed: 0 to below 0.5."))
+    if geometry.seal_moment is not None and not geometry.seal_moment >= 0.0:
+        faults.append(("seal_moment", f"it is {geometry.seal_moment:g} N m.", "It must not be negative."))
     bore, outer = geometry.bore_diameter, geometry.outer_diameter
     if bore is not None and bore >= pitch - ball:
         faults.append(

@@ -62,7 +62,16 @@ GEOMETRY: dict[str, Reader] = {
     "width": _LENGTH,
     "shoulder_angle": _quantity("rad"),
     "static_load_rating": _FORCE,
+    "dynamic_load_rating": _FORCE,
     "kind": _text(names=lambda: tuple(BEARING_KINDS)),
+    "radial_clearance": _LENGTH,
+    "seal_moment": _quantity("N*m"),
+}
+CAGE: dict[str, Reader] = {
+    "land_diameter": _LENGTH,
+    "land_width": _LENGTH,
+    "clearance": _LENGTH,
+    "land": _text("inner", "outer"),
 }
 MOUNTING: dict[str, Reader] = {
     "arrangement": _row,
@@ -128,9 +137,11 @@ REQUIRED = {
     "temperatures": ("assembly",),
     "lubricant": ("kinematic_viscosity_40", "kinematic_viscosity_100"),
     "heat": (),
+    "cage": ("land_diameter", "land_width", "clearance"),
 }
 TABLES = {
     "bearing": GEOMETRY | MOUNTING,
+    "cage": CAGE,
     "fit": FIT,
     "operation": OPERATION,
     "temperatures": TEMPERATURES,

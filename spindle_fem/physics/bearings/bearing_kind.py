@@ -26,7 +26,13 @@ class BearingKind:
     palmgren_load_exponent : float, [-]
         y of the same.
     skf_rolling, skf_sliding : (float, float, float)
-        R1, R2, R3 and S1, S2, S3 of the SKF friction model, single row.
+        R1, R2, R3 and S1, S2, S3 of the SKF friction model, single row; empty with ``skf_groove``.
+    skf_groove : (R1, R2, S1, S2) or None
+        Of the SKF friction model's formulas for deep grooves.
+    palmgren_axial_factor : float or None
+        Of the axial load in Palmgren's load moment; None: 0.9 over the tangent of the contact angle.
+    rated_contact_angle : float or None, [rad]
+        With which load ratings count; None: that of the bearing without load.
     """
 
     source: str
@@ -35,8 +41,11 @@ class BearingKind:
     static_axial_factors: tuple[tuple[float, ...], tuple[float, ...]]
     palmgren_load_factors: tuple[tuple[float, ...], tuple[float, ...]]
     palmgren_load_exponent: float
-    skf_rolling: tuple[float, float, float]
-    skf_sliding: tuple[float, float, float]
+    skf_rolling: tuple[float, ...]
+    skf_sliding: tuple[float, ...]
+    skf_groove: tuple[float, float, float, float] | None = None
+    palmgren_axial_factor: float | None = None
+    rated_contact_angle: float | None = None
 
     def static_axial_factor(self, contact_angle: float) -> float:
         """Y0 at a contact angle [rad]."""

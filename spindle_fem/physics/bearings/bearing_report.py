@@ -6,9 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
+from spindle_fem.physics.bearings.rating_life import rating_life
+from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 from spindle_fem.validity import CodedWarning
 
 REPORT_SCHEMA = "spindle-fem/bearing-report/1"
@@ -38,12 +42,17 @@ def report_of_states(
         "axial_deflection_um": first.axial_displacement * 1e6,
         "radial_deflection_um": first.radial_displacement * 1e6,
         "axial_stiffness_N_um": first.axial_stiffness * 1e-6,
+        "rating_life_h": None,
         "heat_W": sum(state.heat_W for state in states) if has_heat else None,
         "terms_W": _sum_terms(states),
     }
+    lives = [
+        life_report(state.geometry, state.balls.load, state.balls.weight, state.speed) for state in states
+    ]
     if len(states) == 1:
-        report["balls"] = _ball_reports(first)
+        report |= lives[0] | {"balls": _ball_reports(first)}
     else:
+        report["rating_life_h"] = _set_life([life["rating_life_h"] for life in lives])
         report["bearings"] = [
             {
                 "name": state.name,
@@ -52,14 +61,33 @@ def report_of_states(
                 "axial_load_N": state.axial_force,
                 "preload_N": _number(state.preload),
                 "heat_W": state.heat_W if has_heat else None,
+                **life,
                 "terms_W": state.terms_W,
                 "balls": _ball_reports(state),
             }
-            for state in states
+            for state, life in zip(states, lives, strict=True)
         ]
     found = [warning for state in states for warning in state.warnings]
     report["warnings"] = [{"code": entry.code, "text": entry.text} for entry in (*warnings, *found)]
     return report
+
+
+def life_report(
+    geometry: BearingGeometry | RollerGeometry,
+    load: NDArray[np.float64],
+    weight: NDArray[np.float64] | None,
+    speed: float,
+) -> dict[str, float | None]:
+    """Basic rating life in millions of turns and in hours; None without load or, of hours, at rest."""
+    turns = rating_life(geometry, load, weight)
+    hours = turns * 1e6 * 2.0 * math.pi / (3600.0 * abs(speed)) if speed else math.inf
+    return {"rating_life_million_turns": _number(turns), "rating_life_h": _number(hours)}
+
+
+def _set_life(hours: list[float | None]) -> float | None:
+    """Life of all bearings together, h: they fail independently, with a Weibull slope of 10/9."""
+    damage = sum(life ** (-10.0 / 9.0) for life in hours if life is not None)
+    return damage**-0.9 if damage > 0.0 else None
 
 
 def _sum_terms(states: tuple[BearingState, ...]) -> dict[str, float]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_state import BearingHeat
-from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.hertz import INNER, STATIC_PRESSURE, bearing_contact_constants
 from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 
@@ -23,11 +22,11 @@ class FrictionMoment:
         """Sum of the parts, N m."""
         return sum(self.parts.values())
 
-    def heat(self, model: str, speed: float, options: HeatOptions) -> BearingHeat:
-        """Heat at a speed [rad/s], with that of a contact seal."""
+    def heat(self, model: str, speed: float, geometry: BearingGeometry | RollerGeometry) -> BearingHeat:
+        """Heat at a speed [rad/s], with that of the bearing's contact seals."""
         terms = {name: part * speed for name, part in self.parts.items()}
-        if options.seal is not None:
-            terms["seal"] = options.seal.moment * speed
+        if geometry.seal_moment is not None:
+            terms["seal"] = geometry.seal_moment * speed
         return BearingHeat(model, terms, {})
 
 

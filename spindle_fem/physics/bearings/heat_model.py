@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -22,51 +21,6 @@ from spindle_fem.physics.bearings.traction import ContactPatch, LubricantState, 
 
 FloatArray = NDArray[np.float64]
 BallAttitude = Literal["equilibrium", "outer"]
-
-
-@dataclass(frozen=True, slots=True)
-class CageGuidance:
-    """A cage that runs on a ring's land: Petroff shear of a film.
-
-    Attributes
-    ----------
-    land_diameter, land_width, clearance : float, [m]
-        ``clearance`` is radial.
-    land : {"inner", "outer"}
-        Ring that guides it.
-    """
-
-    land_diameter: float
-    land_width: float
-    clearance: float
-    land: Literal["inner", "outer"] = "outer"
-
-    def __post_init__(self) -> None:
-        for key in ("land_diameter", "land_width", "clearance"):
-            if not getattr(self, key) > 0.0:
-                raise SpecError(f"cage.{key}", f"it is {getattr(self, key):g} m.", "It must be above 0.")
-
-    def power(self, viscosity: float, speed: float, orbital: float) -> float:
-        """Heat of the guiding land, P = η π w d³ ω_rel²/(4c), W."""
-        relative = speed - orbital if self.land == "inner" else orbital
-        shear = viscosity * math.pi * self.land_width * self.land_diameter**3 * relative**2
-        return shear / (4.0 * self.clearance)
-
-
-@dataclass(frozen=True, slots=True)
-class ContactSeal:
-    """A rubbing seal of constant friction moment (K_S1 d_s^β + K_S2 of a catalogue).
-
-    Attributes
-    ----------
-    moment : float, [N m]
-    """
-
-    moment: float
-
-    def __post_init__(self) -> None:
-        if not self.moment >= 0.0:
-            raise SpecError("seal.moment", f"it is {self.moment:g} N m.", "It must not be negative.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +44,6 @@ class HeatOptions:
     palmgren_f0: float = 2.0
     skf_friction_ehl: float = 0.04
     skf_friction_boundary: float = 0.15
-    cage: CageGuidance | None = None
-    seal: ContactSeal | None = None
 
     def __post_init__(self) -> None:
         known = friction_model_names()

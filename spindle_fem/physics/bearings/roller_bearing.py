@@ -70,6 +70,10 @@ class RollerGeometry:
         f_0 of a row; None: that of the kind.
     kind : str
         One of ``BEARING_KINDS`` with rollers.
+    seal_moment : float or None, [N m]
+        Friction moment of rubbing seals; None: none.
+    dynamic_load_rating : float or None, [N]
+        Catalogue C of all rows, for the rating life; None: by ISO 281.
 
     Raises
     ------
@@ -95,6 +99,8 @@ class RollerGeometry:
     outer_diameter: float | None = None
     palmgren_lubrication_factor: float | None = None
     kind: str = "cylindrical_roller"
+    seal_moment: float | None = None
+    dynamic_load_rating: float | None = None
 
     def __post_init__(self) -> None:
         for key, what, how_to_fix in roller_faults(self):

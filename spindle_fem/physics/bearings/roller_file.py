@@ -13,7 +13,7 @@ from spindle_fem.definition.bearing_catalogue import catalogue_bearing
 from spindle_fem.definition.bearing_types import has_rollers
 from spindle_fem.errors import FaultsError, GeometryError, OutOfValidityError, SpecError, SpindleFemError
 from spindle_fem.physics.bearings.bearing_keys import GEOMETRY, HEAT, LUBRICANT, OPERATION, Reader
-from spindle_fem.physics.bearings.bearing_report import REPORT_SCHEMA
+from spindle_fem.physics.bearings.bearing_report import REPORT_SCHEMA, life_report
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.bearing_tables import (
     heat_of,
@@ -53,6 +53,8 @@ _BEARING: dict[str, Reader] = {
     "bore_diameter": _LENGTH,
     "outer_diameter": _LENGTH,
     "palmgren_f0": _NUMBER,
+    "seal_moment": GEOMETRY["seal_moment"],
+    "dynamic_load_rating": GEOMETRY["dynamic_load_rating"],
     "kind": GEOMETRY["kind"],
 }
 _FIELDS = {"palmgren_f0": "palmgren_lubrication_factor"}
@@ -166,6 +168,7 @@ def _report(geometry: RollerGeometry, state: BearingState, solved: RollerStates)
         "schema": REPORT_SCHEMA,
         "radial_deflection_um": state.radial_displacement * 1e6,
         "radial_stiffness_N_um": solved.radial_stiffness * 1e-6,
+        **life_report(geometry, balls.load, None, state.speed),
         "heat_W": None if state.heat is None else state.heat_W,
         "terms_W": state.terms_W,
         "rollers": rollers,

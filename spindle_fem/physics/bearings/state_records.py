@@ -356,12 +356,9 @@ def _control_doubts(
 def _heat_warnings(name: str, geometry, heat: HeatOptions) -> list[CodedWarning]:
     warnings = []
     model = HEAT_MODELS[heat.level]
-    if model.counts_cage and heat.cage is None and heat.seal is None:
-        warnings.append(
-            CodedWarning(
-                "cage_seal_not_given", f"{name}: cage and seal friction count 0; give their dimensions."
-            )
-        )
+    if model.counts_cage and geometry.cage is None and geometry.seal_moment is None:
+        text = f"{name}: cage and seal friction count 0; give cage and seal_moment of its bearing type."
+        warnings.append(CodedWarning("cage_seal_not_given", text))
     if model.needs_boundary and None in (geometry.bore_diameter, geometry.outer_diameter):
         text = f"{name}: bore or outer diameter assumed 1.75 ball diameters from the pitch circle."
         warnings.append(CodedWarning("boundary_dimensions_assumed", text))

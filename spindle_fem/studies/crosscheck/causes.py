@@ -163,7 +163,7 @@ def _narrow_raceways(coarse: MachineNetwork, smeared: MachineNetworkState, heat_
     bands = contact_bands(spec, point, smeared.bearing_temperatures())
     along_z, along_r = [], []
     for group, bearing in spec.bearings:
-        kind = spec.bearing_types[group.bearing_type]
+        kind = spec.bearing_types[group.type_name(bearing)]
         for side, face, inwards in (
             ("inner", 0.5 * kind.inner_ring_outer_diameter, -1.0),
             ("outer", 0.5 * kind.outer_ring_inner_diameter, 1.0),
@@ -199,7 +199,7 @@ def contact_bands(
     bands = {}
     for group, bearing in spec.bearings:
         state = states[bearing.name]
-        kind = spec.bearing_types[group.bearing_type]
+        kind = spec.bearing_types[group.type_name(bearing)]
         middle = 0.5 * (bearing.z[0] + bearing.z[1])
         if isinstance(kind, RollerBearingType):
             half = 0.5 * kind.rows * kind.roller_length

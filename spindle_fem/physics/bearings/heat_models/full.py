@@ -28,8 +28,9 @@ def full(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
     terms = {**sliding.terms, **ring_terms(inputs, rolling_contacts)}
     orbital = float(np.average(inputs.orbital, weights=inputs.system.weight))
     viscosity = float(inputs.lubricant.viscosity[0])
-    terms["cage"] = 0.0 if options.cage is None else options.cage.power(viscosity, inputs.speed, orbital)
-    terms["seal"] = 0.0 if options.seal is None else options.seal.moment * inputs.speed
+    cage = inputs.geometry.cage
+    terms["cage"] = 0.0 if cage is None else cage.power(viscosity, inputs.speed, orbital)
+    terms["seal"] = (inputs.geometry.seal_moment or 0.0) * inputs.speed
     return BearingHeat("full", terms, {**sliding.per_contact, **rolling_contacts})
 
 

@@ -27,7 +27,7 @@ def of_rollers(inputs: RollerHeatInputs, options: HeatOptions) -> BearingHeat:
     moment = palmgren_roller_moment(
         inputs.geometry, inputs.speed, inputs.kinematic_viscosity, inputs.states.driving_load
     )
-    return moment.heat("palmgren", inputs.speed, options)
+    return moment.heat("palmgren", inputs.speed, inputs.geometry)
 
 
 @HEAT_MODELS.register
@@ -42,7 +42,7 @@ def palmgren(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
         inputs.radial_force,
         lubrication_factor=options.palmgren_f0,
     )
-    return moment.heat("palmgren", inputs.speed, options)
+    return moment.heat("palmgren", inputs.speed, inputs.geometry)
 
 
 def palmgren_moment(
@@ -70,9 +70,11 @@ def palmgren_moment(
     viscous = _viscous_moment(geometry.pitch_diameter, speed, kinematic_viscosity, lubrication_factor)
     axial, radial = abs(axial_load), abs(radial_load)
     ratio = static_equivalent_load(geometry, axial, radial) / static_load_rating(geometry)
-    tangent = math.tan(geometry.contact_angle)
-    driving = radial if tangent == 0.0 else max(0.9 * axial / tangent - 0.1 * radial, radial)
-    kind = geometry.catalogue
+    kind, tangent = geometry.catalogue, math.tan(geometry.contact_angle)
+    axial_factor = kind.palmgren_axial_factor
+    if axial_factor is None:
+        axial_factor = 0.9 / tangent if tangent > 0.0 else 0.0
+    driving = max(axial_factor * axial - 0.1 * radial, radial)
     factor = kind.palmgren_load_factor(geometry.contact_angle)
     load = factor * ratio**kind.palmgren_load_exponent * driving * pitch
     return FrictionMoment({"viscous": viscous, "load": load * 1e-3})

@@ -10,6 +10,7 @@ from spindle_fem.physics.bearings.catalogue_friction import (
     FrictionMoment,
     boundary_diameters,
     roller_boundary,
+    static_load_rating,
 )
 from spindle_fem.physics.bearings.heat_model import (
     HeatInputs,
@@ -31,7 +32,7 @@ def of_rollers(inputs: RollerHeatInputs, options: HeatOptions) -> BearingHeat:
         inputs.states.driving_load,
         friction_boundary=options.skf_friction_boundary,
     )
-    return moment.heat("skf", inputs.speed, options)
+    return moment.heat("skf", inputs.speed, inputs.geometry)
 
 
 @HEAT_MODELS.register
@@ -47,7 +48,7 @@ def skf(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
         friction_ehl=options.skf_friction_ehl,
         friction_boundary=options.skf_friction_boundary,
     )
-    return moment.heat("skf", inputs.speed, options)
+    return moment.heat("skf", inputs.speed, inputs.geometry)
 
 
 def skf_moment(
@@ -76,19 +77,16 @@ def skf_moment(
 
     Source: SKF rolling bearings catalogue (2013).
     """
-    (r1, r2, r3), (s1, s2, s3) = geometry.catalogue.skf_rolling, geometry.catalogue.skf_sliding
     bore, outer = boundary_diameters(geometry)
     mean = 0.5 * (bore + outer) * 1e3
     rpm = abs(speed) * 30.0 / math.pi
     viscosity = kinematic_viscosity * 1e6
     axial, radial = abs(axial_load), abs(radial_load)
-    inertia = mean**4 * rpm**2
-    rolling = r1 * mean**1.97 * (radial + r3 * inertia + r2 * axial) ** 0.54
+    share = _groove_moments if geometry.catalogue.skf_groove is not None else _angular_moments
+    rolling, sliding = share(geometry, mean, rpm, axial, radial)
     reduction = float(inlet_shear_factor(speed, mean * 1e-3, kinematic_viscosity)) * float(
         replenishment_factor(speed, bore, outer, kinematic_viscosity)
     )
-    third = 4.0 / 3.0
-    sliding = s1 * mean**0.26 * ((radial + s3 * inertia) ** third + s2 * axial**third)
     coefficient = _sliding_coefficient(rpm * viscosity, mean, friction_ehl, friction_boundary)
     return FrictionMoment(
         {
@@ -96,6 +94,29 @@ def skf_moment(
             "sliding": coefficient * sliding * 1e-3,
         }
     )
+
+
+def _angular_moments(
+    geometry: BearingGeometry, mean: float, rpm: float, axial: float, radial: float
+) -> tuple[float, float]:
+    """G_rr and G_sl of an angular-contact bearing of a mean diameter [mm]."""
+    (r1, r2, r3), (s1, s2, s3) = geometry.catalogue.skf_rolling, geometry.catalogue.skf_sliding
+    inertia = mean**4 * rpm**2
+    rolling = r1 * mean**1.97 * (radial + r3 * inertia + r2 * axial) ** 0.54
+    third = 4.0 / 3.0
+    return rolling, s1 * mean**0.26 * ((radial + s3 * inertia) ** third + s2 * axial**third)
+
+
+def _groove_moments(
+    geometry: BearingGeometry, mean: float, rpm: float, axial: float, radial: float
+) -> tuple[float, float]:
+    """G_rr and G_sl of a deep-groove bearing, whose contact angle under thrust follows from its C0."""
+    r1, r2, s1, s2 = geometry.catalogue.skf_groove
+    if axial == 0.0:
+        return r1 * mean**1.96 * radial**0.54, s1 * mean**-0.26 * radial ** (5.0 / 3.0)
+    sine = math.sin(math.radians(24.6 * (axial / static_load_rating(geometry)) ** 0.24))
+    rolling = r1 * mean**1.96 * (radial + r2 / sine * axial) ** 0.54
+    return rolling, s1 * mean**-0.145 * (radial**5 + s2 * mean**1.5 / sine * axial**4) ** (1.0 / 3.0)
 
 
 def skf_roller_moment(
