@@ -88,3 +88,13 @@ def test_key_does_not_depend_on_order(assembly):
 def test_bad_sizes(assembly, arguments, message):
     with pytest.raises(BadInputError, match=message):
         build_sizes(assembly, **arguments)
+
+
+def test_a_solid_shaft_is_no_finer_than_a_hollow_one() -> None:
+    def finest(bore: float) -> float:
+        shaft = PartGeometry("shaft", (AnnularSegment(0.0, 0.2, bore, 0.03),))
+        solid = assemble([shaft])
+        return min(edge_sizes(solid, build_sizes(solid, "coarse")))
+
+    # the ends reach the axis, where no circle asks for edges
+    assert finest(0.0) >= finest(0.01)

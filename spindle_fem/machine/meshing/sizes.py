@@ -176,7 +176,8 @@ def edge_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> list[float]:
         length = (edge.z[1] - edge.z[0]) + (edge.r[1] - edge.r[0])
         size = min(size, sizes.strip_edges * length)
         if not edge.is_axis:
-            size = min(size, 2.0 * math.pi * max(edge.r[0], 1e-3 * edge.r[1]) / sizes.circle_segments)
+            # a face that reaches the axis has no inner circle
+            size = min(size, 2.0 * math.pi * (edge.r[0] or edge.r[1]) / sizes.circle_segments)
         if edge.is_cylinder and not edge.is_axis:
             clearance = _radial_clearance(edge, assembly)
             size = min(size, math.sqrt(8.0 * edge.r[0] * _CLEARANCE_SHARE * clearance))
