@@ -1,7 +1,7 @@
 """Machines drawn at random over kinds of bearing, arrangement, drive and cooling, as raw definitions.
 
-``python -m scripts.random_machines --number 300 --seed 1`` draws them, checks, meshes and solves each by elements and
-by the machine's own network, and ends with status 1 if one neither solves nor is refused with a reason.
+``python -m scripts.random_machines --number 300 --seed 1`` draws them, checks, meshes and solves each by elements
+and by the machine's own network, and ends with status 1 if one neither solves nor is refused with a reason.
 """
 
 from __future__ import annotations
@@ -330,9 +330,8 @@ def main() -> int:
             word, text = solve_machine(content, Path(folder) / "machine.toml")
             counted[word] += 1
             line = " ".join(text.split())
-            print(
-                f"{number:4d} {content['name']:32s} {word:8s} {time.process_time() - start:5.1f} s  {line[:300]}"
-            )
+            spent = time.process_time() - start
+            print(f"{number:4d} {content['name']:32s} {word:9s} {spent:5.1f} s  {line[:300]}")
             sys.stdout.flush()
             if word == "failed" and arguments.keep is not None:
                 arguments.keep.mkdir(parents=True, exist_ok=True)
