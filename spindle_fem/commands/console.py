@@ -117,13 +117,14 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
 
 
 def print_check(content: dict[str, Any], picture: Path | None = None) -> None:
-    """What a valid machine is made of, and where it was drawn."""
+    """Operation, parts, surfaces, contacts, probes and sources of a valid machine, and its picture."""
     console = open_console()
     lists = [key for key, rows in content.items() if isinstance(rows, list)]
     for key in (key for key in lists if key not in ("assumed", "warnings")):
         if not content[key]:
             continue
-        table = headed_table(key, "name", "")
+        table = headed_table(key.replace("_", " ").capitalize(), "", "")
+        table.show_header = False
         for row in content[key]:
             table.add_row(row["name"], row.get("detail", ""))
         console.print(table)

@@ -9,6 +9,7 @@ from typing import Any
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import NoEquilibriumError
+from spindle_fem.operation.operating_limits import require_possible_speeds
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.studies.heat_study import heat_study
 from spindle_fem.units import to_si
@@ -28,9 +29,9 @@ def heat_table(
     Parameters
     ----------
     speeds : iterable of str
-        With units; 500 to 4500 rpm in steps of 500 when empty.
+        With units; nine up to one and a half times the machine's speed when empty.
     temperature : str
-        Of rings, balls and grease.
+        One for rings, balls and grease.
     coupled : bool
         Solve the machine at every speed and take its temperatures.
     folder : Path, optional
@@ -38,11 +39,14 @@ def heat_table(
 
     Raises
     ------
+    SpecError
+        A speed that no rolling bearing of the machine reaches.
     NoEquilibriumError
         At no speed do the bearings have an equilibrium.
     """
     spec = load_machine(machine, overrides)
     chosen = [to_si(text, "rad/s", where="--speed") for text in speeds]
+    require_possible_speeds(spec, chosen, "--speed")
     kelvin = to_si(temperature, "K", where="--temperature", kind="temperature")
     content = heat_study(spec, chosen, kelvin, coupled=coupled)
     if not content["models"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import FaultsError, SpecError
@@ -27,11 +27,25 @@ def require_possible_operation(spec: MachineSpec) -> None:
         raise FaultsError(spec.name, faults)
 
 
+def require_possible_speeds(spec: MachineSpec, speeds: Iterable[float], where: str) -> None:
+    """Refuse speeds [rad/s] that no rolling bearing of the machine reaches; ``where`` names what gave them.
+
+    Raises
+    ------
+    SpecError
+    """
+    for speed in speeds:
+        reason = too_fast(spec, speed)
+        if reason is not None:
+            raise SpecError(where, f"{speed * 30.0 / math.pi:.0f} rpm.", reason)
+
+
 def _faults(spec: MachineSpec) -> Iterator[SpecError]:
-    # Of a definition with other faults, tables may be missing.
-    reason = None if spec.operation is None else too_fast(spec, spec.operation.speed)
-    if reason is not None:
-        yield SpecError("operation.speed", f"{spec.operation.speed * 30.0 / math.pi:.0f} rpm.", reason)
+    # A definition with other faults may lack tables.
+    try:
+        require_possible_speeds(spec, [spec.operation.speed] if spec.operation else (), "operation.speed")
+    except SpecError as fault:
+        yield fault
     if spec.coolant is not None:
         coolant, inlet = coolant_by_name(spec.coolant.fluid), spec.coolant.inlet_temperature
         low, high = coolant.lowest_temperature, coolant.highest_temperature
