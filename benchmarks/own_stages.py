@@ -27,7 +27,7 @@ from spindle_fem.model.mesh.time_stepper import integrate
 from spindle_fem.model.reduced.build_reduced import build_reduced_model
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.report.run_outputs import write_outputs
-from spindle_fem.report.run_report import peak_memory_MB
+from spindle_fem.results.run_summary import peak_memory_MB
 from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
 from spindle_fem.solvers.prepared_machine import machine_on_mesh

@@ -71,7 +71,7 @@ def run_machine(
         )
 
         prepared = prepare_machine(spec, progress=tell)
-        helpers.prepare(spec, prepared.mesh, prepared.operators.n_unknowns)
+        helpers.prepare(spec, prepared.mesh, prepared.operators.order, prepared.operators.n_unknowns)
         result = solve_prepared(prepared, progress=tell, find_fold=True)
         if estimate_mesh_error:
             tell("second mesh")

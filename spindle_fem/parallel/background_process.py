@@ -135,6 +135,8 @@ def _serve(make: Callable[[], Any], connection: Any, other_end: Any) -> None:
 
     other_end.close()
     os.environ.update(ONE_THREAD)
+    # xarray would load Dask, for half a second, to ask whether arrays are Dask's: here none is
+    sys.modules.setdefault("dask", None)
     worker_threads._thread_count.cache_clear()
     asked: queue.SimpleQueue = queue.SimpleQueue()
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from spindle_fem import __version__
-from spindle_fem.report.figure_style import rasterise
+from spindle_fem.report.figure_style import PNG_LEVEL, rasterise
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -152,20 +152,26 @@ class Section:
 def illustration_of(picture: Figure | Image | Path, caption: str, alt: str = "") -> Illustration:
     """Picture for a report, from a figure, an image of one, or an image file.
 
-    WebP at this quality is a fifth of the PNG, which stays the original.
+    Pictures in true colour become WebP, at this quality a fifth of the PNG, which stays the original.
+    Charts with a palette are smaller as PNG, and sharp.
     """
     from PIL import Image
 
     if hasattr(picture, "canvas"):
         image = Image.fromarray(rasterise(picture))
     elif isinstance(picture, Image.Image):
-        image = picture.convert("RGB")
+        image = picture
     else:
         with Image.open(picture) as opened:
-            image = opened.convert("RGB")
+            opened.load()
+            image = opened
     buffer = io.BytesIO()
-    image.save(buffer, "WEBP", quality=76, method=1)
-    source = "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode()
+    kind = "png" if image.mode == "P" else "webp"
+    if kind == "png":
+        image.save(buffer, "PNG", compress_level=PNG_LEVEL)
+    else:
+        image.convert("RGB").save(buffer, "WEBP", quality=76, method=1)
+    source = f"data:image/{kind};base64," + base64.b64encode(buffer.getvalue()).decode()
     return Illustration(source, caption, alt or caption, *image.size)
 
 

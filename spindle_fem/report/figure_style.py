@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
 from spindle_fem.results.output_folder import whole_file
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 DPI = 160
+# A tenth larger files than the usual 6 in three quarters of the time.
+PNG_LEVEL = 4
 WIDTH_PX = 1600
 
 
@@ -131,7 +133,8 @@ def plain_decades(axis: Axis) -> None:
     """Plain numbers, 1, 2, 5 and so on, along a logarithmic axis."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
+    # the numbered ticks are dense enough, and each tick costs as much to draw as a line
+    axis.set_minor_locator(NullLocator())
 
 
 class ShownFigure(Figure):
@@ -202,7 +205,7 @@ def image_of(figure: Figure, *, colours: int = 0) -> Image:
 def write_png(image: Image, path: Path) -> Path:
     """Write an image of a figure, whole or not at all: a sweep that goes on takes up its pictures."""
     with whole_file(path) as partial:
-        image.save(partial, "PNG", dpi=(DPI, DPI), compress_level=6)
+        image.save(partial, "PNG", dpi=(DPI, DPI), compress_level=PNG_LEVEL)
     return path
 
 

@@ -16,7 +16,7 @@ from spindle_fem.report.block_page import (
     render_document,
 )
 from spindle_fem.report.heat_charts import merged_terms
-from spindle_fem.report.run_report import HEAT_CAPTIONS
+from spindle_fem.report.run_figures import HEAT_CAPTIONS
 from spindle_fem.report.table_rows import fixed, number, table_of
 from spindle_fem.results.output_folder import read_content, replace_text
 from spindle_fem.studies.heat_study import HEAT_SCHEMA

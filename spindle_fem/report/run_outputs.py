@@ -1,7 +1,8 @@
 """Every file of a run, written by this process and two that were started beside it.
 
-One draws the pictures, one the charts and the data; both load what they need
-and draw what depends on the mesh alone while the machine is still solved.
+One draws the pictures, one the charts and the data, and works out growth; both load what they
+need, and do what depends on definition and mesh alone, while the machine is still solved. This
+file itself loads little: it is read before they are started.
 """
 
 from __future__ import annotations
@@ -15,16 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spindle_fem.parallel import BackgroundProcess
-from spindle_fem.report.run_report import (
-    FIGURE_FOLDER,
-    OVER_SPEED,
-    caption_of,
-    in_order,
-    peak_memory_MB,
-    render_run_report,
-)
+from spindle_fem.report.run_figures import FIGURE_FOLDER, OVER_SPEED, caption_of, in_order
 from spindle_fem.results.output_folder import replace_text
-from spindle_fem.results.run_summary import build_summary
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +26,7 @@ if TYPE_CHECKING:
 
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
-    from spindle_fem.model.elastic.deformed_shape import BodyShape
+    from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
     from spindle_fem.report.block_page import Illustration
     from spindle_fem.report.drawn_surfaces import SegmentSet
     from spindle_fem.results.thermal_result import ThermalResult
@@ -55,6 +48,7 @@ class OutputHelpers:
         self._pictures = BackgroundProcess(_PictureWorker, beside=_no_renderer())
         self._charts = BackgroundProcess(_ChartWorker)
         self._waiting: dict[str, Callable[[], Any]] = {}
+        self._shape: Callable[[], Any] | None = None
         self._begun: Path | None = None
 
     def __enter__(self) -> OutputHelpers:
@@ -64,10 +58,11 @@ class OutputHelpers:
         self._pictures.close()
         self._charts.close()
 
-    def prepare(self, spec: MachineSpec, mesh: TaggedMesh, n_unknowns: int) -> None:
-        """Draw what mesh and definition show alone."""
+    def prepare(self, spec: MachineSpec, mesh: TaggedMesh, order: int, n_unknowns: int) -> None:
+        """Do what mesh and definition tell alone."""
         self._pictures.ask("prepare", mesh, n_unknowns)
-        self._charts.ask("prepare", spec)
+        self._charts.ask("draw_definition", spec)
+        self._charts.ask("prepare_growth", spec, mesh, order)
 
     def begin(self, result: ThermalResult, folder: Path) -> None:
         """Write pictures, data and charts of a result, all but those over speed."""
@@ -80,6 +75,8 @@ class OutputHelpers:
         self._begun = folder
         self._waiting["pictures"] = self._pictures.ask("write", plain, figures)
         self._waiting["data"] = self._charts.ask("write_data", plain, folder)
+        self._shape = self._charts.ask("shape")
+        self._waiting["growth"] = self._charts.ask("write_growth")
         self._waiting["charts"] = self._charts.ask("write_charts")
 
     def begun_in(self, folder: Path) -> bool:
@@ -90,9 +87,9 @@ class OutputHelpers:
         """Write the charts over speed of the result begun."""
         self._waiting["over speed"] = self._charts.ask("write_over_speed", dict(study))
 
-    def draw_growth(self, shapes: Mapping[str, BodyShape]) -> None:
-        """Write the picture of the deformed machine of the result begun."""
-        self._waiting["growth"] = self._charts.ask("write_growth", dict(shapes))
+    def shape(self) -> tuple[Growth | None, dict[str, float]]:
+        """Growth and displacements of the result begun."""
+        return self._shape()
 
     def wait(self) -> dict[str, float]:
         """Wait for all that was begun; seconds of each part."""
@@ -139,6 +136,7 @@ def write_outputs(
         with OutputHelpers() as own:
             return write_outputs(result, folder, started=started, notify=notify, helpers=own)
     from spindle_fem.results.field_file import write_fields
+    from spindle_fem.results.run_summary import build_summary, peak_memory_MB
 
     folder = Path(folder)
     clock = _Clock(notify)
@@ -148,13 +146,13 @@ def write_outputs(
         with clock.step("fields"):
             if result.heat_study is not None:
                 helpers.draw_over_speed(result.heat_study)
-            helpers.draw_growth(result.shapes)
             write_fields(result, folder / "fields.vtu")
     finally:  # also after an error nothing must go on writing here
         with clock.step("pictures"):
             beside = helpers.wait()
     with clock.step("report"):
         wall_time = time.perf_counter() - started if started is not None else sum(clock.times.values())
+        result = result.with_shape(*helpers.shape())
         summary = build_summary(result, wall_time, peak_memory_MB())
         summary["timings_s"] = {**summary["timings_s"], **clock.times, **beside}
         replace_text(
@@ -229,17 +227,26 @@ class _ChartWorker:
 
         self._folder = Path()
         self._result: ThermalResult | None = None
+        self._growth_model: GrowthModel | None = None
         self._definition: Image | None = None
         self._dataset: xr.Dataset | None = None
         self._surface: xr.Dataset | None = None
         self._drawn: dict[str, Illustration] = {}
 
-    def prepare(self, spec: MachineSpec) -> None:
+    def draw_definition(self, spec: MachineSpec) -> None:
         """Draw the machine as defined."""
         from spindle_fem.report.figure_style import image_of
         from spindle_fem.report.machine_drawing import machine_drawing
 
         self._definition = image_of(machine_drawing(spec), colours=_CHART_COLOURS)
+
+    def prepare_growth(self, spec: MachineSpec, mesh: TaggedMesh, order: int) -> None:
+        """Solve the elastic bodies for what growth is read from."""
+        from spindle_fem.model.elastic.machine_bodies import carries_rings
+        from spindle_fem.model.elastic.machine_growth import GrowthModel
+
+        if carries_rings(spec):
+            self._growth_model = GrowthModel(spec, mesh, order)
 
     def write_data(self, result: ThermalResult, folder: Path) -> float:
         """Write the data and the machine; seconds."""
@@ -248,7 +255,7 @@ class _ChartWorker:
         from spindle_fem.results.dataset import build_dataset, write_dataset
 
         began = time.perf_counter()
-        self._result, self._folder = result, folder
+        self._result, self._folder = replace(result, growth_model=self._growth_model), folder
         self._dataset, self._surface = build_dataset(result), display_surface(result)
         write_dataset(self._dataset, folder / "result.nc")
         write_dataset(self._surface, folder / "result.nc", group=SURFACE_GROUP)
@@ -259,7 +266,7 @@ class _ChartWorker:
         """Write the charts of the result; seconds."""
         began = time.perf_counter()
         if self._definition is None:
-            self.prepare(self._result.spec)
+            self.draw_definition(self._result.spec)
         self._keep(self._definition, "machine_definition")
         self._write_all(draw_charts(self._result))
         return time.perf_counter() - began
@@ -274,13 +281,18 @@ class _ChartWorker:
         )
         return time.perf_counter() - began
 
-    def write_growth(self, shapes: Mapping[str, BodyShape]) -> float:
+    def shape(self) -> tuple[Growth | None, dict[str, float]]:
+        """Growth and displacements of the result."""
+        return self._result.growth, self._result.displacements
+
+    def write_growth(self) -> float:
         """Write the growth of the bodies and the picture of the deformed machine; seconds."""
         from spindle_fem.report.growth_chart import deformed_machine
         from spindle_fem.results.dataset import write_dataset
         from spindle_fem.results.growth_file import GROWTH_GROUP, growth_dataset
 
         began = time.perf_counter()
+        shapes = self._result.shapes
         if shapes:
             write_dataset(growth_dataset(shapes), self._folder / "result.nc", group=GROWTH_GROUP)
         self._write_all({"deformed_machine": lambda: deformed_machine(shapes)})
@@ -288,6 +300,8 @@ class _ChartWorker:
 
     def write_report(self, summary: dict[str, Any], pictures: Mapping[str, Illustration]) -> None:
         """Write the page."""
+        from spindle_fem.report.run_report import render_run_report
+
         illustrations = in_order({**self._drawn, **pictures})
         page = render_run_report(summary, self._dataset, self._surface, illustrations)
         replace_text(self._folder / "report.html", page)

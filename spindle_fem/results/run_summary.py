@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.metadata
 import math
 import platform
+import resource
+import sys
 from typing import TYPE_CHECKING, Any
 
 from spindle_fem.operation.source_terms import SOURCE_PREFIX
@@ -44,6 +46,12 @@ def package_versions() -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             versions[name] = "not installed"
     return versions
+
+
+def peak_memory_MB() -> float:  # noqa: N802 - the unit belongs to the name
+    """Largest resident memory of this process so far."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1024.0**2 if sys.platform == "darwin" else 1024.0)
 
 
 def build_summary(

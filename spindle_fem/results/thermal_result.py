@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.model.elastic.deformed_shape import BodyShape, deformed_shapes
-from spindle_fem.model.elastic.machine_bodies import carries_rings
-from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
 from spindle_fem.results.presented import Presented
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
+    from spindle_fem.model.elastic.deformed_shape import BodyShape
+    from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
     from spindle_fem.validity import CodedWarning
 
 
@@ -234,6 +233,8 @@ class ThermalResult(Presented):
         Worked out when first asked for. Ball loads are those that were found; those of the
         assembled preload where the heat model gives none.
         """
+        from spindle_fem.model.elastic.machine_bodies import carries_rings
+
         if not carries_rings(self.spec):
             return None
         model = self._elastic
@@ -242,6 +243,9 @@ class ThermalResult(Presented):
     @cached_property
     def shapes(self) -> dict[str, BodyShape]:
         """The elastic bodies before and after, by name; empty without bearings on bodies."""
+        from spindle_fem.model.elastic.deformed_shape import deformed_shapes
+        from spindle_fem.model.elastic.machine_bodies import carries_rings
+
         if not carries_rings(self.spec):
             return {}
         field = self.temperature[: self.n_unknowns]
@@ -266,6 +270,8 @@ class ThermalResult(Presented):
 
     @cached_property
     def _elastic(self) -> GrowthModel:
+        from spindle_fem.model.elastic.machine_growth import GrowthModel
+
         return self.growth_model or GrowthModel(self.spec, self.mesh, self.order)
 
     def _headline(self) -> str:
@@ -282,6 +288,12 @@ class ThermalResult(Presented):
             rows["coolant"] = f"{self.coolant.heat:.0f} W"
         rows["heat in"] = f"{self.energy.heat_in:.1f} W, imbalance {self.energy.imbalance_relative:.0e}"
         return rows
+
+    def with_shape(self, growth: Growth | None, displacements: Mapping[str, float]) -> ThermalResult:
+        """The same result with :attr:`growth` and :attr:`displacements` as another process found them."""
+        shaped = replace(self)
+        shaped.__dict__.update(growth=growth, displacements=dict(displacements))
+        return shaped
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
         """The same result with the seconds of each stage."""

@@ -402,7 +402,7 @@ def test_the_report_holds_the_sentence_and_every_figure(reported):
         "where",
         "missing_heat",
     }
-    assert html.count("data:image/webp") == len(figures)
+    assert html.count("data:image/") == len(figures)
 
 
 def test_the_sentence_names_rivals_and_errors(reported):

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from spindle_fem.errors import UnitError
-from spindle_fem.units import Uncertain, quantity_example, registry, to_si, uncertain_to_si
+from spindle_fem.units import _USUAL, Uncertain, quantity_example, registry, to_si, uncertain_to_si
 
 
 @pytest.mark.parametrize(
@@ -145,3 +145,14 @@ def test_what_is_no_prior_is_refused(value, parts):
 @pytest.mark.parametrize("unit", ["m", "rad", "rad/s", "m**3/s", "K", "W/m**2/K", "1/Pa"])
 def test_the_examples_in_messages_can_be_read(unit):
     assert to_si(quantity_example(unit).strip('"'), unit, where="example") > 0.0
+
+
+def test_usual_units_are_read_as_pint_reads_them():
+    units = registry()
+    for (written, unit), factor in _USUAL.items():
+        for number in (1.0, 19.0, 0.1, 7.3e-5, 123456.789, -2.7):
+            exact = units.Quantity(number, units.parse_units(written)).to(unit).magnitude
+            assert number * factor == exact == to_si(f"{number!r} {written}", unit, where="k"), written
+    for number in (-40.0, 15.0, 17.6, 36.66):
+        exact = units.Quantity(number, "degC").to("K").magnitude
+        assert to_si(f"{number} degC", "K", where="k", kind="temperature") == exact
