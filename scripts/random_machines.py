@@ -1,7 +1,8 @@
 """Machines drawn at random over kinds of bearing, arrangement, drive and cooling, as raw definitions.
 
-``python -m scripts.random_machines --number 300 --seed 1`` draws them, checks, meshes and solves each by elements
-and by the machine's own network, and ends with status 1 if one neither solves nor is refused with a reason.
+``python -m scripts.random_machines --number 300 --seed 1`` draws them, checks, meshes and solves each by
+elements and by the machine's own network, and ends with status 1 if one neither solves nor is refused with a
+reason.
 """
 
 from __future__ import annotations

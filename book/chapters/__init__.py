@@ -5,6 +5,7 @@ from book.chapters import (
     bench_motor,
     concealed,
     exact,
+    machines,
     models,
     network,
     peers,
@@ -17,6 +18,7 @@ from book.page import Entry
 _MODULES = (
     exact,
     balances,
+    machines,
     published,
     models,
     network,

@@ -28,7 +28,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
     """Solve every machine on the coarse mesh and the reference spindle on three, and compare."""
     del pictures
     runs = {
-        (machine, preset): _solved(desk, machine, preset)
+        (machine, preset): solved(desk, machine, preset)
         for machine, preset in [
             *((machine, "coarse") for machine in MACHINES),
             *((REFERENCE, preset) for preset in PRESETS if preset != "coarse"),
@@ -94,7 +94,9 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
     )
 
 
-def _solved(desk: Desk, machine: str, preset: str) -> dict[str, Any]:
+def solved(desk: Desk, machine: str, preset: str) -> dict[str, Any]:
+    """Summary of a machine that ships, solved on a preset of the mesh."""
+
     def run(folder: Path) -> None:
         from spindle_fem.definition.load import load_machine
         from spindle_fem.results.run_summary import build_summary

@@ -37,6 +37,9 @@ RELAXATION = 0.3
 ANDERSON_DEPTH = 6
 # Greases and seals are gone long before; a field beyond this is running away.
 RUNAWAY_TEMPERATURE = 600.0
+# How far cold grease may heat a machine in one step, K: it rubs so much more than warm grease that its heat
+# says nothing of where the machine settles.
+WARM_GREASE = (363.15, 423.15)
 MIXING_BELOW = 0.5
 # K; expansion moves a state without it by more, so that knowing it nearer saves nothing.
 FIRST_STATE = 1.0
@@ -196,16 +199,25 @@ class _Operation:
             relative_tolerance=_linear_tolerance(self.change),
         )
         self.lumped_known = True
-        self._require_bounded()
         self.change = float(np.abs(self.solution.temperature - field).max())
-        return _joined(self.solution)
+        return self._bounded(state, _joined(self.solution))
 
-    def _require_bounded(self) -> None:
-        """Refuse temperatures that run away."""
-        hottest = float(self.solution.temperature.max())
-        if not np.isfinite(hottest) or hottest > RUNAWAY_TEMPERATURE:
+    def _bounded(self, state: NDArray[np.float64], found: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The field found, or the way to it as far as warm grease where cold grease would make it run away.
+
+        Raises
+        ------
+        NoSteadyStateError
+            It runs away with the heat of warm grease too.
+        """
+        hottest, before = float(found.max()), float(state.max())
+        if np.isfinite(hottest) and hottest <= RUNAWAY_TEMPERATURE:
+            return found
+        reach = next((warm for warm in WARM_GREASE if before < warm - 1.0), None)
+        if not np.isfinite(hottest) or reach is None:
             heat = f"{self.loads.total_heat:.0f} W would heat it over {hottest - 273.15:.0f} °C."
             raise no_equilibrium(self.machine.spec.name, self.point, heat)
+        return state + (found - state) * (reach - before) / (hottest - before)
 
     def settled(self, state: NDArray[np.float64], found: NDArray[np.float64]) -> bool:
         """Whether field, heat and coolant agree, or the field changes little enough."""

@@ -11,12 +11,19 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
 
 # What tells them apart: the warmest bearing, K above the room (no measurement stands behind these bands).
-PAGES = {"belt_lathe": ("L", 20.0, 80.0), "router_spindle": ("F", 10.0, 60.0)}
+PAGES = {
+    "belt_lathe": ("L", 20.0, 80.0),
+    "router_spindle": ("F", 10.0, 60.0),
+    "externally_driven": ("F", 30.0, 80.0),
+    "grinding_spindle": ("R", 15.0, 50.0),
+    # cold grease alone would heat it over 350 °C, warm grease does not
+    "groove_spindle": ("F", 30.0, 70.0),
+}
 
 
 @pytest.fixture(scope="module", params=PAGES)
 def solved(request):
-    spec = spindle_fem.load_machine(request.param, ["mesh.preset=coarse"])
+    spec = spindle_fem.load_machine(request.param, ["mesh.preset=coarse", "mesh.order=1"])
     return request.param, spindle_fem.solve(spec)
 
 
