@@ -50,8 +50,21 @@ _USUAL = {
     ("h", "s"): 3600.0,
     **{
         (unit, unit): 1.0
-        for unit in ("m", "W", "N", "K", "s", "kg/m**3", "1/K", "1/Pa", "W/K", "J/K")
-        + ("W/m/K", "J/kg/K", "W/m**2/K")
+        for unit in (
+            "m",
+            "W",
+            "N",
+            "K",
+            "s",
+            "kg/m**3",
+            "1/K",
+            "1/Pa",
+            "W/K",
+            "J/K",
+            "W/m/K",
+            "J/kg/K",
+            "W/m**2/K",
+        )
     },
 }
 _TEMPERATURE_SCALES = ("degree_Celsius", "degree_Fahrenheit", "degree_Reaumur")
