@@ -38,7 +38,7 @@ def crosscheck_machine(
     overrides : iterable of str
         ``path=value`` texts.
     progress : callable, optional
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
     keep : callable, optional
         Given what was found.
 

@@ -56,7 +56,7 @@ def run_transient_study(
     restart : str or Path, optional
         ``state.npz`` of an earlier run on the same mesh, to go on from.
     progress : callable, optional
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
     keep : callable, optional
         Given the machine and the study as it ran.
 

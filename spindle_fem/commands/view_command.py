@@ -55,7 +55,7 @@ def view_folder(
     design : int, optional
         Which design of a sweep; its optimum when absent.
     progress : callable
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
 
     Returns
     -------

@@ -444,7 +444,7 @@ class Predictor:
         column, drive = names.index(reading.channel), self.drives[number]
         own = {f"{reading.name}.{item.name}": item.name for item in reading.parameters}
         asked = {own[name]: position for position, name in enumerate(derivatives) if name in own}
-        told.temperature[:, column], told.sensitivity[:, column], by = reading.told(
+        told.temperature[:, column], told.sensitivity[:, column], by = reading.read_with_derivatives(
             drive.times,
             told.temperature[:, column],
             told.sensitivity[:, column],

@@ -1,1 +1,1 @@
-"""What ``import spindle_fem`` gives: functions that answer with results to look at, plot and save."""
+"""Functions of ``import spindle_fem``, which return results to look at, plot and save."""

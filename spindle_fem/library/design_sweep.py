@@ -69,7 +69,7 @@ def sweep(
     scheduler: str | None = None,
     progress: bool = False,
 ) -> DesignSweep:
-    """Solve every design of a study; one that was stopped goes on where its folder's table ends.
+    """Solve every design of a study; a stopped study resumes where its folder's table ends.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a study found, with the folder of its files, a temporary one where none was given."""
+"""Result of a study together with the folder of its files, a temporary one if none was given."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from spindle_fem.results.presented import Presented
 
 
 class FolderResult(Presented, dict[str, Any]):
-    """What a study found: the content of its JSON file by key, and the folder of its files.
+    """Result of a study: the content of its JSON file by key, and the folder of its files.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ class MachineDiagnosis(FolderResult):
         return before_after(self.to_xarray(), number)
 
     def plot_residuals(self) -> Figure:
-        """How far each channel is off in each condition, before and after."""
+        """Mean residual of each channel in each condition, before and after."""
         return residual_map(self.to_xarray())
 
     def plot_probabilities(self) -> Figure:
@@ -104,7 +104,7 @@ def diagnose(
         Mesh on which both fits are run again by the full model; ``auto`` is the coarse one unless that
         would take very many time steps.
     progress : callable, optional
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
 
     Raises
     ------

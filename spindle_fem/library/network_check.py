@@ -51,11 +51,11 @@ class NetworkCheck(FolderResult):
         return crosscheck_charts.difference_map(self.found.comparison)
 
     def plot_temperatures(self) -> Figure:
-        """Both fields on one scale."""
+        """Temperature fields of network and FEM on one scale."""
         return crosscheck_charts.temperature_map(self.found.comparison)
 
     def plot_causes(self) -> Figure:
-        """What makes the nodes differ that differ most."""
+        """Causes of the largest differences between nodes."""
         return crosscheck_charts.causes_chart(self.found.comparison, self.found.study, CAUSES)
 
     def _headline(self) -> str:
@@ -73,7 +73,7 @@ def crosscheck(
     overrides: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> NetworkCheck:
-    """Build the paper's network of a machine, solve it beside the elements, and say why they differ.
+    """Build the paper's network of a machine, solve it and the FEM, and explain their differences.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def crosscheck(
     overrides : iterable of str
         ``path=value`` texts.
     progress : callable, optional
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
 
     Raises
     ------

@@ -160,7 +160,7 @@ def simulate(
     overrides : iterable of str
         ``path=value`` texts.
     progress : callable, optional
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
 
     Raises
     ------

@@ -22,7 +22,7 @@ ONE = "bearing"
 
 
 class SolvedBearing(Presented, dict[str, Any]):
-    """What ``spindle-fem bearing --json`` prints, by key."""
+    """Content of ``spindle-fem bearing --json``, by key."""
 
     def to_pandas(self) -> pd.DataFrame:
         """Balls or rollers, by bearing and number: angles, loads, pressures, films; units in the names."""

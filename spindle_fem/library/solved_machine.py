@@ -58,7 +58,7 @@ class SolvedMachine(ThermalResult):
         return draw_charts(self)["axial_profiles"]()
 
     def plot_heat_balance(self) -> Figure:
-        """Where the heat comes from and where it goes."""
+        """Heat sources and sinks."""
         return draw_charts(self)["heat_balance"]()
 
     def plot_bearings(self) -> Figure | None:
@@ -70,7 +70,7 @@ class SolvedMachine(ThermalResult):
         return draw_charts(self)["coolant"]()
 
     def plot_growth(self) -> Figure | None:
-        """Where growth puts shaft, rings and housing, exaggerated; None without bearings on bodies."""
+        """Shaft, rings and housing displaced by growth, exaggerated; None without bearings on bodies."""
         return deformed_machine(self.shapes)
 
 
@@ -89,7 +89,7 @@ def solve(
     point : OperatingPoint, optional
         The definition's own by default.
     progress : callable
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
 
     Raises
     ------

@@ -111,7 +111,7 @@ def transient(
     restart : str or Path, optional
         ``state.npz`` of an earlier run on the same mesh, to go on from.
     progress : callable, optional
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
 
     Raises
     ------

@@ -41,18 +41,18 @@ GAP_STEPS = 1.5
 UNIFORM_TOLERANCE = 0.01
 LONG_GAP_SECONDS = 1800.0
 LONG_GAP_STEPS = 60.0
-# Four years, more than machines are logged in one piece: at a step a minute two million steps are kept, and
-# a wrong stamp asks for more than any memory.
+# Four years, longer than machines are logged in one piece: at one step a minute two million steps are kept,
+# and a wrong stamp would need more memory than any computer has.
 LONGEST_SECONDS = 4.0 * 366.0 * 86400.0
 # Least noise of a channel that declares none, K: no sensor on a machine is better than a millikelvin.
 SMALLEST_SIGMA = 1.0e-3
-# The same of a displacement, m: what the best capacitive probes resolve.
+# Smallest sigma of a displacement, m: resolution of the best capacitive probes.
 SMALLEST_DISPLACEMENT_SIGMA = 1.0e-8
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """What was measured, at every distinct stamp in order.
+    """Measured data at every distinct stamp, in order.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Recording:
     segments : (S, 2) int64 ndarray
         Start and stop of the stretches between long gaps.
     unseen_changes : tuple of (input, float, float), [s]
-        Between which of its own readings a held input changed, where others were read between them; told by
+        Readings between which a held input changed while others were read in between; set by
         a diagnosis.
     displacement_names, displacement_sensors : tuple of str
         Columns, and the sensor of the machine of each.
@@ -168,7 +168,7 @@ class Recording:
         return np.interp(times, at, values)
 
     def input_history(self, names: tuple[str, ...] | None = None) -> InputHistory:
-        """Inputs on the recording's own grid, gaps bridged as each one's ``hold`` says."""
+        """Inputs on the recording's own grid, gaps bridged according to each input's ``hold``."""
         chosen = self.input_names if names is None else names
         values = np.empty((self.times.size, len(chosen)))
         for position, name in enumerate(chosen):
@@ -221,7 +221,7 @@ def read_recording(
         again from its readings. Default: half an hour or 60 median steps,
         whichever is longer.
     names : callable, optional
-        Names of the machine that it is for: a manifest with faults is then told those that it does not have.
+        Names of the machine, to report unknown ones beside a manifest's other faults.
 
     Raises
     ------

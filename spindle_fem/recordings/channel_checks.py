@@ -1,4 +1,4 @@
-"""What is wrong with one channel's readings, and how noisy they are."""
+"""Defects and noise of one channel's readings."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _SAMPLE_FOR_RESOLUTION = 20_000
 
 @dataclass(frozen=True, slots=True)
 class ChannelNoise:
-    """How a channel scatters, in SI.
+    """Noise of a channel, in SI.
 
     Attributes
     ----------
@@ -214,9 +214,9 @@ def temperature_flags(
 
 
 def _spikes(values: Array, noise: float, white: float) -> NDArray[np.bool_]:
-    """Readings that leave their neighbours, while those agree with each other.
+    """Readings that depart from their neighbours, while those agree with each other.
 
-    A true peak has steep flanks: the departure must stand out from the
+    A true peak has steep flanks: the departure must exceed the
     differences between the neighbours too.
     """
     departures = np.abs(values - median_filter(values, SPIKE_WINDOW, mode="mirror"))
@@ -278,7 +278,7 @@ def _stuck(values: Array) -> NDArray[np.bool_]:
 def stale_readings(
     times: Array, values: Array, inputs_missing: NDArray[np.bool_], coarse_step: float
 ) -> NDArray[np.bool_]:
-    """Readings that a logger repeats after their source has gone.
+    """Readings that a logger repeats after their source has failed.
 
     Parameters
     ----------

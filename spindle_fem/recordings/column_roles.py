@@ -1,4 +1,4 @@
-"""What each column of a measuring file probably means: by its name, its unit, its size and how it behaves."""
+"""Guess the meaning of each column of a measuring file from its name, unit, size and behaviour."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from spindle_fem.units import registry
 _UNITS = {"speed": "rpm", "coolant_flow": "l/min", "thrust": "N"}
 # Readings of sensors on machines, degC.
 _PLAUSIBLE = (-40.0, 250.0)
-# The same where only the place says that it is a temperature.
+# The same range if only the place suggests a temperature.
 _ON_MACHINES = (-30.0, 150.0)
 # Readings in kelvin of the same sensors, above all that are plausible in °C.
 _KELVIN = (250.0, 425.0)
-# Band in which a value stands still: of its range, and of its largest size.
+# Band within which a value counts as constant: relative to its range, and to its largest size.
 _STILL, _STILL_OF_SIZE = 0.02, 0.001
 
 
@@ -106,7 +106,7 @@ def _guess(
 
 
 def _said_input(name: str, unit: str, inputs: dict[str, str], present: np.ndarray) -> str:
-    """The input of which a name has a word; without a unit name and size must not say otherwise."""
+    """Input suggested by a word of the name; without a unit, name and size must not contradict it."""
     drives = drives_by_words(name, inputs)
     if not drives or unit:
         return drives
@@ -209,7 +209,7 @@ def _temperature_unit(present: np.ndarray) -> str:
 
 
 def _doubt_of_size(unit: str | None, present: np.ndarray) -> str:
-    """What is odd about the size of a temperature in its unit."""
+    """Doubt about a temperature whose size does not fit its unit; empty if there is none."""
     if unit not in ("degC", "K") or not present.size:
         return ""
     low, high = np.percentile(present, [5.0, 95.0])

@@ -1,4 +1,4 @@
-"""Units as devices write them beside names of columns, in the words that this program knows."""
+"""Units as devices write them beside column names, translated to units that this program knows."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _WRITINGS = {
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s+(?:/|in)\s+(?P<unit>\S+(?: C)?)$")
 _GLUED = re.compile(r"^(?P<name>.*\w)(?P<unit>[°º]\s?[CFcf])$")
-# Behind a name and a blank only writings stand for units that no word of a name is written like.
+# After a name and a blank, only texts that cannot be a word of a name count as units.
 _NO_WORDS = frozenset(
     {writing for writing in _WRITINGS if not writing.isascii() or not writing.replace(" ", "").isalpha()}
     | {"degc", "degf", "deg c", "grad c", "grad celsius", "celsius", "rpm", "upm", "lpm"}
@@ -56,7 +56,7 @@ _CELSIUS = re.compile(r"^(?P<name>(?:[Tt]|[Tt]emp\w*)[_ ].*\w)_(?P<unit>C)$")
 _UNDERSCORE = re.compile(r"^(?P<name>.*\w)_(?P<unit>degC|degF|rpm|K|s|ms|W|kW|N|kN|bar|l_min|um|mm|percent)$")
 
 
-# Format words that stand where columns of dates and clocks would have a unit, German, French and English.
+# Date formats found where columns of dates and clocks would have a unit, German, French and English.
 _DATE_FORM = r"(?:[tdj]{1,2}|m{1,4}|[jya]{2,4})(?:[-./ ](?:[tdj]{1,2}|m{1,4}|[jya]{2,4})){1,2}"
 _SECOND_FORM = r"(?:s{1,2}|sek|sec)(?:[.,:](?:0|[a-z]){1,9})?"
 _CLOCK_FORM = rf"(?:h{{1,2}}|std):(?:m{{1,2}}|min)(?::{_SECOND_FORM})?(?: ?(?:am/pm|tt))?"
@@ -64,7 +64,7 @@ _TIME_FORM = re.compile(rf"(?:{_DATE_FORM})?(?:[t ,;]*(?:{_CLOCK_FORM}))?", re.I
 
 
 def is_time_form(text: str) -> bool:
-    """Whether a cell says how dates or clocks are written.
+    """Whether a cell is a format of dates or clocks.
 
     >>> [is_time_form(cell) for cell in ("TT.MM.JJJJ", "[hh:mm:ss,000]", "YYYY-MM-DD HH:MM", "min", "")]
     [True, True, True, False, False]
@@ -117,6 +117,6 @@ def without_unit(name: str) -> tuple[str, str]:
 
 
 def _is_no_word(text: str) -> bool:
-    """Whether a text behind a name can be nothing but its unit."""
+    """Whether a text after a name can only be its unit."""
     plain = text.replace("º", "°").replace("° ", "°")
     return plain.lower() in _NO_WORDS or plain in _NO_WORDS_AS_WRITTEN

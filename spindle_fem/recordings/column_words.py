@@ -1,4 +1,4 @@
-"""What names of columns say, in the languages of machine builders."""
+"""Vocabulary of column names, in the languages of machine builders."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def same(name: str, allowed: tuple[str, ...]) -> str:
 
 
 def within(name: str, allowed: tuple[str, ...]) -> str:
-    """The longest allowed name whose words stand one after another in a name, where it is the only one."""
+    """The longest allowed name whose words appear consecutively in a name, if it is the only one."""
     words = _words(name)
     found: dict[int, list[str]] = {}
     for item in allowed:

@@ -1,4 +1,4 @@
-"""What a model says beside what was read: errors by channel and condition, result files."""
+"""Compare predictions with readings: errors by channel and condition, result files."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Comparison:
     conditions: Conditions
 
     def row(self, channel: str, condition: str = ALL) -> ErrorRow:
-        """One row of the table."""
+        """Row of the table for a channel and condition."""
         return next(row for row in self.rows if (row.channel, row.condition) == (channel, condition))
 
 
@@ -152,12 +152,12 @@ def write_simulated(
     predicted: NDArray[np.float64],
     displacements: NDArray[np.float64] | None = None,
 ) -> None:
-    """Write ``simulated.csv``: ``time_s``, temperatures in °C, displacements in µm, one column a channel.
+    """Write ``simulated.csv``: ``time_s``, temperatures in °C, displacements in µm, one column per channel.
 
     Parameters
     ----------
     predicted : (N, c) ndarray
-        Temperatures [K], then any displacements that stand among the recording's readings [µm].
+        Temperatures [K], then any displacements that are among the recording's readings [µm].
     displacements : (N, d) ndarray, optional, [m]
     """
     zero = np.where(np.arange(predicted.shape[1]) < recording.temperature_count, ZERO_CELSIUS_K, 0.0)

@@ -57,14 +57,14 @@ class ChannelDefects:
 
 @dataclass(frozen=True, slots=True)
 class Thinning:
-    """What averaging over bins of time did.
+    """Summary of averaging over bins of time.
 
     Attributes
     ----------
     rows, bins : int
         Before and after.
     missing : int
-        Means (bin and channel) that stand for too few readings.
+        Means (bin and channel) with too few readings.
     readings_left_out : int
         Readings that carried a flag, or were missing, and entered no mean.
     """

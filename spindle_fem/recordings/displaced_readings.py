@@ -9,7 +9,7 @@ import numpy as np
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
 
-# As large in number as kelvins, and as models of machines read them.
+# Makes displacements comparable in size with kelvins, in the unit that models of machines use.
 MICROMETRES = 1.0e6
 
 

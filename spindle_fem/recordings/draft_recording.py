@@ -30,7 +30,7 @@ MOST_CELLS_NAMED = 5
 
 @dataclass(frozen=True, slots=True)
 class DraftedRecording:
-    """What drafting leaves.
+    """Result of drafting a recording.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ def draft_recording(
 
 
 def _no_temperature(where: str, channels: list[GuessedChannel], machine: RecordableNames) -> RecordingError:
-    """What is missing for a recording of which no column is read by a probe."""
+    """Explain what is missing if no column of a recording is read by a probe."""
     columns = ", ".join(guess.channel.column for guess in channels)
     left = [guess.channel for guess in channels if guess.channel.role == "covariate"]
     warm = ", ".join(channel.column for channel in left if channel.unit in ("degC", "degF", "K"))
@@ -138,7 +138,7 @@ def _no_temperature(where: str, channels: list[GuessedChannel], machine: Recorda
 
 
 def _require_times(times: pd.Series, pieces: list[_Piece]) -> None:
-    """Refuse times that do not tell rows apart, in the words of the files that were given."""
+    """Refuse times that do not distinguish rows, citing the files that were given."""
     if times.nunique() > 1:
         return
     where = ", ".join(str(piece.path) for piece in pieces)

@@ -12,7 +12,7 @@ _SEAL = re.compile(rb"# As drafted, by SHA-256: lines above ([0-9a-f]{64}), data
 
 
 def sealed(manifest: str, data: str) -> str:
-    r"""A drafted manifest with the sums of itself and of its data in a last line, a comment.
+    r"""Append a comment to a drafted manifest with the checksums of itself and of its data.
 
     >>> sealed("schema = 1\n", "time,SP01\n").splitlines()[1][:37]
     '# As drafted, by SHA-256: lines above'

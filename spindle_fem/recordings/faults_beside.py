@@ -1,4 +1,4 @@
-"""What a faulty manifest names beside its other faults that its data or the machine do not have."""
+"""Further faults of a faulty manifest: names that its data or the machine do not have."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from spindle_fem.recordings.recordable_names import RecordableNames
 def manifest_for(
     path: str | Path, names: Callable[[], RecordableNames] | None = None, *, growing: bool = False
 ) -> tuple[Manifest, Path]:
-    """As :func:`~spindle_fem.recordings.manifest.load_manifest`, with :func:`faults_beside` its faults.
+    """Load a manifest; if it is faulty, add :func:`faults_beside` to its faults.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def faults_beside(
     Parameters
     ----------
     names : callable, optional
-        Of the machine; asked only here, where the recording is refused anyway.
+        Names of the machine; called only here, where the recording is refused anyway.
     """
     manifest = find_manifest(recording)
     content = read_toml(manifest)

@@ -44,13 +44,13 @@ class LineSplitter:
         return [line.removesuffix(b"\r") for line in whole]
 
     def rest(self) -> bytes:
-        """What has no line end yet; it is forgotten."""
+        """Return and clear the text that has no line end yet."""
         found, self._rest = self._rest, b""
         return found
 
 
 def follow_lines(data: Path, *, to_end: bool, poll: float, tell: Tell) -> Iterator[list[bytes]]:
-    """Lines of a file, or of standard input for ``-``, as they come.
+    """Yield lines of a file, or of standard input for ``-``, as they arrive.
 
     An empty list says that nothing came for a while. A file that is replaced or cut short is read from its
     beginning again, whose first line is the header again.
@@ -64,7 +64,7 @@ def follow_lines(data: Path, *, to_end: bool, poll: float, tell: Tell) -> Iterat
     poll : float, [s]
         Time between two looks at a file that does not grow.
     tell : callable
-        Told what happened to the file.
+        Called with messages on what happened to the file.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def _growing(data: Path, poll: float, tell: Tell) -> Iterator[list[bytes]]:
                     yield lines.take(content)
                 happened = _lost(data, own.st_ino, stream.tell())
                 if happened:
-                    # What was written between the last look and the replacement.
+                    # Lines written between the last look and the replacement.
                     yield lines.take(stream.read())
                     tell(f"{data}: {happened}; read from its beginning again")
                     break
@@ -125,7 +125,7 @@ def _growing(data: Path, poll: float, tell: Tell) -> Iterator[list[bytes]]:
 
 
 def _lost(data: Path, inode: int, position: int) -> str:
-    """What happened to a file that is read no further; empty where it is still the same."""
+    """Reason why a file is no longer followed; empty if it is still the same file."""
     try:
         now = os.stat(data)
     except FileNotFoundError:

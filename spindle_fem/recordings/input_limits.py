@@ -1,4 +1,4 @@
-"""Recorded inputs held against what a machine can do: what none can is refused, what is unusual is said."""
+"""Check recorded inputs against the machine: impossible ones are refused, unusual ones reported."""
 
 from __future__ import annotations
 

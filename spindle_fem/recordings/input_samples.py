@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class InputHistory:
-    """What drives a machine, at strictly increasing times.
+    """Inputs that drive a machine, at strictly increasing times.
 
     Attributes
     ----------

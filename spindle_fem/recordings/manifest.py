@@ -19,7 +19,7 @@ RECORDING_SCHEMA = "spindle-fem/recording/1"
 DATA_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 STANDARD_INPUT = "-"
 
-# What the machines with geometry know; a network machine may name other boundaries and sources.
+# Inputs of machines with geometry; a network machine may name other boundaries and sources.
 DRIVES_UNITS = {
     "speed": "rad/s",
     "thrust": "N",

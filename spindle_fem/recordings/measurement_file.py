@@ -28,7 +28,7 @@ BLANKS = " "
 SEPARATORS = {";": "a semicolon", "\t": "a tab", ",": "a comma", "|": "a bar", BLANKS: "blanks"}
 # Lines by which a file's form is judged: beyond any preamble, and still quick.
 LINES_JUDGED = 400
-# Blanks stand in stamps and names too: they must fit that much better than signs.
+# Blanks occur in stamps and names too: they must fit this much better than signs.
 BLANKS_COUNT = 0.7
 _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 _NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)*|[.,]\d+)(?:[eE][+-]?\d+)?"
@@ -41,7 +41,7 @@ _STAMP = re.compile(r"(?=.*\d)\d{1,4}[-./:]\d{1,2}[-./:T ]?[\d:.,TZ +\-/APMapm]*
 
 @dataclass(frozen=True, slots=True)
 class MeasurementTable:
-    """One table of a measuring device.
+    """One table from a measuring device.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class MeasurementTable:
 
 
 def read_measurement(path: Path) -> MeasurementTable:
-    """Cells of a file, its kind told by its ending.
+    """Read the cells of a file, its format inferred from its suffix.
 
     Raises
     ------
@@ -255,7 +255,7 @@ def _decode(content: bytes, encoding: str, path: Path) -> str:
 
 
 def _fit(lines: list[str], separator: str) -> float:
-    """How much of some lines reads as numbers and stamps when they are cut at a separator."""
+    """Share of cells that are numbers or stamps when lines are split at a separator."""
     rows = [row for row in _cut(lines, separator) if len(row) > 1]
     if not rows:
         return 0.0
@@ -322,7 +322,7 @@ def _table(
 
 
 def _holds_units(row: list[str]) -> bool:
-    """Whether every filled cell is a unit, or says how a date or a clock is written."""
+    """Whether every filled cell is a unit or a format of dates or clocks."""
     filled = [cell for cell in row if cell.strip("-[]() ")]
     return all(is_time_form(cell) or unit_of_text(cell) for cell in filled)
 
@@ -342,7 +342,7 @@ def _first_of_body(rows: list[list[str]]) -> int | None:
 def _named(
     path: Path, cells: pd.DataFrame, units: list[str], first_line: int, found: list[str], unsure: list[str]
 ) -> MeasurementTable:
-    """Names without the units that stand in them."""
+    """Table with the units removed from its column names."""
     stated, names = {}, []
     for name, cell in zip(cells.columns, units, strict=False):
         plain, inside = without_unit(name)

@@ -1,4 +1,4 @@
-"""Names of a machine that the channels of a recording may stand for."""
+"""Names of a machine that the channels of a recording may refer to."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from spindle_fem.recordings.manifest import DRIVES_UNITS
 
 @dataclass(frozen=True, slots=True)
 class RecordableNames:
-    """What recordings of a machine may name; all empty where no machine is given.
+    """Names that recordings of a machine may use; all empty if no machine is given.
 
     Attributes
     ----------

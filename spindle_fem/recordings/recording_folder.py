@@ -52,7 +52,7 @@ def recordings_in(path: str | Path, without: Iterable[str | Path] = ()) -> dict[
 
 
 def _may_be_recording(file: Path) -> bool:
-    """Whether a TOML file is a manifest, or too broken to say what it is."""
+    """Whether a TOML file is a manifest, or too broken to tell."""
     try:
         schema = read_toml(file).get("schema")
     except SpindleFemError:

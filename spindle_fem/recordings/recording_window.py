@@ -25,7 +25,7 @@ MOST_WAITING = 100_000
 
 
 class RecordingWindow:
-    """Rows of a recording's data as they come, of which the last are kept.
+    """Arriving rows of a recording's data, of which the last are kept.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class RecordingWindow:
     data : Path
         Names the file in messages.
     tell : callable
-        Told of rows that are left out.
+        Called with messages on rows that are left out.
 
     Attributes
     ----------

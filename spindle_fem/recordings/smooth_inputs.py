@@ -36,7 +36,7 @@ SAME = 1e-9
 LONGEST_REACH, NEGLIGIBLE = 60, 4.0
 # A level that differs by more than the walk and the noise explain lies beyond a jump.
 JUMP_SIGMAS, MEDIAN_WINDOW = 2.0, 5
-# A walk slower than this share of the noise in each reading cannot be told from none.
+# A random walk slower than this share of the noise in each reading is indistinguishable from none.
 SLOWEST = 1.0e-3
 
 

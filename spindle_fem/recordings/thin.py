@@ -16,7 +16,7 @@ from spindle_fem.units import ANGULAR_SPEED_UNIT
 
 Array = NDArray[np.float64]
 
-# A bin's mean stands for it where at least this share of its rows can be used.
+# A bin's mean is used if at least this share of its rows is usable.
 LEAST_SHARE = 0.5
 
 
@@ -51,7 +51,7 @@ def thinned_recording(
     RecordingError
         A step that is not positive, or so long that fewer than two bins are left.
     OutOfValidityError
-        A negative input whose power is asked for.
+        A negative input whose power is requested.
     """
     if not step > 0.0:
         raise RecordingError(recording.source, f"bins of {step:g} s.", "Allowed: above 0.")

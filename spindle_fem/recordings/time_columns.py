@@ -1,4 +1,4 @@
-"""Which columns of a measuring file hold its time, in which form, and what they say in seconds or stamps."""
+"""Find the time columns of a measuring file, their format, and convert them to seconds or stamps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Charts of heat and coolant: where heat comes from, enters and goes; coolant along the channel."""
+"""Charts of heat and coolant: heat sources, where heat enters and leaves, coolant along the channel."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 @styled
 def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
-    """Where heat comes from and where it goes, widths in proportion to W; bearings as wholes."""
+    """Heat sources and sinks, widths in proportion to W; each bearing as a whole."""
     sources = {
         name: value for name, value in heat_by_source(energy.heat_in_by, bearings).items() if value > 0.0
     }
@@ -220,7 +220,7 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
     ----------
     ports : bool
         Whether the first and the last cell are the drilled ports: another
-        section with another film, so they are told in words.
+        section with another film, so they are described in words.
     """
     figure = new_figure(620.0)
     order = np.argsort(coolant.position, kind="stable")

@@ -65,7 +65,7 @@ class Bullets:
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A paragraph that stands out; with a ``lead`` in bold, an alert."""
+    """A highlighted paragraph; with a ``lead`` in bold, an alert."""
 
     text: str
     tone: Literal["good", "bad", ""] = ""
@@ -126,7 +126,7 @@ class Columns:
 
 @dataclass(frozen=True, slots=True)
 class Interactive:
-    """A template of its own with its data as JSON, and the script that brings it to life."""
+    """A template with its data as JSON and the script that runs it."""
 
     template: str
     script: str
@@ -135,7 +135,7 @@ class Interactive:
 
     @property
     def payload(self) -> str:
-        """The data as it may stand in a page."""
+        """The data as JSON that is safe inside a page."""
         return json.dumps(self.data).replace("</", "<\\/")
 
 

@@ -1,4 +1,4 @@
-"""Time along an axis: by the clock where stamps tell it, else from the start."""
+"""Time axis: clock time if stamps give it, otherwise time since the start."""
 
 from __future__ import annotations
 

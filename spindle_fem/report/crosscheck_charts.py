@@ -125,7 +125,7 @@ def difference_map(comparison: Comparison) -> Figure:
 
 @styled
 def temperature_map(comparison: Comparison) -> Figure:
-    """Both fields on the same scale."""
+    """Temperature fields of network and FEM on one scale."""
     figure = new_figure(1150.0)
     machine = comparison.machine
     axes = _section_axes(figure, machine, True)

@@ -27,7 +27,7 @@ Box = tuple[tuple[float, float], tuple[float, float]]
 def draw_definition(
     path: Path, spec: MachineSpec | None, faults: Sequence[SpindleFemError] = ()
 ) -> tuple[SpindleFemError, ...]:
-    """Write the picture of a machine; of a faulty one with its faults marked.
+    """Write the picture of a machine, with any faults marked.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def _boxes(spec: MachineSpec) -> Iterator[tuple[str, Box]]:
 def _place(
     fault: SpindleFemError, boxes: dict[str, Box], spec: MachineSpec | None
 ) -> tuple[float, float] | None:
-    """Where in the meridian plane a fault belongs, (z, r) [m]: what its key names, else its text."""
+    """Position of a fault in the meridian plane, (z, r) [m], from its key or else from its text."""
     if spec is None:
         return None
     parts = {surface.name: surface.part for surface in spec.surface}

@@ -31,8 +31,8 @@ COMPRESSED = {"zlib": True, "complevel": 4}
 def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Array]) -> xr.Dataset:
     """Readings, predictions, inputs, heat tracks, sets and parameters of a diagnosis.
 
-    Recordings follow one another along ``stamp``; ``recording_index`` tells
-    which a stamp belongs to.
+    Recordings follow one another along ``stamp``; ``recording_index`` gives
+    the recording of each stamp.
 
     Parameters
     ----------

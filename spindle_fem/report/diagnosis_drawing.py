@@ -1,4 +1,4 @@
-"""Where heat would explain what the model leaves, drawn on the machine's half section."""
+"""Positions where heat would explain the residuals, drawn on the machine's half section."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from spindle_fem.report.meridian_axes import MM, box, draw_edges, extent, meridi
 if TYPE_CHECKING:
     import xarray as xr
 
-# As thick as a wall is drawn, m.
+# Drawn thickness of a wall, m.
 WALL = 3.0e-3
 PLAIN = "#e9ecef"
 DOUBTED = "#c1121f"

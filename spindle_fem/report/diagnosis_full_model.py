@@ -11,7 +11,7 @@ from spindle_fem.report.table_rows import fixed, table_of, words
 
 
 def full_model_sections(content: Mapping[str, Any]) -> list[Section]:
-    """The section, or none where the full model was not asked for.
+    """Section on the full model; none unless the full model was requested.
 
     Parameters
     ----------

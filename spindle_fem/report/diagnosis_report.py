@@ -123,7 +123,7 @@ def write_diagnosis_report(
 
 
 def _read_data(path: Path) -> xr.Dataset | None:
-    """Dataset of the folder; None where the recording said too little to make one."""
+    """Dataset of the folder; None if the recording was too short on information to make one."""
     if not path.is_file():
         return None
     data = load_netcdf(path)

@@ -67,7 +67,7 @@ def fit_table(content: Mapping[str, Any]) -> Table:
 
 
 def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:
-    """How the machine may differ from its definition: what is most moved, and what to measure."""
+    """Possible deviations of the machine from its definition: the largest, and what to measure."""
     told = content.get("misdescription") or {}
     if not told.get("directions"):
         return []

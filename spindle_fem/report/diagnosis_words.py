@@ -79,13 +79,13 @@ def sensors_named(content: Mapping[str, Any]) -> list[str]:
 
 
 def place_named(content: Mapping[str, Any]) -> str:
-    """Where the mismatch is, if that is a place of the physics; else empty."""
+    """Component where the mismatch is, if it is physical and not a sensor; else empty."""
     place = content["mismatch"]["where"]["component"] or ""
     return "" if place in sensors_named(content) else place
 
 
 def found_words(content: Mapping[str, Any]) -> str:
-    """What the findings are: found, or only what comes nearest.
+    """Describe the findings: found, or only what comes nearest.
 
     >>> found_words({"verdict": "unexplained"}), found_words({"verdict": "sensor"})
     ('what comes nearest', 'what was found')
@@ -203,7 +203,7 @@ def _or(items: Sequence[str]) -> str:
 
 
 def checks(content: Mapping[str, Any]) -> list[str]:
-    """What a maintenance engineer should look at, the most probable first."""
+    """Checks for a maintenance engineer, the most probable first."""
     effects = catalogue()
     found: dict[str, None] = {}
     sets = [content["findings"], *(item["findings"] for item in content["alternatives"])]
@@ -218,7 +218,7 @@ def checks(content: Mapping[str, Any]) -> list[str]:
 
 
 def confidence_words(content: Mapping[str, Any]) -> list[str]:
-    """How the answer was found and what it leaves open."""
+    """Sentences on how the answer was found and what it leaves open."""
     mismatch, fit = content["mismatch"], content["fit"]
     found = [
         f"If nothing were missing, a difference as large would have the probability "

@@ -29,7 +29,7 @@ class TriangleSet:
     points : (n, 3) float64 ndarray, [m]
     triangles : (m, 3) int64 ndarray
     values : (n, k) float64 ndarray
-        What was asked for, for example temperature in K.
+        Requested quantity, for example temperature in K.
     label : (m,) int32 ndarray
         Part or surface that each triangle belongs to.
     normals : (n, 3) float64 ndarray or None

@@ -88,7 +88,7 @@ _STYLE = {
 
 @dataclass(frozen=True, slots=True)
 class ColourBar:
-    """One colour scale: its map, its limits, its label with the unit, and which end values go beyond."""
+    """One colour scale: its map, its limits, its label with the unit, and which ends are exceeded."""
 
     colour_map: Colormap
     low: float
@@ -203,7 +203,7 @@ def image_of(figure: Figure, *, colours: int = 0) -> Image:
 
 
 def write_png(image: Image, path: Path) -> Path:
-    """Write an image of a figure, whole or not at all: a sweep that goes on takes up its pictures."""
+    """Write an image atomically: a resumed sweep reuses its pictures."""
     with whole_file(path) as partial:
         image.save(partial, "PNG", dpi=(DPI, DPI), compress_level=PNG_LEVEL)
     return path

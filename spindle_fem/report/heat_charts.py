@@ -45,7 +45,7 @@ def _panels(number: int, title: str) -> tuple[Figure, Sequence[Axes]]:
 
 
 def _groups(content: Mapping[str, Any]) -> dict[str, Sequence[Mapping[str, Any]]]:
-    """Rows of each bearing; bearings that cannot be told apart in a chart share a line, "F1, F2"."""
+    """Rows of each bearing; bearings indistinguishable in a chart share a line, "F1, F2"."""
     groups: list[tuple[list[str], Sequence[Mapping[str, Any]]]] = []
     for name, rows in content["bearings"].items():
         for names, others in groups:
@@ -93,7 +93,7 @@ def _lines(
             [pick(row) for row in rows],
             linestyle="-" if line == GAPS else line,
             color=CYCLE[index % len(CYCLE)],
-            # what lies under another stands out on both sides of it
+            # a line under another remains visible on both sides of it
             linewidth=widths[index],
             label=f"{name}{note}",
         )
@@ -236,7 +236,7 @@ def heat_terms(content: Mapping[str, Any]) -> Figure:
 
 @styled
 def heat_models(content: Mapping[str, Any]) -> Figure:
-    """The same bearings by every heat model: how far they are apart."""
+    """Friction heat of the same bearings by every heat model."""
     groups = _groups(content)
     figure, axes = _panels(len(groups), "Friction heat by every heat model")
     speeds = [row["speed_rpm"] for row in content["models"]]

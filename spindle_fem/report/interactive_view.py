@@ -110,7 +110,7 @@ def display_surface(result: ThermalResult, triangle_budget: int = TRIANGLE_BUDGE
 
 
 def viewer_payload(surface: xr.Dataset) -> dict[str, Any]:
-    """What the page's viewer reads of a surface for drawing."""
+    """Data that the page's viewer needs, from a surface for drawing."""
     is_section = surface["triangle_is_section"].values == 1
     triangles, part = (surface[name].values.astype(np.int64) for name in ("triangle", "triangle_part"))
     columns = ("centre", "radius", "temperature", "length")

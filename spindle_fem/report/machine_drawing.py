@@ -40,7 +40,7 @@ COOLANT_COLOUR = "#f0c419"
 
 
 def part_colours(names: Sequence[str]) -> tuple[str, ...]:
-    """Fill colours of parts: by the kind that the name tells, else in turn.
+    """Fill colours of parts: by the kind in the name, else in turn.
 
     >>> part_colours(["shaft", "F1.inner_ring", "sleeve"])
     ('#b9c4cf', '#8fbf8b', '#d9a7a0')
@@ -332,7 +332,7 @@ def _above(spec: MachineSpec) -> list[Label]:
         if place is None:
             continue
         z, radius, angle = place
-        # Out of the plane a probe is turned into the nearer half, and its angle is told.
+        # A probe out of the plane is turned into the nearer half and labelled with its angle.
         side = math.copysign(1.0, round(math.cos(angle), 9)) if abs(math.cos(angle)) > 1e-9 else 1.0
         away = abs(math.sin(angle)) > 0.02
         text = f"{probe.name}\nθ = {math.degrees(angle):.0f}°" if away else probe.name

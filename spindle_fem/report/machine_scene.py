@@ -235,5 +235,5 @@ def spread_out(number: int, pairs: list[tuple[int, int]]) -> Array:
 
 
 def table_times(number: int, most: int) -> NDArray[np.int64]:
-    """Which of many rows to show: at most ``most``, evenly spread, first and last among them."""
+    """Indices of the rows to show: at most ``most``, evenly spread, first and last among them."""
     return np.unique(np.round(np.linspace(0, number - 1, min(number, most))).astype(np.int64))

@@ -1,4 +1,4 @@
-"""Free numbers of a fit in words, and which of them a picture shows."""
+"""Parameters of a fit in words, and which of them to show."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from spindle_fem.inference.coordinate_names import (
 
 ALONG = {"r": "along the radius", "z": "along the axis"}
 MOST_SHOWN = 25
-# Shift from which a parameter has moved, and width up to which it is well told, both in widths of the prior.
-MOVED, WELL_TOLD = 0.5, 0.8
+# A parameter has moved from this shift on, and is well determined up to this width, both in prior widths.
+MOVED, WELL_DETERMINED = 0.5, 0.8
 
 
 def parameter_words(name: str, recordings: Sequence[str] = ()) -> str:
@@ -62,7 +62,7 @@ def _plain(key: str) -> str:
 
 
 def worth_showing(shifts: ArrayLike, widths: ArrayLike) -> NDArray[np.int64]:
-    """Rows of the parameters that moved noticeably or are well told, in order; all where they are few.
+    """Rows of the parameters that moved or are well determined, in order; all if they are few.
 
     Parameters
     ----------
@@ -73,10 +73,10 @@ def worth_showing(shifts: ArrayLike, widths: ArrayLike) -> NDArray[np.int64]:
     >>> worth_showing(shifts, [1.0] * 31 + [0.2]).tolist()
     [30, 31]
     """
-    moved, told = np.abs(np.asarray(shifts, dtype=float)), np.asarray(widths, dtype=float)
+    moved, width = np.abs(np.asarray(shifts, dtype=float)), np.asarray(widths, dtype=float)
     if moved.size <= MOST_SHOWN:
         return np.arange(moved.size)
-    rank = np.maximum(moved / MOVED, WELL_TOLD / np.maximum(told, 1.0e-9))
+    rank = np.maximum(moved / MOVED, WELL_DETERMINED / np.maximum(width, 1.0e-9))
     order = np.argsort(-rank, kind="stable")[:MOST_SHOWN]
     chosen = order[rank[order] >= 1.0]
     return np.sort(chosen if chosen.size else order[:1])

@@ -1,4 +1,4 @@
-"""Charts of a planned measurement: which effects it tells apart, and what sensors and tests would add."""
+"""Charts of a planned measurement: effects it can distinguish, and gains from further sensors and tests."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def drawn_effects(content: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 @styled
 def pair_matrix(content: Mapping[str, Any]) -> Figure:
-    """Information in bits between every two effects; a cross where the one is not told from the other."""
+    """Information in bits between every two effects; a cross where they cannot be distinguished."""
     keys = drawn_effects(content)
     place = {key: index for index, key in enumerate(keys)}
     values = np.full((len(keys), len(keys)), np.nan)

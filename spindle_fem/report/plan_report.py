@@ -126,7 +126,7 @@ def _size_table(content: Mapping[str, Any]) -> Table:
 
 
 def _confused_table(content: Mapping[str, Any]) -> Table:
-    """For every effect that is seen, what it cannot be told from."""
+    """Effects that cannot be distinguished from each effect that is seen."""
     seen = {(d["effect"], d["component"]) for d in content["detectable"] if d["at_usual_size"]}
     found: dict[tuple[str, str], list[Mapping[str, Any]]] = {key: [] for key in seen}
     for pair in content["pairs"]:

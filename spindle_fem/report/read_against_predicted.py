@@ -1,4 +1,4 @@
-"""Temperature channels over time: what was read, what a model says, and what is left between them."""
+"""Temperature channels over time: readings, predictions, and the residuals."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ LINES = {
 MOST_CHANNELS = 12
 MOST_POINTS = 1500
 BINS = 240
-# As recordings are divided: a longer pause than so many usual steps.
+# A pause longer than this many usual steps divides a recording.
 LONG_GAP_STEPS = 60.0
 
 
@@ -103,7 +103,7 @@ def draw_course(upper: Axes, lower: Axes, course: Course, scale: float) -> None:
 
 
 def draw_legend(figure: Figure, predictions: Mapping[str, Array], band: str, *, held_out: bool) -> None:
-    """One row under the title: readings, each prediction, what is shaded."""
+    """Legend in one row under the title: readings, each prediction, the shaded band."""
     entries: dict[str, Line2D | Rectangle] = {
         "read": Line2D([], [], color=READ, linestyle="none", marker=".", markersize=6)
     }
@@ -152,7 +152,7 @@ def courses_figure(courses: list[Course], title: str, notes: str, band: str, sta
         draw_course(upper, lower, course, scale)
         upper.set_title(course.name if len(courses) > 1 else "")
         for axes in (upper, lower):
-            # Beyond the widest tick label, in every row alike.
+            # Clear of the widest tick label, the same in every row.
             axes.yaxis.set_label_coords(-84.0 / width, 0.5)
         label_times(lower, start, seconds)
         if row + 1 < rows:

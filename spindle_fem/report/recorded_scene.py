@@ -49,7 +49,7 @@ class Course:
 
     @property
     def inputs(self) -> InputHistory:
-        """What drove the machine, SI."""
+        """Inputs to the machine over time, SI."""
         names = tuple(str(name) for name in self._data["input_name"].values)
         held = (
             self._data["input_held"].values == 1 if "input_held" in self._data else np.zeros(len(names), bool)

@@ -74,7 +74,7 @@ def recording_figure(recording: Recording) -> Figure:
             at = np.flatnonzero(~missing & ((flags & flag) > 0))
             if at.size:
                 marked.add(flag)
-                # far readings stand at the edge: they would leave nothing to see of the others
+                # outliers are drawn at the edge: on scale they would flatten all other readings
                 shown_at = np.clip(values[at], low, high) if usable.size else values[at]
                 axes.plot(
                     times[at], shown_at, sign, color=colour, markersize=4.5, fillstyle="none", clip_on=False

@@ -121,7 +121,7 @@ def write_outputs(
     started : float, optional
         ``time.perf_counter()`` when the run began, for ``wall_time_s``.
     notify : callable, optional
-        Told the name of each step as it begins.
+        Called with the name of each step as it begins.
     helpers : OutputHelpers, optional
         Started before, perhaps with this result begun in this folder; started
         here when not given.
@@ -187,7 +187,7 @@ class _PictureWorker:
         self._edges = part_edges(mesh)
 
     def write(self, result: ThermalResult, figures: Path) -> float:
-        """Write every picture; seconds."""
+        """Write every picture; return the seconds it took."""
         from spindle_fem.report.figure_style import image_of
         from spindle_fem.report.profiles import meridian_section, temperature_scale
 

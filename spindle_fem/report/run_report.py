@@ -149,7 +149,7 @@ def render_run_report(
 
 
 def _equilibrium(summary: Mapping[str, Any]) -> list[Any]:
-    """How far the machine runs from the end of its equilibria."""
+    """Margin between the operating point and the end of its thermal equilibria."""
     found = summary.get("equilibrium")
     if found is None:
         return []

@@ -54,7 +54,7 @@ def heat_by_source(heat_in_by: Mapping[str, float], bearings: Iterable[str]) -> 
 
 
 def headline(summary: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Cards with the numbers that a designer asks for first."""
+    """Cards with the numbers that a designer looks for first."""
     temperature, energy = summary["temperature"], summary["energy"]
     x, y, z = temperature["max_at_mm"]
     items = [
@@ -165,7 +165,7 @@ def regime_words(coolant: Mapping[str, Any]) -> str:
 def coolant_table(coolant: Mapping[str, Any]) -> Table:
     """Channel flow with the range of its film coefficient."""
     film = coolant["film_coefficient_W_m2K"]
-    # Folders of earlier versions do not tell.
+    # Folders of earlier versions lack the key.
     asked = coolant.get("asked_flow_m3_s", coolant["flow_m3_s"])
     entries = (
         ("flow asked for", significant(asked * 6.0e4), "L/min"),
@@ -271,14 +271,14 @@ def growth_table(summary: Mapping[str, Any]) -> Table:
 
 
 def displacement_table(summary: Mapping[str, Any]) -> Table:
-    """What displacement sensors read."""
+    """Readings of the displacement sensors."""
     fields = (words("sensor", itemgetter(0)), fixed("displacement / µm", itemgetter(1), 2))
     caption = "What the displacement sensors read since assembly."
     return table_of(fields, summary.get("displacements", {}).items(), caption)
 
 
 def nose_table(summary: Mapping[str, Any]) -> Table:
-    """How the nose has moved from the frame that the flange is bolted to."""
+    """Displacement of the nose relative to the frame that the flange is bolted to."""
     growth = summary["growth"]
     entries = [
         (words, number(growth[key]), unit)

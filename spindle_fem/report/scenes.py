@@ -26,7 +26,7 @@ from spindle_fem.report.figure_style import ColourBar
 
 EDGE_COLOUR = "#1b2127"
 LINE_LIFT = 3.0e-4
-# Of balls, and of rollers.
+# Subdivisions of a ball's surface; sides of a roller.
 SUBDIVISIONS, SIDES = 3, 48
 
 
@@ -47,12 +47,12 @@ class Picture:
 
     @property
     def width(self) -> int:
-        """In pixels."""
+        """Width in pixels."""
         return self.image.shape[1]
 
     @property
     def height(self) -> int:
-        """In pixels."""
+        """Height in pixels."""
         return self.image.shape[0]
 
     def to_pixels(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -236,7 +236,7 @@ class SceneRenderer:
         window.Render()
         reader = vtkWindowToImageFilter()
         reader.SetInput(window)
-        reader.ShouldRerenderOff()  # rendering in software is most of the cost of a picture
+        reader.ShouldRerenderOff()  # software rendering is most of the cost of a picture
         reader.ReadFrontBufferOff()
         reader.SetInputBufferTypeToRGB()
         reader.Update()
@@ -294,8 +294,8 @@ def ball_triangles(
 ) -> TriangleSet:
     """Every ball as a sphere and every roller as a cylinder, ``values`` by bearing at their points.
 
-    ``label`` counts the bearings; the first ball stands at θ = 0. ``shown`` tells from their
-    centres (n, 3) which are wanted.
+    ``label`` counts the bearings; the first ball is at θ = 0. ``shown`` selects by the
+    centres (n, 3) which to draw.
     """
     found = [
         TriangleSet(

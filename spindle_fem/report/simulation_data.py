@@ -16,7 +16,7 @@ SIMULATION_SCHEMA = "spindle-fem/simulation-data/1"
 
 
 def simulation_dataset(simulation: Simulation) -> xr.Dataset:
-    """What a simulation rests on; temperatures in °C, inputs in SI, named as in ``diagnosis.nc``."""
+    """Inputs and results of a simulation; temperatures in °C, inputs in SI, named as in ``diagnosis.nc``."""
     import xarray as xr
 
     recording = simulation.recording

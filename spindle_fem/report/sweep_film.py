@@ -19,7 +19,7 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 
 def held_text(chart: FilmChart) -> str:
-    """What is held, with its amount."""
+    """The quantity held constant, with its value."""
     if chart.held == "velocity":
         return f"velocity {chart.amount:.1f} m/s"
     return f"flow {chart.amount * 6e4:.0f} L/min"
@@ -155,7 +155,7 @@ def _mark(axes: object, item: FilmChart, *, own: bool = True) -> None:
 
 
 def film_words(films: Sequence[FilmChart], limits: PumpLimits = NO_LIMITS) -> list[Any]:
-    """Where each map is largest, also within the pump's limits, and what the paper's choice gives on it."""
+    """Maximum of each film map, also within the pump's limits, and the film at the paper's choice."""
     fields = [
         words("equations", lambda item: MODELS[item.model]),
         words("held", held_text),

@@ -74,7 +74,7 @@ def write_sweep_report(
     spec : MachineSpec
         The machine before any design, for the film maps.
     results : mapping of design to ThermalResult, optional
-        Fields of the best designs; without them their picture stays as it is.
+        Fields of the best designs; without them the existing picture is kept.
     """
     solved, parameters, outputs = drawn_columns(summary, rows)
     films = film_study(spec)
@@ -177,7 +177,7 @@ def _titled(
     rows: Sequence[Row],
     parameters: Sequence[Scale],
 ) -> dict[str, ThermalResult]:
-    """Results by a title that tells name and parameters of the design."""
+    """Results by a title that gives name and parameters of the design."""
     names = {item["design"]: name for name, item in summary["references"].items()}
     titled = {}
     for design, result in results.items():
@@ -326,7 +326,7 @@ def _table(rows: Sequence[Row], parameters: Sequence[Scale], outputs: Sequence[S
 
 
 def answered_by(row: Row) -> str:
-    """What answered a design, with the error estimate of a reduced answer, and whether its mesh was moved."""
+    """Backend that solved a design, with a reduced model's error estimate, and whether its mesh was moved."""
     if row["backend"] is None:
         return MISSING
     error = row["error_estimate_K"]

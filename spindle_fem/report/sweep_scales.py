@@ -25,7 +25,7 @@ _SHOWN = {
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """One column of the table as it is drawn.
+    """Scale and label of one drawn column of the table.
 
     Attributes
     ----------

@@ -62,7 +62,7 @@ def rows_of(cells: Any) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One column of a table and how its cell is made.
+    """One column of a table and how its cells are made.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Field:
         return column(self.title, **({self.kind: True} if self.kind else {}))
 
     def cell(self, row: Any) -> Any:
-        """What stands in this column for a row."""
+        """Content of this column for a row."""
         return self.write(self.read(row) if callable(self.read) else row[self.read])
 
 

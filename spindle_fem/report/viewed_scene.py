@@ -1,4 +1,4 @@
-"""What the interactive view shows, and the data that it travels as.
+"""Content of the interactive view, and its encoding for the page.
 
 A scene is a surface to draw and, where a cut can be moved, the tetrahedra behind it; layers of values at
 its points, at one time or several; balls and named places with their histories. Everything goes into a page
@@ -51,7 +51,7 @@ class Layer:
 
     @property
     def colour_map(self) -> Colormap:
-        """Of the layer's values."""
+        """Colour map of the layer's values."""
         return DIFFERENCE_MAP if self.difference else TEMPERATURE_MAP
 
 
@@ -78,7 +78,7 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One quantity over time, of a named place: ``times`` in s, ``values`` in the unit of the layers."""
+    """One quantity of a named place over time: ``times`` in s, ``values`` in the unit of the layers."""
 
     name: str
     times: Array
@@ -137,7 +137,7 @@ class Scene:
     notes: tuple[str, ...] = ()
 
     def payload(self) -> dict[str, Any]:
-        """What the page's program reads: a header and one deflated block in base64."""
+        """Data for the page's program: a header and one deflated block in base64."""
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         span = float((high - low).max())
         scales = {layer.name: self._scale(layer) for layer in self.layers}
@@ -200,7 +200,7 @@ class Scene:
 
     def _scale(self, layer: Layer) -> tuple[float, float]:
         """Ends of the colour scale over all times, balls and places: one for all of a kind, to compare."""
-        # What fields differ by says nothing of what is left at the probes.
+        # Differences of fields and residuals at probes have unrelated sizes.
         alike = [
             item
             for item in self.layers
@@ -253,6 +253,6 @@ def _differences(indices: Indices) -> NDArray[np.int32]:
 
 
 def _rounded(values: Array, decimals: int) -> list[float | None]:
-    """Plain numbers for JSON, which knows no NaN."""
+    """Plain numbers for JSON, with None for NaN."""
     found = np.round(np.asarray(values, dtype=np.float64), decimals)
     return [value if np.isfinite(value) else None for value in found.tolist()]

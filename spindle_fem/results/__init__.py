@@ -1,1 +1,1 @@
-"""What a solved machine knows, as objects, summary, dataset and fields."""
+"""Results of a solved machine as objects, summary, dataset and fields."""

@@ -196,7 +196,7 @@ def load_netcdf(path: str | Path, group: str | None = None) -> xr.Dataset:
     import h5py
     import xarray as xr
 
-    # Where attributes cannot be read, h5netcdf leaves half a file behind, which tells of its end.
+    # If attributes cannot be read, h5netcdf leaves a half-opened file, which reports an error when deleted.
     with h5py.File(path) as file:
         dict(file.attrs)
     return xr.load_dataset(path, group=group, engine="h5netcdf")

@@ -1,6 +1,6 @@
 """``fields.vtkhdf``: temperature fields over time in one file, which ParaView opens as a time series.
 
-VTK's own HDF5 format, version 2: the mesh stands in the file once, each time adds its temperatures.
+VTK's own HDF5 format, version 2: the mesh is stored once, each time adds its temperatures.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Output folders that are complete or say that they are not."""
+"""Output folders that are complete or marked as incomplete."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from spindle_fem.errors import BadInputError, SpindleFemError
 from spindle_fem.results.run_log import logged_in
 
 MARKER = "INCOMPLETE"
-# How much of a message about a damaged file is told.
-_TOLD = 200
+# Longest quoted part of a message about a damaged file, characters.
+_MOST_QUOTED = 200
 # Errors of the system that say nothing about what is read.
 _WRITING = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
-# What only commands of this program write: pages and figures may be anybody's, the rest is the user's.
+# Files that only commands of this program write; pages and figures may be anyone's, the rest the user's.
 # A drafted recording is for its user to check and edit: no results are written beside it.
 _OWN = frozenset(
     {
@@ -60,8 +60,8 @@ def output_folder(folder: str | Path, *, own: Set[str] = _OWN) -> Iterator[Path]
     """Folder that carries a file ``INCOMPLETE`` until its block ends without error.
 
     Files of an earlier run are replaced one by one; whatever else is there is
-    left alone. After an error the marker stays and names it. ``log.txt`` tells
-    what was run and how it went.
+    left alone. After an error the marker stays and names it. ``log.txt`` records
+    the command and its outcome.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def reading_results(folder: str | Path) -> Iterator[None]:
 
 
 def _damaged(folder: str | Path, error: Exception) -> BadInputError:
-    told = " ".join(f"{type(error).__name__}: {error}".split())[:_TOLD]
+    told = " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_QUOTED]
     return BadInputError(
         str(folder), f"holds a file that was damaged or changed ({told}).", "Run the command again."
     )

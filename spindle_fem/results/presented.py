@@ -1,4 +1,4 @@
-"""How results look in a terminal and in a notebook: one line, or a small table."""
+"""Display of results in a terminal and in a notebook: one line, or a small table."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from html import escape
 
 
 class Presented:
-    """Gives a result its ``repr`` and its table in notebooks; a result says what stands in them."""
+    """Gives a result its ``repr`` and its table in notebooks, from its headline and rows."""
 
     __slots__ = ()
 
     def _headline(self) -> str:
-        """What it is, in a few words."""
+        """Kind of result, in a few words."""
         raise NotImplementedError
 
     def _rows(self) -> Mapping[str, str]:
-        """What matters most, by name, as text with units."""
+        """Most important values by name, as text with units."""
         return {}
 
     def __repr__(self) -> str:

@@ -16,7 +16,7 @@ from spindle_fem.errors import SpindleFemError
 
 LOG_FILE = "log.txt"
 LOGGER = logging.getLogger("spindle_fem")
-# Where Python puts warnings once a program has asked for that.
+# Where Python sends warnings once ``logging.captureWarnings`` is on.
 WARNINGS = logging.getLogger("py.warnings")
 LINE = "%(asctime)s %(levelname)-7s %(message)s"
 

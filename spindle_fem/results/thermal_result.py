@@ -1,4 +1,4 @@
-"""What a solved machine knows: the field and everything derived from it."""
+"""Result of a solved machine: the field and everything derived from it."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ class BearingResult:
 
 @dataclass(frozen=True, slots=True)
 class CoolantResult:
-    """Channel flow; arrays run along the helix, one entry a cell.
+    """Channel flow; arrays run along the helix, one entry per cell.
 
     Attributes
     ----------
     flow, asked_flow : float, [m³/s]
-        What flows, and what the definition asks of the pump.
+        Actual flow, and the flow that the definition requests from the pump.
     position : (n,) ndarray, [m]
         Developed length from the inlet to the cell centre.
     angle : (n,) ndarray, [rad]
@@ -144,7 +144,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Equilibrium:
-    """How far a running machine is from where its preload runs away.
+    """Distance of a running machine from runaway of its preload.
 
     Attributes
     ----------
@@ -170,7 +170,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, repr=False)
 class ThermalResult(Presented):
-    """A solved machine.
+    """Steady result of one machine.
 
     Attributes
     ----------
@@ -190,11 +190,11 @@ class ThermalResult(Presented):
     extra : mapping
         More entries of the summary.
     heat_study : mapping or None
-        Heat over speed at this run's temperatures, where it was asked for.
+        Heat over speed at this run's temperatures, if requested.
     growth_model : GrowthModel or None
         Where the solution made one already.
     equilibrium : Equilibrium or None
-        Of a machine with preloaded bearings, where it was asked for.
+        For a machine with preloaded bearings, if requested.
     """
 
     spec: MachineSpec
@@ -228,9 +228,9 @@ class ThermalResult(Presented):
 
     @cached_property
     def growth(self) -> Growth | None:
-        """What temperatures, fits and ball loads do to the machine's shape; None without bearings on bodies.
+        """Displacements due to temperatures, fits and ball loads; None without bearings on bodies.
 
-        Worked out when first asked for. Ball loads are those that were found; those of the
+        Computed on first use. Ball loads are those of the solution; those of the
         assembled preload where the heat model gives none.
         """
         from spindle_fem.model.elastic.machine_bodies import carries_rings
@@ -296,5 +296,5 @@ class ThermalResult(Presented):
         return shaped
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
-        """The same result with the seconds of each stage."""
+        """Copy with the seconds of each stage."""
         return replace(self, timings=dict(timings))

@@ -71,7 +71,7 @@ class Watch:
     looks : sequence of float, [s]
         Times at which a step has to end besides those of the inputs.
     progress : callable
-        Told in words how far the run is.
+        Called with the progress of the run in words.
     """
 
     stop: Callable[[ThermalState], bool] | None = None

@@ -121,7 +121,7 @@ def prepare_machine(
     size_factor : float, optional
         In place of the machine's own, for mesh-refinement estimates.
     progress : callable
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
     """
     clock = Clock(progress)
     clock.begin("geometry")

@@ -1,1 +1,1 @@
-"""What the commands work out, one study a command."""
+"""Computations behind the commands, one study per command."""

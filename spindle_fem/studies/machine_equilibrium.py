@@ -1,4 +1,4 @@
-"""How far a running machine is from the end of its equilibria, and what its bearings do not bear for long."""
+"""Margin of a running machine to the end of its thermal equilibria, and contacts at risk of fatigue."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 # Pa; contact pressure below which bearing steel does not tire (ISO 281:2007, 9.3.3.1).
 FATIGUE_PRESSURE = 1.5e9
-# Of the running speed: how far above it equilibria are followed.
+# Equilibria are followed up to this multiple of the running speed.
 SEARCHED_RANGE = 1.5
 
 

@@ -26,7 +26,7 @@ def check_energy(energy: EnergyBalance) -> Check:
 
 
 def check_coolant(mismatch: float) -> Check:
-    """What the walls give equals what the coolant carries away."""
+    """Check that heat from the walls equals the heat carried away by the coolant."""
     return _within(
         "coolant enthalpy",
         mismatch,
@@ -37,7 +37,7 @@ def check_coolant(mismatch: float) -> Check:
 
 
 def check_circuits(mismatch: float) -> Check:
-    """What the walls of circuits give equals what their coolant carries away."""
+    """Check that heat from the walls of circuits equals the heat carried away by their coolant."""
     what = "Film heat less enthalpy rise of each circuit's coolant, relative; the worst."
     return _within("circuit enthalpy", mismatch, BALANCE_LIMIT, "", what)
 

@@ -1,4 +1,4 @@
-"""What every channel of a recording should have read, the machine as defined or calibrated on others."""
+"""Predict every channel of a recording, with the machine as defined or calibrated on others."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def simulate_recordings(
     overrides : sequence of str
         ``path=value`` texts.
     progress : callable
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def _simulate_geometry(
 
 
 def _displacements(predictor: Predictor, factors: Mapping[str, float]) -> Array:
-    """What the displacement channels of the one recording should read, (N, d) [m] from each first reading."""
+    """Predicted displacement channels of one recording, (N, d) [m] from each first reading."""
     recording = predictor.recordings[0]
     if not recording.displacement_names:
         return recording.displacements
@@ -185,7 +185,7 @@ def _outside_range(predictor: Predictor, parameters: Mapping[str, float]) -> dic
 
 
 def _beyond_words(outside: Mapping[str, float]) -> str:
-    """Which coefficients the recording takes beyond the model's range, how far, and what widens it."""
+    """Name the coefficients beyond the model's range, by how much, and how to widen it."""
     named = ", ".join(f"{name} by {100.0 * share:.2g} %" for name, share in outside.items())
     return (
         f"the recorded inputs take coefficients beyond what the reduced model was made for: {named}. "
@@ -231,9 +231,9 @@ def _effect_notes(effects: ActiveEffects) -> list[str]:
 
 
 def _prediction(predictor: Predictor, result: Calibration | None) -> tuple[Array, Array]:
-    """What one recording should read, and half the width of the interval of a reading, both (N, c) K.
+    """Predicted readings of one recording, and half the width of the interval of a reading, both (N, c) K.
 
-    Starting temperatures belong to each recording: what a calibration learned of its own says nothing here.
+    Starting temperatures are specific to each recording, so a calibration's own do not apply.
     """
     priors = (*predictor.uncertain(), *predictor.starts())
     learned = {} if result is None else result.factors

@@ -1,4 +1,4 @@
-"""From a definition to a checked result: the one call behind ``spindle-fem run``."""
+"""From a definition to a checked result: the function behind ``spindle-fem run``."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from spindle_fem.validity import CodedWarning, by_consequence
 
 # Between the element sizes of the two meshes of an estimate.
 REFINEMENT_RATIO = 1.5
-# Of the circulation pumps in spindle coolers, which give 3 to 6 bar.
+# Pressure of circulation pumps in spindle coolers, which give 3 to 6 bar.
 PUMP_PRESSURE = 6.0e5
 
 
@@ -59,7 +59,7 @@ def solve(
     point : OperatingPoint, optional
         The definition's own by default.
     progress : callable
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
 
     Returns
     -------
@@ -207,7 +207,7 @@ def _bearings(
 def _omitted_preload(
     machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState, lumped: Mapping[str, float]
 ) -> list[CodedWarning]:
-    """What the temperatures found would do to the preload, where that is left out."""
+    """Warn of the preload change that the solved temperatures would cause where it is not modelled."""
     spec = machine.spec
     if spec.heat.thermal_preload or spec.heat.model == "table" or not spec.bearing_set:
         return []
@@ -276,7 +276,7 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
     order = ("laminar", "transition", "turbulent")
 
     def mean(values: np.ndarray) -> float:
-        # Of the channel itself; the short ports have a film of their own.
+        # Average over the channel itself; the short ports have a film of their own.
         wall = area[:, ~cells.is_port]
         return float((values[:, ~cells.is_port] * wall).sum() / wall.sum())
 
@@ -311,7 +311,7 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
 
 
 def _circuits(machine: PreparedMachine, coupled: CoupledState) -> dict[str, CircuitResult]:
-    """What the coolant of every circuit beside the channel did."""
+    """Flow, heat and film of every circuit beside the channel."""
     found = {}
     outlets = circuit_outlets(machine, coupled.solution, coupled.loads)
     for film in machine.spec.circuits:
@@ -359,9 +359,9 @@ def _probes(
 
 
 def with_heat_study(result: ThermalResult) -> ThermalResult:
-    """The same result with bearing loads, films and heat over speed, at its own temperatures.
+    """The result with bearing loads, films and heat over speed added, at its own temperatures.
 
-    Left as it is where the heat comes from a table, or no speed looked at has an equilibrium.
+    Unchanged if the heat comes from a table, or no speed examined has an equilibrium.
     """
     spec = result.spec
     if spec.heat.model == "table" or not result.bearings:

@@ -138,13 +138,13 @@ class TransientStudy(SpecModel):
         return self
 
     def end_of(self, phase: Phase) -> Until | None:
-        """What ends a phase, None for a fixed length."""
+        """Stop condition of a phase, None for a fixed length."""
         return None if phase.duration is not None else phase.until or self.until
 
 
 @dataclass(frozen=True, slots=True)
 class PhaseResult:
-    """One phase as it ran.
+    """Result of one phase.
 
     Attributes
     ----------
@@ -171,12 +171,12 @@ class StudyResult:
 
     @property
     def state(self) -> ThermalState:
-        """At the end, to go on from."""
+        """State at the end, to continue from."""
         return self.phases[-1].transient.state
 
     @property
     def memory(self) -> Array | None:
-        """What terms remember at the end; None without terms."""
+        """Memory of terms at the end; None without terms."""
         return self.phases[-1].transient.memory
 
     def joined(self, name: str) -> Array:
@@ -194,7 +194,7 @@ class StudyResult:
 
 
 class Settled:
-    """Stop condition: no probe has changed by more than asked over a window."""
+    """Stop condition: no probe has changed by more than the given tolerance over a window."""
 
     def __init__(
         self, rows: ReadingRows, history: OperatingHistory, until: Until, start: ThermalState
@@ -206,7 +206,7 @@ class Settled:
         self._seen = [self._read(start)]
 
     def __call__(self, state: ThermalState) -> bool:
-        """Whether the probes have settled at this state; asked after every step."""
+        """Whether the probes have settled at this state; called after every step."""
         if not np.any(self.looks == state.time):
             return False
         self._seen.append(self._read(state))
@@ -297,7 +297,7 @@ def run_study(
 
 @dataclass(frozen=True, slots=True)
 class _StudyWatch:
-    """Who is told how far a study is, and who keeps fields."""
+    """Callbacks for progress and for keeping fields."""
 
     progress: Callable[[str], None]
     keep: Callable[[ThermalState], None]

@@ -1,4 +1,4 @@
-"""What a transient study found, as plain data: phases, energy, steps, approach to the steady state."""
+"""Results of a transient study as plain data: phases, energy, steps, approach to the steady state."""
 
 from __future__ import annotations
 

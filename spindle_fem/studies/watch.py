@@ -38,7 +38,7 @@ _PERIODS = {"hour": 3600.0, "day": 86400.0, "week": 604800.0, "month": MONTH, "y
 
 @dataclass(frozen=True, slots=True)
 class Watching:
-    """How a recording is watched.
+    """Settings of a watch on a recording.
 
     Attributes
     ----------
@@ -105,16 +105,16 @@ def duration(text: str, where: str) -> float:
 def watch_recording(
     machine: str | Path, recording: str | Path, how: Watching, *, progress: Progress = lambda stage: None
 ) -> Iterator[dict[str, Any]]:
-    """State changes of a machine against its recording, and heartbeats, as they come.
+    """Yield state changes of a machine against its recording, and heartbeats, as they occur.
 
     Parameters
     ----------
     machine : str or Path
         A definition or the name of one that ships; with geometry or a ``[network]``.
     recording : str or Path
-        Manifest of the data that are written; ``-`` as its data stands for standard input.
+        Manifest of the data being written; ``data = "-"`` reads standard input.
     progress : callable
-        Told each stage, and what is wrong with the file.
+        Called with each stage, and with faults of the file.
 
     Yields
     ------
@@ -176,7 +176,7 @@ def _smooth(window: RecordingWindow) -> Recording | None:
 def _begin(
     machine: str | Path, how: Watching, first: Recording, calibration: Sequence[Recording], progress: Progress
 ) -> WatchedMachine:
-    """The machine with what its calibration recordings, or the beginning of this one, tell."""
+    """The machine fitted to its calibration recordings, or to the beginning of this one."""
     progress("reduced model")
     stop = int(np.searchsorted(first.times, first.times[0] + how.warm_up, side="right"))
     sound = [piece_of(first, 0, stop)] if how.warm_up else []
@@ -241,7 +241,7 @@ class _Teller:
                 yield self._line(item, window)
 
     def end(self, window: RecordingWindow) -> Iterator[dict[str, Any]]:
-        """What holds at the end, unless it was said."""
+        """Yield the final state unless it was already reported."""
         if self._latest is not None and self._latest is not self._said:
             yield self._line(self._latest, window)
 

@@ -188,12 +188,12 @@ def test_readings_and_their_derivatives_go_through_the_sensor():
     times, rng = np.arange(5.0), np.random.default_rng(1)
     temperature, by = 300.0 + rng.normal(size=5), rng.normal(size=(5, 3))
     inputs = {"ambient": np.full(5, 290.0)}
-    told, told_by, own = Halved().told(times, temperature, by, inputs, {}, ("gain",))
+    told, told_by, own = Halved().read_with_derivatives(times, temperature, by, inputs, {}, ("gain",))
     np.testing.assert_allclose(told, 290.0 + 0.5 * (temperature - 290.0))
     np.testing.assert_allclose(told_by, 0.5 * by)
     # To the logarithm of the gain.
     np.testing.assert_allclose(own[:, 0], 0.5 * (temperature - 290.0))
-    told, _, own = Halved().told(times, temperature, by[:, :0], inputs, {"gain": 2.0})
+    told, _, own = Halved().read_with_derivatives(times, temperature, by[:, :0], inputs, {"gain": 2.0})
     np.testing.assert_allclose(told, 290.0 + 2.0 * (temperature - 290.0))
     assert own.shape == (5, 0)
 

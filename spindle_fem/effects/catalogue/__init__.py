@@ -1,1 +1,1 @@
-"""One file an effect; a new file is a new effect."""
+"""Catalogue of effects, one file per effect; a new file is a new effect."""

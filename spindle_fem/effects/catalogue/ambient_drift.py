@@ -45,7 +45,7 @@ class DriftTerm(Term):
         self.heat_places = tuple(fluid_place(film) for film in films)
 
     def heat(self, context: TermContext) -> Complex:
-        """The same shift for every film, (n, k) K."""
+        """Shift of the surroundings, the same for every film, (n, k) K."""
         own, time = context.parameters, context.time
         if self._form == STEADY:
             shift = own["rate"] * time
@@ -63,7 +63,7 @@ class DriftTerm(Term):
 
 
 class AmbientDrift(Effect):
-    """The air at the machine differs from what the ambient sensor tells.
+    """The air at the machine differs from the reading of the ambient sensor.
 
     Source: machine halls drift by 0.5 to 2 K/h and step with doors and heating
     (ISO 230-3, environmental temperature variation error).
@@ -184,7 +184,7 @@ class AmbientDrift(Effect):
         return machine.duration > 0.5 * CYCLES.get(candidate.form, 0.0)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How fast, how much, when."""
+        """State rate or size and time of the drift."""
         subject = (
             "The room at the machine"
             if candidate.component == "ambient"

@@ -104,7 +104,7 @@ class ChillerCycling(Effect):
         return tuple(found)
 
     def can_show(self, machine: MachineView, candidate: Candidate) -> bool:
-        """A swing needs two periods to be told from a drift."""
+        """Two periods are needed to distinguish a swing from a drift."""
         return machine.duration > 2.0 * PERIODS[0]
 
     def starts_from(

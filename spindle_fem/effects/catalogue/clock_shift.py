@@ -47,13 +47,13 @@ class ClockShift(SensorEffect):
     )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
-        """One form."""
+        """The shift, in s."""
         most = 0.25 * machine.duration
         shift = linear("shift", 0.0, min(400.0, most), "s", low=-most, high=most)
         return {"": ((shift,), min(200.0, 0.5 * most), ({},))}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How far."""
+        """State by how many seconds the channel is late or early."""
         shift = reported["shift"].value
         word = "late" if shift >= 0.0 else "early"
         return f"Channel {candidate.component} is {abs(shift):.0f} s {word}."

@@ -26,12 +26,12 @@ class BypassTerm(Term):
         self.name, self.parameters = name, (FRACTION,)
 
     def operating_factor(self, point: Operating, parameters: Mapping[str, float]) -> dict[str, float]:
-        """What is left of the flow."""
+        """Factor on the flow through the channel."""
         return {FLOW: 1.0 - parameters["fraction"]}
 
 
 class MixedOutlet(Reading):
-    """The outlet sensor reads the channel's flow mixed with what went past it at inlet temperature.
+    """The outlet sensor reads the channel's flow mixed with the bypass at inlet temperature.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class CoolantBypass(Effect):
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """Which part, and where the outlet sensor sits."""
+        """State the share that bypasses the channel and where the flows join."""
         where = " and joins it before the outlet sensor" if candidate.form == MIXED else ""
         return (
             f"Channel: {100.0 * reported['fraction'].value:.0f} % of the coolant flow misses the "

@@ -157,7 +157,7 @@ class CoolantFilm(Effect):
         return found
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """Which factor, and from where on."""
+        """State the factor on the film and from where it applies."""
         if candidate.form == FOULING:
             return (
                 f"{capital(candidate.component.replace('_', ' '))}: the film coefficient is "

@@ -63,7 +63,7 @@ class DriveHeat(Effect):
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much, and how late."""
+        """State heat, power of speed and lag."""
         late = f", {reported['lag'].value / 60.0:.0f} min behind it" if "lag" in reported else ""
         return (
             f"Heat from the drive reaches {place_words(candidate.component)}: {quantity(reported[NAME])} at "

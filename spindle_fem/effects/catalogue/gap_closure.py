@@ -41,7 +41,7 @@ class GapClosureTerm(Term):
         self.name, self.coefficients = name, seats
         self.reads = (*rings, *around)
         self._rings = len(rings)
-        # What closes something: every ring, or all of them together; those whose mean closes each seat.
+        # Rings whose expansion is followed: each, or the mean of all; and the rings that close each seat.
         self._followed = len(rings) if closed_by else 1
         self._closed_by = [list(own) for own in closed_by or ((0,),) * len(seats)]
         # How far each has closed; the temperatures that they count from, 0 until the first step knows them.
@@ -59,7 +59,7 @@ class GapClosureTerm(Term):
         return rows(context, *(1.0 - context.parameters["opening"] * (1.0 - closed)))
 
     def advance(self, context: TermContext, step: float) -> Complex:
-        """How far each has closed, and what excesses count from where that is the start, (n or 2 n, k)."""
+        """Closure of each seat, then reference excesses if counted from the start, (n or 2 n, k)."""
         own, number = context.parameters, self._followed
         rings = context.temperatures[: self._rings]
         rings = rings if number > 1 else rings.mean(axis=0, keepdims=True)
@@ -151,7 +151,7 @@ class GapClosure(Effect):
         ]
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How open, and when it closes."""
+        """State how far the seats are open and at which difference they close."""
         over = "the housing" if OVER_HOUSING in candidate.form else "their temperature at the start"
         return (
             f"{capital(place_words(candidate.component))}: cold, the outer seats conduct down to "

@@ -38,7 +38,7 @@ class GreaseChurningTerm(Term):
     Parameters
     ----------
     speed : str
-        Input that tells whether the machine turns.
+        Input that shows whether the machine turns.
     threshold : float
         Magnitude of it above which it does.
     restarts : bool
@@ -79,7 +79,7 @@ class GreaseChurningTerm(Term):
         return repeated(context, 1.0 + own["extra_friction"] * fresh, len(self.bearings))
 
     def advance(self, context: TermContext, step: float | Array) -> Complex:
-        """How far the grease is run in, (1, k)."""
+        """Progress of the grease's run-in, (1, k)."""
         own = context.parameters
         speed = np.abs(context.inputs[self._speed])
         turning = speed > self._threshold

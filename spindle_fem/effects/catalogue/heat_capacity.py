@@ -65,7 +65,7 @@ class ContactCapacityTerm(Term):
         )
 
     def heat(self, context: TermContext) -> Complex:
-        """Into every place, (n, k) W."""
+        """Heat into every place, (n, k) W."""
         own, (mass, place) = context.parameters, self._temperatures(context)
         return self._spread.heat(context, own["capacity"] * (mass - place) / own["contact_time"])
 
@@ -140,7 +140,7 @@ class HeatCapacity(Effect):
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much, and what that is in steel."""
+        """State the capacity and its equivalent mass of steel."""
         size = reported["capacity"].value
         lag = reported.get("contact_time")
         behind = f" It follows with {lag.value / 60.0:.0f} min." if lag is not None else ""

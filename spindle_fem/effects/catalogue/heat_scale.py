@@ -50,7 +50,7 @@ class HeatScale(Effect):
         return {"factor": Reported(values.get(candidate.amplitude, 1.0), "")}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """By how much."""
+        """State the factor on the heat."""
         return (
             f"{capital(place_words(candidate.component))}: the heat is {reported['factor'].value:.2f} "
             "times the modelled one at every speed and temperature."

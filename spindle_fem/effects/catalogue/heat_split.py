@@ -71,7 +71,7 @@ class HeatSplit(Effect):
     law_sigma = MappingProxyType({"inner_share_change": 0.08})
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """All bearings alike, by the machine's own parameter, or one set."""
+        """All bearings by one share (the machine's own parameter if it has one), or one set."""
         if machine.kind == "network" or not machine.sets:
             return ()
         own = machine.parameters.get(INNER_SHARE)
@@ -97,7 +97,7 @@ class HeatSplit(Effect):
         return {"inner_share_change": Reported(value, "")}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How far the share moves."""
+        """State the change of the inner rings' share."""
         place = EVERY if candidate.form == EVERY else place_words(candidate.component)
         return (
             f"{capital(place)}: the share of the friction heat that enters the inner rings differs from "

@@ -15,7 +15,7 @@ REFERENCE = 0.6
 
 
 class JointTerm(Term):
-    """One factor on several coefficients.
+    """One common factor on several coefficients.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class JointConductance(Effect):
         return {"factor": Reported(values.get(candidate.amplitude, 1.0), "")}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much better or worse."""
+        """State the factor on the contact conductance."""
         contact = f" ({candidate.form})" if candidate.form else ""
         return (
             f"{capital(place_words(candidate.component))}{contact}: the contact conducts "

@@ -95,7 +95,7 @@ class MountSink(Effect):
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """By how much, and since when."""
+        """State the temperature difference of the frame and its onset."""
         value = reported[NAME]
         word = "above" if value.value >= 0.0 else "below"
         size = quantity(Reported(abs(value.value), "K"))

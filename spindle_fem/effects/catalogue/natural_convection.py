@@ -61,7 +61,7 @@ class NaturalConvection(OutsideFilmEffect):
         )
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How strongly the film follows."""
+        """State exponent and share of the convective film."""
         return (
             f"{capital(place_words(candidate.component))}: the film to the air is not constant but "
             f"grows with the power {reported['exponent'].value:.2f} of the temperature difference (natural "

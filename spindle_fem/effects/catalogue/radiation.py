@@ -64,7 +64,7 @@ class Radiation(OutsideFilmEffect):
         return (amplitude("radiative_share", 0.6, high=5.0),)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How large the part is."""
+        """State the radiative share of the film."""
         return (
             f"{capital(place_words(candidate.component))}: heat is lost by radiation besides the "
             "constant film; "

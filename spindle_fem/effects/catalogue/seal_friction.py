@@ -76,7 +76,7 @@ class SealFriction(Effect):
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much at which end, and how much more when new."""
+        """State the heat at each end and the extra heat of a new seal."""
         new = ""
         if "more_when_new" in reported:
             new = (

@@ -23,7 +23,7 @@ TIME_IN_AIR = (600.0, 0.8)
 
 
 class DetachedReading(Reading):
-    """From an instant on the sensor follows a mix of its place and the ambient air, with a lag.
+    """From a given time the sensor follows a mix of its place and the ambient air, with a lag.
 
     With a contact ``G`` to its place, a loss ``L`` to the air and a capacity
     ``C`` it relaxes towards ``T + s (T_air - T)``, ``s = L / (G + L)``, in
@@ -33,7 +33,7 @@ class DetachedReading(Reading):
     Parameters
     ----------
     ambient : float, [K]
-        Where no input tells it.
+        Used if no input gives it.
     """
 
     def __init__(
@@ -97,11 +97,11 @@ class SensorDetached(SensorEffect):
         }
 
     def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
-        """Reading of a channel; the air has the reference temperature where no input tells it."""
+        """Reading of a channel; the air is at the reference temperature if no input gives it."""
         return DetachedReading(channel, name, parameters, self._ambient)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """Since when, and how far."""
+        """State since when and to which share the sensor reads the air."""
         since = f"since {reported['time'].value / 60.0:.0f} min" if "time" in reported else "from the start"
         return (
             f"Sensor {candidate.component} has been off its place {since}: it reads the air to "

@@ -51,7 +51,7 @@ class SensorDrift(SensorEffect):
     )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
-        """From the first stamp, or from an instant on."""
+        """Drift from the first stamp, or from a later time."""
         span = machine.duration
         rate = linear("rate", 0.0, 2.0 / span, "K/s")
         start = linear("start", 0.5 * span, 0.3 * span, "s", low=0.0, high=span)
@@ -62,6 +62,6 @@ class SensorDrift(SensorEffect):
         }
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How fast."""
+        """State the drift rate and its start."""
         since = f" from {reported['start'].value / 60.0:.0f} min on" if "start" in reported else ""
         return f"Sensor {candidate.component} drifts by {reported['rate'].value:+.2g} K/h{since}."

@@ -46,7 +46,7 @@ class SensorGain(SensorEffect):
     )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
-        """One form."""
+        """The gain."""
         return {"": ((amplitude("gain", 0.15, null=1.0, low=0.0, high=5.0),), 1.1, ({},))}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:

@@ -53,13 +53,13 @@ class SensorLag(SensorEffect):
     )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
-        """One form."""
+        """The time constant, in s."""
         longest = 0.5 * machine.duration
         size = amplitude("time_constant", min(300.0, longest), "s", high=longest)
         return {"": ((size,), min(200.0, 0.5 * longest), ({},))}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How late."""
+        """State the time constant."""
         return (
             f"Sensor {candidate.component} follows the temperature with a time constant of "
             f"{reported['time_constant'].value:.0f} s."

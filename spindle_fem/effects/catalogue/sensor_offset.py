@@ -47,11 +47,11 @@ class SensorOffset(SensorEffect):
     )
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
-        """One form."""
+        """The offset, in K."""
         return {"": ((linear("offset", 0.0, 1.5, "K", low=-50.0, high=50.0),), 1.0, ({},))}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """By how much."""
+        """State the offset and its sign."""
         offset = reported["offset"].value
         word = "too high" if offset >= 0.0 else "too low"
         return (

@@ -132,7 +132,7 @@ class ShaftConvection(Effect):
         ]
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much more."""
+        """State the additional film or conductance at 3000 rpm."""
         size = next(iter(reported.values()))
         amount = (
             f"its film at 3000 rpm is {1.0 + size.value:.1f} times the modelled one"

@@ -123,7 +123,7 @@ class Starvation(Effect):
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: dict[str, Reported]) -> str:
-        """Where, by how much, above which speed."""
+        """State the change of friction and the speed above which it occurs."""
         change = 100.0 * reported["friction_change"].value
         word = "more" if change >= 0.0 else "less"
         return (

@@ -26,17 +26,17 @@ from spindle_fem.effects.framework.term import Term, TermContext
 NAME = "friction_increase_at_10K"
 REFERENCE_DIFFERENCE = 10.0
 MECHANICS = "bearing mechanics"
-# Of the increase by mechanics: how widely the share of friction that follows the load spreads; about half
-# of it does in greased bearings (Palmgren's load-dependent moment beside the viscous one).
+# Standard deviation of the share of friction that follows the load; about half of it does
+# in greased bearings (Palmgren's load-dependent moment beside the viscous one).
 LOAD_SHARE_SIGMA = 0.5
-# Of the same: friction that follows its load more than this is none of rings.
+# Largest share: friction that follows its load more than this does not come from rings.
 MOST_LOAD_SHARE = 3.0
-# Of the logarithm: how widely the power spreads with which friction grows over the ring difference, as
-# the state of the grease has it (load^(2/3..4/3)).
+# Standard deviation of the logarithm of the exponent of friction over the ring difference, which depends
+# on the state of the grease (load^(2/3..4/3)).
 EXPONENT_SIGMA = 0.12
-# Of what mechanics has between the bearings of a set: spacers ground to fit share the load otherwise.
+# Standard deviation of the unevenness within a set: spacers ground to fit share the load otherwise.
 UNEVENNESS_SIGMA = 0.5
-# Of the standard clearance deviation: a fit looser than ordered is likelier than a tighter one, as rings
+# In standard deviations of the clearance: a fit looser than ordered is likelier than a tighter one, as rings
 # are made smaller than their size and bores larger.
 CLEARANCES = (-2.0, 4.0)
 
@@ -77,11 +77,11 @@ class ThermalPreloadTerm(Term):
 
 
 class PreloadMechanicsTerm(Term):
-    """Friction of every bearing of a set as mechanics answers to rings and fit, ``1 + a ((m - 1) / m₁₀)^e``.
+    """Friction of every bearing of a set from bearing mechanics, ``1 + a ((m - 1) / m₁₀)^e``.
 
     ``m`` is friction over that without temperature differences: by the mean ring difference of the set,
-    and by the gap that outer rings, warmer than the housing, close. How much more one bearing takes than
-    another scales with the unevenness: 1 as mechanics has it, 0 all alike. ``m₁₀`` is its mean increase at
+    and by the gap that outer rings, warmer than the housing, close. The differences between the bearings
+    scale with the unevenness: 1 as the mechanics predicts, 0 all equal. ``m₁₀`` is the mean increase at
     10 K as assembled, so that ``a / m₁₀`` is the share of the friction that follows the load. A set that goes
     slack loses that share as a power of its friction, which stays above 0. The lag is that of what
     lies between the places read and the raceways.
@@ -132,9 +132,9 @@ class PreloadMechanicsTerm(Term):
 class ThermalPreload(Effect):
     """Preload that follows the inner-outer temperature difference.
 
-    Where a definition has fits and preload, the mechanics of its bearings says in which form and by how
-    much each of them. A power of the difference, alike for a set, stands for it elsewhere, and beside it for
-    bearings that were mounted otherwise than the definition says.
+    If a definition has fits and preload, the mechanics of its bearings gives the form and the size
+    for each bearing. Otherwise, and for bearings mounted differently from the definition, friction follows
+    a power of the difference, the same for the whole set.
 
     Source: Hertz (1882), load with deflection^1.5; Bossmanns & Tu (1999), Int.
     J. Mach. Tools Manuf. 39, 1345-1366, thermally induced preload in spindles;
@@ -167,11 +167,11 @@ class ThermalPreload(Effect):
     )
 
     def in_definition(self, spec: MachineSpec) -> bool:
-        """Where heat follows expansion."""
+        """Machines whose heat follows thermal expansion."""
         return spec.heat.thermal_preload
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """By the power law and, where there are fits, by mechanics: one each a bearing set."""
+        """For each bearing set, the power law and, where there are fits, the mechanics."""
         found = []
         for group in machine.groups:
             bearings = tuple(b for b in machine.sets[group] if b in machine.inner and b in machine.outer)
@@ -199,7 +199,7 @@ class ThermalPreload(Effect):
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How strongly friction follows."""
+        """State how strongly friction follows."""
         by_mechanics = "exponent" not in reported
         exponent = (
             candidate.constants["exponent"] * reported["exponent_factor"].value

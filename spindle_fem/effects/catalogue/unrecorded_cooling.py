@@ -68,7 +68,7 @@ class UnrecordedCooling(UnrecordedEffect):
 
     name = "unrecorded_cooling"
     kind = "missing_physics"
-    # It can take almost any course, so that less speaks for it than for a law.
+    # It can take almost any course over time, hence less probable a priori than a law.
     prior_weight = 0.5
     title = "something cools this place that no recorded input explains"
     check = (
@@ -95,7 +95,7 @@ class UnrecordedCooling(UnrecordedEffect):
         return heat if form == "heat" else heat / machine.typical_rise
 
     def followed(self, machine: MachineView) -> Sequence[RecordedQuantity]:
-        """What was recorded beside the inputs: inputs that cool have laws of their own."""
+        """Quantities recorded beside the inputs; inputs that cool have laws of their own."""
         return tuple(item for item in machine.quantities if item.beside and not item.changes)
 
     def places(self, machine: MachineView) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ class UnrecordedCooling(UnrecordedEffect):
         return (*self.places(machine), *(machine.joint_coefficients if machine.kind == "network" else ()))
 
     def acts_on(self, machine: MachineView, spot: str) -> tuple[str, ...]:
-        """Places that a spot stands for; the end of a link."""
+        """Places of a spot; the wall end of a link."""
         link = self.link(machine, spot)
         return (machine.walls[link],) if link else super().acts_on(machine, spot)
 
@@ -135,7 +135,7 @@ class UnrecordedCooling(UnrecordedEffect):
         return CoolingTerm(name, amplitude("conductance", usual, "W/K"), spread, on, fluid)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much, and how often."""
+        """State size and intervals of the cooling."""
         size = reported.get("conductance") or reported["heat"]
         if candidate.terms[0].coefficients:
             return (

@@ -24,7 +24,7 @@ class UnrecordedHeatSource(UnrecordedEffect):
 
     name = "unrecorded_heat_source"
     kind = "missing_physics"
-    # It can take almost any course, so that less speaks for it than for a law.
+    # It can take almost any course over time, hence less probable a priori than a law.
     prior_weight = 0.5
     title = "something heats this place that no recorded input explains"
     check = (
@@ -52,7 +52,7 @@ class UnrecordedHeatSource(UnrecordedEffect):
         return 0.2 * machine.typical_heat
 
     def followed(self, machine: MachineView) -> Sequence[RecordedQuantity]:
-        """All of them, speeds only by their changes: what grows with speed has laws of its own."""
+        """All recorded quantities, speeds only by their changes: laws cover heat that grows with speed."""
         return machine.quantities
 
     def level_places(self, machine: MachineView) -> tuple[str, ...]:
@@ -60,7 +60,7 @@ class UnrecordedHeatSource(UnrecordedEffect):
         return (*self.places(machine), *machine.source_heat)
 
     def acts_on(self, machine: MachineView, spot: str) -> tuple[str, ...]:
-        """Places that a spot stands for; the node that a source heats."""
+        """Places of a spot; the node heated by a source."""
         return (machine.inner[spot],) if self.source(machine, spot) else super().acts_on(machine, spot)
 
     def source(self, machine: MachineView, spot: str) -> str:
@@ -78,7 +78,7 @@ class UnrecordedHeatSource(UnrecordedEffect):
         return UnrecordedHeatTerm(name, amplitude("heat", usual, "W"), spread, on)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much, and how often."""
+        """State size and intervals of the heat."""
         source = next(iter(candidate.terms[0].bearings), "")
         if source:
             more = reported["heat"].value / candidate.constants["nominal"]

@@ -104,7 +104,7 @@ class ViscosityHeat(Effect):
     )
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """One a bearing set or source."""
+        """One candidate per bearing set or source."""
         found = []
         for group in machine.groups:
             bearings = tuple(b for b in machine.sets[group] if b in machine.inner)

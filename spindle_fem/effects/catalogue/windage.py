@@ -61,7 +61,7 @@ class Windage(Effect):
         return tuple(found)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """How much, and its law."""
+        """State the heat and its power of speed."""
         return (
             f"Air friction heats {place_words(candidate.component)}: {quantity(reported[NAME])} at 4500 "
             f"rpm, with the power {reported['exponent'].value:.1f} of speed."

@@ -1,1 +1,1 @@
-"""What an effect is, and the building blocks that the catalogue is written with."""
+"""Base classes of effects, and the building blocks of the catalogue."""

@@ -1,4 +1,4 @@
-"""What the documentation and the tests learn of an effect from the effect itself."""
+"""Description of an effect, kept with the effect, for the documentation and the tests."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ GROUPS = (
 
 @dataclass(frozen=True, slots=True)
 class Makes:
-    """Which way an effect of positive amplitude moves a probe of the reference spindle.
+    """Direction in which an effect of positive amplitude moves a probe of the reference spindle.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Makes:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """One row of docs/effects.md, and what tests hold an effect to.
+    """One row of docs/effects.md, and expectations that tests check.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
-"""What an effect of the catalogue is, and what one candidate for it looks like.
+"""Base class of the effects in the catalogue, and the candidates that an effect proposes.
 
-An *effect* (``thermal_preload``, ``sensor_lag``, ...) knows where in a machine
+An *effect* (``thermal_preload``, ``sensor_lag``, ...) determines where in a machine
 it can act and in which mathematical forms. One form at one place is a
 *candidate*: terms for the thermal model, factors on the machine's own
 parameters, or a transformation of a reading, with free parameters and priors.
@@ -32,7 +32,7 @@ Kind = Literal["missing_physics", "parameter", "sensor"]
 
 @dataclass(frozen=True, slots=True)
 class Reported:
-    """One parameter as a finding states it.
+    """One parameter as a finding reports it.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Reported:
 
 
 class Reading(ABC):
-    """A sensor that tells something else than the temperature at its place.
+    """A sensor whose reading differs from the temperature at its place.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Reading(ABC):
         inputs: Mapping[str, Array],
         parameters: Mapping[str, NDArray[np.complex128]],
     ) -> NDArray[np.complex128]:
-        """What the sensor tells.
+        """Reading of the sensor.
 
         Affine in ``values``, analytic in the parameters (complex steps).
 
@@ -85,16 +85,16 @@ class Reading(ABC):
             By inner name.
         """
 
-    def told(
+    def read_with_derivatives(
         self,
         times: Array,
         temperature: Array,
         slopes: Array,
         inputs: Mapping[str, Array],
         values: Mapping[str, float],
-        asked: Sequence[str] = (),
+        differentiate_by: Sequence[str] = (),
     ) -> tuple[Array, Array, Array]:
-        """What the sensor tells, and derivatives.
+        """Reading of the sensor and its derivatives.
 
         Parameters
         ----------
@@ -102,28 +102,30 @@ class Reading(ABC):
         temperature : (N,) ndarray, [K]
             At the sensor's place.
         slopes : (N, p) ndarray
-            Derivatives of it.
+            Its derivatives by p parameters.
         inputs : mapping of str to (N,) ndarray
         values : mapping of str to float
             Own parameters by inner name; nominal where absent.
-        asked : sequence of str
-            Own parameters to differentiate by: to the logarithm where they are logarithmic.
+        differentiate_by : sequence of str
+            Own parameters to differentiate by; logarithmic ones by their logarithm.
 
         Returns
         -------
-        (N,) ndarray, (N, p) ndarray and, to own parameters, (N, len(asked)) ndarray
+        (N,), (N, p) and, by own parameters, (N, len(differentiate_by)) ndarray
         """
         width = slopes.shape[1]
-        columns = 1 + width + len(asked)
+        columns = 1 + width + len(differentiate_by)
         own = {item.name: values.get(item.name, item.value) for item in self.parameters}
         # Affine in the temperature: differences of whole columns; complex steps for own parameters.
         series = np.repeat(temperature[:, None].astype(complex), columns, axis=1)
         series[:, 1 : 1 + width] += slopes
         parameters = {name: np.full(columns, value, dtype=complex) for name, value in own.items()}
         for item in self.parameters:
-            if item.name in asked:
+            if item.name in differentiate_by:
                 scale = own[item.name] if item.logarithmic else 1.0
-                parameters[item.name][1 + width + asked.index(item.name)] += 1j * COMPLEX_STEP * scale
+                parameters[item.name][1 + width + differentiate_by.index(item.name)] += (
+                    1j * COMPLEX_STEP * scale
+                )
         found = self.read(times, series, inputs, parameters)
         by = (found[:, 1 : 1 + width] - found[:, :1]).real
         return found[:, 0].real, by, found[:, 1 + width :].imag / COMPLEX_STEP
@@ -306,7 +308,7 @@ class Effect(ABC):
     def starts_from(
         self, candidate: Candidate, times: Array, residual: Array
     ) -> tuple[Mapping[str, float], ...]:
-        """Where to begin searches, given what a model without the effect leaves unexplained.
+        """Starting points of searches, given the residual of a model without the effect.
 
         Parameters
         ----------
@@ -329,7 +331,7 @@ class Effect(ABC):
         return {own[name].name: stated(own[name], values.get(name, own[name].value)) for name in order}
 
     def check_of(self, candidate: Candidate) -> str:
-        """What to look at where this candidate is found."""
+        """What to check on the machine if this candidate is found."""
         return self.check
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
@@ -366,7 +368,7 @@ def quantity(item: Reported) -> str:
 
 
 def place_words(component: str) -> str:
-    """A component as it stands in a sentence.
+    """A component as written in a sentence.
 
     >>> place_words("front_bearings"), place_words("F2"), place_words("drive_end")
     ('the front bearings', 'F2', 'the drive end')
@@ -376,7 +378,7 @@ def place_words(component: str) -> str:
 
 
 def capital(text: str) -> str:
-    """With a capital first letter, the rest untouched."""
+    """Capitalise the first letter; leave the rest unchanged."""
     return text[:1].upper() + text[1:]
 
 
@@ -405,14 +407,14 @@ class IntervalEffect(Effect):
 
     @abstractmethod
     def places(self, machine: MachineView) -> tuple[str, ...]:
-        """Where it can act: spots of the view, finer than the components that findings name."""
+        """Spots of the view where it can act, finer than the components that findings name."""
 
     def acts_on(self, machine: MachineView, spot: str) -> tuple[str, ...]:
-        """Places of the model that a spot stands for."""
+        """Places of the model that a spot consists of."""
         return machine.spots[spot]
 
     def level_places(self, machine: MachineView) -> tuple[str, ...]:
-        """Where a level may change once or a few times."""
+        """Spots where a level may change once or a few times."""
         return self.places(machine)
 
     def link(self, machine: MachineView, spot: str) -> str:

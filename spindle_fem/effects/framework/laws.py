@@ -90,7 +90,7 @@ def rows(context: TermContext, *values: ArrayLike) -> Complex:
 
 
 def repeated(context: TermContext, value: ArrayLike, number: int) -> Complex:
-    """The same row several times, (number, k)."""
+    """One row repeated several times, (number, k)."""
     return np.repeat(rows(context, value), number, axis=0)
 
 

@@ -90,7 +90,7 @@ class FrictionTable:
 
 @dataclass(frozen=True, slots=True)
 class ChannelFlow:
-    """What the Reynolds number of the coolant follows from.
+    """Duct data and coolant, from which the Reynolds number follows.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class ChannelFlow:
     area: float
 
     def reynolds_number(self, flow: float, temperature: float) -> float:
-        """On the hydraulic diameter, for a flow of all starts [m³/s] at the inlet temperature [K]."""
+        """Reynolds number on the hydraulic diameter, for the flow of all starts [m³/s] at the inlet [K]."""
         viscosity = float(coolant_by_name(self.fluid).properties(temperature).kinematic_viscosity)
         return flow / self.area * self.hydraulic_diameter / viscosity
 
@@ -144,7 +144,7 @@ class RecordedQuantity:
 
 
 def no_mechanics(component: str) -> None:
-    """Nothing is known of how the friction of a set follows its rings."""
+    """No mechanics: how the friction of a set follows its rings is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +208,7 @@ class MachineView:
     outlets : tuple of str
         Channels that read the mixed coolant after the channel.
     speed_inputs : mapping of component to tuple of str
-        Inputs that tell how fast the machine turns there.
+        Inputs that give the rotational speed there.
     input_scale : mapping of str to float
         Largest magnitude of every input in the recording.
     capacity : mapping of component to float, [J/K]
@@ -296,11 +296,11 @@ class MachineView:
         return sets or tuple(self.sets)
 
     def speeds(self, component: str) -> tuple[str, ...]:
-        """Inputs that tell how fast the machine turns there."""
+        """Inputs that give the rotational speed there."""
         return self.speed_inputs.get(component, ())
 
     def running(self, component: str) -> tuple[str, ...]:
-        """Input that tells whether there is friction or other heat there, if any does."""
+        """Input that shows whether there is friction or other heat there, if any."""
         own = self.source_inputs.get(component)
         found = self.speeds(component) or (() if own is None else (own,))
         return found[:1]
@@ -320,7 +320,7 @@ class MachineView:
         return self.reported.get(key, key)
 
     def form(self, key: str, form: str = "") -> str:
-        """Form that tells a spot or source from others of the same component."""
+        """Form that distinguishes a spot or source from others of the same component."""
         own = "" if self.component(key) == key else key
         return " ".join(part for part in (own, form) if part)
 

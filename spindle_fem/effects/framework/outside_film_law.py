@@ -11,7 +11,7 @@ from spindle_fem.effects.framework.laws import Complex, columns, fluid_temperatu
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
 
-# What the constant film is usually taken for: a wall this much warmer than room air.
+# Usual basis of the constant film: a wall this much warmer than room air, K.
 REFERENCE_DIFFERENCE = 10.0
 REFERENCE_TEMPERATURE = 293.15
 
@@ -59,7 +59,7 @@ class OutsideFilmTerm(Term):
 
 
 class OutsideFilmEffect(Effect):
-    """One candidate for the standing outside, and for every boundary link of a network.
+    """One candidate for the stationary outside, and for every boundary link of a network.
 
     Attributes
     ----------

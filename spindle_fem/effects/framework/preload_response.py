@@ -1,6 +1,6 @@
-"""How the friction of a set follows its rings and fits: what bearing mechanics answered, to be interpolated.
+"""Tables of friction over ring temperatures and fits, computed by bearing mechanics, with interpolation.
 
-The answer depends on three numbers: by how much the inner rings are warmer than the outer ones, the
+Friction depends on three numbers: by how much the inner rings are warmer than the outer ones, the
 gap that temperatures alone leave between outer rings and housing (negative: interference), and the
 speed. Whatever the housing does to the set it does through that gap.
 """

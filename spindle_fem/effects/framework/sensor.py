@@ -1,4 +1,4 @@
-"""Sensors that tell something else than the temperature at their place: what all of them have in common."""
+"""Common base of the effects on sensors, whose reading differs from the temperature at their place."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from spindle_fem.effects.framework.effect import Candidate, Effect, Reading
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import TermParameter
 
-# What a form needs: parameters with the amplitude first, reference, starts.
+# Parts of a form: parameters with the amplitude first, reference, starts.
 Form = tuple[tuple[TermParameter, ...], float, Sequence[Mapping[str, float]]]
 
 
 class ChannelReading(Reading):
-    """A reading that takes nothing but its channel and its parameters."""
+    """A reading that needs only its channel and its parameters."""
 
     def __init__(self, channel: str, name: str, parameters: tuple[TermParameter, ...]) -> None:
         self.channel, self.name, self.parameters = channel, name, parameters
@@ -26,7 +26,7 @@ class SensorEffect(Effect):
     Attributes
     ----------
     reading_kind : type of ChannelReading
-        What the sensor tells; an effect whose reading needs more has a ``reading`` of its own.
+        Class of the reading; an effect whose reading needs more overrides ``reading``.
     """
 
     kind = "sensor"

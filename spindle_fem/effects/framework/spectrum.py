@@ -1,4 +1,4 @@
-"""Periods that stand out in readings at any stamps."""
+"""Dominant periods of readings at arbitrary stamps."""
 
 from __future__ import annotations
 

@@ -12,12 +12,12 @@ from spindle_fem.effects.framework.term import Term, TermContext
 
 # Before any data: value and standard deviation.
 SHARE_BESIDE = (0.15, 0.15)
-# What runs in: heat beyond the lasting one when new, and its time constant with its logarithm's deviation.
+# Running in: heat of a new part beyond the lasting heat (relative), and its time constant, s; deviations.
 RUN_IN, RUN_IN_TIME = (0.3, 0.3), (5000.0, 0.8)
 
 
 def turning_places(machine: MachineView, places: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
-    """Where heat may follow a speed: place, speed, and how a form tells the speed from others there.
+    """Places where heat may follow a speed, that speed, and the form that distinguishes it from others there.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def turning_places(machine: MachineView, places: tuple[str, ...]) -> Iterator[tu
 
 
 class SpeedHeatTerm(Term):
-    """Heat ``P (n / n0)^m``, spread evenly over its places, lagging where asked.
+    """Heat ``P (n / n0)^m``, spread evenly over its places, optionally with a lag.
 
     Parameters
     ----------

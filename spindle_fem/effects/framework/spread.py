@@ -1,4 +1,4 @@
-"""How heat lies over places: evenly, more on one side than on the other, or drawn to one spot."""
+"""Distribution of heat over places: even, stronger on one side, or concentrated on one spot."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Spread:
 
     @property
     def parameters(self) -> tuple[TermParameter, ...]:
-        """What is free about it."""
+        """Free parameters of the distribution."""
         focus = (linear("focus", FOCUSED, FOCUSED_SIGMA, low=0.0, high=1.0),) if self.spot else ()
         names = ("up", "across") if self.sides else ()
         return focus + tuple(linear(name, 0.0, 0.5 * UNEVEN, low=-1.0, high=1.0) for name in names)

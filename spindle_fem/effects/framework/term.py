@@ -36,12 +36,12 @@ FLUID_PREFIX = "fluid."
 COOLANT_INLET = "fluid.coolant_inlet"
 # Coefficient of the film in the cooling channel.
 CHANNEL_FILM = "channel.film"
-# Inputs that drive nothing but terms that follow them: ``covariate.<column>``.
+# Inputs used only by terms that follow them: ``covariate.<column>``.
 COVARIATE = "covariate."
 
 
 class Operating(Protocol):
-    """What an operating point tells a term, SI."""
+    """Quantities of the operating point that a term may use, in SI."""
 
     speed: float
     thrust: float
@@ -52,7 +52,7 @@ class Operating(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TermParameter:
-    """One number of a term.
+    """One parameter of a term.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class TermParameter:
 
 @dataclass(frozen=True, slots=True)
 class TermContext:
-    """What a term sees; the last axis counts complex perturbations, or instants.
+    """Inputs and state of a term; the last axis counts complex perturbations, or instants.
 
     Attributes
     ----------

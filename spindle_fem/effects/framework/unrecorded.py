@@ -51,7 +51,7 @@ SMALLEST_VARIATION = 0.05
 
 
 class Share(Protocol):
-    """How far something is on over time.
+    """Time course between off (0) and on (1).
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Share(Protocol):
     follows: tuple[str, ...]
 
     def share(self, context: TermContext) -> Complex:
-        """How far it is on, (k,)."""
+        """Share that is on, (k,)."""
 
     def mean_share(self, own: Mapping[str, float]) -> float:
         """Mean while it is on, from values by inner name."""
@@ -115,7 +115,7 @@ class InIntervals:
         if self._number == 1:
             factors = []
         elif course == STEPS:
-            # As many free numbers as levels: the first stands to the common size as it is.
+            # As many free numbers as levels: the first level is the common size itself.
             factors[0] = replace(factors[0], sigma=0.0)
         # A level that changes is another state of the machine, at once: its lag is that of the masses.
         lag = shape("lag", self._width, 0.0, "s") if course == STEPS else _lag()
@@ -150,7 +150,7 @@ class InIntervals:
         ]
 
     def share(self, context: TermContext) -> Complex:
-        """How far it is on, (k,)."""
+        """Share that is on, (k,)."""
         own, time = context.parameters, np.asarray(context.time, dtype=float)
         lag = own["lag"]
         width = max(time.size, np.size(lag))
@@ -179,16 +179,16 @@ class InIntervals:
         return float(np.average(self.factors(own), weights=[end - start for start, end in self.edges(own)]))
 
     def advance(self, context: TermContext, step: float | Array) -> Complex:
-        """Nothing is remembered."""
+        """State unchanged: there is no memory."""
         return context.state
 
 
 class Followed:
-    """As large as a power of a recorded quantity above an onset, or as its changes, with a lag.
+    """In proportion to a power of a recorded quantity above an onset, or to its changes, with a lag.
 
     ``((q - q1) / (q0 - q1))^m``, nothing below ``q1``: a seal that touches, a seat that opens. Changes are
-    those of the square: the energy that acceleration and braking turn over. A recording begins with what it
-    was at rest.
+    those of the square: the energy that acceleration and braking convert. A recording starts with the
+    quantity at its value at rest.
     """
 
     n_states = 1
@@ -212,7 +212,7 @@ class Followed:
         return power((quantity - own[ONSET]) / (own["reference"] - own[ONSET]), own["exponent"])
 
     def share(self, context: TermContext) -> Complex:
-        """How far it is on, (k,)."""
+        """Share that is on, (k,)."""
         if not self._changes:
             return context.state[0]
         apart = self._target(context) - context.state[0]
@@ -258,7 +258,7 @@ class UnrecordedTerm(Term):
 
 
 class UnrecordedHeatTerm(UnrecordedTerm):
-    """Heat that comes, or goes whatever the temperature; ``sign`` -1 where it goes."""
+    """Heat added, or removed if ``sign`` is -1, independent of temperature."""
 
     def __init__(self, name: str, size: TermParameter, spread: Spread, on: Share, sign: float = 1.0) -> None:
         super().__init__(name, size, spread, on)
@@ -382,7 +382,7 @@ class UnrecordedEffect(IntervalEffect):
         return replace(found, sized_by=parameter) if sized else found
 
     def check_of(self, candidate: Candidate) -> str:
-        """What runs in its intervals, or with what it follows."""
+        """What to check: whatever runs in its intervals, or with the quantity it follows."""
         name = followed_name(candidate)
         return self.check_law.format(name.replace("_", " ")) if name else self.check
 
@@ -423,7 +423,7 @@ def followed_name(candidate: Candidate) -> str:
 
 
 def quantity_followed(machine: MachineView, candidate: Candidate) -> RecordedQuantity | None:
-    """The same with what is known of it; None where it follows none."""
+    """The recorded quantity that a candidate follows; None if it follows none."""
     name = followed_name(candidate)
     return next((item for item in machine.quantities if item.name == name), None)
 

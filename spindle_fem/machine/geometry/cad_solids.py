@@ -125,7 +125,7 @@ def build_solids(assembly: AssemblyGeometry, geometry: Geometry) -> SolidModel:
 
 
 def _renewed_faces(before: list[int], volume: int) -> dict[int, int]:
-    """Which face of the volume took the place of each that is gone, by their common curves."""
+    """Replacement of each face of the volume that a Boolean operation removed, matched by boundary curves."""
     after = set(_skin(volume))
     fresh = {frozenset(_curves(tag)): tag for tag in after.difference(before)}
     return {
@@ -168,7 +168,7 @@ def _remove_construction(volumes: Iterable[int]) -> None:
 
 
 def _revolve_parts(assembly: AssemblyGeometry, geometry: Geometry) -> dict[str, int]:
-    """One volume a part; meridian faces are revolved as one compound, so that neighbours share faces."""
+    """One volume per part; meridian faces are revolved as one compound so that neighbours share faces."""
     import gmsh
 
     kernel = gmsh.model.occ

@@ -25,7 +25,7 @@ PORT_MARGIN = 1.0e-3
 
 @dataclass(frozen=True, slots=True)
 class ChannelDefinition:
-    """What the user asks for, lengths in m.
+    """Helical channel as the user defines it, lengths in m.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ def build_channel(
     Returns
     -------
     notes : tuple of str
-        Where a port was drilled narrower than asked.
+        One for each port drilled narrower than requested.
     """
     number_of_faults = len(faults)
     _check_numbers(definition, faults)

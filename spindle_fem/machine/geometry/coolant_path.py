@@ -102,7 +102,7 @@ def delivered_flow(spec: MachineSpec, inlet: ArrayLike, asked: float | None = No
 
 
 def _port_length(spec: MachineSpec) -> float:
-    """From the channel's outer wall to the outside of its part, mean of both ends, m."""
+    """Distance from the channel's outer wall to the outside of its part, mean of both ends, m."""
     channel = spec.channel
     wall = channel.inner_radius + channel.depth
     segments = next((part.segment for part in spec.part if part.name == channel.part), ())

@@ -131,7 +131,7 @@ class Piece:
         return True
 
     def describe(self) -> str:
-        """Which exposed face this is, for messages."""
+        """Describe this exposed face, for messages."""
         facing = self.facing(self.above == VOID)
         if self.kind == "cylinder":
             return f"the {facing} face r {in_millimetres(self.r[0])}, z {span(self.z)}"

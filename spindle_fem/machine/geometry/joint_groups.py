@@ -1,4 +1,4 @@
-"""Which joint group each contact of the mesh belongs to."""
+"""Joint group of each contact of the mesh."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ LARGEST = 10**12
 
 @dataclass(frozen=True, slots=True)
 class MeridianMap:
-    """Which part owns each cell of the grid spanned by all coordinates.
+    """Owner of each cell of the grid spanned by all part coordinates.
 
     Attributes
     ----------

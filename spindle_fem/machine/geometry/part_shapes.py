@@ -1,4 +1,4 @@
-"""What a machine is drawn from: rings of parts, boxes that pick faces, named surfaces, balls and rollers."""
+"""Shapes that make up a machine: rings of parts, boxes that pick faces, named surfaces, balls and rollers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class PartGeometry:
 
 @dataclass(frozen=True, slots=True)
 class FaceBox:
-    """Exposed faces that look one way and lie between bounds, lengths in m.
+    """Exposed faces with one orientation that lie between bounds, lengths in m.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class FaceBox:
         Direction of the normal: +r, -r, -z, +z.
     z, r : (low, high) or None
         A face that lies in the range only in part is split there; None takes
-        every face. A plane face is asked for with equal bounds or a range.
+        every face. Select a plane face with equal bounds or a range.
     """
 
     facing: Facing

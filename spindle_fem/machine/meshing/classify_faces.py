@@ -1,4 +1,4 @@
-"""Which named surface or joint a CAD face belongs to, and its shape, from points on it."""
+"""Named surface or joint of each CAD face, and its shape, from points on it."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ TRIANGLE_EDGES = ((0, 1), (1, 2), (2, 0))
 
 
 def edge_key(first: NDArray[np.int64], second: NDArray[np.int64], n_nodes: int) -> NDArray[np.int64]:
-    """One integer for an edge, the same in both directions."""
+    """Integer key of an edge, the same in both directions."""
     return np.minimum(first, second) * np.int64(n_nodes) + np.maximum(first, second)
 
 

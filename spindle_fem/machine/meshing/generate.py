@@ -67,7 +67,7 @@ class LinearMesh:
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """One rung of the ladder of settings: gmsh algorithms and a factor on all sizes."""
+    """One attempt at meshing: gmsh algorithms and a factor on all sizes."""
 
     surface_algorithm: int
     volume_algorithm: int
@@ -75,7 +75,7 @@ class Attempt:
     optimize_threshold: float = 0.2
 
     def describe(self) -> str:
-        """For notes and logs."""
+        """Describe the attempt, for notes and logs."""
         surface = {5: "Delaunay", 6: "frontal Delaunay", 1: "MeshAdapt"}[self.surface_algorithm]
         volume = {10: "HXT", 1: "Delaunay"}[self.volume_algorithm]
         return f"{surface} surfaces, {volume} volumes, sizes x {self.size_factor:g}"

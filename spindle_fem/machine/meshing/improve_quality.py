@@ -94,7 +94,7 @@ def _relax(
     patches: _Patches,
     columns: NDArray[np.int64],
 ) -> int:
-    """One sweep over nodes whose patches share no element; number of nodes moved."""
+    """Sweep once over nodes whose patches share no element; return the number of nodes moved."""
     nodes, members = _independent_nodes(elements, quality, bad, patches, columns)
     if not nodes:
         return 0

@@ -11,7 +11,7 @@ from spindle_fem.machine.geometry.meridian import MeridianMap
 from spindle_fem.machine.meshing.classify_faces import EXACT, port_coordinates
 from spindle_fem.machine.meshing.sizes import MeshSizes, edge_sizes
 
-# A wall is tight when it asks for sizes below this share of the channel's.
+# A wall is tight when it needs sizes below this share of the channel's.
 _TIGHT = 0.7
 # Growth of size per distance between corners of the meridian section.
 _CORNER_GROWTH = 0.8

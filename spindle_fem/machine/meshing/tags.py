@@ -1,4 +1,4 @@
-"""From gmsh's shared-node mesh to parts with nodes of their own, names and joints."""
+"""Convert gmsh's shared-node mesh to parts with nodes of their own, names and joints."""
 
 from __future__ import annotations
 

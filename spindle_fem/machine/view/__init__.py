@@ -1,1 +1,1 @@
-"""What commands and effects ask about a machine: its places, parts and usual sizes."""
+"""Information on a machine for commands and effects: its places, parts and usual sizes."""

@@ -1,4 +1,4 @@
-"""What the effects of the catalogue need to know of a machine and of a recording made with it."""
+"""Build the view of a machine and one of its recordings that the effects of the catalogue need."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ Array = NDArray[np.float64]
 
 
 def view_of(names: MachineNames, recording: Recording) -> MachineView:
-    """A machine with geometry on one recording.
+    """View of a machine with geometry for one recording.
 
-    Parts are told by what they are and where they lie: the largest rotating
+    Parts are identified by kind and position: the largest rotating
     part is the shaft, what lies ahead of its bearings the nose, behind them
     the drive end; the largest standing part is the housing, its widest segment
     the flange.
@@ -122,7 +122,7 @@ def _films(
     rotating = {part.name for part in spec.part if part.rotating}
     for film in spec.film:
         if isinstance(film, CircuitFilm):
-            # Of the coolant's effects, not of those on the air around the machine.
+            # Effects on coolant handle these; here are the films to the air around the machine.
             continue
         for name in film.surface:
             coefficient = f"film.{name}"
@@ -154,7 +154,7 @@ def _spots(
     heat: Mapping[str, tuple[str, ...]],
     sets: Mapping[str, tuple[str, ...]],
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
-    """Places where heat may come and go, and the component that each is told as."""
+    """Places where heat may be added or removed, and the component reported for each."""
     spots = {key: heat[key] for key in (*sets, "shaft", "nose", "drive_end", "flange") if key in heat}
     reported: dict[str, str] = {}
     if SHAFT_GAP in heat and heat[SHAFT_GAP] != heat["shaft"]:
@@ -166,7 +166,7 @@ def _spots(
     housing = layout.housing
     channel = layout.spec.channel
     if channel is not None:
-        # What heats its wall heats the part that it is cut into.
+        # Heat at its wall also heats the part it is cut into.
         own = layout.component_of(channel.part)
         spots[CHANNEL_WALL], reported[CHANNEL_WALL] = heat["channel"], own
     if housing is not None:
@@ -214,7 +214,7 @@ def _focal(
 
 
 def _switched_on(spec: MachineSpec) -> frozenset[str]:
-    """What the machine already has, by id, or by id and component where that is all it concerns."""
+    """Effects that the machine already has: by id, or by id and component where limited to one component."""
     found = {f"{entry.effect} @ {entry.component}" for entry in spec.effects}
     return frozenset(found) | effects_in_definition(spec)
 

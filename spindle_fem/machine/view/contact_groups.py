@@ -73,7 +73,7 @@ def seats_of(
 
 
 def _common(components: set[str], owner: Mapping[str, str]) -> str:
-    """One component for several: their set, the shaft or the housing."""
+    """Common component of several: their set, the shaft or the housing."""
     groups = {owner.get(name, name) for name in components}
     rest = groups - {"shaft", "housing"}
     if len(rest) == 1:

@@ -1,7 +1,7 @@
-"""Recordings that nobody made: a day about what a machine's definition says.
+"""Synthetic recordings: a day around the operating point of a machine's definition.
 
 Where an effect can act follows from the machine, its usual size from a
-recording. Without one, these stand in for it.
+recording. Without a recording, these are used instead.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from spindle_fem.recordings.defects import DefectReport
 from spindle_fem.recordings.standard_inputs import standard_inputs
 
 DAY = 86400.0
-# Flow and speed range over this share of what the definition has, as laws of the Reynolds number ask for it.
+# Flow and speed vary by this share of the defined values, since laws of the Reynolds number need a range.
 RANGE = 0.5
 
 

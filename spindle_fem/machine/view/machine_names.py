@@ -1,4 +1,4 @@
-"""What a model of a machine calls its places and coefficients, known before there is a mesh."""
+"""Names of places and coefficients in the model of a machine, known before there is a mesh."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class MachineNames:
     def of(cls, spec: MachineSpec) -> MachineNames:
         """Names of a machine whose parts fit together.
 
-        Slices of parts that a coarse mesh may be unable to tell apart are among the places.
+        Includes slices of parts that a coarse mesh may be unable to distinguish.
         """
         assembly = build_assembly(spec)
         contacts = assembly.joint_names

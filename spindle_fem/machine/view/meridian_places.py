@@ -1,4 +1,4 @@
-"""Where in the meridian plane a component, spot or probe of a machine with geometry lies."""
+"""Position in the meridian plane of a component, spot or probe of a machine with geometry."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def centre_of(spec: MachineSpec, name: str) -> tuple[float, float] | None:
     weights = [region.volume for region in regions]
     total = sum(weights)
     if total <= 0.0:
-        # Cylinders of no thickness by their area, points alike.
+        # Without volume: cylinders weighted by area, points equally.
         weights = [region.middle[0] * (region.z[1] - region.z[0]) or 1.0 for region in regions]
         total = sum(weights)
     radius = sum(w * region.middle[0] for w, region in zip(weights, regions, strict=True)) / total
@@ -128,7 +128,7 @@ def _of_channel(spec: MachineSpec, name: str) -> tuple[Region, ...]:
 
 
 def _of_ring(spec: MachineSpec, name: str) -> tuple[Region, ...]:
-    """What a ring through a probe covers of its part, one standard deviation to either side."""
+    """Section of the part covered by a ring through a probe, one standard deviation to either side."""
     reach = STANDARD_DISTANCE / 3.0**0.5
     for probe in spec.probe:
         if name == f"{AROUND}{probe.name}":

@@ -1,4 +1,4 @@
-"""Which part of a machine is what: told by kind and place, not by names."""
+"""Role of each part of a machine (shaft, housing, flange, ...), from kind and position, not from names."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STANDING_GAP = "standing_gap"
 
 
 class Layout:
-    """Which part is what.
+    """Roles of the parts of a machine.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Layout:
         self.flange = self._flange()
 
     def _flange(self) -> str:
-        """Widest segment of the housing; empty where none stands out."""
+        """Widest segment of the housing; empty if none is clearly wider than the others."""
         if self.housing is None or len(self.housing.segment) < 2:
             return ""
         wide = sorted(self.housing.segment, key=lambda s: s.outer_diameter)
@@ -114,7 +114,7 @@ class Layout:
             if standing:
                 found[STANDING_GAP] = standing
         for part in self.spec.part:
-            # What holds the seal at an end of the shaft.
+            # A part that holds the seal at an end of the shaft.
             end = "" if part in (self.shaft, self.housing) else self.component_of(part.name)
             if not part.rotating and end in ("nose", "drive_end") and part.name in self.places:
                 found[f"standing_{end}"] = (*found.get(f"standing_{end}", ()), part.name)
@@ -143,7 +143,7 @@ class Layout:
         return next(s for s in self.spec.all_surfaces if s.name == name)
 
     def is_flange_back(self, surface: Surface) -> bool:
-        """Whether a surface is nothing but a plane end of the flange: what is bolted to a frame."""
+        """Whether a surface is only a plane end of the flange, the face bolted to a frame."""
         ends = self.flange_ends()
         if ends is None or surface.part != self.housing.name:
             return False
@@ -158,7 +158,7 @@ class Layout:
         )
 
     def end_of(self, surface: Surface) -> str:
-        """Which end of the shaft a rotating surface belongs to; empty in between."""
+        """End of the shaft that a rotating surface belongs to; empty in between."""
         middle = self._middle(surface)
         if middle is None:
             return ""

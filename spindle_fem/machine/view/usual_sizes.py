@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 # Channels rise at least this much, K, and heat is at least this much, W, for usual sizes of effects.
 LEAST_RISE = 2.0
 LEAST_HEAT = 1.0
-# A quantity is on above this share of its largest value; number of quantiles that tell its levels.
+# A quantity is on above this share of its largest value; number of quantiles that represent its levels.
 LEAST_ON, QUANTILES = 0.05, 32
 # Units that have a name, by what they come out as from SI base units.
 NAMED = {"kg*m/s**2": "N", "kg*m**2/s**3": "W"}
@@ -38,7 +38,7 @@ def lowest_speed(speed: Array) -> float:
 
 
 def usual_rise(recording: Recording, ambient: Array) -> float:
-    """How far the channels leave the surroundings, the 95th percentile."""
+    """Usual deviation of the channels from the ambient temperature: the 95th percentile, K."""
     difference = np.abs(np.where(recording.usable, recording.temperature, np.nan) - ambient[:, None])
     if not np.isfinite(difference).any():
         return LEAST_RISE

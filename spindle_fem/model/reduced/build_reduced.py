@@ -183,7 +183,7 @@ def reduced_model_of(
         a machine that differs in coefficients only will then do, where its
         range holds these.
     progress : callable
-        Told each stage by name as it begins.
+        Called with the name of each stage as it begins.
     """
     chosen = options or ReductionOptions()
     digest = reduced_digest(spec, chosen.key(spec))

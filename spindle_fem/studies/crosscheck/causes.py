@@ -1,6 +1,6 @@
-"""Why network and elements differ, found by exchanging one assumption at a time.
+"""Causes of the differences between network and FEM, found by exchanging one assumption at a time.
 
-Between the paper's lumps and the three-dimensional elements stand models that
+Between the paper's lumps and the three-dimensional elements lies a chain of models that
 differ from their neighbour in one thing only. The differences of neighbours
 add up to the whole difference, exactly.
 """
@@ -70,7 +70,7 @@ class CauseStudy:
 
 
 def without_ports(spec: MachineSpec) -> MachineSpec:
-    """The same machine with solid metal where its ports are."""
+    """The machine with solid metal in place of its ports."""
     channel = spec.channel
     if channel is None or channel.ports is None:
         return spec
@@ -194,7 +194,7 @@ def band_lines(low: float, high: float) -> tuple[Array, Array]:
 def contact_bands(
     spec: MachineSpec, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
 ) -> dict[str, tuple[float, float]]:
-    """Where balls or rollers touch each raceway: from and to along z of the mean contact, m."""
+    """Mean contact of balls or rollers on each raceway: start and end along z, m."""
     states = BearingMechanics(spec).states(point, temperatures, expand=False)
     bands = {}
     for group, bearing in spec.bearings:

@@ -42,7 +42,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Crosscheck:
-    """What a cross-check found.
+    """Result of a cross-check.
 
     Attributes
     ----------

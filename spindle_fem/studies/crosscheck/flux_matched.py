@@ -104,7 +104,7 @@ class MatchedNetwork:
 
     @property
     def capacity(self) -> Array:
-        """Of every node, (n,) [J/K]."""
+        """Heat capacity of every node, (n,) [J/K]."""
         return self.machine.capacity[: self.n_nodes]
 
     @property
@@ -113,11 +113,11 @@ class MatchedNetwork:
         return tuple(self.machine.ball_nodes)
 
     def boundary_temperature(self, point: OperatingPoint) -> Array:
-        """Of every boundary at an operating point, (b,) [K]."""
+        """Temperature of every boundary at an operating point, (b,) [K]."""
         return _boundary_values(self.machine, self.boundary_names, point)
 
     def conductance(self, point: OperatingPoint, heat_model: HeatModel) -> Array:
-        """Of every link at an operating point, (m,) [W/K]: films follow the speed."""
+        """Conductance of every link at an operating point, (m,) [W/K]; films follow the speed."""
         around = self.matched.around
         pairs = base_conductances(self.machine, point, heat_model, around, self.matched.temperature)
         both = zip(self.first.tolist(), self.second.tolist(), strict=True)

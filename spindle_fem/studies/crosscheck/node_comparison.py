@@ -1,4 +1,4 @@
-"""Node by node and link by link: what the network says and what the elements say."""
+"""Compare network and FEM node by node and link by link."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Comparison:
 def compare(
     prepared: PreparedMachine, coupled: CoupledState, state: MachineNetworkState, regions: NodeRegions
 ) -> Comparison:
-    """Both models at the same operating point.
+    """Compare both models at the same operating point.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def compare(
 
 
 def _bypass(state: MachineNetworkState) -> dict[tuple[int, int], float]:
-    """Friction heat that goes from a raceway straight to the balls, W."""
+    """Friction heat that passes from a raceway directly to the balls, W."""
     found: dict[tuple[int, int], float] = {}
     heat = state.network.friction_heat(state.temperature)
     for name, ball in state.network.machine.ball_nodes.items():

@@ -26,13 +26,13 @@ CLAIMED_RISE, CLAIMED_FALL = 3.0, 15.0
 # The claim says "about".
 FALL_TOLERANCE = 3.0
 PERFECT_FILM = 100.0
-# Of the network's cells.
+# Refinement of the network's cells.
 REFINEMENT = 4
 
 
 @dataclass(frozen=True, slots=True)
 class ClaimCase:
-    """What one model says of one design, temperatures in K."""
+    """Prediction of one model for one design, temperatures in K."""
 
     design: str
     model: str
@@ -121,7 +121,7 @@ def with_perfect_film(spec: MachineSpec) -> MachineSpec:
 
 
 def reynolds_number(spec: MachineSpec) -> float:
-    """Of the channel flow at inlet temperature, on the hydraulic diameter."""
+    """Reynolds number of the channel flow at inlet temperature, on the hydraulic diameter."""
     section = section_of(spec.channel)
     properties = coolant_by_name(spec.coolant.fluid).properties(spec.coolant.inlet_temperature)
     velocity = section.velocity(OperatingPoint.of(spec).coolant_flow)
@@ -129,7 +129,7 @@ def reynolds_number(spec: MachineSpec) -> float:
 
 
 def applies(spec: MachineSpec) -> bool:
-    """Whether the claim can be asked of a machine: bearings inside a cooling channel."""
+    """Whether the claim is testable on a machine: bearings inside a cooling channel."""
     return spec.channel is not None and spec.coolant is not None and bool(spec.bearing_set)
 
 
@@ -139,7 +139,7 @@ def check_claim(
     *,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> dict[str, Any]:
-    """Both models on the base design and the paper's optimum, with what makes the change.
+    """Compare both models on the base design and the paper's optimum, and split the change by cause.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ _GAUSS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 @dataclass(frozen=True, slots=True)
 class NodeRegions:
-    """Where each network node lies in a finite-element mesh.
+    """Part of a finite-element mesh that corresponds to each network node.
 
     Attributes
     ----------

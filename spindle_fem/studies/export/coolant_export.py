@@ -26,17 +26,17 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
-# Of films and coefficients, between the points of a table.
+# Relative error of films and coefficients between the points of a table.
 TOLERANCE = 5e-5
-# Of the coolant's operators, left out with the directions in which they hardly vary.
+# Directions of the coolant's operators are left out below this relative variation.
 LEFT_OUT = 1e-7
-# Of squares of samples, what rounding leaves.
+# Rounding error of squares of samples, relative.
 ROUND_OFF = 1e-15
 # Points of the coolant's table; samples that its directions are taken from.
 MOST_POINTS, MOST_SAMPLES = 3000, 300
 # Mean rises of the channel's wall above the inlet, K: where films are worked out, and points of the table.
 RISES, RISE_AXIS = np.linspace(-15.0, 30.0, 10), np.linspace(-15.0, 30.0, 46)
-# What the wall changes is a small part of the film: fewer flows and directions do.
+# The wall changes the film only a little: fewer flows and directions suffice.
 WALL_TOLERANCE, WALL_LEFT_OUT = 2e-3, 3e-6
 # Least mean of a wall's rise, as a share of its largest, by which it can be scaled.
 LEAST_MEAN = 0.2
@@ -46,7 +46,7 @@ SETTLED, SETTLING_STEP = 3.0 * 86400.0, 3600.0
 
 @dataclass(frozen=True, slots=True)
 class WallRise:
-    """How the channel's wall lies above the inlet: a profile along the cells, scaled by its mean.
+    """Rise of the channel's wall above the inlet: a profile along the cells, scaled by its mean.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class WallRise:
 
     @classmethod
     def of(cls, fast: FastModel) -> WallRise:
-        """As it is after days at the definition's operating point."""
+        """Rise after days at the definition's operating point."""
         point = OperatingPoint.of(fast.spec)
         inputs = standard_inputs(fast.spec)
         values = np.array([[inputs[name] for name in STANDARD]] * 2)
@@ -82,7 +82,7 @@ class WallRise:
 
 @dataclass(frozen=True, slots=True)
 class CoolantOperators:
-    """What the coolant adds to a fast model's operators.
+    """Contribution of the coolant to a fast model's operators.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class CoolantOperators:
         return {part: own.reshape(-1, *shape) for part, own, shape in zip(PARTS, split, shapes, strict=True)}
 
     def scale(self, row: Array) -> Array:
-        """What the entries of a sample are divided by so that heats, loads and temperatures count alike."""
+        """Divisors of a sample's entries that give heats, loads and temperatures equal weight."""
         ends = np.cumsum([np.prod(shape) for shape in self._shapes()])
         split = np.split(row, ends[:-1])
         return np.concatenate([np.full(part.shape, np.linalg.norm(part) or 1.0) for part in split])
@@ -180,7 +180,7 @@ class CoolantOperators:
 
 
 def coolant_table(coolant: CoolantOperators, axes: tuple[Array, Array]) -> OperatorTable:
-    """What the coolant adds over flow and inlet temperature, on the few directions in which it varies."""
+    """Coolant operators over flow and inlet temperature, on the few directions in which they vary."""
     nominal = coolant.nominal
     base = coolant.sample(nominal.coolant_flow, nominal.coolant_inlet_temperature - ZERO_CELSIUS_K)
     scale = coolant.scale(base)
@@ -205,7 +205,7 @@ def _directions(
 
 
 def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> FeedbackTable | None:
-    """What the film in the channel changes where its wall is not as far above the inlet as usual.
+    """Change of the channel's film when its wall is not as far above the inlet as usual.
 
     The change of conduction and loads is written as heats, each proportional to one combination of
     unknowns and loads: the singular vectors of the directions in which the operators vary. The outlet's

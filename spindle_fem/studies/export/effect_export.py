@@ -27,20 +27,20 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
-# Instants and temperatures along which a sensor is asked whether it follows more than its place.
+# Instants (s) and temperatures (K) that test whether a sensor depends on more than its place's temperature.
 TIMES = np.array([0.0, 20.0, 700.0, 9000.0, 2.0e5])
 WANDERING = np.array([290.0, 341.0, 303.0, 318.0, 296.0])
-# What sensors that are asked find around them, K; other inputs have no part in a reading.
+# Ambient and coolant temperature in these tests, K; other inputs do not affect a reading.
 AROUND = 293.15
-# Points whose coolant alone differs, at which films are asked whether they follow it.
+# Points that differ in the coolant only, to test whether films follow it.
 COOLANTS = tuple(OperatingPoint(100.0, 1000.0, AROUND, inlet, 3e-4) for inlet in (283.15, 293.15, 303.15))
-# Of readings, K; of heat between the points of a table.
+# Tolerance of readings, K; of heat between the points of a table.
 EXACT, TOLERANCE = 1e-9, 5e-5
 
 
 @dataclass(frozen=True, slots=True)
 class SensorLine:
-    """What a sensor tells: ``gain`` times the temperature at its place, plus the rest, in °C.
+    """Affine reading of a sensor: ``gain`` times the temperature at its place, plus the rest, in °C.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class ExportedEffects:
         return self._changes.together((*self._changes.parts(point, {}), beside))
 
     def read(self, outputs: Sequence[str], loads: Sequence[str], output: Array, direct: Array) -> None:
-        """Let sensors tell their lines, in place.
+        """Apply the sensors' lines to the output matrices, in place.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ def heat_powers(effects: ExportedEffects, inputs: Sequence[ModelInput]) -> list[
 
 
 def _needs(candidate: Candidate) -> str:
-    """What an effect follows that an exported model does not know; empty where it can be exported."""
+    """Dependence of an effect that an exported model cannot represent; empty if it can be exported."""
     for term in candidate.terms:
         if term.n_states:
             return "remembers what was, which the model's states do not hold"
@@ -195,16 +195,16 @@ def _needs(candidate: Candidate) -> str:
                 "follows the Reynolds number as it moves with the inlet temperature, which simulate takes in "
                 "steps of a kelvin: the two would be some millikelvin apart"
             )
-        if term.heat_places and _tells_time(term):
+        if term.heat_places and _depends_on_time(term):
             return "follows the clock of one recording"
     reading = candidate.reading
     if reading is None:
         return ""
-    told = _told(reading, WANDERING)
+    read = _readings(reading, WANDERING)
     line = _line(reading)
     expected = line.gain * (WANDERING - ZERO_CELSIUS_K) + line.offset
     expected += sum(share * (AROUND - ZERO_CELSIUS_K) for share in line.by_input.values())
-    if np.abs(told - ZERO_CELSIUS_K - expected).max() > EXACT:
+    if np.abs(read - ZERO_CELSIUS_K - expected).max() > EXACT:
         return "follows the clock of one recording, or what its sensor read before"
     return ""
 
@@ -223,13 +223,13 @@ class _AnyInput(dict):
         return AROUND
 
 
-def _tells_time(term: Term) -> bool:
+def _depends_on_time(term: Term) -> bool:
     known = _AnyInput()
     return any(np.any(heat_of(term, known, time) != heat_of(term, known, TIMES[-1])) for time in TIMES)
 
 
-def _told(reading: Reading, temperatures: Array, **shifted: float) -> Array:
-    """What a sensor tells along temperatures [K] of its place, with some inputs shifted [K]."""
+def _readings(reading: Reading, temperatures: Array, **shifted: float) -> Array:
+    """Readings of a sensor along temperatures [K] of its place, with some inputs shifted [K]."""
     around = {name: np.full(TIMES.size, AROUND) for name in ("ambient", "coolant_inlet")}
     around |= {name: around[name] + shift for name, shift in shifted.items()}
     own = {item.name: np.full(1, item.value, dtype=complex) for item in reading.parameters}
@@ -239,9 +239,11 @@ def _told(reading: Reading, temperatures: Array, **shifted: float) -> Array:
 def _line(reading: Reading) -> SensorLine:
     """A sensor that follows its place and inputs in a straight line, seen at the first instant."""
     still = np.full(TIMES.size, ZERO_CELSIUS_K)
-    base = _told(reading, still)[0]
-    gain = _told(reading, still + 1.0)[0] - base
-    by_input = {name: _told(reading, still, **{name: 1.0})[0] - base for name in ("ambient", "coolant_inlet")}
+    base = _readings(reading, still)[0]
+    gain = _readings(reading, still + 1.0)[0] - base
+    by_input = {
+        name: _readings(reading, still, **{name: 1.0})[0] - base for name in ("ambient", "coolant_inlet")
+    }
     by_input = {name: share for name, share in by_input.items() if share}
     offset = base - ZERO_CELSIUS_K - sum(by_input.values()) * (AROUND - ZERO_CELSIUS_K)
     return SensorLine(gain, offset, by_input)

@@ -27,7 +27,7 @@ def machine_state_space(
     recordings: Sequence[Recording] = (),
     progress: Progress = lambda stage: None,
 ) -> StateSpace:
-    """What :func:`spindle_fem.studies.simulate.simulate_recordings` marches, for other programs.
+    """Model behind :func:`spindle_fem.studies.simulate.simulate_recordings`, for other programs.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ SCHEME_TEXTS = {
 
 
 def file_writer(path: Path) -> Callable[[StateSpace, Path], list[Path]]:
-    """What writes a file of this name.
+    """Writer for the suffix of a file.
 
     Raises
     ------
@@ -189,13 +189,13 @@ def _c_tables(header: Mapping[str, Any], kept: Mapping[str, Array]) -> list[dict
 
 
 def _table_of(tables: list[dict[str, Any]], column: Array) -> Array:
-    """Which of the feedback tables each heat's column is in."""
+    """Index of the feedback table that holds each heat's column."""
     ends = np.cumsum([table["columns"] for table in tables if table["kind"] == "feedback"])
     return np.searchsorted(ends, column, side="right")
 
 
 def _columns(tables: list[dict[str, Any]], kind: str) -> int:
-    """How many entries the tables of a kind give together."""
+    """Total number of entries of the tables of one kind."""
     return sum(table["columns"] for table in tables if table["kind"] == kind)
 
 

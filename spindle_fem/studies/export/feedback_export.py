@@ -1,4 +1,4 @@
-"""What follows temperatures in an exported model: friction and ball rows, films of natural convection."""
+"""Temperature-dependent parts of an exported model: friction and ball rows, films of natural convection."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
-# Of heats and coefficients, between the points of a table.
+# Relative error of heats and coefficients between the points of a table.
 TOLERANCE = 1e-4
-# Of a wall above its surroundings, K, and of these, °C.
+# Range of a wall above its surroundings, K, and of the surroundings, °C.
 WALL_RANGE, SURROUNDINGS_RANGE = (-60.0, 120.0), (-10.0, 50.0)
 # Raceways and balls count for the temperature of a film.
 FILM_SHARES = (0.25, 0.25, 0.5)

@@ -25,7 +25,7 @@ UNITS = {
     "1": {},
 }
 
-# Behind the exported module: the model as PythonFMU3 asks for it.
+# Appended to the exported module: the model with the interface that PythonFMU3 needs.
 SLAVE = '''
 
 from pythonfmu3 import Boolean, CoSimulation, Float64, Fmi3Causality  # noqa: E402

@@ -47,7 +47,7 @@ UNITS = ("rad/s", "N", CELSIUS, CELSIUS, "m**3/s")
 # Range of the coolant about the definition's: shares of its flow, kelvin about its inlet temperature.
 FLOW_SHARES = (0.25, 2.0)
 INLET_RANGE = (-10.0, 20.0)
-# What friction may warm the coolant by at the upper end of its properties, K.
+# Warming of the coolant by friction allowed for at the upper end of its properties, K.
 OWN_WARMING = 2.0
 # Largest thrust, in the larger of the definition's and the heat table's reference.
 THRUST_SHARE = 2.0

@@ -18,7 +18,7 @@ from spindle_fem.studies.export.interpolation_axes import refined_axis, values_o
 Array = NDArray[np.float64]
 
 PARTS = ("conduction", "load", "output", "feedthrough")
-# Of coefficients, between the points of a table.
+# Relative error of coefficients between the points of a table.
 TOLERANCE = 5e-5
 
 

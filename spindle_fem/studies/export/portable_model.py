@@ -262,7 +262,7 @@ class PortableModel:
         stage = inverse @ right
         state = inverse @ (STAGE_WEIGHT * stage - START_WEIGHT * before + weight * end)
         if followed:
-            # What the state answers to heats at the step's end.
+            # Response of the state to heats at the step's end.
             warmed = weight * (inverse @ out.T)
             answer = warmed + GAMMA * STAGE_WEIGHT * (inverse @ warmed)
             base, state = state, state + answer @ heat

@@ -42,7 +42,7 @@ class SourceTableLoad:
 
 @dataclass(frozen=True, slots=True)
 class SourceLoads:
-    """What all sources of a machine add to its exported model.
+    """Contribution of all sources of a machine to its exported model.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class SourceLoads:
 
 
 def source_loads(spec: MachineSpec, standard: Sequence[ModelInput]) -> SourceLoads:
-    """Every source: one that follows an input by its gain, a table over speed, or an input of its own.
+    """Loads of every source: one that follows an input by its gain, a table over speed, or an own input.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ class ModelInput:
     magnitude: bool = False
 
     def as_plain(self) -> dict[str, Any]:
-        """As the header has it."""
+        """Plain values for the header of the file."""
         return {name: getattr(self, name) for name in self.__slots__}
 
 

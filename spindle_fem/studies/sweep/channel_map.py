@@ -1,6 +1,6 @@
-"""The map of space that takes the channel of one machine to that of another.
+"""Map of space from the channel of one machine to that of another.
 
-Both machines are alike but for the channel's depth, width and pitch. In
+The machines differ only in the channel's depth, width and pitch. In
 cylindrical coordinates about the axis, in this order:
 
 - along z, the walls of all turns go to their new places: centre lines with
@@ -33,7 +33,7 @@ from spindle_fem.machine.geometry.faces import MeridianEdge
 
 Array = NDArray[np.float64]
 
-# What may differ between the two channels.
+# Dimensions that may differ between the two channels.
 MOVABLE = ("depth", "width", "pitch")
 # The map around a port ends this many of its radii from its axis, or sooner.
 _PORT_REACH = 3.5
@@ -121,7 +121,7 @@ class ChannelMap:
         return found
 
     def _along(self, radius: Array, angle: Array, z: Array) -> tuple[Array, Array]:
-        """Distance from the nearest centre line along z, and where z goes."""
+        """Distance from the nearest centre line along z, and the mapped z."""
         before, after, room = self.source.definition, self.target.definition, self.room
         turn = np.sign(self.source.angle_span) * angle / (2.0 * np.pi) * before.starts
         advance, new_advance = (item.pitch / item.starts for item in (before, after))
@@ -209,7 +209,7 @@ class ChannelMap:
 
 
 def _between(values: Array, knots: tuple[Array, ...], images: tuple[Array, ...]) -> Array:
-    """Straight pieces through knots that each value has of its own; values beyond them go straight on."""
+    """Piecewise linear maps with knots for each value, extrapolated linearly."""
     first = values < knots[1]
     low, high = np.where(first, knots[0], knots[1]), np.where(first, knots[1], knots[2])
     new_low, new_high = np.where(first, images[0], images[1]), np.where(first, images[1], images[2])
@@ -217,7 +217,7 @@ def _between(values: Array, knots: tuple[Array, ...], images: tuple[Array, ...])
 
 
 def build_map(source: AssemblyGeometry, target: AssemblyGeometry) -> ChannelMap:
-    """Map between two machines that differ in nothing but depth, width and pitch of the channel.
+    """Map between two machines that differ only in depth, width and pitch of the channel.
 
     Raises
     ------

@@ -17,7 +17,7 @@ _SHARE = 0.25 * np.pi * _WEIGHTS
 
 @dataclass(frozen=True, slots=True)
 class ChannelMeasures:
-    """What a channel has and takes away.
+    """Dimensions of a channel and the volumes it removes.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class ChannelMeasures:
 def channel_measures(channel: ChannelGeometry, exit_radii: Sequence[float] = ()) -> ChannelMeasures:
     """Measures of a channel whose ports open into cylinders about the axis.
 
-    A port stands with its axis in the end face of the channel: one half of it
+    The axis of a port lies in the end face of the channel: one half of it
     begins at the channel's roof, the other at a flat start inside the metal.
 
     Parameters

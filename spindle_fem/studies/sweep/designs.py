@@ -39,7 +39,7 @@ SPEED_PATH = "operation.speed"
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One value that a parameter takes.
+    """One value of a parameter.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""One design solved, as one row of the table; designs of one geometry share mesh and operators."""
+"""Solve one design to one row of the table; designs of one geometry share mesh and operators."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ LOGGER = logging.getLogger(__name__)
 
 # Tables of a definition that shape the mesh; designs that agree in them share it.
 _SHAPING = ("part", "bearing_types", "bearing_set", "channel", "surface", "remaining_surfaces", "mesh")
-# What does not change a result.
+# Keys that do not change a result.
 _NOT_IN_KEY = ("name", "title", "description", "marks")
 FILM_LOW, FILM_HIGH = "@film_low", "@film_high"
-# What a design may fail with; anything else is a fault of the program.
+# Errors that make a design fail; anything else is a fault of the program.
 SOLVE_ERRORS = (SpindleFemError, ArithmeticError, np.linalg.LinAlgError)
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What is asked of every design of a study.
+    """Outputs and options common to all designs of a study.
 
     Attributes
     ----------
@@ -204,7 +204,7 @@ def _digest(content: Any) -> str:
 
 
 def reason_of(error: BaseException) -> str:
-    """One line that says what was wrong."""
+    """One line that describes an error."""
     if isinstance(error, FaultsError):
         return "; ".join(reason_of(fault) for fault in error.faults)
     text = str(error) if isinstance(error, SpindleFemError) else f"{type(error).__name__}: {error}"

@@ -1,4 +1,4 @@
-"""Groups of designs answered by one projected model; what it cannot answer is left to full solves."""
+"""Solve groups of designs by one projected model; designs outside its validity are left to full solves."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ AT_ONCE = 256
 # Errors of a model at the designs that were solved in full: the largest in K, and the largest ratio of a
 # true error to its estimate, at least 1.
 TRUE_ERROR, ERROR_RATIO = "true", "true over estimated"
-# Beyond the coefficients that the basis was made for by more than this, the full solve answers.
+# Designs whose coefficients exceed the range of the basis by more than this are solved in full.
 RANGE_SLACK = 1.0e-6
 
 
@@ -72,7 +72,7 @@ class GroupTask:
 
 
 def answer_group(group: GroupTask, question: Question) -> list[Row]:
-    """Rows of those designs that the projected model answers, and of those it was checked by.
+    """Rows of the designs that the projected model covers, and of those used to check it.
 
     Every design that gets no row is for the full solve: outside the model's
     range, with too large an error, or of a machine that the model refuses.
@@ -81,7 +81,7 @@ def answer_group(group: GroupTask, question: Question) -> list[Row]:
         try:
             model, rows, tables = model_of(group, question)
         except SpindleFemError:
-            return []  # the full solves will say what is wrong, design by design
+            return []  # the full solves will report the fault, design by design
         if not model.errors[TRUE_ERROR] <= LARGEST_ERROR:
             return rows
         wanted = {task.key for task in group.wanted} - {row["key"] for row in rows} - set(model.checked)
@@ -155,7 +155,7 @@ def _answer(
 
 
 def _states(solver: SteadySolver, inputs: DesignInputs, question: Question) -> list[SteadyBatch]:
-    """States of designs: nominal, and at both ends of the channel film's band where asked."""
+    """States of designs: nominal, and at both ends of the channel film's band if requested."""
     nominal = solver.solve(inputs)
     if not question.film_uncertainty:
         return [nominal]

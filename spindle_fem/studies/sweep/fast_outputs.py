@@ -1,4 +1,4 @@
-"""What a study asks of designs, from their projected states: the same paths as in a run's summary."""
+"""Outputs of designs from their projected states: the same paths as in a run's summary."""
 
 from __future__ import annotations
 

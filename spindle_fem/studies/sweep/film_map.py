@@ -58,8 +58,8 @@ def film_map(
 ) -> FilmMap:
     """Film coefficient over depth and temperature, at constant velocity or constant flow.
 
-    The paper holds the velocity without saying its value: a deeper channel
-    then asks for more flow. A cooler of given size holds the flow.
+    The paper keeps the velocity constant without giving its value: a deeper channel
+    then needs more flow. A cooler of given size keeps the flow constant.
 
     Parameters
     ----------

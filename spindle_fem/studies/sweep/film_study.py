@@ -28,7 +28,7 @@ MODELS = {"paper": "the paper's equations 30 and 31", "helical": "helical duct"}
 
 @dataclass(frozen=True, slots=True)
 class FilmChart:
-    """One film map with what the pump must do.
+    """One film map with the demand on the pump.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class FilmChart:
 
 @dataclass(frozen=True, slots=True)
 class PumpLimits:
-    """What a study allows the pump, infinite where it says nothing.
+    """Pump limits of a study, infinite if not given.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class PumpLimits:
         return bool(np.isfinite(min(self.pressure_drop, self.pumping_power)))
 
     def demand(self, chart: FilmChart) -> NDArray[np.float64]:
-        """What the pump must do over what it may, pressure or power, the larger; 1 is its limit.
+        """Pump demand over its limit, pressure or power, the larger; 1 is the limit.
 
         Same shape as the chart, (n_depths, n_temperatures).
         """

@@ -1,4 +1,4 @@
-"""Which designs keep the limits, which are better than which, and whether that is certain."""
+"""Feasibility of designs, their ranking, and whether the ranking is certain."""
 
 from __future__ import annotations
 

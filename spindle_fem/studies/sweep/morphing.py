@@ -41,8 +41,8 @@ from spindle_fem.studies.sweep.channel_measures import channel_measures
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Steps of the lattice, m: a mesh is moved by half of one at most (docs/design_studies.md tells what was
-# measured). The pitch moves the channel's end once a turn, so its step is divided where there are many.
+# Steps of the lattice, m: a mesh is moved by half of one at most (measured in docs/design_studies.md).
+# The pitch moves the channel's end once a turn, so its step is divided where there are many.
 LATTICE: Mapping[str, float] = MappingProxyType({"depth": 2.5e-3, "width": 2.0e-3, "pitch": 1.0e-3})
 _TURNS_OF_WHOLE_STEP = 5
 _ON_FACE = 5.0e-6
@@ -224,7 +224,7 @@ def _curved_faces(
 
 
 def _on_port(port: PortGeometry, places: Array) -> NDArray[np.bool_]:
-    """Which triangles (n, 3, 3) lie on the cylinder of a port; its flat start does not."""
+    """Mask of the triangles (n, 3, 3) on the cylinder of a port, without its flat start."""
     along, across, axial = port_coordinates(port, places)
     on_cylinder = np.abs(np.hypot(across, axial) - port.radius).max(axis=1) < _ON_FACE
     return on_cylinder & (along.min(axis=1) > 0.0) & (np.ptp(along, axis=1) > _STRAIGHT)

@@ -126,7 +126,7 @@ def _add_known(
 
 
 def _coordinate(axis: Axis, shown: Any) -> Any:
-    """Where a shown value lies on an axis: its number in a list, else its SI value inside the range."""
+    """Coordinate of a shown value on an axis: index in a list, else SI value clipped to the range."""
     if axis.low is None:
         return [one.shown for one in axis.choices].index(shown)
     if axis.rule is not None and axis.rule.kind == "temperature":
@@ -139,7 +139,7 @@ def _values(study: Study, row: Row) -> list[float]:
 
 
 def _excess(row: Row, limits: Sequence[Limit]) -> dict[str, float]:
-    """How far each limit is broken, relative to it; at most 0 where it holds at every end of the film."""
+    """Relative violation of each limit; at most 0 if it holds at both ends of the film's band."""
     found = {}
     for number, limit in enumerate(limits):
         values = [row.get(limit.output + end) for end in ("", FILM_LOW, FILM_HIGH)]

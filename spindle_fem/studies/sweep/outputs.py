@@ -1,4 +1,4 @@
-"""What a study may ask of a solved design: dotted paths into the summary, with their units."""
+"""Outputs that a study may request of a solved design: dotted paths into the summary, with their units."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from spindle_fem.studies.sweep.judge_designs import Limit, limits_of
 from spindle_fem.studies.sweep.outputs import WORDS, only_full, output_fault
 from spindle_fem.studies.sweep.study_file import Study, load_study
 
-# Rows that stand in the table for designs of a study, besides parameters and outputs.
+# Leading columns of the table, besides parameters and outputs.
 _HEAD = ("design",)
 _TAIL = ("status", "reason", "feasible", "backend", "error_estimate_K", "mesh", "geometry", "key")
 

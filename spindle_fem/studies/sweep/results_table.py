@@ -20,7 +20,7 @@ EARLIER = EARLIER_PREFIX + RESULTS
 OK, FAILED, IMPOSSIBLE = "ok", "failed", "impossible"
 STATUSES = (OK, FAILED, IMPOSSIBLE)
 
-# What answered a design: a solve of the whole field, or the projected model of its group.
+# Backend of a design: a solve of the whole field, or the projected model of its group.
 FULL, REDUCED = "full", "reduced"
 # Its mesh: made for it, or moved from that of a machine whose channel is near.
 NEW, MOVED = "new", "moved"
@@ -182,7 +182,7 @@ def parse_cell(text: str) -> Any:
 
 
 def write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Row]) -> None:
-    """The same table with types, by renaming so that no reader sees half of it."""
+    """Write the table with types, atomically."""
     import pandas
 
     frame = pandas.DataFrame([[row[name] for name in columns] for row in rows], columns=list(columns))

@@ -30,7 +30,7 @@ def run_tasks(
     jobs: int = 1,
     scheduler: str | None = None,
 ) -> None:
-    """Solve tasks and hand over each row as it comes, in any order.
+    """Solve tasks and pass on each row as it arrives, in any order.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def run_tasks(
     Raises
     ------
     BadInputError
-        Dask is not installed, or no scheduler answers there.
+        Dask is not installed, or no scheduler responds there.
     WorkerDiedError
         A worker process died; the rows so far have landed.
     """
@@ -123,7 +123,7 @@ def _mesh_of(task: DesignTask) -> str:
 
 
 def _sorted(tasks: Sequence[DesignTask]) -> list[DesignTask]:
-    """By mesh, then geometry; meshes, geometries and designs in the order of the study."""
+    """Tasks by mesh, then geometry; meshes, geometries and designs in the order of the study."""
     first: dict[str, int] = {}
     for position, task in enumerate(tasks):
         first.setdefault(_mesh_of(task), position)

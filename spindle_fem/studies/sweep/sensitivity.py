@@ -1,4 +1,4 @@
-"""Which parameter matters: shares of the variance of an output, and designs near a given one."""
+"""Importance of parameters: shares of the variance of an output, and designs near a given one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which designs of a study can share one reduced model, and which none can answer."""
+"""Group designs of a study that can share a reduced model; refuse those that cannot have one."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def without_marks(value: Any) -> Any:
 
 
 def refusal(spec: MachineSpec) -> str:
-    """Why no projected model can answer a machine; empty where one can."""
+    """Reason why a projected model cannot represent a machine; empty if it can."""
     if any(isinstance(film, NaturalFilm) for film in spec.film):
         return "a film follows the temperature of each place of its surface"
     if spec.heat.thermal_preload and spec.heat.model != "table":

@@ -1,4 +1,4 @@
-"""The study file: which designs of a machine to solve and what to ask of them."""
+"""Study file: designs of a machine to solve, and outputs to report."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class StudyParameter(SpecModel):
 
 
 class StudySettings(SpecModel):
-    """How designs are chosen and what is kept of each."""
+    """Selection of designs and of outputs."""
 
     design: Literal["grid", "sobol", "latin_hypercube"] = "grid"
     """Every combination, or a sample that fills the space evenly."""
@@ -251,7 +251,7 @@ class Study(SpecModel):
 
     @property
     def judged(self) -> tuple[str, ...]:
-        """Every output that is needed, each once, those asked for first."""
+        """All outputs needed, each once, requested ones first."""
         named = (
             *self.study.outputs,
             *(c.output for c in self.constraint),

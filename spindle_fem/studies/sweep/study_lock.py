@@ -1,4 +1,4 @@
-"""One study at a time in a folder."""
+"""Lock a folder, so that only one study at a time writes to it."""
 
 from __future__ import annotations
 

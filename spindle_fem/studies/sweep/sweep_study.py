@@ -45,7 +45,7 @@ def solve_study(
     table : ResultTable
         Rows so far; gets each new one as it comes.
     tell : callable
-        Told how many more designs are done.
+        Called with the number of further designs done.
     jobs, scheduler
         As of :func:`~spindle_fem.studies.sweep.run_tasks.run_tasks`.
 
@@ -101,7 +101,7 @@ def _solve_missing(
 
 
 def _heads(table: ResultTable, tasks: Sequence[DesignTask], prepared: PreparedStudy) -> list[Row]:
-    """What each row gets from the study as it is now: its place, its design, the verdict of the limits."""
+    """Columns of each row that follow the current study: number, design, verdict on the limits."""
     return [
         {
             "design": task.design.number,

@@ -13,7 +13,7 @@ from spindle_fem.studies.sweep.prepared_study import PreparedStudy
 from spindle_fem.studies.sweep.results_table import FAILED, FULL, IMPOSSIBLE, MOVED, NEW, OK, REDUCED, Row
 from spindle_fem.studies.sweep.sensitivity import neighbours, sensitivities
 
-# Neighbours told of the best design, for each parameter.
+# Neighbours of the best design listed for each parameter.
 NEIGHBOURS = 2
 # Machines shown cut open.
 PICTURES = 4
@@ -70,7 +70,7 @@ def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> d
 
 
 def _backends(rows: Sequence[Row]) -> dict[str, Any]:
-    """How many designs were solved in full, how many by a projected model, and its largest error estimate."""
+    """Numbers of designs solved in full and by a projected model, and its largest error estimate."""
     errors = [row["error_estimate_K"] for row in rows if row["backend"] == REDUCED]
     return {
         FULL: sum(row["backend"] == FULL for row in rows),
@@ -80,7 +80,7 @@ def _backends(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def pictured_designs(prepared: PreparedStudy, rows: Sequence[Row], ranking: Ranking | None) -> list[int]:
-    """Designs worth a picture: the best, spread over the front, and those to compare with."""
+    """Designs to picture: the best, spread over the front, and those to compare with."""
     if ranking is None:
         return []
     front = [ranking.rows[index]["design"] for index in ranking.front]
