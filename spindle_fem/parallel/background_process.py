@@ -1,4 +1,4 @@
-"""One object in a copy of this process, which works while this one goes on."""
+"""Run one object in a copy of this process, concurrently with it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from spindle_fem.errors import SpindleFemError, WorkerDiedError
 from spindle_fem.parallel import worker_threads
 from spindle_fem.parallel.worker_threads import MORE_ROOM, ONE_THREAD, Job, core_count
 
-# A process that has not answered for so long is taken for dead, s.
+# A process that has not answered for this time is considered dead, s.
 PATIENCE_S = 600.0
 
 
@@ -31,17 +31,17 @@ ForkingPickler.register(types.MappingProxyType, lambda item: (_read_only, (dict(
 
 
 class BackgroundProcess:
-    """One object in a copy of this process, made before there is work for it.
+    """One object in a copy of this process, created before there is work for it.
 
-    What the object loads and prepares when it is made, and what it is asked for while this
-    process computes, costs no waiting time later. Calls are answered in their order. On one
-    core, or where processes cannot be copied, the object is made here and answers when an
-    answer is waited for. Errors of the object are raised where the answer is waited for.
+    Whatever the object loads, prepares or computes while this process works costs no waiting
+    time later. Calls are processed in order. On one
+    core, or where processes cannot be copied, the object is created here and works when a
+    result is waited for. Errors of the object are raised where the result is waited for.
 
     Parameters
     ----------
     make : callable
-        Makes the object; its methods are what can be asked for. Arguments and answers are pickled.
+        Makes the object, whose methods can be called. Arguments and results are pickled.
     beside : bool
         False to have it made here in any case.
 
@@ -54,7 +54,7 @@ class BackgroundProcess:
 
     def __init__(self, make: Callable[[], Any], *, beside: bool = True) -> None:
         self._make = make
-        self._asked: list[tuple[str, tuple]] = []
+        self._calls: list[tuple[str, tuple]] = []
         self._answers: list[tuple[bool, Any]] = []
         self._here: Any = None
         self._connection: Any = None
@@ -68,17 +68,17 @@ class BackgroundProcess:
         self.close()
 
     def ask(self, method: str, *arguments: Any) -> Job:
-        """Hand a call over; the returned function waits for its answer.
+        """Submit a call; the returned function waits for its result.
 
         Raises
         ------
         WorkerDiedError
             From the returned function: the process ended before its time, or does not answer.
         """
-        number = len(self._asked)
-        self._asked.append((method, arguments if self._connection is None else ()))
+        number = len(self._calls)
+        self._calls.append((method, arguments if self._connection is None else ()))
         if self._connection is not None:
-            with contextlib.suppress(OSError):  # said when the answer is waited for
+            with contextlib.suppress(OSError):  # reported when the result is waited for
                 self._connection.send((method, arguments))
         return lambda: self._answer_of(number)
 
@@ -91,7 +91,7 @@ class BackgroundProcess:
 
     def _answer_of(self, number: int) -> Any:
         while len(self._answers) <= number:
-            method, arguments = self._asked[len(self._answers)]
+            method, arguments = self._calls[len(self._answers)]
             if self._connection is not None:
                 self._answers.append(self._receive(method))
             else:
@@ -148,7 +148,7 @@ def _serve(make: Callable[[], Any], connection: Any, other_end: Any) -> None:
             asked.put(None)
 
     try:
-        # read at once, so that nobody who only hands over waits for the object
+        # read at once, so that callers who only submit do not wait for the object
         threading.Thread(target=read, daemon=True).start()
         made = None
         with threadpool_limits(1):

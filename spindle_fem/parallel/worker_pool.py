@@ -49,7 +49,7 @@ class Shared(Generic[Value]):
 
 @lru_cache(maxsize=1)
 def _shared_at(path: str) -> Shared:
-    """What was sent; what it works out on its way is kept for the next job."""
+    """The shared objects; what they compute and cache is kept for the next job."""
     return Shared(pickle.loads(Path(path).read_bytes()))
 
 
@@ -120,7 +120,7 @@ class WorkerPool:
         Raises
         ------
         BadInputError
-            Dask is not installed, or no scheduler answers.
+            Dask is not installed, or no scheduler responds.
         """
         if self._scheduler is None:
             return self._number
@@ -133,9 +133,9 @@ class WorkerPool:
             _executor(self._number - 1).submit(_nothing)
 
     def start(self, job: Job, name: str = "") -> Job:
-        """Start a job in another process; the returned function waits for its answer.
+        """Start a job in another process; the returned function waits for its result.
 
-        Without other processes the job runs when its answer is asked for. The job is sent as it
+        Without other processes the job runs when its result is requested. The job is sent as it
         is now: what it holds may change afterwards.
 
         Raises
@@ -199,7 +199,7 @@ class WorkerPool:
         return found
 
     def stream(self, jobs: Sequence[Job], names: Sequence[str] = ()) -> Iterator[tuple[int, Any]]:
-        """Number of each job and its answer, as they come; other processes do all of them, where there are.
+        """Yield number and result of each job as it finishes; other processes do all of them, if any.
 
         Parameters
         ----------
@@ -209,7 +209,7 @@ class WorkerPool:
         Raises
         ------
         BadInputError
-            Dask is not installed, or no scheduler answers.
+            Dask is not installed, or no scheduler responds.
         WorkerDiedError
             A worker process ended before its time; names the jobs that were running.
         """

@@ -1,4 +1,4 @@
-"""How many threads and workers there may be, and jobs in threads of this process."""
+"""Limits on threads and workers, and jobs in threads of this process."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ _ONE: ContextVar[bool] = ContextVar("one_thread", default=False)
 @cache
 def core_count() -> int:
     """Cores that this process may use; at most ``SPINDLE_FEM_THREADS``."""
-    return _asked("SPINDLE_FEM_THREADS") or _given_cores()
+    return _from_environment("SPINDLE_FEM_THREADS") or _given_cores()
 
 
 @cache
 def _thread_count() -> int:
-    return _asked("SPINDLE_FEM_THREADS") or _asked("OMP_NUM_THREADS") or _given_cores()
+    return _from_environment("SPINDLE_FEM_THREADS") or _from_environment("OMP_NUM_THREADS") or _given_cores()
 
 
 def thread_count() -> int:
-    """Threads of compiled loops: one within :func:`one_thread`, else as the environment or the cores say."""
+    """Threads of compiled loops: one within :func:`one_thread`, else set by environment or cores."""
     return 1 if _ONE.get() else _thread_count()
 
 
 def worker_count(asked: int) -> int:
-    """Worker processes: as many as asked for, or one a core below 1."""
+    """Number of worker processes: the given number, or one per core if below 1."""
     return asked if asked >= 1 else core_count()
 
 
@@ -60,7 +60,7 @@ def one_thread() -> Iterator[None]:
         _ONE.reset(token)
 
 
-def _asked(name: str) -> int:
+def _from_environment(name: str) -> int:
     given = os.environ.get(name, "")
     return int(given) if given.isdigit() else 0
 
@@ -117,9 +117,9 @@ def in_threads(jobs: Sequence[Job]) -> list:
 
 
 def beside(job: Job) -> Job:
-    """Start a job in another thread; what is returned waits for it and gives its answer.
+    """Start a job in another thread; the returned function waits for its result.
 
-    With one core the job begins when it is waited for.
+    With one core the job starts when it is waited for.
     """
     if core_count() == 1:
         return job

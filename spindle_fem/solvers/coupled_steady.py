@@ -44,9 +44,9 @@ MIXING_BELOW = 0.5
 # K; expansion moves a state without it by more, so that knowing it nearer saves nothing.
 FIRST_STATE = 1.0
 MAXIMUM_RETREATS = 10
-# Of the speed asked for: where films are taken first when the fold is looked for below it.
+# Share of the requested speed at which films are first evaluated when the fold is searched below it.
 SLOW_RUNNING = 0.3
-# Of the speed that a search reached: where films and contacts are taken anew for the next.
+# Shares of the speed reached by a search at which films and contacts are updated for the next.
 FOLD_APPROACHES = (0.9, 0.97, 0.97)
 FOLD_TOLERANCE = 0.01
 # A linear residual this small against the last change of the field costs no extra iteration of the loop.

@@ -1,6 +1,6 @@
-"""Loads that follow the temperatures while time runs.
+"""Loads that follow the temperatures over time.
 
-Each stage of a time step asks for the loads at its own time and at its own
+Each stage of a time step evaluates the loads at its own time and at its own
 latest temperatures and is solved again until they agree, so the coupled
 scheme keeps the second order of the time steps. Coefficients of the matrix
 (films, ball contacts) are only renewed when they have moved by more than a
@@ -39,12 +39,12 @@ Array = NDArray[np.float64]
 
 # Bearings this close to their last temperatures make the same heat: some microwatts.
 SAME_TEMPERATURE_K = 1.0e-6
-# The end of a step is asked for an instant before it: time and inputs are then apart by rounding.
+# The end of a step is evaluated an instant before it: time and inputs then differ by rounding.
 SAME = 1.0e-12
 
 
 class HeatInMemory:
-    """A heat model that answers the same question only once.
+    """A heat model that caches its last evaluation.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class HeatInMemory:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Loads as the solver asked for them at one time."""
+    """Loads evaluated for the solver at one time."""
 
     time: float
     point: OperatingPoint
@@ -84,7 +84,7 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True)
 class _Answer:
-    """What was asked for last."""
+    """Last evaluation for the solver."""
 
     evaluation: Evaluation
     problem: ConductionProblem
@@ -92,7 +92,7 @@ class _Answer:
 
 @dataclass(frozen=True, slots=True)
 class _ChannelStep:
-    """What the terms did to the channel in one step: inlet [K], factors on flow and film, at both ends."""
+    """Effect of the terms on the channel in one step: inlet [K], factors on flow and film, at both ends."""
 
     begin: float
     end: float
@@ -217,7 +217,7 @@ class CoupledInputs:
         point = self.history.at(time)
         if not self._steps:
             return point, 1.0
-        # Of two steps that meet there the later one: inputs jump at the start of a step.
+        # Where two steps meet, take the later one: inputs jump at the start of a step.
         later = bisect.bisect_right(self._steps, time, key=lambda step: step.begin)
         inlet, flow, film = self._steps[max(later - 1, 0)].at(time)
         moved = replace(

@@ -1,6 +1,6 @@
-"""One fixed-point iteration for every steady state that heat, films and temperature settle at.
+"""One fixed-point iteration for every steady state of coupled heat, films and temperature.
 
-Far from the fixed point it goes a share of the way, near it Anderson's
+Far from the fixed point the iteration is relaxed, near it Anderson's
 combination of the last iterates takes over.
 
 Source: Walker & Ni (2011), SIAM J. Numer. Anal. 49, 1715-1735.

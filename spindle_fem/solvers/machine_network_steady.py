@@ -31,7 +31,7 @@ from spindle_fem.solvers.solution_branch import Branch, follow_branch
 
 Array = NDArray[np.float64]
 BALANCE_TOLERANCE = 1.0e-10
-# K; of the bearings' temperatures between rounds, with the heat model asked in each.
+# Change of the bearings' temperatures between rounds of the heat model, K.
 TOLERANCE = 1.0e-7
 # Contacts that follow their films leave some 1e-5 of the last change: the state is good to about 1e-6 K.
 FOLLOWED_TOLERANCE = 0.1
@@ -112,7 +112,7 @@ class MachineNetworkState:
 
 
 def network_heat_model(machine: MachineNetwork) -> HeatModel:
-    """The heat model that a definition asks for, its rings on the elastic bodies of the network."""
+    """Heat model of a definition, with rings on the elastic bodies of the network."""
     if machine.growth is None:
         return heat_model_of(machine.spec)
     return BearingMechanics(machine.spec, machine.growth.seats)
@@ -184,7 +184,7 @@ def _crept_up(
 
 
 class _NetworkResponse:
-    """What the temperatures that heats and contacts of the bearings make do to these again."""
+    """Feedback from the bearings' heats and contacts through their temperatures."""
 
     def __init__(self, machine: MachineNetwork, point: OperatingPoint, mechanics: BearingMechanics) -> None:
         self.machine, self.point, self.mechanics = machine, point, mechanics
@@ -285,7 +285,7 @@ class _Operation:
 
 
 class _PreloadOperation(_Operation):
-    """The same while expansion changes the preload, and with it the heat."""
+    """Operation whose preload changes with expansion, and with it the heat."""
 
     def __init__(self, machine: MachineNetwork, point: OperatingPoint, heat_model: HeatModel) -> None:
         super().__init__(machine, point, heat_model)

@@ -62,7 +62,7 @@ def require_state(machine: PreparedMachine, state: ThermalState) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """What looks at a transient while it runs.
+    """Observers of a running transient.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ def simulate_full(
     memory : ndarray, optional
         What the terms remember where ``start`` goes on from an earlier run.
     watch : Watch
-        What may end the run, times at which a step has to end, and who is told.
+        What may end the run, times at which a step has to end, and the progress callback.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def simulate_full(
 
 
 class _Run:
-    """What is noted of every accepted step."""
+    """Records of every accepted step."""
 
     def __init__(
         self,

@@ -40,7 +40,7 @@ LONG = 1.0e9
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """What a machine has beyond its definition's tables.
+    """Effects of a machine beyond its definition's tables.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ def with_factors(machine: PreparedMachine, physics: Physics) -> tuple[PreparedMa
 
 @dataclass(frozen=True, slots=True)
 class _Begin:
-    """What held at the start of a time step."""
+    """State at the start of a time step."""
 
     time: float
     sensed: Array
@@ -184,7 +184,7 @@ class FieldTerms:
     # --------------------------------------------------------------- in time
     @property
     def memory(self) -> Array:
-        """What the terms remember at the end of the last step."""
+        """Memory of the terms at the end of the last step."""
         return self._begin.memory
 
     def begin(
@@ -232,12 +232,12 @@ class FieldTerms:
         self._begin = _Begin(time, sensed, memory, after.inputs)
 
     def at(self, time: float, point: OperatingPoint, temperature: Array, lumped: Array) -> LoadChange:
-        """What the terms do at a stage of the time step that has begun."""
+        """Change by the terms at a stage of the current time step."""
         sensed, inputs = self._sensed(temperature, lumped), point.inputs
         return self._change(time, point, inputs, sensed, self._memory(time, sensed, inputs))
 
     def steady(self, point: OperatingPoint, temperature: Array, lumped: Array) -> LoadChange:
-        """What the terms do in the long run: memories have gone where they go, clocks stand at zero."""
+        """Change by the terms in the long run: memories settled, time zero."""
         sensed, inputs = self._sensed(temperature, lumped), point.inputs
         return self._change(0.0, point, inputs, sensed, self.settled(point, temperature, lumped))
 
@@ -248,7 +248,7 @@ class FieldTerms:
 
     # --------------------------------------------------------------- details
     def _sensed(self, temperature: Array, lumped: Array) -> Array:
-        """What terms read, then the places that lose heat, [K]."""
+        """Temperatures read by terms, then those of places that lose heat, [K]."""
         return self._sense @ np.concatenate((temperature, lumped))
 
     def _advanced(
@@ -347,9 +347,9 @@ class FieldTerms:
 
 
 def steady_physics(machine: PreparedMachine, physics: Physics) -> Callable[..., LoadChange] | None:
-    """What :func:`.coupled_steady.solve_coupled` takes as ``beyond``; None without physics.
+    """Argument ``beyond`` of :func:`.coupled_steady.solve_coupled`; None without physics.
 
-    Memories have gone where they go, clocks stand at zero. Take the machine of
+    Memories have settled, time is zero. Pass the machine from
     :func:`with_factors`.
     """
     if not physics.is_there:
@@ -368,7 +368,7 @@ def steady_physics(machine: PreparedMachine, physics: Physics) -> Callable[..., 
 def settled_memory(
     machine: PreparedMachine, physics: Physics, point: OperatingPoint, temperature: Array, lumped: Array
 ) -> Array | None:
-    """What the terms remember in a steady state, such as :func:`steady_physics` makes; None without physics.
+    """Memory of the terms in a steady state, such as :func:`steady_physics` makes; None without physics.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where the rings' own heat stops having a thermal equilibrium.
+"""Speed above which the rings' own heat has no thermal equilibrium.
 
 A rigid preload rises when the inner ring is hotter than the outer one, more
 preload makes more friction heat, and more heat a larger difference. Above some
@@ -26,9 +26,9 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.solvers.solution_branch import Branch, follow_branch
 
-# Of the end of a search: where a branch of equilibria begins.
+# Share of the end of a search at which a branch of equilibria begins.
 SLOWEST = 0.05
-# Of what a watt does to the machine, in the energy norm; means over surfaces err by less.
+# Tolerance of a watt's effect on the machine, in the energy norm; means over surfaces err by less.
 RESPONSE_TOLERANCE = 1.0e-5
 
 

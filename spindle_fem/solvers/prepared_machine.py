@@ -55,7 +55,7 @@ class PreparedMachine:
     timings: Mapping[str, float] = field(default_factory=dict)
 
     def field_state(self, unknowns: NDArray[np.float64], lumped: Mapping[str, float]) -> FieldState:
-        """What the loads see of a field: the mean over each facet, and the lumped nodes."""
+        """Quantities of a field that the loads need: the mean over each facet, and the lumped nodes."""
         facets = {
             surface: self.operators.facet_integral(unknowns, rows) / self.operators.facet_area[rows]
             for surface, rows in self.operators.surface_rows.items()
@@ -173,12 +173,12 @@ def machine_on_mesh(spec: MachineSpec, mesh: TaggedMesh, operators: ThermalOpera
 
 
 def without_expansion(machine: PreparedMachine) -> PreparedMachine:
-    """The same machine with bearings that keep the size of assembly."""
+    """The machine with bearings that keep their size at assembly."""
     return machine_on_mesh(at_assembly_size(machine.spec), machine.mesh, machine.operators)
 
 
 class Clock:
-    """Seconds of each stage; tells the progress callback as stages begin."""
+    """Seconds of each stage; calls the progress callback as stages begin."""
 
     def __init__(self, progress: Progress) -> None:
         self.progress = progress

@@ -1,4 +1,4 @@
-"""What probes and bearings show at any state, as rows over the unknowns."""
+"""Readings of probes and bearings at any state, as rows over the unknowns."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _outlet_weights(machine: PreparedMachine, film: CircuitFilm) -> Array:
 
 
 def _circuit_outlets(machine: PreparedMachine) -> sparse.csr_array:
-    """What the walls of each circuit give to its outlet, (n_circuits, n_unknowns)."""
+    """Contribution of the walls of each circuit to its outlet, (n_circuits, n_unknowns)."""
     rows = [
         sparse.csr_array(_outlet_weights(machine, film)[None, :])
         @ mean_matrix(machine.operators, list(film.surface))

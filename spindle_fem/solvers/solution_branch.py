@@ -34,7 +34,7 @@ FOLD_TOLERANCE = 2.0e-5
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """Where a branch went.
+    """A branch of solutions and where it ends.
 
     Attributes
     ----------
@@ -93,11 +93,11 @@ class _Walk:
         self.jacobian: Array | None = None
 
     def residual(self, point: Array) -> Array:
-        """What is left of ln x = ln G, (k,)."""
+        """Residual of ln x = ln G, (k,)."""
         return self.residuals(point[None, :-1], point[-1])[0]
 
     def residuals(self, states: Array, parameter: float) -> Array:
-        """The same of several states ln x (n, k) at one parameter."""
+        """Residuals of several states ln x (n, k) at one parameter."""
         return states - np.log(self.respond(np.exp(states), float(parameter) * self.end))
 
     def differentiate(self, point: Array, residual: Array) -> None:

@@ -1,4 +1,4 @@
-"""How a transient of a machine is followed, and what is known of it afterwards."""
+"""Options and records of a machine's transient."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ ENERGY_TOLERANCE = 1.0e-8
 # The coolant is marched along walls that are known to the coupling tolerance. Tens of kelvin drive the heat
 # there, so each kelvin of it changes what they give by less than this share.
 ENERGY_PER_KELVIN = 0.1
-# Factor on the coupling's tolerance where a run's balance asks for less, and runs at most: where water cools,
-# tenths of a kelvin drive the heat.
+# Factor on the coupling's tolerance if a run's balance requires less, and largest number of runs: where
+# water cools, tenths of a kelvin drive the heat.
 FINER_COUPLING, MOST_TRIES = 0.25, 3
 
 
 @dataclass(frozen=True, slots=True)
 class TransientOptions:
-    """How accurately a transient is followed.
+    """Accuracy settings of a transient.
 
     Attributes
     ----------
@@ -100,10 +100,10 @@ Found = TypeVar("Found")
 
 
 def balanced(run: Callable[[TransientOptions], Found], options: TransientOptions) -> Found:
-    """What a run gives, coupled more exactly as long as its heat balance asks for that.
+    """Result of a run, repeated with tighter coupling until its heat balance holds.
 
-    How exact the fixed point of a step has to be for the balance depends on what heats and cools; the
-    balance is held to what the options ask for throughout.
+    The coupling accuracy needed for the balance depends on what heats and cools; the
+    balance is held to the options' limit throughout.
 
     Raises
     ------

@@ -88,13 +88,13 @@ def test_the_whole_run_at_once_is_the_run_step_by_step(fast, steps, monkeypatch,
 
 def test_a_run_that_is_known_takes_one_round(fast, steps, monkeypatch):
     rounds = []
-    plain = TermMarch._told
+    plain = TermMarch._evaluate
 
-    def told(self, *own):
+    def evaluate(self, *own):
         rounds.append(own[-1])
         return plain(self, *own)
 
-    monkeypatch.setattr(TermMarch, "_told", told)
+    monkeypatch.setattr(TermMarch, "_evaluate", evaluate)
     run = answering_run(fast, steps, TERMS)
     states, _ = run.march(293.15)
     assert rounds.count(Derivatives.STATE) > 1

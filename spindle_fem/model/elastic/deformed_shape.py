@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class BodyShape:
-    """One body before and after.
+    """One body before and after deformation.
 
     Attributes
     ----------

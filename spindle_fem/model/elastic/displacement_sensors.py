@@ -1,6 +1,6 @@
-"""What displacement sensors on the flange read of the shaft, as outputs of the elastic bodies.
+"""Readings of displacement sensors on the flange, as outputs of the elastic bodies.
 
-A reading is made of how far the shaft carries the spot from the bearing that holds it, how far the
+A reading combines how far the shaft carries the spot from the bearing that holds it, how far the
 housing carries that bearing from the flange, and the shift and tilt of the axis where the housing bends.
 """
 

@@ -1,6 +1,6 @@
 """One body of revolution: its stiffness, factored, and shifts of its faces by any cause.
 
-A shift of a face is a linear output J(u) of the displacement. It is solved once, K λ = J; by
+A shift of a face is a linear output J(u) of the displacement. K λ = J is solved once; by
 reciprocity λ then gives the output for every load: an inner product with a temperature field, with
 the centrifugal load, with a pressure on any other face.
 """
@@ -98,7 +98,7 @@ class ElasticBody:
         return splu(matrix[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0), free
 
     def stiffness_matrix(self) -> sparse.csr_matrix:
-        """Of every unknown, none held, [N/m]."""
+        """Stiffness over all unknowns, none constrained, [N/m]."""
         normal, shear = (self.coefficients[name][..., 0] for name in ("normal", "shear"))
         return forms.stiffness_matrix(self.basis, self.harmonic, normal, shear)
 

@@ -24,7 +24,7 @@ ELEMENT_SIZE = 4.0e-3
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """Where a ring meets shaft or housing.
+    """Contact of a ring with shaft or housing.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Seat:
 
 @dataclass(frozen=True, slots=True)
 class MachineBodies:
-    """Bodies of a machine and what each is made of.
+    """Bodies of a machine and the parts of each.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ Side = Literal["shaft", "housing"]
 
 @dataclass(frozen=True, slots=True)
 class SeatState:
-    """One ring on its seat, everything from the assembled state.
+    """One ring on its seat, relative to the assembled state.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Growth:
 
 
 def _assembled_radial_force(spec: MachineSpec, group: BearingSet, bearing: SetBearing) -> float:
-    """By which the balls of a bearing press its rings apart as assembled, N; rollers carry no preload."""
+    """Radial force between the rings of a bearing from its assembled preload, N; rollers carry none."""
     if not group.preload > 0.0:
         return 0.0
     share = group.preload / sum(other.takes_thrust == bearing.takes_thrust for other in group.bearing)
@@ -154,7 +154,7 @@ class GrowthModel:
         return solved, self._rows(solved)
 
     def _forward(self, name: str) -> Array | None:
-        """How far the shaft carries the nose forward of its bearing, or the housing that of its flange."""
+        """Output for the forward shift: nose less bearing of the shaft, or bearing less flange of the housing."""
         layout, body = Layout(self.spec, set()), self.bodies.bodies[name]
         held = self.holding_seat(name)
         ends = layout.flange_ends()
@@ -168,7 +168,7 @@ class GrowthModel:
         return body.mean_shift(flange_back(layout), AXIAL) - at_bearing
 
     def _seen(self, name: str, sight: SensorSight) -> Array:
-        """What a body adds to the reading of a sensor on the flange: the shaft, or the housing below it."""
+        """Contribution of a body (shaft, or housing below it) to the reading of a sensor on the flange."""
         body, held = self.bodies.bodies[name], self.holding_seat(name)
         if not sight.axial:
             spot = body.spot_shift(sight.z, sight.r, RADIAL) if name == self.bodies.shaft else None
@@ -203,7 +203,7 @@ class GrowthModel:
         return rows, spins
 
     def _bending(self) -> Array:
-        """Rows (4, n_unknowns): nose up, across; tilt up, across. Empty where they cannot be told."""
+        """Rows (4, n_unknowns): nose up, across; tilt up, across. Empty if they are not defined."""
         layout, sets = Layout(self.spec, set()), self.spec.bearing_set
         if len(sets) < 2 or not self.bodies.shaft or layout.flange_ends() is None:
             return np.zeros((0, self._size))
@@ -238,7 +238,7 @@ class GrowthModel:
 
     # ------------------------------------------------------------------ seats
     def shifts(self, temperature: Array) -> dict[str, Array]:
-        """What temperature alone does to each bearing, (4,) m, as ``SeatBodies.law`` takes it."""
+        """Shifts of each bearing due to temperature alone, (4,) m, as ``SeatBodies.law`` takes them."""
         rises = self.thermal_rows @ temperature - self._unit_shifts * self._assembled_at[:, None]
         return dict(zip(self.bearings, rises, strict=True))
 
@@ -279,7 +279,7 @@ class GrowthModel:
         return self._pressures(thermal, speed, forces)
 
     def assembled_pressures(self) -> Array:
-        """The same as assembled."""
+        """Pressures as assembled."""
         return self._pressures(np.zeros((len(self.bearings), 4)), 0.0, self.assembly_forces)
 
     def _pressures(self, thermal: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Array:

@@ -65,7 +65,7 @@ class MeridianField:
         Parameters
         ----------
         around : {"even", "up", "across"}
-            Which amplitude the outputs ask for: the mean over the angle, or that of cos θ or sin θ
+            Amplitude for the outputs: the mean over the angle, or that of cos θ or sin θ
             (θ = 0 up, growing towards -x).
         """
         shape, factor, cosine, sine = self._fit

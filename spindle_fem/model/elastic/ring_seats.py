@@ -86,12 +86,12 @@ class RingSeats:
         return BodyOutputs.of(body, {seat.ring: body.mean_shift(seat.face, RADIAL) for seat in own})
 
     def seats_on(self, carrier: str) -> list[int]:
-        """Which of the rings sit on a body, in the order of its outputs."""
+        """Indices of the rings that sit on a body, in the order of its outputs."""
         return [i for i, ring in enumerate(self.rings) if ring.seat.carrier == carrier]
 
     @cached_property
     def bodies(self) -> SeatBodies:
-        """How all seats yield, in the order of the rings."""
+        """Compliance of all seats, in the order of the rings."""
         count, inwards = len(self.rings), self.inwards
         bearing = np.arange(count) // 2
         own = np.array([ring.outputs.compliance(ring.areas) for ring in self.rings])

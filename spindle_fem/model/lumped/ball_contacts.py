@@ -1,4 +1,4 @@
-"""Ball contacts that conduct as the temperature of their film says."""
+"""Ball contacts whose conductance follows the temperature of their film."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ContactFaces:
 
 @dataclass(frozen=True, slots=True)
 class BallContactLaw:
-    """What moving film temperatures add to the links and heat shares of the ball rows.
+    """Changes of the links and heat shares of the ball rows with moving film temperatures.
 
     Arrays over all faces of all raceways; made by :meth:`of`.
 
@@ -120,7 +120,7 @@ class BallContactLaw:
         """The friction law refuses what lies beyond the tables."""
 
     def conductance(self, film_temperature: Array) -> tuple[Array, Array]:
-        """Of every raceway (W/K) and its slope (W/K²) at given films (K); constant beyond the tables."""
+        """Conductance of every raceway (W/K) and slope (W/K²) at films (K); constant beyond the tables."""
         kelvin = film_temperature[self.film]
         at = np.minimum(np.maximum(kelvin, self.breaks[0]), self.breaks[-1])
         piece = np.minimum(np.searchsorted(self.breaks[1:-1], at, side="right"), len(self.breaks) - 2)

@@ -160,7 +160,7 @@ def side_wall_area(channel: ChannelDefinition, inner: float, outer: float, turns
 
 
 def _ring_fractions(channel: ChannelDefinition) -> list[tuple[float, float, float]]:
-    """Closed rings that stand for the helix: z low, z high, share of the circumference."""
+    """Closed rings that represent the helix: z low, z high, share of the circumference."""
     rings = []
     for start in range(channel.starts):
         offset = (start / channel.starts - 0.5 * (channel.starts - 1) / channel.starts) * channel.pitch

@@ -2,7 +2,7 @@
 
 While expansion is not followed, a bearing's mechanics depend on its own film
 temperature only. A table of a few exact states, solved side by side, then
-stands for them in every Newton step and time step.
+replaces them in every Newton step and time step.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ HEAT_RANGE = (-15.0, 120.0)
 # Exact states of a table: with 19 the heat between them is right to 1e-5.
 HEAT_POINTS = 19
 FEWEST_HEAT_POINTS = 4
-# Cubic pieces that stand for the polynomials.
+# Cubic pieces that represent the polynomials.
 PIECES = 4 * (HEAT_POINTS - 1)
 
 
@@ -153,7 +153,7 @@ def _states(
 def _one_by_one(
     point: OperatingPoint, heat_model: HeatModel, names: Sequence[str], temperatures: Array
 ) -> tuple[list[float], Array]:
-    """Those of some temperatures that a heat model knows, and its states there, (n_bearings, 3, m)."""
+    """Temperatures within the range of a heat model, and its states there, (n_bearings, 3, m)."""
     known: list[float] = []
     states: list[list[tuple[float, float, float]]] = []
     refused: OutOfValidityError | None = None

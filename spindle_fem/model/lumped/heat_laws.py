@@ -323,7 +323,7 @@ class FrictionLaw:
         return ((c3 * x + c2) * x + c1) * x + c0 + slope * (base - at), slope
 
     def film_temperature(self, temperature: Array) -> Array:
-        """Of each bearing, K."""
+        """Film temperature of each bearing, K."""
         return self.weights @ temperature + self.feedback * self.heat(temperature)[0]
 
     def require_valid(self, temperature: Array) -> None:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class NodeCentres:
-    """Where each node's temperature is taken to be.
+    """Position to which each node's temperature refers.
 
     Attributes
     ----------
@@ -104,12 +104,12 @@ def half_resistance(
     faces: Faces, side: NDArray[np.int64], cells: MeridianCells, partition: Partition, centres: NodeCentres,
     conductivity: Array,
 ) -> Array:  # fmt: skip
-    """From node centre to face, K/W: logarithmic along r, linear along z (Table 1).
+    """Resistance from node centre to face, K/W: logarithmic along r, linear along z (Table 1).
 
     Parameters
     ----------
     side : (n,) int64 ndarray
-        The cell on the side asked for.
+        The cell on the requested side.
     conductivity : (n_parts,) ndarray, [W/(m·K)]
     """
     node = partition.node_of_cell[side]

@@ -39,12 +39,12 @@ class SparseBalance:
 
     @property
     def name(self) -> str:
-        """Of the machine."""
+        """Name of the machine."""
         return self.network.machine.spec.name
 
     @property
     def node_names(self) -> tuple[str, ...]:
-        """Of the machine's network."""
+        """Names of the nodes of the machine's network."""
         return self.network.machine.node_names
 
     @property

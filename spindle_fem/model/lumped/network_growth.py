@@ -24,7 +24,7 @@ ON_LINE = 1.0e-7
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NetworkGrowth:
-    """How the rings of a machine shift and yield, by temperatures of nodes.
+    """Shifts and compliance of a machine's rings, from temperatures of nodes.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class NetworkGrowth:
 
     @classmethod
     def of(cls, spec: MachineSpec, cells: MeridianCells, partition: Partition) -> NetworkGrowth:
-        """Of a machine cut into cells; every cell has the temperature of its node."""
+        """Build for a machine divided into cells; every cell has the temperature of its node."""
         bodies = machine_bodies(spec)
         seating = RingSeats(spec, bodies)
         number = len(partition.node_names)

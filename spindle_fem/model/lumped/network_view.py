@@ -65,11 +65,11 @@ def view_of_network(
             fluids[coefficient] = boundary[other]
             surroundings.setdefault(other, []).append(coefficient)
         elif ends[1] < n:
-            # What is heated expands into what holds it.
+            # The heated end expands into the end that encloses it.
             hot, cold = ends if ends[0] in heated or ends[1] not in heated else ends[::-1]
             walls[coefficient], fluids[coefficient] = names[hot], names[cold]
             joints[link] = (coefficient,)
-    # Air that moves more, or a room that is fuller, changes all films to it alike.
+    # More air movement, or a warmer room, changes all films to that air by the same factor.
     for other, links in surroundings.items():
         if len(links) > 1:
             largest = max(links, key=conductance.__getitem__).removeprefix("link.")
@@ -135,7 +135,7 @@ def _boundary_temperatures(network: ThermalNetwork) -> dict[str, str | float]:
 def _sources(
     network: ThermalNetwork, turning: tuple[str, ...]
 ) -> tuple[dict[str, str], dict[str, str], dict[str, tuple[str, ...]], dict[str, str]]:
-    """Node that each source heats, what that is joined to, its speed-like input, and what it is told as."""
+    """Node heated by each source, the node it is joined to, its speed-like input, and its name in reports."""
     inner: dict[str, str] = {}
     outer: dict[str, str] = {}
     speeds: dict[str, tuple[str, ...]] = {}
@@ -148,7 +148,7 @@ def _sources(
         inner[name] = network.node_names[node]
         reported[name] = network.node_names[node]
         speeds[name] = (source,) if source in turning else ()
-        # What is not heated itself comes first: it is what holds the bearing, or stands for it.
+        # Nodes without heat of their own come first: they hold the bearing.
         joined = [
             (int(b if a == node else a) not in heated, float(value), int(b if a == node else a))
             for a, b, value in zip(

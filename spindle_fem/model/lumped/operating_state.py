@@ -47,7 +47,7 @@ TABLES_KEPT = 64
 
 @dataclass(frozen=True, slots=True)
 class Raceway:
-    """How the mean temperature of a raceway follows from nodes, balls and heat.
+    """Mean temperature of a raceway from nodes, balls and heat.
 
     ``T = node_weights @ T[nodes] + ball_weight * T_balls + per_heat * heat``.
     ``bypass`` is the share of the heat that leaves the raceway straight to the
@@ -221,7 +221,7 @@ def operate(
 
 
 def _merged(first, second, conductance, kind):
-    """One link for each pair and kind."""
+    """Sum parallel links of the same pair and kind."""
     kinds, code = np.unique(kind.astype(str), return_inverse=True)
     keys = np.column_stack([first, second, code])
     unique, inverse = np.unique(keys, axis=0, return_inverse=True)
@@ -230,7 +230,7 @@ def _merged(first, second, conductance, kind):
 
 
 def _bearing(machine, group, name, heat: BearingHeat, links):
-    """Links of a ball row, and where its heat goes."""
+    """Links of a ball row, and the distribution of its heat."""
     shares, conductances = heat_shares(machine.spec.heat), ball_conductances(group, heat)
     ball = machine.ball_nodes[name]
     spread = np.zeros(machine.n_nodes)
@@ -344,7 +344,7 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
 
 
 def _circuit(machine: MachineNetwork, film: CircuitFilm, point: OperatingPoint) -> CircuitLaw:
-    """The coolant of a circuit, eliminated: it holds no heat of its own."""
+    """Coolant of a circuit, eliminated: it has no heat capacity."""
     value, _ = film_coefficient(film, point, np.zeros(1), film.inlet_temperature)
     patches = [machine.surfaces[surface] for surface in film.surface]
     patch = SurfacePatch.joined(patches)

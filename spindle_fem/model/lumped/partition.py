@@ -1,4 +1,4 @@
-"""Which cells of the meridian plane make one node of the network, and its name.
+"""Group cells of the meridian plane into nodes of the network, and name the nodes.
 
 Columns follow the bearings: one for each bearing, one for each spacer or span
 between bearings that is at least half a bearing wide (narrower ones go half
@@ -227,7 +227,7 @@ def coarse_partition(
     cells: MeridianCells,
     gap_spans: Mapping[str, tuple[float, float]],
 ) -> Partition:
-    """One node a body and column, as in the paper's network."""
+    """Partition with one node per body and column, as in the paper's network."""
     columns, bodies, _ = plan_nodes(spec, assembly, cells, gap_spans)
     node_of_cell = np.full(cells.n_cells, -1, dtype=np.int64)
     names: list[str] = []
@@ -250,7 +250,7 @@ def coarse_partition(
 
 
 def fine_partition(spec: MachineSpec, assembly: AssemblyGeometry, cells: MeridianCells) -> Partition:
-    """Every cell a node of its own, named by part and place."""
+    """Partition with one node per cell, named by part and place."""
     columns = build_columns(spec, assembly)
     middle = cells.z.mean(axis=1)
     edges = np.array([column.z[1] for column in columns])

@@ -21,7 +21,7 @@ Inputs = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of a network that a prior may leave free.
+    """One number of a network that may be given a prior.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From a written network to one that can be solved."""
+"""Convert a written network to one that can be solved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is asked of a mesh: coefficients, heat, films, lumped nodes."""
+"""Conduction problem on a mesh: coefficients, heat, films, lumped nodes."""
 
 from __future__ import annotations
 

@@ -153,7 +153,7 @@ def elements_by_forms(loaded: SkfemMesh) -> ElementIntegrals:
 def elements_by_kernel(
     points: NDArray[np.float64], tetrahedra: NDArray[np.int64], order: int
 ) -> ElementIntegrals:
-    """The same integrals by a kernel, on quadratic tetrahedra (n, 10)."""
+    """Element integrals by a kernel, on quadratic tetrahedra (n, 10)."""
     table, mapping = tetrahedron_table(order), tetrahedron_table(2)
     n, n_nodes = len(tetrahedra), table.values.shape[1]
     shape = n, len(upper_pairs(n_nodes)[0])
@@ -187,7 +187,7 @@ def facets_by_forms(loaded: SkfemMesh, facets: NDArray[np.int64]) -> FacetIntegr
     basis = loaded.facet_basis(facets)
     unknowns = loaded.unknown_of_dof[basis.element_dofs].T
     own = facets[:, : 3 if basis.Nbfun == 4 else 6]
-    # where the facet's nodes stand among those of its element
+    # positions of the facet's nodes among those of its element
     place = np.argmax(unknowns[:, None, :] == own[:, :, None], axis=2)
     rows, columns = upper_pairs(own.shape[1])
     element = np.arange(len(facets))[:, None]
@@ -200,10 +200,10 @@ def facets_by_forms(loaded: SkfemMesh, facets: NDArray[np.int64]) -> FacetIntegr
 
 
 def facets_in_bulk(points: NDArray[np.float64], facets: NDArray[np.int64], order: int) -> FacetIntegrals:
-    """The same integrals in a few array operations.
+    """Facet integrals in a few array operations.
 
     Each integral over all facets is one matrix product: area elements at the quadrature points times
-    what the form is of the reference triangle's shape functions.
+    the form's values on the reference triangle.
     """
     table = triangle_table(order)
     rows, columns = upper_pairs(table.values.shape[1])

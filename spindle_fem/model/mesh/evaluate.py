@@ -1,4 +1,4 @@
-"""Temperatures where they are asked for: points, surfaces, maxima, heat flux."""
+"""Temperatures at points, on surfaces, maxima, and heat flux."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Location:
     place : (n, 3) ndarray
         Reference coordinates.
     distance : (n,) ndarray, [m]
-        From the asked point to the nearest point of its element; 0 inside.
+        Distance from the given point to the nearest point of its element; 0 inside.
     """
 
     element: NDArray[np.int64]

@@ -1,7 +1,7 @@
-"""Room for large arrays in large pages.
+"""Allocate large arrays in large pages.
 
 The first touch of each page of fresh memory costs about a microsecond, which for
-pages of 4 kB is as much as filling it. Linux hands out pages of 2 MB where asked.
+pages of 4 kB is as much as filling it. Linux provides pages of 2 MB on request.
 """
 
 from __future__ import annotations

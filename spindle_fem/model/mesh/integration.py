@@ -58,7 +58,7 @@ class MeshIntegrals:
 
 @dataclass(frozen=True, slots=True)
 class _Neighbours:
-    """What stands around each node: places in the elements' nodes, and higher nodes across joints."""
+    """Surroundings of each node: its positions in the elements, and higher nodes across joints."""
 
     nodes: NDArray[np.uint32]
     part: NDArray[np.int32]
@@ -177,7 +177,7 @@ def _general_rows(mesh: TaggedMesh, order: int, n_unknowns: int, around: _Neighb
 
 
 def _linear_rows(mesh: TaggedMesh, order: int, n_unknowns: int, around: _Neighbours) -> _UpperRows:
-    """Rows of linear elements, made with what stands in them."""
+    """Rows of linear elements, filled with their integrals at once."""
     nodes, part = around.nodes, around.part
     values, load = room((len(nodes), 7)), np.zeros(n_unknowns)
     bounds = np.linspace(0, len(nodes), INTEGRATION_CALLS + 1).astype(np.int64)

@@ -19,7 +19,7 @@ from spindle_fem.model.mesh.linear_system import ThermalSystem
 from spindle_fem.model.mesh.multigrid import build_hierarchy
 from spindle_fem.model.mesh.threads import chunk_bounds, row_blocks, run_blocks, run_team, unsigned
 
-# Of a cube: at 2,200 unknowns a factor takes three times as long as multigrid, at 11,000 ten times.
+# For a cube: at 2,200 unknowns a factor takes three times as long as multigrid, at 11,000 ten times.
 DIRECT_BELOW = 2_000
 RELATIVE_TOLERANCE = 1e-11
 MAX_ITERATIONS = 400
@@ -327,7 +327,7 @@ def _to_error(
     wanted: float,
     limit: int,
 ) -> tuple[NDArray[np.float64], int, float]:
-    """Correction whose estimated error is nowhere above what is wanted, iterations, and that error."""
+    """Correction with an estimated error everywhere below the tolerance, iterations, and that error."""
     state = _Iteration(matrix, residual)
     preconditioned = first
     for iteration in range(1, limit + 1):

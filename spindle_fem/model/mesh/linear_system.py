@@ -61,7 +61,7 @@ class ThermalSystem:
         return np.concatenate((self.load, self.lumped_load))
 
     def tied(self) -> ThermalSystem:
-        """The same equations with perfect joints eliminated."""
+        """System with perfect joints eliminated."""
         if self.tie is None:
             return self
         tie = self.tie

@@ -53,7 +53,7 @@ class MovedFace:
 
 @dataclass(frozen=True, slots=True)
 class MovedChannel:
-    """How far the walls of the cooling channel move for one unit, m: inner and outer along r, all along z."""
+    """Movement of the cooling channel's walls per unit, m: inner and outer along r, all along z."""
 
     inner: float = 0.0
     outer: float = 0.0
@@ -139,7 +139,7 @@ class MovableMesh:
 
     @cached_property
     def _stiffness(self) -> sparse.csr_array:
-        """Of the Laplace operator on welded nodes."""
+        """Stiffness of the Laplace operator on welded nodes."""
         n = self.mesh.n_corners
         weld = sparse.csr_array((np.ones(n), (np.arange(n), self._weld)))
         matrix = self.operators.matrix(self.operators.conduction)
@@ -206,7 +206,7 @@ class MovableMesh:
 
     @cached_property
     def mesh_prolongation(self) -> sparse.csr_array:
-        """From corners to all nodes."""
+        """Prolongation from corners to all nodes."""
         if len(self.mesh.points) == self.mesh.n_corners:
             return sparse.eye_array(self.mesh.n_corners, format="csr")
         return prolongation_from_corners(self.mesh)

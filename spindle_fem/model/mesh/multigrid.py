@@ -83,7 +83,7 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class CyclePlan:
-    """What a cycle goes through, and where: see :func:`spindle_fem.model.mesh.kernels.team_loops.cycle`.
+    """Schedule of a cycle: see :func:`spindle_fem.model.mesh.kernels.team_loops.cycle`.
 
     Attributes
     ----------

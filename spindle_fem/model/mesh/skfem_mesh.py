@@ -147,9 +147,9 @@ def load_into_skfem(mesh: TaggedMesh, order: int) -> SkfemMesh:
 
 
 def _numbers(mesh: TaggedMesh) -> NDArray[np.int64]:
-    """New number of each node: both sides of a joint have theirs in the same order.
+    """New number of each node, in the same order on both sides of a joint.
 
-    scikit-fem turns each facet so that its nodes' numbers rise; sides whose numbers rise alike then
+    scikit-fem turns each facet so that its nodes' numbers rise; sides numbered in the same order then
     have quadrature points that coincide.
     """
     n = len(mesh.points)

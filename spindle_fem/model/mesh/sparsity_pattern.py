@@ -68,7 +68,7 @@ def expand_pattern(indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Sym
 
 
 def grouped(labels: NDArray[np.integer], size: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Which places hold each label below ``size``: where each label's begin, (size + 1,), and the places.
+    """Positions of each label below ``size``: where each label's begin, (size + 1,), and the positions.
 
     >>> starts, places = grouped(np.array([2, 0, 2]), 3)
     >>> starts.tolist(), places.tolist()

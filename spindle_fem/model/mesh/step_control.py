@@ -1,4 +1,4 @@
-"""How the steps of a transient on a mesh are chosen and how closely each is solved."""
+"""Choice of the steps of a transient on a mesh, and accuracy of each solve."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ERROR_TOLERANCE_K = 0.05
 
 @dataclass(frozen=True, slots=True)
 class StepControl:
-    """How steps are chosen.
+    """Settings for the choice of steps.
 
     Attributes
     ----------

@@ -66,7 +66,7 @@ def fill_rows(
     entries_a_row: float,
     kinds: tuple[type, ...] = (np.int32, np.float64),
 ) -> tuple[NDArray, ...]:
-    """Compressed rows whose lengths are not known before: starts, columns and what goes with them.
+    """Fill compressed rows of unknown length: starts, columns and their entries.
 
     ``function(low, high, *given, counts, columns, ...)`` fills a range of rows, writes
     row i's length to ``counts[i + 1]`` and returns how many entries it made, or -1 when

@@ -67,7 +67,7 @@ class Stage:
 
 @dataclass(slots=True)
 class _Kept:
-    """What the last solve left for the next."""
+    """Data of the last solve, reused by the next."""
 
     coefficients: ConductionProblem | None = None
     system: ThermalSystem | None = None
@@ -189,7 +189,7 @@ class StageSolver:
         self._kept.before = (size, stages[0].unknowns)
 
     def forget_slope(self) -> None:
-        """Drop what guesses are made of: the inputs jump."""
+        """Discard the data for initial guesses, because the inputs jump."""
         self._kept.slope = None
         self._kept.before = None
 
@@ -275,7 +275,7 @@ class StageSolver:
         )
 
     def _is_left(self, change: float) -> float:
-        """What further iterations would change at most, K, where the last one changed so much."""
+        """Upper bound of the remaining change, K, from the last iteration's change."""
         if not self._control.trust_contraction or self._contraction >= UNKNOWN_CONTRACTION:
             return change
         share = self._contraction / (1.0 - self._contraction) + REDUCTION
@@ -303,7 +303,7 @@ class StageSolver:
         if solution.iterations and judge:
             self._recent.add(solution.unknowns - guess, self._storage, kept.conduction)
         self.linear_iterations += solution.iterations
-        # Later solves of a stage gain too few decades to tell.
+        # Later solves of a stage gain too few decades to judge by.
         if judge and solution.digits > 0.0:
             effort = solution.iterations / solution.digits
             if kept.fresh_effort is None:

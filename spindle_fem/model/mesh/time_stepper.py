@@ -185,7 +185,7 @@ def integrate(
         try:
             stages = solver.take_step(state, end, size)
         except ConvergenceError:
-            # What is stored outweighs what follows the field the more, the shorter the step.
+            # The shorter the step, the more storage outweighs temperature-dependent terms.
             rejections += 1
             if control.tolerance is None or rejections > MAX_REJECTIONS:
                 raise

@@ -1,7 +1,7 @@
-"""What terms that answer to temperatures add to a linear model, as few heats with their derivatives.
+"""Contribution of temperature-dependent terms to a linear model, as few heats with their derivatives.
 
 Heat of the terms, and the heat that a changed coefficient moves, are unknowns ``q`` of small number; the
-linear model answers to them by precomputed columns, so that Newton's method works on ``q`` alone and a
+linear model responds to them by precomputed columns, so that Newton's method works on ``q`` alone and a
 step stays implicit.
 """
 
@@ -36,7 +36,7 @@ MOST_ITERATIONS = 25
 
 @dataclass(frozen=True, slots=True)
 class RunInstants:
-    """What the model itself is at some instants of a run.
+    """Quantities of the model itself at some instants of a run.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class RunInstants:
     friction : (n, n_heat_places) ndarray, [W]
         Heat that the machine itself gives to its heat places.
     friction_by : (n, n_heat_places, p) ndarray, [W]
-        Its derivatives to the asked parameters.
+        Its derivatives by the requested parameters.
     shifts : mapping of coefficient to ((n,) ndarray, (n, p) ndarray), [K]
         What shifts fluids beside these terms, and derivatives.
     """
@@ -61,7 +61,7 @@ class RunInstants:
         return self._with(self.instants.at(rows), rows)
 
     def one(self, row: int) -> RunInstants:
-        """One of them, with inputs as plain numbers."""
+        """One of the instants, with inputs as plain numbers."""
         inputs = {name: float(values[row]) for name, values in self.instants.inputs.items()}
         return self._with(Instants(float(self.instants.times[row]), inputs), slice(row, row + 1))
 
@@ -112,7 +112,7 @@ class _Moved:
 
 
 class AddedHeat:
-    """Terms that answer to temperatures on one model: columns, sensed temperatures, evaluation.
+    """Temperature-dependent terms on one model: columns, sensed temperatures, evaluation.
 
     Added are every heat that terms put into places, then the heat of every heat place of every bearing whose
     friction they scale, then what every coefficient that they scale conducts more in each direction.
@@ -192,7 +192,7 @@ class AddedHeat:
         return {item.coefficient for item in self._moved} | {film for _, film in self._fluids}
 
     def columns(self, inlet_load: Array) -> Array:
-        """What every added quantity puts in, (r, m); ``inlet_load`` is that of 1 K of the coolant's inlet."""
+        """Load of every added quantity, (r, m); ``inlet_load`` is that of 1 K of the coolant's inlet."""
         fast, model = self.fast, self.fast.model
         found = np.empty((model.size, self.n_added))
         fluids = dict(self._fluids)
@@ -224,7 +224,7 @@ class AddedHeat:
         Parameters
         ----------
         touched : mapping of coefficient to sequence of int
-            Which of the asked parameters scale it.
+            Indices of the requested parameters that scale it.
         sensed : (n, n_y) ndarray, [K]
         states : (n, n_x) ndarray
             Memories of the terms.
@@ -310,7 +310,7 @@ class AddedHeat:
 
     @staticmethod
     def _scaled_by(found: Quantities, columns: slice, targets: Sequence[int]) -> None:
-        """Add the derivatives of what is proportional to asked parameters, to their logarithms."""
+        """Add derivatives of quantities proportional to requested parameters, by their logarithms."""
         if found.by_parameter.shape[2]:
             for target in targets:
                 found.by_parameter[:, columns, target] += found.value[:, columns]

@@ -37,7 +37,7 @@ SOLVER_TOLERANCE = 1.0e-7
 CENTRAL_DEGREE, DEGREE = 5, 2
 # Basis vectors from which first guesses are combined.
 GUESS_SIZE = 80
-# Of the walls and films above the ambient, at first, K.
+# Initial rise of walls and films above the ambient, K.
 FIRST_RISE = 15.0
 # The hottest and coldest that tables of the bearings' heat reach to at first.
 FIRST_TABLES = (ZERO_CELSIUS_K + 10.0, ZERO_CELSIUS_K + 75.0)
@@ -65,7 +65,7 @@ def build_model_for_designs(
     specs : sequence of MachineSpec
         The designs.
     film_band : bool
-        Whether they are also asked for at both ends of the channel film's band.
+        Whether both ends of the channel film's band are needed too.
 
     Returns
     -------
@@ -216,7 +216,7 @@ class _Samples:
         self._solve(row, sample, bearings, CENTRAL_DEGREE, together=False)
 
     def add(self, row: int, sample: Sample | None = None) -> None:
-        """What heats and cools a design, set by set, at its coefficients."""
+        """Add solutions for the heat and cooling of a design, set by set, at its coefficients."""
         sets = [[bearing.name for bearing in group.bearing] for group in self.machine.spec.bearing_set]
         self._solve(row, sample or self._first_sample(row), sets, DEGREE, together=True)
 

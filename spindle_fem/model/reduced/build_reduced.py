@@ -38,7 +38,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class ReductionOptions:
-    """How a reduced model is made.
+    """Options for making a reduced model.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class ReductionOptions:
     highest_speed: float | None = None
 
     def key(self, spec: MachineSpec) -> dict[str, float]:
-        """What of it a model's identity depends on."""
+        """Options on which a model's identity depends."""
         return {**asdict(self), "highest_speed": self.highest_speed_of(spec)}
 
     def highest_speed_of(self, spec: MachineSpec) -> float:
@@ -316,10 +316,10 @@ def _add_nominal(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: M
 
 
 def _add_contacts(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: MachineSpec) -> None:
-    """What each contact by itself changes, at the nominal coefficients.
+    """Add the effect of each single contact, at the nominal coefficients.
 
-    The uncertain parameters move the contacts of a set together: the field beside one seat that is worse
-    than the others is in no other solution. ``K⁻¹ g J u``, and the same of that, are the first terms of
+    The uncertain parameters move the contacts of a set together: no other solution contains the field beside
+    one seat that is worse than the others. ``K⁻¹ g J u``, and the same of that, are the first terms of
     the series in a share of one conductance g with the operator J.
     """
     contacts = [
@@ -330,7 +330,7 @@ def _add_contacts(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: 
     loads = physical_loads(full, nominal, spec)
     for system in shifted_systems(full, nominal, SHIFTS, space.basis(GUESS_SIZE)):
         fields = system.solve(loads)
-        # All loads press heat through a contact much alike: the largest combination stands for them.
+        # All loads press heat through a contact almost alike: the largest combination represents them.
         columns = [_largest_combination(contact @ fields) for contact in contacts]
         for _ in range(CONTACT_ORDERS):
             changes = system.solve(np.column_stack(columns))

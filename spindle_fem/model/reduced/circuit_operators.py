@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class CircuitMaps:
-    """What the warming of one circuit adds, and its outlet, in the unknowns of a model.
+    """Contribution of one circuit's warming, and its outlet, in the unknowns of a model.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class CircuitOperators:
         values : (n_c,) ndarray
             Every coefficient of the model.
         touched : mapping of parameter to sequence of int
-            Positions of the coefficients that each asked parameter scales.
+            Positions of the coefficients that each requested parameter scales.
         """
         for film, walls, column in self._circuits:
             own = values[walls.rows]

@@ -12,12 +12,12 @@ Array = NDArray[np.float64]
 
 # In the energy-orthonormal basis an eigenvalue is a share of the stored energy's dissipation.
 RANK_TOLERANCE = 1e-3
-# Of the largest flow in any direction, where it is known how far the states of a model spread.
+# Relative to the largest flow in any direction, if the spread of a model's states is known.
 FLOW_TOLERANCE = 5e-3
 
 
 class ConductingDirections:
-    """``K_i = Q D Qᵀ`` of every coefficient of a model, each found when first asked for.
+    """``K_i = Q D Qᵀ`` of every coefficient of a model, each computed on first use.
 
     Parameters
     ----------

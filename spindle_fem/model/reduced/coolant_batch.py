@@ -35,12 +35,12 @@ class ChannelField:
 
     @property
     def march(self) -> MarchResult:
-        """At the wall temperatures that were given, cells of shape (n, n_starts, n_along)."""
+        """March at the given wall temperatures, cells of shape (n, n_starts, n_along)."""
         return self.channel.march
 
     @property
     def enthalpy_rise(self) -> Array:
-        """Of each design, all channels, (n,) [W]."""
+        """Enthalpy rise of each design, all channels, (n,) [W]."""
         gained = self.march.specific_heat_capacity * np.diff(self.march.edge_rise, axis=-1)
         return (self.channel.mass_flow * gained).sum(axis=(1, 2))
 

@@ -89,7 +89,7 @@ def film_derivative(
     return CoolantMaps(*(np.imag(getattr(maps, name)) / COMPLEX_STEP for name in CoolantMaps.__slots__))
 
 
-# Of the logarithm of film over capacity rate: distance of nodes, and how many share an interpolation.
+# Spacing of nodes in the logarithm of film over capacity rate, and nodes per interpolation.
 SPACING, STENCIL = 0.05, 10
 # Interpolations that are kept, for the classes of a run.
 MOST_STENCILS = 8
@@ -109,17 +109,17 @@ class UniformFilmMaps:
         self._stencils: dict[int, Array] = {}
 
     def maps(self, film: float, capacity_rate: float, pumping_heat: float = 0.0) -> CoolantMaps:
-        """As :func:`coolant_maps` gives them, to 1e-8 of the largest up to some ten units of transfer."""
+        """Interpolate :func:`coolant_maps`, to 1e-8 of the largest up to some ten units of transfer."""
         at, stencil = self._place(film, capacity_rate)
         return self._scaled(_lagrange(at) @ stencil, capacity_rate, pumping_heat)
 
     def film_derivative(self, film: float, capacity_rate: float, pumping_heat: float = 0.0) -> CoolantMaps:
-        """As :func:`film_derivative` gives it: the derivative of what :meth:`maps` interpolates."""
+        """Interpolate :func:`film_derivative`: the derivative of what :meth:`maps` interpolates."""
         at, stencil = self._place(film, capacity_rate)
         return self._scaled(_lagrange_slope(at) / SPACING @ stencil, capacity_rate, pumping_heat)
 
     def _place(self, film: float, capacity_rate: float) -> tuple[float, Array]:
-        """Where in its stencil a film is, in nodes, and the maps at the nodes (STENCIL, n)."""
+        """Position of a film in its stencil, in nodes, and the maps at the nodes (STENCIL, n)."""
         position = float(np.log(film / capacity_rate)) / SPACING
         first = int(np.floor(position)) - STENCIL // 2 + 1
         if first not in self._stencils:

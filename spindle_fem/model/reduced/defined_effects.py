@@ -20,7 +20,7 @@ from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.operation.preload_mechanics import machine_view
 from spindle_fem.recordings.align import Recording
 
-# `check` asks here about definitions and needs no solver, whose compiled loops take a second to load.
+# `check` uses this module and needs no solver, whose compiled loops take a second to load.
 if TYPE_CHECKING:
     from spindle_fem.model.reduced.fast_model import FastModel
     from spindle_fem.solvers.mesh_terms import Physics
@@ -46,7 +46,7 @@ class ActiveEffects:
 
     @property
     def readings(self) -> tuple[Reading, ...]:
-        """Sensors that do not tell the temperature at their place."""
+        """Sensors whose reading differs from the temperature at their place."""
         return tuple(item.reading for item in self.candidates if item.reading is not None)
 
     @property
@@ -69,12 +69,12 @@ NO_EFFECTS = ActiveEffects()
 
 
 def require_known_effects(entries: Sequence[EffectEntry | None]) -> None:
-    """Refuse entries that the catalogue does not know, every one at once.
+    """Refuse entries that are not in the catalogue, all at once.
 
     Parameters
     ----------
     entries : sequence of EffectEntry or None
-        None stands for one that was refused already.
+        None marks one that was refused already.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def active_effects(
     Parameters
     ----------
     entries : sequence of EffectEntry or None
-        None stands for one that was refused already.
+        None marks one that was refused already.
     view : MachineView
         Of the machine on what it is driven by.
     probes : sequence of str
@@ -138,7 +138,7 @@ def active_effects(
 def _built(
     entries: Sequence[EffectEntry | None], candidate_of: Callable[[EffectEntry, str], Candidate]
 ) -> ActiveEffects:
-    """Candidates of entries, every fault at once; None stands for an entry that was refused already."""
+    """Candidates of entries, every fault at once; None marks an entry that was refused already."""
     faults: list[SpindleFemError] = []
     found: list[Candidate] = []
     names: set[str] = set()
@@ -173,7 +173,7 @@ def check_effects(entries: Sequence[EffectEntry | None], spec: MachineSpec) -> N
     Parameters
     ----------
     entries : sequence of EffectEntry or None
-        None stands for one that was refused already.
+        None marks one that was refused already.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def check_network_effects(entries: Sequence[EffectEntry | None], network: Therma
     Parameters
     ----------
     entries : sequence of EffectEntry or None
-        None stands for one that was refused already.
+        None marks one that was refused already.
 
     Raises
     ------
@@ -268,7 +268,7 @@ def physics_of(machine: PreparedMachine) -> Physics:
 
 
 def _names_of(machine: PreparedMachine) -> MachineNames:
-    """Names of a machine without the slices of parts that its mesh cannot tell apart."""
+    """Names of a machine without the slices of parts that its mesh cannot distinguish."""
     from spindle_fem.operation.named_places import named_places
 
     names = MachineNames.of(machine.spec)

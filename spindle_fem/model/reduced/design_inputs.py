@@ -1,4 +1,4 @@
-"""What designs of one mesh differ in, as arrays with a row for each design."""
+"""Quantities that vary between designs of one mesh, as arrays with a row for each design."""
 
 from __future__ import annotations
 

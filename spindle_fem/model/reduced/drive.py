@@ -20,8 +20,8 @@ from spindle_fem.recordings.standard_inputs import standard_inputs
 
 Array = NDArray[np.float64]
 
-# Of the channel's film at constant Nusselt number: 0.02 % a kelvin and 0.3 % a per cent. Where it follows
-# viscosity, about 1 % a kelvin.
+# Sensitivity of the channel's film at constant Nusselt number: 0.02 % per kelvin and 0.3 % per per cent.
+# Where it follows viscosity, about 1 % per kelvin.
 INLET_BIN = 0.25
 FLOW_BIN = 0.01
 SPEED_BIN = 2.0e-3

@@ -56,7 +56,7 @@ class ExactPropagator:
         load_start: Array | None,
         load_end: Array | None,
     ) -> Array:
-        """What one parameter adds to the derivative of ``u_1`` in many equal steps.
+        """Contribution of one parameter to the derivative of ``u_1`` in many equal steps.
 
         Parameters
         ----------

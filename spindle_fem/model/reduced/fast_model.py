@@ -37,7 +37,7 @@ MOST_SUMS = 4_000_000
 
 
 class ModelInputs(Protocol):
-    """What a machine with geometry and a written network answer differently.
+    """Interface in which a machine with geometry and a written network differ.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class ModelInputs(Protocol):
     inlet: str | None
 
     def operating_key(self, point: OperatingPoint) -> tuple[float, ...]:
-        """What :meth:`base` depends on."""
+        """Quantities on which :meth:`base` depends."""
 
     def base(self, point: OperatingPoint) -> Mapping[str, float]:
         """Every coefficient at an operating point before factors."""
@@ -167,7 +167,7 @@ class FastModel:
         return {name: known.get(name, 0.0) for name in names}
 
     def projected(self, basis: Array, spread: Array | None = None) -> FastModel:
-        """The same on a smaller basis, (r, s), in which states spread so far, (s,)."""
+        """Project on a smaller basis, (r, s), given the spread of the states in it, (s,)."""
         return FastModel(project(self.model, basis, basis.T @ self.model.one), self.inputs, spread)
 
     # ------------------------------------------------------------- operators

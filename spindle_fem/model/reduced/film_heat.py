@@ -103,7 +103,7 @@ class FilmHeat(Term):
         return found[: len(self.bearings)]
 
     def heat(self, context: TermContext) -> NDArray[np.complex128]:
-        """What flows between balls and raceways beside what flows with a film at 30 °C."""
+        """Heat between balls and raceways beyond that with a film at 30 °C."""
         temperatures, film = self._film(context)
         more = np.empty((len(film), 2, film.shape[1]), dtype=film.dtype)
         for columns, speed, thrust in self._points(context):
@@ -160,7 +160,7 @@ def tabulated_machine(spec: MachineSpec, friction_map: FrictionMap) -> MachineSp
 
 
 def operators_machine(table: MachineSpec, film_heat: FilmHeat) -> MachineSpec:
-    """What the reduced operators of a tabulated machine are made of, whatever its heat.
+    """Machine from which the reduced operators of a tabulated machine are made, whatever its heat.
 
     Ball rows that follow their contacts get the range over which ``film_heat``
     moves them, so that the basis knows it.

@@ -41,7 +41,7 @@ QUANTITIES = (
 
 @dataclass(frozen=True, slots=True)
 class HeatTable:
-    """What the bearings of one mechanical state do over the temperature of their films.
+    """Heat and conductances of the bearings of one mechanical state over the temperature of their films.
 
     The bearings of a set feel one another's films only through the loads,
     which hardly change: every bearing has its own temperature in a table made

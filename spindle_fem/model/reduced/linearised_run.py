@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """How the model answers, by groups of equal steps.
+    """Responses of the model, by groups of equal steps.
 
     Attributes
     ----------
@@ -46,12 +46,12 @@ class Answers:
     given: Mapping[int, int]
 
     def with_sensed(self, forcing: Array) -> Array:
-        """What is added to the ends of steps (G, r, p) with what is sensed of it, (G, r + n_y, p)."""
+        """Changes at the ends of steps (G, r, p) with their sensed temperatures, (G, r + n_y, p)."""
         return np.concatenate((forcing, np.matmul(self.sense, forcing)), axis=1)
 
 
 class Lines(NamedTuple):
-    """What terms add at the start and end of every step, and what they remember, with derivatives.
+    """Contributions of terms at the start and end of every step, and their memory, with derivatives.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Lines(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """What followed.
+    """Result of a linearised run.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Linearised:
         self._answered: tuple[Array, Array] | None = None
 
     def _end_lines(self, columns: int) -> tuple[Array, Array]:
-        """What is added at the end, by what is sensed and remembered: answered for many columns."""
+        """Contribution at the end of steps, by sensed and remembered values: prepared for many columns."""
         if columns > 1 and self._answered is None:
             end = self.lines.end
             self._answered = self._solve @ end.by_sensed, self._solve @ end.by_state

@@ -70,7 +70,7 @@ def fast_network(network: ThermalNetwork, spec: NetworkMachineSpec | None = None
 
 
 class NetworkInputs:
-    """What :class:`spindle_fem.model.reduced.fast_model.ModelInputs` asks, of a written network.
+    """Implementation of :class:`spindle_fem.model.reduced.fast_model.ModelInputs` for a written network.
 
     Parameters are factors named ``conductance.<link>``, ``capacity.<node>``,
     ``gain.<source>``, ``temperature.<boundary>`` (of the absolute temperature
@@ -94,7 +94,7 @@ class NetworkInputs:
     boundary_of : mapping of str to str
         Boundary of every link that ends at one, by coefficient.
     ambient_boundary : str or None
-        Boundary that stands for the surroundings: that named ``ambient``, or the only one.
+        Boundary that represents the surroundings: that named ``ambient``, or the only one.
     """
 
     inlet = None
@@ -120,7 +120,7 @@ class NetworkInputs:
 
     # ------------------------------------------------------------- coefficients
     def operating_key(self, point: OperatingPoint) -> tuple[float, ...]:
-        """Nothing: links conduct as they are written."""
+        """Empty key: links conduct as they are written."""
         return ()
 
     def base(self, point: OperatingPoint) -> dict[str, float]:
@@ -143,12 +143,12 @@ class NetworkInputs:
         return f"boundary.{self.boundary_of[coefficient]}"
 
     def ambient_input(self, place: str) -> str:
-        """Load input that is the surroundings of a node.
+        """Load input for the surroundings of a node.
 
         Raises
         ------
         SpecError
-            No boundary stands for them.
+            No boundary represents them.
         """
         if self.ambient_boundary is None:
             raise SpecError(
@@ -227,7 +227,7 @@ class NetworkInputs:
 
     # ------------------------------------------------------------- recordings
     def drive(self, recording: Recording, *, largest_step: float = LARGEST_STEP) -> Drive:
-        """Inputs of a recording on the steps of its own grid; long gaps begin anew.
+        """Inputs of a recording on the steps of its own grid; long gaps start anew.
 
         Every input of the recording is there, by the name of what it drives,
         also those that the network does not use; and ``ambient``, the nominal

@@ -1,4 +1,4 @@
-"""Names and unit operators of a thermal network, as the fast model wants them."""
+"""Names and unit operators of a thermal network, in the form the fast model needs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LINK = "link."
 
 @dataclass(frozen=True, slots=True)
 class NetworkTable:
-    """What scales the numbers of a network, as :class:`CoefficientTable` has it for a machine.
+    """Factors on the numbers of a network, like :class:`CoefficientTable` for a machine.
 
     Attributes
     ----------

@@ -153,9 +153,9 @@ def with_open_terms(
 
 
 def _at_both_ends(terms: EffectTerms, drive: Drive) -> list[TermAnswers]:
-    """What open terms do just after the start and just before the end of every step.
+    """Values of open terms just after the start and just before the end of every step.
 
-    Derivatives are whole ones to the asked parameters, (G, q, p), what is remembered included.
+    Derivatives by the requested parameters are total, (G, q, p), memory included.
     """
     steps = len(drive.steps)
     inputs = [

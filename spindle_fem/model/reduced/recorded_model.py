@@ -83,7 +83,7 @@ def _recorded_range(recordings: Sequence[Recording], name: str, otherwise: float
 def recentred_model(
     fast: FastModel, factors: Mapping[str, float], options: ReductionOptions, progress: Progress
 ) -> FastModel:
-    """The same machine on a reduced model that was made at some factors."""
+    """The machine with a reduced model made at the given factors."""
     terms = fast.inputs.extra_terms
     film_heat = next((term for term in terms if isinstance(term, FilmHeat)), None)
     made_of = fast.spec if film_heat is None else operators_machine(fast.spec, film_heat)

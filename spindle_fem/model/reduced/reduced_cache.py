@@ -1,4 +1,4 @@
-"""Where reduced models lie in the cache: hashes of what makes them, and families that share a geometry."""
+"""Keys of reduced models in the cache: hashes of their input, and families that share a geometry."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def _content(spec: MachineSpec) -> dict[str, Any]:
     # The operating point and the words change nothing in the operators.
     for key in ("operation", "name", "title", "description", "initial", "effects"):
         content.pop(key, None)
-    # Of heat sources only where they enter: the basis holds the fields of these places.
+    # Heat sources count only by their place: the basis holds the fields of these places.
     content["source"] = sorted({source.place for source in spec.source})
     return _without_tolerances(content)
 
 
 def _without_tolerances(content: Any) -> Any:
-    """The same with lengths that have a tolerance as plain ones."""
+    """Content with lengths that have a tolerance replaced by plain ones."""
     if isinstance(content, dict):
         if content.keys() == {"value", "sigma"}:
             return content["value"]

@@ -54,7 +54,7 @@ class FastTransient:
     added : (G + 1, m) ndarray
         What the terms added just before each of them.
     tangents : (G + 1, r, p) ndarray or None
-        Derivatives of the states; None where none were asked for.
+        Derivatives of the states; None if none were requested.
     """
 
     times: Array
@@ -112,7 +112,7 @@ def simulate_fast(
 
 
 class TransientRun:
-    """One drive with one set of parameters.
+    """One run with given inputs and parameters.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class TransientRun:
         self.loads, self.loads_by = opened.loads, opened.loads_by
         self.start, self.end = opened.start, opened.end
         self.start_by, self.end_by = opened.start_by, opened.end_by
-        # What dynamic terms scale: the machine's own friction times what open terms make of it.
+        # Dynamic terms scale the machine's own friction times the factors of open terms.
         self.friction_start, self.friction_end = (item[:, : self._n_heat] for item in (self.start, self.end))
         self._friction_start_by = self._friction_derivatives(self.start_by)
         self._friction_end_by = self._friction_derivatives(self.end_by)
@@ -188,7 +188,7 @@ class TransientRun:
         return self.fast.load_inputs(self.drive.names, inputs, built.factors, built.machine_derivatives)
 
     def _friction_derivatives(self, by: Mapping[str, Array]) -> Array:
-        """Derivatives of the heat of every heat place to every asked parameter, (G, n_heat_places, p)."""
+        """Derivatives of every heat place's heat by every requested parameter, (G, n_heat_places, p)."""
         found = np.zeros((len(self.drive.steps), self._n_heat, len(self.derivatives)))
         for column, parameter in enumerate(self.derivatives):
             if parameter in by:
@@ -267,7 +267,7 @@ class TransientRun:
 
     # ---------------------------------------------------------- sensitivities
     def forcing_of(self, states: Array, tracks: Tracks | None) -> Array:
-        """What the asked parameters add to the derivative of each step's end, (G, r, p)."""
+        """Contribution of the requested parameters to the derivative of each step's end, (G, r, p)."""
         forcing = np.zeros((len(self.drive.steps), states.shape[1], len(self.derivatives)))
         for group, (key, rows) in enumerate(self.groups.items()):
             operators, propagator = self.operators[key[0]], self.propagators[key]
@@ -315,7 +315,7 @@ class TransientRun:
     def tangents(
         self, forcing: Array, tracks: Tracks | None, *, explicit: bool = False, start: Array | None = None
     ) -> Array:
-        """Small changes of the states that follow from small changes of the loads.
+        """Small changes of the states due to small changes of the loads.
 
         Parameters
         ----------
@@ -324,7 +324,7 @@ class TransientRun:
         tracks : Tracks or None
             What the terms did in the run that the changes are small against; they answer.
         explicit : bool
-            Whether the columns are the asked parameters, which the terms also know.
+            Whether the columns are the requested parameters, on which the terms depend too.
         start : (S, r, p) ndarray, optional
             Changes of the given states: the first, and those after long gaps.
 
@@ -340,7 +340,7 @@ class TransientRun:
 
     # ----------------------------------------------------------------- outputs
     def _outputs(self, states: Array, sensitivities: Array | None, tracks: Tracks | None) -> FastTransient:
-        """Outputs at the wanted times; the class is that of the step that begins there."""
+        """Outputs at the output times; the class is that of the step that begins there."""
         fast, drive = self.fast, self.drive
         n_out, n_par = len(fast.channels), len(self.derivatives)
         at_grid = np.empty((len(states), n_out))

@@ -165,7 +165,7 @@ def _owners(values: Array, slopes: Array, within: float) -> NDArray[np.int64]:
 
 @dataclass(frozen=True, slots=True)
 class _SteadyChange:
-    """What a term's steady changes are a little above and below the value of one of its parameters.
+    """A term's steady changes slightly above and below the value of one of its parameters.
 
     Attributes
     ----------

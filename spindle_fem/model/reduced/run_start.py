@@ -1,4 +1,4 @@
-"""Where a run of the fast model starts: at time zero, and again after every long gap of a recording."""
+"""Initial states of a run of the fast model: at time zero, and again after every long gap of a recording."""
 
 from __future__ import annotations
 

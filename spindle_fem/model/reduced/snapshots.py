@@ -15,12 +15,12 @@ from spindle_fem.model.reduced.mesh_model import MeshModel
 
 Array = NDArray[np.float64]
 
-# Of a solution's norm in energy: a field of tens of kelvin is then right to some 1e-4 K.
+# Relative to a solution's norm in energy: a field of tens of kelvin is then right to some 1e-4 K.
 # Tighter ones changed no checked error in its third digit.
 SOLVER_TOLERANCE = 3e-5
 # Directions below this share of what the basis drops are dropped at once.
 KEPT_SHARE = 0.3
-# What projecting twice leaves of a solution that is already held.
+# Rest after projecting twice a solution that is already in the basis, relative.
 ROUND_OFF = 1e-11
 
 
@@ -72,7 +72,7 @@ class ShiftedSystem:
         return self._iterate(loads, guesses, self.tolerance)
 
     def correct(self, loads: Array, solutions: Array, relative_tolerance: float) -> Array:
-        """What is missing from approximate solutions, to a share of it, (n, m) [K]."""
+        """Correction of approximate solutions, to a relative tolerance of itself, (n, m) [K]."""
         return self._iterate(loads - self.matrix @ solutions, None, relative_tolerance)
 
     def _iterate(self, loads: Array, guesses: Array | None, relative_tolerance: float) -> Array:

@@ -45,7 +45,7 @@ def fast_spindle(model: ThermalModel, spec: MachineSpec, extra_terms: Sequence[T
 
 
 class SpindleInputs:
-    """What :class:`spindle_fem.model.reduced.fast_model.ModelInputs` asks, of a machine with geometry.
+    """Implementation of :class:`spindle_fem.model.reduced.fast_model.ModelInputs` with geometry.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class SpindleInputs:
         return "ambient" if temperature == "ambient" else f"fixed[{self.fixed_fluids.index(temperature)}]"
 
     def ambient_input(self, place: str) -> str:
-        """The same surroundings for all places."""
+        """The surroundings, the same for all places."""
         return "ambient"
 
     def fluid_temperature(self, coefficient: str, inputs: Mapping[str, Any]) -> Any:
@@ -109,7 +109,7 @@ class SpindleInputs:
         return inputs["ambient"] if temperature == "ambient" else temperature
 
     def fluid_parameters(self, coefficient: str) -> tuple[str, ...]:
-        """None: factors leave the temperatures of fluids alone."""
+        """No parameters: factors leave the temperatures of fluids alone."""
         return ()
 
     # --------------------------------------------------------------------- loads

@@ -21,7 +21,7 @@ from spindle_fem.operation.friction_map import film_temperature
 
 Array = NDArray[np.float64]
 
-# Of the last change of any temperature; what remains is a fraction of it.
+# Largest last change of any temperature, K; the remaining error is a fraction of it.
 SETTLED = 2.0e-5
 MOST_ITERATIONS = 60
 # The matrix is made anew at the films of the moment where it does not settle by then.
@@ -92,7 +92,7 @@ class SteadySolver:
         self.cell_mean = model.cell_load / area[:, None]
         # The rest of a cell's film is that of its uneven wall.
         rest = model.cell_film - area[:, None, None] * self.cell_mean[:, :, None] * self.cell_mean[:, None]
-        # What changes with temperature: ball conductances, then films of the channel's cells.
+        # Temperature-dependent operators: ball conductances, then films of the channel's cells.
         self.moving = np.concatenate((model.operators[self.balls], rest)).reshape(-1, size, size)
         self.fixed = model.operators[self.steady].reshape(len(self.steady), -1)
         self.fluids = [names.index(name) for name in model.fluid_names]
@@ -126,7 +126,7 @@ class SteadySolver:
 
 
 class _Run:
-    """One batch on its way to its steady states."""
+    """One batch, iterated to its steady states."""
 
     def __init__(self, solver: SteadySolver, inputs: DesignInputs, band: Array | None) -> None:
         self.solver, self.model, self.inputs = solver, solver.model, inputs
@@ -222,7 +222,7 @@ class _Run:
         return residual
 
     def _heat_slope(self, film: Array) -> Array:
-        """How much less each bearing heats for each kelvin of its film, (n, n_bearings, r) W/K."""
+        """Decrease of each bearing's heat per kelvin of its film, (n, n_bearings, r) W/K."""
         tables = self.solver.tables
         change = np.empty_like(film)
         for table, rows in self._tables:

@@ -1,6 +1,6 @@
-"""What drawings and mounting leave open of a machine with geometry, one direction each.
+"""Deviations that drawings and mounting leave open on a machine with geometry, one direction each.
 
-A direction names a quantity, how far it may be from the definition, and what a unit of it changes in the
+A direction names a quantity, how far it may be from the definition, and how a unit of it changes the
 operators of the finite-element model.
 """
 
@@ -29,7 +29,7 @@ from spindle_fem.solvers.prepared_machine import PreparedMachine, machine_on_mes
 
 Array = NDArray[np.float64]
 
-# One standard deviation of what no length stands for.
+# One standard deviation of quantities that no length represents.
 FILM_ALONG, FILM_MODES = 0.10, 3
 """Share of the channel's film in each smooth mode along it."""
 MASS_SHARE = 0.05
@@ -40,7 +40,7 @@ CONTACT_SHARE = 0.30
 """Share by which one contact between standing parts differs from its group."""
 AIR_DIFFERENCE = 2.0
 """K by which air above a machine is warmer than below."""
-# Of steel, as added masses are told, J/(kg K).
+# Heat capacity of steel, in which added masses are expressed, J/(kg K).
 STEEL = 470.0
 # Difference where the mesh moves, this share of a standard deviation: a thousandth off, far from round-off.
 STEP = 1e-3
@@ -63,7 +63,7 @@ FIELDS = (
 
 @dataclass(frozen=True, slots=True)
 class FullMachine:
-    """What directions change: a machine on its mesh, its operators and the displacements of its faces."""
+    """Machine that directions change: its mesh, operators and displacements of faces."""
 
     machine: PreparedMachine
     model: MeshModel
@@ -88,7 +88,7 @@ class Difference:
 
 
 class Cause(Protocol):
-    """What a direction is in the model."""
+    """Representation of a direction in the model."""
 
     def difference(self, full: FullMachine, sigma: float) -> Difference:
         """Change of the full model for one unit."""
@@ -103,14 +103,14 @@ class StructuralDirection:
     name : str
         Unique for a machine.
     key : str
-        Of the definition; words where none stands for it.
+        Key of the definition; words if there is none.
     unit : str
     sigma : float
         One standard deviation, in ``unit``.
     statement : str
         What its value is, in words.
     cause : Cause or None
-        None where it is only told of: what it changes is in a projected model.
+        None if it is only reported: its effect is already in a projected model.
     """
 
     name: str
@@ -137,7 +137,7 @@ class Moved:
     channel_keys: Mapping[str, float] = field(default_factory=dict)
 
     def difference(self, full: FullMachine, sigma: float) -> Difference:
-        """From the same elements with their nodes moved a little."""
+        """Difference to the same elements with their nodes moved a little."""
         step = STEP * sigma
         return Difference(difference_of(self.moved(full, step), full.model, step), channel=self.channel_keys)
 
@@ -195,7 +195,7 @@ class ContactShare:
     Attributes
     ----------
     way : {"even", "up", "across"}
-        Everywhere alike, as the cosine of the angle from above, or as its sine.
+        Uniform, as the cosine of the angle from above, or as its sine.
     """
 
     contacts: tuple[str, ...]
@@ -308,7 +308,7 @@ def _outside(part: Part, segment: AnnulusSegment, distance: float) -> MovedFace:
 
 
 def _diameters(spec: MachineSpec, mesh: TaggedMesh) -> Iterator[StructuralDirection]:
-    """Outer diameters of standing parts, together where the definition does not tell them apart."""
+    """Outer diameters of stationary parts, together where the definition does not distinguish them."""
     for part in (item for item in spec.part if not item.rotating):
         shared = []
         largest = max(segment.outer_diameter for segment in part.segment)

@@ -1,4 +1,4 @@
-"""A fast model that also answers to what drawings and mounting leave open: dimensions, places, films, masses.
+"""A fast model that also responds to dimensions, places, films and masses that drawings leave open.
 
 The basis of a fast model holds no fields of moved faces, and is costly to make again. This model has a
 smaller one of its own, from the physical loads and from what each direction changes of their fields, on the
@@ -51,7 +51,7 @@ Progress = Callable[[str], None]
 FORMAT = "spindle-fem/structural-model/1"
 # Whatever the machine's own: derivatives need no better.
 COARSE = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
-# Of the proper orthogonal decomposition; vectors at most.
+# Tolerance of the proper orthogonal decomposition, and largest number of vectors.
 TOLERANCE, LARGEST = 2e-5, 160
 # Fields of one direction that join the basis, for each frequency.
 FIELDS_EACH = 4
@@ -65,7 +65,7 @@ DIFFERENCE = 1e-2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AffineChange:
-    """What one unit of a direction changes in a projected model.
+    """Change of a projected model by one unit of a direction.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class StructuralModel(FastModel):
         changes: Mapping[str, float] = NO_CHANGES,
         conductances: Mapping[str, float] = NO_CHANGES,
     ) -> ClassOperators:
-        """As :meth:`FastModel.operators`; derivatives to directions are to their units."""
+        """Like :meth:`FastModel.operators`; derivatives by directions are per unit."""
         others = [name for name in parameters if name not in self.changes]
         found = super().operators(point, factors, others, changes=changes, conductances=conductances)
         values = self._values(point, factors, changes)
@@ -166,7 +166,7 @@ class StructuralModel(FastModel):
         return found
 
     def storage_by(self, factors: Mapping[str, float], parameters: Sequence[str]) -> dict[str, Array]:
-        """As :meth:`FastModel.storage_by`; derivatives to directions are to their units."""
+        """Like :meth:`FastModel.storage_by`; derivatives by directions are per unit."""
         found = super().storage_by(factors, [name for name in parameters if name not in self.changes])
         for name in (item for item in parameters if item in self.changes):
             if "storage" in self.changes[name].rows:
@@ -227,7 +227,7 @@ def build_structural_model(
 
 
 def full_machine(machine: PreparedMachine) -> FullMachine:
-    """What the directions of a prepared machine change."""
+    """Data for the directions of a prepared machine."""
     channel = machine.spec.channel
     walls = None
     if channel is not None:

@@ -1,4 +1,4 @@
-"""Marches with terms that answer to temperatures: step by step, or the whole run at once.
+"""Marches with temperature-dependent terms: step by step, or the whole run at once.
 
 Step by step, each step solves for what the terms add at its end. At once, Newton's
 method works on what is sensed in the whole run: terms are evaluated at all instants
@@ -41,7 +41,7 @@ LOST = 1000.0
 
 @dataclass(slots=True)
 class Tracks:
-    """What the terms did in every step, kept for the derivatives.
+    """Contributions of the terms in every step, kept for the derivatives.
 
     Attributes
     ----------
@@ -73,14 +73,14 @@ class Tracks:
         return np.vstack((self.added_start[:1], self.added_end))
 
     def follow(self, forcing: Array, start: Array, *, explicit: bool) -> Array:
-        """Small changes of the states, (G + 1, r, p), to which the terms answer.
+        """Small changes of the states, (G + 1, r, p), including the response of the terms.
 
         Parameters
         ----------
         forcing : (G, r, p) ndarray
         start : (S, r, p) ndarray
         explicit : bool
-            Whether the columns are the asked parameters, which the terms also know.
+            Whether the columns are the requested parameters, on which the terms depend too.
         """
         answers = self.linearised.answers
         own = (self.start_by_parameter, self.end_by_parameter, self.state_by_parameter) if explicit else ()
@@ -131,7 +131,7 @@ class TermMarch:
         ConvergenceError
             The terms run away.
         """
-        # What runs away on the way, in Newton's first rounds, may have a state all the same.
+        # A state may exist even if it diverges in Newton's first rounds.
         with np.errstate(all="ignore"):
             try:
                 found = self._at_once(near)
@@ -174,7 +174,7 @@ class TermMarch:
         return np.array([point - 1 for point in self.answers.given if point], dtype=np.int64)
 
     def _at_once(self, near: Array | None) -> tuple[Array, Tracks] | None:
-        """None where Newton's method does not end soon."""
+        """Solution of all steps at once; None if Newton's method does not converge soon."""
         answers, start = self.answers, self.start
         steps = len(answers.group_of_step)
         begins = np.flatnonzero(~self._goes_on())
@@ -194,13 +194,13 @@ class TermMarch:
             if not np.all(np.isfinite(sensed)):
                 return None
             asked = Derivatives.ALL if slopes else Derivatives.STATE
-            told = self._told((before, after), begins, sensed, memory, asked)
-            memory = told.memory
+            evaluated = self._evaluate((before, after), begins, sensed, memory, asked)
+            memory = evaluated.memory
             try:
-                linearised = Linearised(answers, told.lines)
+                linearised = Linearised(answers, evaluated.lines)
             except ConvergenceError:
                 return None
-            found = linearised.follow(forcing, given, *told.constants(sensed))
+            found = linearised.follow(forcing, given, *evaluated.constants(sensed))
             moved = float(np.abs(found.sensed[:, :, 0] - sensed).max(initial=0.0))
             sensed = found.sensed[:, :, 0]
             if not moved < LOST:
@@ -210,13 +210,13 @@ class TermMarch:
             before_that = moved
             if moved <= TEMPERATURE_TOLERANCE or left <= CERTAIN * TEMPERATURE_TOLERANCE:
                 if self.dynamic.derivatives and not slopes:
-                    told = self._told((before, after), begins, sensed, memory, Derivatives.ALL)
-                return found.states[:, :, 0], self._tracks(found, linearised, told)
+                    evaluated = self._evaluate((before, after), begins, sensed, memory, Derivatives.ALL)
+                return found.states[:, :, 0], self._tracks(found, linearised, evaluated)
             slopes = False
         return None
 
-    def _tracks(self, found: Followed, linearised: Linearised, told: _Told) -> Tracks:
-        begin, end, memory = told.lines
+    def _tracks(self, found: Followed, linearised: Linearised, evaluated: _Evaluated) -> Tracks:
+        begin, end, memory = evaluated.lines
         return Tracks(
             self.columns,
             found.added_start[:, :, 0],
@@ -227,15 +227,15 @@ class TermMarch:
             memory.by_parameter,
         )
 
-    def _told(
+    def _evaluate(
         self,
         instants: tuple[RunInstants, RunInstants],
         begins: NDArray[np.int64],
         sensed: Array,
         guess: Array | None,
         derivatives: Derivatives,
-    ) -> _Told:
-        """What the terms tell along sensed temperatures (G + 1, n_y); ``guess`` is of what they remember.
+    ) -> _Evaluated:
+        """Values of the terms along sensed temperatures (G + 1, n_y); ``guess`` is their memory.
 
         ``instants`` are those just after the start and just before the end of every step.
         """
@@ -256,7 +256,7 @@ class TermMarch:
             np.roll(end.value, 1, axis=0), np.roll(end.by, 1, axis=0), end.n_sensed, end.n_states
         )
         begin.value[begins], begin.by[begins] = jumps.value, jumps.by
-        return _Told(Lines(begin, end, moves), memory)
+        return _Evaluated(Lines(begin, end, moves), memory)
 
     # ------------------------------------------------------------------ step by step
     def _evaluator(self, where: RunInstants, step: int, memory: Array) -> Callable[[Array], Quantities]:
@@ -326,16 +326,16 @@ def _joined(items: list[Quantities]) -> Quantities:
 
 
 @dataclass(frozen=True, slots=True)
-class _Told:
-    """What terms tell at both ends of every step, and what they remember, (G + 1, n_x)."""
+class _Evaluated:
+    """Values of terms at both ends of every step, and their memory, (G + 1, n_x)."""
 
     lines: Lines
     memory: Array
 
     def constants(self, sensed: Array) -> tuple[Array, Array, Array]:
-        """What their straight lines add where nothing is sensed, from sensed temperatures (G + 1, n_y).
+        """Constant part of the lines, where nothing is sensed, from sensed temperatures (G + 1, n_y).
 
-        Memories are followed as departures from what they are along these temperatures.
+        Memories are expressed as departures from their values along these temperatures.
         """
         begin, end, memory = self.lines
         before, after = sensed[:-1, :, None], sensed[1:, :, None]

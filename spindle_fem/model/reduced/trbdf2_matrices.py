@@ -80,7 +80,7 @@ def build_propagator(storage: Array, conduction: Array, step: float) -> Propagat
 
 
 def load_response(propagator: Propagator | ExactPropagator, start: Array, end: Array, loads: Array) -> Array:
-    """What linear loads add to ``u_1`` in many equal steps.
+    """Contribution of linear loads to ``u_1`` in many equal steps.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def load_response(propagator: Propagator | ExactPropagator, start: Array, end: A
 def stage_values(
     propagator: Propagator | ExactPropagator, before: Array, start: Array, end: Array, loads: Array
 ) -> Array:
-    """What :func:`sensitivity_forcing` needs of equal steps: ``u_γ`` (n, r); of exact ones, the loads."""
+    """Input of :func:`sensitivity_forcing` for equal steps: ``u_γ`` (n, r); for exact ones, the loads."""
     if isinstance(propagator, ExactPropagator):
         return propagator.load_values(start, end, loads)
     weight = DIAGONAL * propagator.step
@@ -135,7 +135,7 @@ def sensitivity_forcing(
     after: Array,
     changes: Sequence[MatrixChange],
 ) -> Array:
-    """What parameters add to the derivative of ``u_1`` in many equal steps.
+    """Contribution of parameters to the derivative of ``u_1`` in many equal steps.
 
     Parameters
     ----------

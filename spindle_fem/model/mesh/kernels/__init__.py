@@ -9,5 +9,5 @@ cache; ``python -m spindle_fem.model.mesh.kernels.compile`` fills it.
 
 # numba's options: kept on disk, run without the interpreter's lock, division by zero as in numpy.
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
-# The same with sums in any order, which vector instructions need.
+# Also allow sums in any order, which vector instructions need.
 FAST = {**OPTIONS, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}

@@ -51,14 +51,14 @@ def fill_linear_rows(
     low, high, elements, starts, members, values, part, extra_starts, extra, load,
     counts, indices, part_of_slot, conduction, storage,
 ):  # fmt: skip
-    """Upper rows of straight linear elements: columns from the diagonal on and all that goes with them.
+    """Fill upper rows of straight linear elements: columns from the diagonal on, with all their entries.
 
     ``members`` and ``extra`` are those of :func:`fill_upper`, ``values`` those of
-    :func:`integrate_linear`. Columns of joints get nothing but their place. Returns
+    :func:`integrate_linear`. Columns of joints get their position only. Returns
     the entries, -1 when the space is too small.
     """
     one, two, three = np.uint32(1), np.uint32(2), np.uint32(3)
-    # conduction and storage by column; those left of the diagonal are summed too and never looked at
+    # conduction and storage by column; those left of the diagonal are summed too but not used
     sums = np.zeros((starts.size, 2))
     last = np.zeros(starts.size, dtype=np.uint32)
     seen = np.empty(256, dtype=np.uint32)

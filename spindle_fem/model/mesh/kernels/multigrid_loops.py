@@ -43,7 +43,7 @@ def add_prolonged(low, high, columns, values, vector, out):
         out[i] += total
 
 
-# The same for several columns (n, m) at once: each entry of the matrix is read once for all.
+# Versions for several columns (n, m) at once: each entry of the matrix is read once for all.
 @njit(**FAST)
 def multiply_many(low, high, starts, columns, values, vectors, out):
     """``out = A vectors`` on a range of rows."""
@@ -59,7 +59,7 @@ def multiply_many(low, high, starts, columns, values, vectors, out):
 
 @njit(**FAST)
 def smooth_many(low, high, starts, columns, values, inverse, right, vectors, keep, add, left, following):
-    """What :func:`smooth` does, on columns."""
+    """Apply :func:`smooth` to several columns."""
     m = right.shape[1]
     for i in range(low, high):
         for c in range(m):
@@ -75,7 +75,7 @@ def smooth_many(low, high, starts, columns, values, inverse, right, vectors, kee
 
 @njit(**FAST)
 def add_prolonged_many(low, high, columns, values, vectors, out):
-    """What :func:`add_prolonged` does, on columns."""
+    """Apply :func:`add_prolonged` to several columns."""
     for i in range(low, high):
         for k in range(WIDTH):
             j, value = columns[i, k], values[i, k]

@@ -91,7 +91,7 @@ def wait(counters, wanted):
 def cycle(is_first, counters, passes, bounds, layout, fine, coarse, coarsest, work, residual, scale, answer):
     """A V-cycle: ``answer`` gets the approximate solution for a residual.
 
-    ``passes`` tells kind, level and first chunk of each pass, ``bounds`` the rows of
+    ``passes`` has kind, level and first chunk of each pass, ``bounds`` the rows of
     each level's chunks; ``fine`` has the arrays of the finest level, ``coarse`` those of
     all coarser levels one after the other, ``layout`` where each level's begin, and
     ``coarsest`` the inverse of the last one's matrix.
@@ -158,7 +158,7 @@ def _vectors(level, layout, work):
 
 @njit(**FAST)
 def _smooth_level(kind, low, high, arrays, vectors):
-    """What a pass computes on the rows of a chunk, from what earlier passes left in the vectors."""
+    """Compute one pass on the rows of a chunk, from vectors left by earlier passes."""
     starts, columns, values, inverse = arrays[0], arrays[1], arrays[2], arrays[3]
     right, direction, left, following, unknowns = vectors
     if kind in (BEGIN, RESTRICT):
