@@ -154,7 +154,7 @@ class GrowthModel:
         return solved, self._rows(solved)
 
     def _forward(self, name: str) -> Array | None:
-        """Output for the forward shift: nose less bearing of the shaft, or bearing less flange of the housing."""
+        """Forward shift of the nose from its bearing (shaft), or of the bearing from the flange (housing)."""
         layout, body = Layout(self.spec, set()), self.bodies.bodies[name]
         held = self.holding_seat(name)
         ends = layout.flange_ends()
