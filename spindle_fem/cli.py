@@ -53,12 +53,18 @@ def new(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Definition to write, .toml")
     ],
+    front: Annotated[str, typer.Option(help="Ball bearings in front, as they are called.")] = "7014 C",
+    rear: Annotated[str, typer.Option(help="Ball bearings behind, of a smaller bore.")] = "7012 C",
+    drive: Annotated[str, typer.Option(help="belt, motor (built in) or coupling.")] = "belt",
+    cooling: Annotated[str, typer.Option(help="helix (water in the housing) or none.")] = "helix",
+    speed: Annotated[str, typer.Option(help="With its unit.")] = "4000 rpm",
 ) -> None:
     """Write a commented machine to start from."""
-    from spindle_fem.commands.new_command import new_machine
+    from spindle_fem.commands.new_command import NewMachine, new_machine
 
     picture = output.with_suffix(".png")
-    say(f"wrote {new_machine(output)}; next: spindle-fem check {output} --picture {picture}")
+    written = new_machine(output, NewMachine(front, rear, drive, cooling, speed))
+    say(f"wrote {written}; next: spindle-fem check {output} --picture {picture}")
 
 
 @app.command()

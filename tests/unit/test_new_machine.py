@@ -7,9 +7,9 @@ import re
 import pytest
 
 from spindle_fem.commands.machine_commands import check_machine
-from spindle_fem.commands.new_command import new_machine
+from spindle_fem.commands.new_command import NewMachine, new_machine
 from spindle_fem.definition.load import examine_machine
-from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.errors import BadInputError, FaultsError, SpecError
 from spindle_fem.report.definition_picture import draw_definition
 
 
@@ -35,6 +35,44 @@ def test_it_is_a_page_and_every_rule_that_it_leans_on_is_listed(tmp_path) -> Non
         "joint.workshop_inner_seats",
         "remaining_surfaces",
     }
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        NewMachine("7010 E HC", "71908 C", "motor", "helix", "18000 rpm"),
+        NewMachine("7024 C", "71922 C", "motor", "none", "3000 rpm"),
+        NewMachine("6014", "6010", "coupling", "none", "2000 rpm"),
+        NewMachine("7214 C", "6004", "belt", "helix", "3000 rpm"),
+        NewMachine("71906 AC", "71904 C", "belt", "helix", "12000 rpm"),
+    ],
+    ids=lambda chosen: f"{chosen.front} {chosen.drive} {chosen.cooling}",
+)
+def test_what_is_chosen_is_a_sound_machine_in_a_page(chosen, tmp_path) -> None:
+    file = new_machine(tmp_path / "chosen.toml", chosen)
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= 70
+    content = check_machine(file)
+    assert content["warnings"] == []
+    names = {row["name"] for row in content["parts"]}
+    assert ("stator" in names) == (chosen.drive == "motor")
+    assert ("COOLANT_OUT" in {row["name"] for row in content["probes"]}) == (chosen.cooling == "helix")
+
+
+@pytest.mark.parametrize(
+    ("chosen", "told"),
+    [
+        (NewMachine(front="7014 Q"), "--front: .*7014 C"),
+        (NewMachine(front="NN3014 K"), "--front: .*no ball bearing"),
+        (NewMachine(rear="7016 C"), "--rear: .*up to 65 mm"),
+        (NewMachine(drive="bell"), "--drive: .*belt"),
+        (NewMachine(cooling="water"), "--cooling: .*helix"),
+        (NewMachine(speed="4000"), "--speed"),
+    ],
+)
+def test_what_cannot_be_chosen_is_told_with_its_option(chosen, told, tmp_path) -> None:
+    with pytest.raises(BadInputError, match=told):
+        new_machine(tmp_path / "a.toml", chosen)
+    assert not (tmp_path / "a.toml").exists()
 
 
 MISTAKES = {
