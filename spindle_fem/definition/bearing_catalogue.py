@@ -42,10 +42,10 @@ _ANGLES = {"C": "15 deg", "E": "25 deg", "AC": "25 deg"}
 _BALL_STEP = 25.4 / 32.0
 _PITCH_FILL = 0.85
 _SHOULDER = 0.6
-# Of the section's height: the outer ring, whose raceway has no ribs in N and NN designs, and the rollers.
+# Shares of the section's height: outer ring, whose raceway has no ribs in N and NN designs, and rollers.
 _OUTER_WALL = 0.25
 _ROLLER = 0.45
-# Of the rollers' length, which is their diameter: what bears between the relieved edges.
+# Bearing length between the relieved edges, as a share of the rollers' length, which equals their diameter.
 _BEARING_LENGTH = 0.9
 
 _BALL = re.compile(r"(719|70|72)(\d\d)[ _]?(C|E|AC)([ _/]?HC)?", re.ASCII)
@@ -168,7 +168,7 @@ def estimated(table: dict[str, Any]) -> str:
 
 
 def _balls(match: re.Match[str], bore: float, outer: float) -> dict[str, Any]:
-    """What a ball bearing adds to its boundary (mm)."""
+    """Keys of a ball bearing beyond its boundary dimensions (mm)."""
     ball, pitch = _ball_and_pitch(_BALL_SERIES[match[1]][2], bore, outer)
     return {
         "ball_count": round(_PITCH_FILL * math.pi * pitch / ball),
@@ -178,7 +178,7 @@ def _balls(match: re.Match[str], bore: float, outer: float) -> dict[str, Any]:
 
 
 def _groove_balls(match: re.Match[str], bore: float, outer: float) -> dict[str, Any]:
-    """What a deep-groove ball bearing adds to its boundary (mm)."""
+    """Keys of a deep-groove ball bearing beyond its boundary dimensions (mm)."""
     ball, pitch = _ball_and_pitch(_GROOVE_SERIES[match[1]][2], bore, outer)
     return {
         "kind": "deep_groove_ball",
@@ -207,7 +207,7 @@ def _ball_sizes(ball: float, pitch: float, *, hybrid: bool) -> dict[str, Any]:
 
 
 def _rollers(match: re.Match[str], bore: float, outer: float) -> dict[str, Any]:
-    """What a cylindrical roller bearing adds to its boundary (mm)."""
+    """Keys of a cylindrical roller bearing beyond its boundary dimensions (mm)."""
     section = 0.5 * (outer - bore)
     raceway = outer - 2.0 * _OUTER_WALL * section
     roller = math.floor(_ROLLER * section + 0.5)

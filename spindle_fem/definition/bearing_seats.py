@@ -1,4 +1,4 @@
-"""What the rings of a bearing sit on."""
+"""Parts that carry the rings of a bearing."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ LARGEST_FIT = 2.0e-3
 def seat_diameter(
     spec: MachineSpec, kind: BearingType, bearing: SetBearing, side: Literal["inner", "outer"]
 ) -> tuple[str, float] | None:
-    """What the ring of a bearing sits on: the part's name and the diameter of its far side, m.
+    """Part that carries a ring of a bearing: its name and the diameter of its far side, m.
 
     The far side of the shaft is its bore (0: solid), that of the housing its
-    outside. None where no part has a seat there.
+    outside. None if no part has a seat there.
     """
     middle = 0.5 * (bearing.z[0] + bearing.z[1])
     for part in spec.part:

@@ -45,9 +45,9 @@ class Cage(SpecModel):
     """A cage that runs on a ring's land and shears the oil between, by Petroff's law; heat model `full`."""
 
     land_diameter: PositiveLength
-    """Of the ring's land."""
+    """Diameter of the ring's land."""
     land_width: PositiveLength
-    """What of it guides, both sides together."""
+    """Width of the land that guides the cage, both sides together."""
     clearance: PositiveLength
     """Between cage and land, on the radius."""
     land: Literal["inner", "outer"] = "outer"
@@ -55,10 +55,10 @@ class Cage(SpecModel):
 
 
 class _BearingType(SpecModel):
-    """What all bearings have; ``catalogue`` gives what is missing."""
+    """Keys common to all bearings; ``catalogue`` supplies missing ones."""
 
     catalogue: str | None = None
-    """Designation of a bearing that ships, such as ``7014 C``, ``NN3014 K``, which gives what is missing."""
+    """Designation of a bearing that ships, such as ``7014 C``, ``NN3014 K``, which supplies missing keys."""
     bore_diameter: PositiveLength
     """Bore of the inner ring."""
     outer_diameter: PositiveLength
@@ -66,9 +66,9 @@ class _BearingType(SpecModel):
     width: PositiveLength
     """Width of both rings."""
     inner_ring_outer_diameter: PositiveLength
-    """Cylinder that stands for the inner ring's outside, where its heat enters."""
+    """Cylinder that represents the inner ring's outside, where its heat enters."""
     outer_ring_inner_diameter: PositiveLength
-    """Cylinder that stands for the outer ring's inside, where its heat enters."""
+    """Cylinder that represents the outer ring's inside, where its heat enters."""
     pitch_diameter: PositiveLength | None = None
     """The middle of bore and outside where none is given."""
     ring_material: Name
@@ -151,11 +151,11 @@ class BallBearingType(_BearingType):
     ball_diameter: PositiveLength
     """Between the groove bottoms."""
     ball_count: Annotated[int, Field(ge=3, le=200, strict=True)]
-    """In one row."""
+    """Number in one row."""
     contact_angle: Angle
     """Unloaded, above 0 up to 60 degrees; of a `deep_groove_ball` it follows from `radial_clearance`."""
     radial_clearance: PositiveLength | None = None
-    """Of a `deep_groove_ball`, on the diameter, as mounted."""
+    """Clearance on the diameter as mounted, for a `deep_groove_ball`."""
     groove_curvature_inner: GrooveCurvature
     """Groove radius over ball diameter."""
     groove_curvature_outer: GrooveCurvature
@@ -167,7 +167,7 @@ class BallBearingType(_BearingType):
     roughness_ball: PositiveLength = 0.01e-6
     """Root mean square (Rq)."""
     cage: Cage | None = None
-    """How a land guides the cage, for the heat model `full`."""
+    """Guidance of the cage by a land, for the heat model `full`."""
 
     def _element_faults(self) -> list[Fault]:
         faults = super()._element_faults()
@@ -190,7 +190,7 @@ class BallBearingType(_BearingType):
 
     @property
     def element_diameter(self) -> float:
-        """Of a ball, m."""
+        """Diameter of a ball, m."""
         return self.ball_diameter
 
     @property
@@ -205,12 +205,12 @@ class BallBearingType(_BearingType):
 
     @property
     def element_volume(self) -> float:
-        """Of all balls, m³."""
+        """Volume of all balls, m³."""
         return self.ball_count * math.pi / 6.0 * self.ball_diameter**3
 
     @property
     def play(self) -> float:
-        """Of the raceways on the diameter before mounting, m."""
+        """Play of the raceways on the diameter before mounting, m."""
         apart = (self.groove_curvature_inner + self.groove_curvature_outer - 1.0) * self.ball_diameter
         return 2.0 * apart * (1.0 - math.cos(self.contact_angle))
 
@@ -228,13 +228,13 @@ class RollerBearingType(_BearingType):
     roller_diameter: PositiveLength
     """Rollers are cylinders that end in relieved edges."""
     roller_length: PositiveLength
-    """That which bears, without edges."""
+    """Bearing length, without edges."""
     roller_count: Annotated[int, Field(ge=3, le=200, strict=True)]
-    """In one row."""
+    """Number in one row."""
     rows: Annotated[int, Field(ge=1, le=2, strict=True)] = 1
     """Two are staggered by half a pitch."""
     radial_clearance: RadialClearance = 0.0
-    """On the diameter as mounted, cold and at rest; negative: preloaded. Bearings of machine tools are
+    """Clearance on the diameter as mounted, cold and at rest; negative: preloaded. Machine-tool bearings are
     driven up their taper to about 0."""
     palmgren_f0: PositiveNumber | None = None
     """Palmgren's lubrication factor of a row; that of the kind, 1 with grease, where none is given."""
@@ -259,12 +259,12 @@ class RollerBearingType(_BearingType):
 
     @property
     def element_diameter(self) -> float:
-        """Of a roller, m."""
+        """Diameter of a roller, m."""
         return self.roller_diameter
 
     @property
     def element_length(self) -> float:
-        """Of a roller, m."""
+        """Bearing length of a roller, m."""
         return self.roller_length
 
     @property
@@ -279,7 +279,7 @@ class RollerBearingType(_BearingType):
 
     @property
     def element_volume(self) -> float:
-        """Of all rollers, m³."""
+        """Volume of all rollers, m³."""
         one = 0.25 * math.pi * self.roller_diameter**2 * self.roller_length
         return self.rows * self.roller_count * one
 

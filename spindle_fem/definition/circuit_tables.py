@@ -34,42 +34,42 @@ DuctLaw = choice_field("spindle_fem.physics.coolant.duct_films")
 
 
 class CircuitFilm(SpecModel):
-    """A coolant of its own that flows along a straight duct and warms on its way.
+    """A separate coolant that flows along a straight duct and warms on its way.
 
     The walls need no ``[[surface]]``: cells along the flow name them ``NAME.1``, ``NAME.2`` and so on from
     the inlet (``NAME.inner.1``, ``NAME.outer.1`` of an annulus). Properties are those of the inlet.
     """
 
     kind: Literal["circuit"]
-    """Tells the films apart."""
+    """Type of film."""
     name: Name
-    """Results, factors and probes use it."""
+    """Name in results, factors and probes."""
     duct: DuctKind = "bore"
-    """What it flows through."""
+    """Shape of the duct."""
     part: Name
     """The part whose wall it wets: around a bore, inside an annulus."""
     outer_part: Name | None = None
     """The part around an annulus; ``part`` itself where none is given."""
     diameter: PositiveLength
-    """Of the bore, or of the inner wall of an annulus, as drawn."""
+    """Diameter of the bore, or of the inner wall of an annulus, as drawn."""
     outer_diameter: PositiveLength | None = None
-    """Of the outer wall of an annulus, at most twice the inner."""
+    """Diameter of the outer wall of an annulus, at most twice the inner."""
     z: Range
-    """From and to of the wetted walls."""
+    """Start and end of the wetted walls."""
     flows_to: Literal["front", "rear"] = "rear"
     """Towards the nose or away from it."""
     cells: Annotated[int, Field(ge=2, le=40, strict=True)] = 8
     """Along the flow; each has one temperature of the coolant, exact between cells of uniform wall."""
     fluid: Fluid
-    """Whose properties are taken."""
+    """Coolant, for its properties."""
     inlet_temperature: Temperature
-    """Where it enters."""
+    """Temperature at the inlet."""
     flow: VolumeFlow
     """Through the duct."""
     law: DuctLaw = "straight"
-    """Which correlation of the film."""
+    """Correlation of the film."""
     factor: UncertainNumber = Uncertain(1.0)
-    """On the coefficient: fouling, rotation, inlets."""
+    """Factor on the coefficient: fouling, rotation, inlets."""
 
     @model_validator(mode="after")
     def _check(self) -> CircuitFilm:
@@ -91,12 +91,12 @@ class CircuitFilm(SpecModel):
 
     @property
     def temperature(self) -> float:
-        """Of the fluid as it enters, K."""
+        """Temperature of the fluid at the inlet, K."""
         return self.inlet_temperature
 
     @property
     def length(self) -> float:
-        """Of the duct, m."""
+        """Length of the duct, m."""
         return self.z[1] - self.z[0]
 
     @property
@@ -114,7 +114,7 @@ class CircuitFilm(SpecModel):
 
     @property
     def walls(self) -> tuple[Surface, ...]:
-        """What the names of its walls pick."""
+        """Surfaces for the names of its walls."""
         step = self.length / self.cells
         edges = [*(round(self.z[0] + step * n, 9) for n in range(self.cells)), self.z[1]]
         ends = list(pairwise(edges))

@@ -1,7 +1,7 @@
-"""What a definition leaves out and named rules give: catalogue bearings, spacers, materials, surroundings.
+"""Complete a definition by named rules: catalogue bearings, spacers, materials, surroundings.
 
-Works on raw tables before they are validated, so that whatever reads a machine
-sees a complete one. What is malformed stays as it is, for validation to name.
+Works on raw tables before they are validated, so that all readers of a machine
+see a complete one. Malformed tables are left for validation to report.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def _with_angle(table: Any) -> Any:
 
 
 def _is_partial(table: Any) -> bool:
-    """Whether a table of a bearing type gives no bearing of its own."""
+    """Whether a table of a bearing type only overrides keys of another."""
     return isinstance(table, Mapping) and not {"catalogue", "bore_diameter"} & set(table)
 
 
@@ -154,7 +154,7 @@ def _under(found: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _bearing_places(content: dict[str, Any], assumed: list[Assumption]) -> None:
-    """Bearings whose place says where they begin span the width of their type."""
+    """Give bearings placed by their start only the width of their type."""
     groups = []
     for group in content.get("bearing_set") if isinstance(content.get("bearing_set"), list) else ():
         if isinstance(group, Mapping) and isinstance(group.get("bearing"), list):

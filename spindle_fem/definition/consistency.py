@@ -172,7 +172,7 @@ def _duplicates(declared: Declared) -> Iterator[SpindleFemError]:
 
 def _materials(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
     materials = declared.names["materials"]
-    # Those that ship need no table: a name that is neither is told with both.
+    # Materials that ship need no table: the message for an unknown name lists both.
     allowed = sorted({*materials, *MATERIALS})
     for part in spec.part:
         if part.material not in materials:
@@ -347,7 +347,7 @@ def _motion(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
 
 
 def factor_targets(spec: MachineSpec) -> tuple[str, ...]:
-    """What a shared factor may apply to."""
+    """Coefficients that a shared factor may apply to."""
     return (
         *(f"film.{film.name}" for film in spec.film if film.name),
         *(f"gap.{gap.name}" for gap in spec.gap),

@@ -42,9 +42,9 @@ class _Drawn:
     unnamed: tuple[Piece, ...]
 
     def seen(self, piece: Piece) -> tuple[int, int]:
-        """What an exposed face looks at, and the distance of a part in nm.
+        """Part that an exposed face looks at, and its distance in nm.
 
-        ``_RIM`` stands for the room, ``VOID`` for faces that see it through an opening only.
+        ``_RIM`` means the room, ``VOID`` a face that sees it through an opening only.
         """
         z_lines, r_lines, owner = self.meridian.z_lines, self.meridian.r_lines, self.meridian.owner
         forward = piece.above == VOID
@@ -201,7 +201,7 @@ def _films(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]:
         if inward or drawn.seen(piece)[0] != _RIM:
             continue
         turns = drawn.rotating[part]
-        # Films of turning cylinders follow their own diameter; still air hardly tells sizes apart.
+        # Films of rotating cylinders depend on their diameter; films of still air hardly depend on size.
         radius = piece.r[1] if turns and piece.kind == "cylinder" else 0
         groups.setdefault((part, piece.kind, radius), []).append(piece)
     made: dict[bool, list[str]] = {True: [], False: []}

@@ -1,4 +1,4 @@
-"""What tables of a definition draw: parts, rings, balls and rollers of bearings, named surfaces."""
+"""Geometry from the tables of a definition: parts, rings, balls and rollers of bearings, named surfaces."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from spindle_fem.machine.geometry.part_shapes import (
 
 
 def part_geometry(part: Part) -> PartGeometry:
-    """What a ``[[part]]`` draws."""
+    """Geometry of a ``[[part]]``."""
     segments = tuple(
         AnnularSegment(*segment.z, 0.5 * segment.inner_diameter, 0.5 * segment.outer_diameter)
         for segment in part.segment
@@ -54,6 +54,6 @@ def element_rows(bearing: SetBearing, kind: BearingType) -> tuple[BallRowGeometr
 
 
 def surface_definition(surface: Surface) -> SurfaceDefinition:
-    """What a ``[[surface]]`` picks."""
+    """Faces selected by a ``[[surface]]``."""
     boxes = tuple(FaceBox(box.facing, box.z, box.r) for box in surface.where)
     return SurfaceDefinition(surface.name, surface.part, boxes)

@@ -1,7 +1,7 @@
 """Effects of the catalogue that a machine definition switches on.
 
-What an effect may be called, where it can act and which parameters it has is
-the catalogue's to say (:mod:`spindle_fem.effects.registry`); here stands how
+Names, places and parameters of effects are defined by the
+catalogue (:mod:`spindle_fem.effects.registry`); this module defines how
 an entry is written.
 """
 
@@ -62,12 +62,12 @@ class EffectEntry(SpecModel):
     effect: str
     """Its id in the catalogue, such as thermal_preload."""
     component: str
-    """Where it acts, such as front_bearings, F2, channel, a probe, a network's node or link."""
+    """Place where it acts, such as front_bearings, F2, channel, a probe, a network's node or link."""
     form: str = ""
-    """Which of the effect's forms, where it has several."""
+    """Form of the effect, if it has several."""
     parameters: dict[str, FreeQuantity] = Field(default_factory=dict)
-    """Its parameters by name. Its amplitude, which says how strong it is, must be given; others that are
-    missing have their usual values."""
+    """Parameters by name. The amplitude, which sets the strength, is required; others that are
+    missing take their usual values."""
     intervals: tuple[Interval, ...] = ()
     """When it is on, from the start of a recording; only for effects of intervals."""
 

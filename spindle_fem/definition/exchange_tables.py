@@ -104,9 +104,9 @@ class PumpCurve(SpecModel):
     """
 
     flow: Annotated[tuple[CurveFlow, ...], Field(min_length=2)]
-    """At least two entries that grow."""
+    """At least two increasing entries."""
     pressure: Annotated[tuple[CurvePressure, ...], Field(min_length=2)]
-    """As many entries, each below the one before."""
+    """As many entries as `flow`, decreasing."""
 
     @model_validator(mode="after")
     def _check(self) -> PumpCurve:
@@ -126,17 +126,17 @@ class Coolant(SpecModel):
     """Coolant in the channel."""
 
     fluid: Fluid = "iso_vg_32"
-    """Whose properties are taken."""
+    """Coolant, for its properties."""
     inlet_temperature: Temperature
     """Mixed, where the coolant enters."""
     flow: VolumeFlow
     """Volume flow of all starts together; less flows where the pump's pressure does not suffice."""
     pressure_limit: Pressure | None = None
-    """Of the pump's relief valve: the flow through channel and drillings takes no more."""
+    """Pressure of the pump's relief valve: the flow through channel and drillings takes no more."""
     pump_curve: PumpCurve | None = None
-    """What the pump gives: no more flows than channel and drillings take at its pressure."""
+    """Characteristic of the pump: the flow is at most where it meets that of channel and drillings."""
     film_model: FilmModel = "helical"
-    """Which correlation of the channel's film."""
+    """Correlation of the channel's film."""
     film_factor: UncertainNumber = Uncertain(1.0)
     """Factor on the film coefficient of the channel."""
     properties_at: Literal["inlet", "bulk"] = "bulk"
@@ -157,7 +157,7 @@ class SeatSurface(SpecModel):
     slope: PositiveNumber = 0.1
     """Combined rms of the profiles' slopes."""
     microhardness: Pressure = 3.0e9
-    """Of the softer surface."""
+    """Microhardness of the softer surface."""
 
 
 class JointGroup(SpecModel):
@@ -165,7 +165,7 @@ class JointGroup(SpecModel):
 
     ``contacts`` are names ``part_a|part_b`` (parts in sorted order) of a
     cylindrical contact and ``part_a|part_b:face`` of a plane one, as
-    ``spindle-fem check`` lists them; ``*`` stands for any text. ``perfect``
+    ``spindle-fem check`` lists them; ``*`` matches any text. ``perfect``
     means no resistance.
     """
 
@@ -186,7 +186,7 @@ class FaceSelector(SpecModel):
     """
 
     facing: Literal["outward", "inward", "front", "rear"]
-    """Where the normal points."""
+    """Direction of the normal."""
     z: Place | None = None
     """A place or from and to; everywhere when left out."""
     r: Place | None = None
@@ -243,11 +243,11 @@ class NaturalFilm(SpecModel):
     characteristic_length: PositiveLength
     """Diameter of the cylinder or height of the plate."""
     orientation: Orientation = "horizontal_cylinder"
-    """Which correlation of natural convection."""
+    """Correlation of natural convection."""
     emissivity: Fraction = 0.9
     """Emissivity of the surface, in large grey surroundings."""
     factor: UncertainNumber = Uncertain(1.0)
-    """On the coefficient."""
+    """Factor on the coefficient."""
     temperature: AmbientOrTemperature = "ambient"
     """Temperature of the surroundings."""
     name: Name | None = None
@@ -262,13 +262,13 @@ class RotatingFilm(SpecModel):
     surface: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of surfaces; each surface takes one film or gap."""
     correlation: RotatingCorrelation = "becker"
-    """How the coefficient follows from the speed."""
+    """Correlation of the coefficient with speed."""
     diameter: PositiveLength
     """Diameter in the Reynolds and Nusselt numbers."""
     minimum: FilmCoefficient
     """Floor, the coefficient at rest."""
     factor: UncertainNumber = Uncertain(1.0)
-    """On the coefficient."""
+    """Factor on the coefficient."""
     temperature: AmbientOrTemperature = "ambient"
     """Temperature of the surroundings."""
     name: Name | None = None
@@ -289,7 +289,7 @@ class Gap(SpecModel):
     standing: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of the standing surfaces that face it."""
     kind: GapLaw = "power_law"
-    """How the coefficient follows from the speed."""
+    """Law of the coefficient over speed."""
     at_rest: FilmCoefficient | None = None
     """With ``kind = "power_law"`` only."""
     rise: FilmCoefficient = 0.0
@@ -299,7 +299,7 @@ class Gap(SpecModel):
     exponent: PositiveNumber = 0.75
     """Exponent of the relative speed."""
     factor: UncertainNumber = Uncertain(1.0)
-    """On the coefficient."""
+    """Factor on the coefficient."""
 
     @model_validator(mode="after")
     def _check(self) -> Gap:

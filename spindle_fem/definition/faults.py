@@ -79,7 +79,7 @@ def key_path(location: Location, content: Any = None) -> str:
             node = entry
         else:
             if isinstance(node, Mapping) and item not in node and position < len(location) - 1:
-                continue  # the tag by which a union was told apart
+                continue  # the tag that selects a member of a union
             text += f".{item}" if text else item
             node = node.get(item) if isinstance(node, Mapping) else None
     return text or "file"

@@ -27,7 +27,7 @@ MARKS = {
 class Fault:
     """One fault inside a table, before the file and the table are known.
 
-    ``key`` is relative to the value that is read: empty for the value itself.
+    ``key`` is relative to the value being read: empty for the value itself.
     """
 
     key: str
@@ -55,7 +55,7 @@ def _fault_of(error: SpindleFemError, key: str = "") -> Fault:
 
 @dataclass(frozen=True, slots=True)
 class QuantityRule:
-    """What one quantity may be; also the source of the reference page.
+    """Allowed values of one quantity; also the source of the reference page.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class QuantityRule:
     above, at_least, at_most : float or None
         Limits in ``unit``.
     words : tuple of str
-        Texts that stand for a value, such as ``"ambient"``.
+        Texts allowed in place of a value, such as ``"ambient"``.
     uncertain : bool
         Whether a prior may be given.
     toleranced : bool
@@ -321,14 +321,14 @@ class RangeRule:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChoiceRule:
-    """What a field may be that names a registered thing; also the source of the reference page."""
+    """Allowed values of a field that names a registered thing; also the source of the reference page."""
 
     things: Registry
     keep: Callable[[str], bool] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the field may be."""
+        """Allowed names."""
         return tuple(name for name in self.things if self.keep is None or self.keep(name))
 
     def read(self, value: Any) -> str:
@@ -359,7 +359,7 @@ class FreeQuantityRule:
 
 @dataclass(frozen=True, slots=True)
 class AllowedText:
-    """Metadata of a field of a kind of its own: what it takes, in words."""
+    """Metadata of a field of a special type: allowed values, in words."""
 
     text: str
 
@@ -393,7 +393,7 @@ class SpecModel(BaseModel):
         use_attribute_docstrings=True,
     )
     marks: dict[str, str] = Field(default_factory=dict)
-    """Where the values come from: P, C, A or U, for the table or key by key."""
+    """Origin of the values: P, C, A or U, for the table or key by key."""
 
     @field_validator("marks", mode="before")
     @classmethod

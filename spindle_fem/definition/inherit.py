@@ -114,7 +114,7 @@ def _merged_marks(
 
 
 def without_none(value: Any) -> Any:
-    """Raw tables without the keys that are ``"none"``, which stands for leaving a key out."""
+    """Raw tables without the keys that are ``"none"``, which means leaving a key out."""
     if isinstance(value, Mapping):
         return {key: without_none(item) for key, item in value.items() if item != "none"}
     if isinstance(value, list):
@@ -286,7 +286,7 @@ def _in_value(node: Any, shape: Shape, path: str, text: str, where: str, inside:
 
 
 def source_of(key_path: str, layers: Iterable[Layer]) -> str:
-    """Which layer a key comes from: the last one that reaches deepest along its path."""
+    """Layer that a key comes from: the last one that reaches deepest along its path."""
     best, source = -1, ""
     for layer in layers:
         if layer.override:
@@ -326,7 +326,7 @@ def _reach(content: Any, key_path: str) -> int:
 
 
 def relabelled(fault: SpindleFemError, layers: Iterable[Layer]) -> SpindleFemError:
-    """The same fault with the file or override in front of its key path."""
+    """The fault with the file or override in front of its key path."""
     layers = tuple(layers)
     source = source_of(fault.where, layers)
     where = source if source == f"--set {fault.where}" else f"{source}: {fault.where}"

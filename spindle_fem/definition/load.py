@@ -145,7 +145,7 @@ def _merged(layers: Iterable[Layer]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """What a definition holds, sound or not.
+    """Content of a definition, sound or not.
 
     Attributes
     ----------

@@ -90,22 +90,22 @@ class RadialLoad(SpecModel):
     """
 
     name: Name
-    """For messages."""
+    """Name in messages."""
     force: PositiveForce
     """Constant."""
     z: Length
-    """Where it acts along the axis; beside the bearings too."""
+    """Place along the axis; may be beside the bearings."""
     angle: Angle = 0.0
-    """Where to it pulls; 0 is up."""
+    """Direction of the force; 0 is up."""
 
 
 class HeatTable(SpecModel):
     """Heat of each bearing against speed, linear between entries."""
 
     speed: tuple[RotationalSpeed, ...]
-    """At least two entries that grow."""
+    """At least two increasing entries."""
     heat: dict[str, tuple[Power, ...]]
-    """One row a bearing, as long as ``speed``."""
+    """One row per bearing, as long as ``speed``."""
     thrust_coefficient: dict[str, Number] = Field(default_factory=dict)
     """c of the factor 1 + c (thrust/reference_thrust - 1), by bearing; 0 where none is given."""
     reference_thrust: PositiveForce = 1750.0
@@ -172,9 +172,9 @@ class SharedFactor(SpecModel):
     """
 
     name: Name
-    """The parameter is called by it."""
+    """Name of the parameter."""
     sigma_rel: SigmaRel
-    """1 sigma of its logarithm."""
+    """Standard deviation of its logarithm."""
     applies_to: Annotated[tuple[str, ...], Field(min_length=1)]
     """Coefficients that it multiplies."""
 
@@ -185,7 +185,7 @@ class Probe(SpecModel):
     name: Name
     """Results and recordings use it."""
     kind: Literal["point", "coolant_outlet", "circuit_outlet"] = "point"
-    """What it reads."""
+    """Quantity that it reads."""
     circuit: Name | None = None
     """Name of the circuit, with ``kind = "circuit_outlet"`` only."""
     part: Name | None = None
@@ -224,39 +224,39 @@ class SensorSpot(SpecModel):
     z: Length
     """Along the axis."""
     radius: Radius
-    """From the axis."""
+    """Distance from the axis."""
     angle: Angle = 0.0
     """Around the axis; 0 is up."""
 
 
 class DisplacementSensor(SpecModel):
-    """What a displacement sensor on the machine's mount reads of the shaft.
+    """A displacement sensor on the machine's mount that reads the shaft.
 
-    Its reading is how far the shaft has moved since assembly, by temperature and rotation.
+    Its reading is the movement of the shaft since assembly, by temperature and rotation.
     """
 
     name: Name
-    """Results and recordings use it."""
+    """Name in results and recordings."""
     at: Annotated[
         Annotated[Name, Tag("name")] | Annotated[SensorSpot, Tag("spot")],
         Discriminator(lambda given: "name" if isinstance(given, str) else "spot"),
     ]
-    """What it looks at: a surface of the shaft, or a spot on it."""
+    """Target: a surface of the shaft, or a spot on it."""
     direction: Literal["axial", "radial"]
     """Axial readings grow away from the mount, radial ones outwards."""
     mount: Name = "flange"
-    """What it is fixed to: the segment of the housing that is its flange."""
+    """Part that holds the sensor: the segment of the housing that is its flange."""
 
 
 class MeshSettings(SpecModel):
-    """How the machine is meshed and interpolated."""
+    """Mesh and interpolation of the machine."""
 
     preset: Literal["coarse", "normal", "fine"] = "normal"
     """Fineness."""
     order: Literal[1, 2] = 2
     """Order of the temperature's polynomials."""
     size_factor: SizeFactor = 1.0
-    """On every element size of the preset."""
+    """Factor on every element size of the preset."""
     size: dict[str, PositiveLength] = Field(default_factory=dict)
     """Element size by part, ring, or ``channel``."""
     circumferential_averaging: Flag = True
@@ -277,7 +277,7 @@ class MachineSpec(SpecModel):
     initial: Literal["ambient", "first_reading"] = "ambient"
     """Temperatures at the start of a simulation."""
     remaining_surfaces: Literal["adiabatic", "error"] = "error"
-    """What becomes of exposed faces that no surface names."""
+    """Treatment of exposed faces that no surface names."""
     heat_capacity_factor: UncertainNumber = Uncertain(1.0)
     """Factor on every heat capacity."""
     surroundings: Literal["workshop"] | None = None
@@ -315,9 +315,9 @@ class MachineSpec(SpecModel):
     factor: tuple[SharedFactor, ...] = ()
     """Uncertain factors that several coefficients share."""
     probe: tuple[Probe, ...] = ()
-    """Where temperatures are read."""
+    """Temperature probes."""
     displacement_sensor: tuple[DisplacementSensor, ...] = ()
-    """Where growth is read."""
+    """Sensors of growth."""
     mesh: MeshSettings = MeshSettings()
     """Fineness of the mesh."""
     effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
@@ -330,14 +330,14 @@ class MachineSpec(SpecModel):
 
     @property
     def rolling_elements(self) -> str:
-        """What its bearings roll on: "balls", "rollers" or "balls and rollers"; empty without bearings."""
+        """Rolling elements: "balls", "rollers" or "balls and rollers"; empty without bearings."""
         names = [group.type_name(bearing) for group, bearing in self.bearings]
         words = {f"{self.bearing_types[name].element_word}s" for name in names}
         return " and ".join(sorted(words))
 
     @property
     def has_pump_limit(self) -> bool:
-        """Whether the pump's pressure can keep the coolant's flow below what is asked for."""
+        """Whether the pump's pressure can keep the coolant's flow below the requested flow."""
         coolant = self.coolant
         return coolant is not None and (coolant.pressure_limit, coolant.pump_curve) != (None, None)
 

@@ -1,4 +1,4 @@
-"""What makes a well-formed written network unusable, each fault by name."""
+"""Faults that make a well-formed written network unusable, each by name."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def _without_empty(value: Any) -> Any:
 
 
 def with_parameters(spec: NetworkMachineSpec, values: Mapping[str, Uncertain]) -> NetworkMachineSpec:
-    """The same machine with some values replaced, for example by calibrated ones.
+    """The machine with some values replaced, for example by calibrated ones.
 
     Parameters
     ----------

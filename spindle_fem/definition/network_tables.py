@@ -142,12 +142,12 @@ class NodeSpec(SpecModel):
 
 
 class BoundarySpec(SpecModel):
-    """Something whose temperature does not answer to the machine: room, coolant, frame."""
+    """Something whose temperature is independent of the machine: room, coolant, frame."""
 
     name: Name
     """Its name."""
     temperature: BoundaryTemperature
-    """Of a prior, `sigma_rel` counts on the absolute temperature; `{low, high}` is the plain way."""
+    """In a prior, `sigma_rel` counts on the absolute temperature; use `{low, high}` instead."""
 
 
 class LinkSpec(SpecModel):
@@ -173,7 +173,7 @@ class SourceSpec(SpecModel):
     """
 
     node: Name
-    """Where the heat enters."""
+    """Node that is heated."""
     input: Name | None = None
     """An input of the recording (a channel's `drives`) that the heat follows."""
     gain: GainField
@@ -195,11 +195,11 @@ class NetworkSpec(SpecModel):
     node: Annotated[tuple[NodeSpec, ...], Field(min_length=1)]
     """At least one."""
     boundary: tuple[BoundarySpec, ...] = ()
-    """What the nodes lose heat to."""
+    """Boundaries that the nodes lose heat to."""
     link: tuple[LinkSpec, ...] = ()
-    """How heat gets from one to another."""
+    """Links that conduct heat between nodes and boundaries."""
     source: tuple[SourceSpec, ...] = ()
-    """Where heat comes from."""
+    """Heat sources."""
 
 
 class NetworkMachineSpec(SpecModel):
@@ -210,9 +210,9 @@ class NetworkMachineSpec(SpecModel):
     name: str
     """Name of the machine, in reports."""
     description: str = ""
-    """What it is and where its values come from."""
+    """Description of the network and origin of its values."""
     initial: Literal["first_reading", "ambient", "steady"] = "first_reading"
-    """Temperatures at the start; nodes that nobody reads are estimated."""
+    """Temperatures at the start; those of nodes without a sensor are estimated."""
     network: NetworkSpec
     """Nodes, boundaries, links and sources."""
     effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()

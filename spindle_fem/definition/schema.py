@@ -1,4 +1,4 @@
-"""What the tables of a definition may hold, read off the models: for messages, overrides, the reference."""
+"""Allowed tables and keys of a definition, read from the models: for messages, overrides, the reference."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from spindle_fem.units import quantity_example
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What a key may hold.
+    """Allowed content of a key.
 
     Attributes
     ----------
     kind : {"table", "list", "mapping", "value"}
     models : tuple of type
-        Of a table: one, or several told apart by their ``kind`` key.
+        Models of a table: one, or several distinguished by their ``kind`` key.
     inner : Any
         Annotation of the entries of a list or mapping.
     annotation : Any
@@ -76,11 +76,11 @@ def shape_of(annotation: Any) -> Shape:
 
 
 def value_text(annotation: Any) -> str:
-    """What a plain value may be, in words."""
+    """Allowed plain values, in words."""
     alternatives, metadata = _peeled(annotation)
-    told = next((item.text for item in metadata if isinstance(item, AllowedText)), None)
-    if told is not None:
-        return told
+    words = next((item.text for item in metadata if isinstance(item, AllowedText)), None)
+    if words is not None:
+        return words
     rule = quantity_rule(annotation)
     if rule is not None:
         text = f"a quantity such as {quantity_example(rule.unit, rule.kind)}" if rule.unit else "a number"

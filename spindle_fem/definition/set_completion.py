@@ -1,6 +1,6 @@
-"""What rules give bearing sets: spacers between their bearings, the force of a preload class.
+"""Complete bearing sets by rules: spacers between their bearings, the force of a preload class.
 
-Works on raw tables, as :mod:`spindle_fem.definition.completion` does; what is malformed stays as it is.
+Works on raw tables, as :mod:`spindle_fem.definition.completion` does; malformed tables are left unchanged.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from spindle_fem.errors import SpindleFemError
 from spindle_fem.units import to_si
 
 _SAME_PLACE = 1.0e-9
-# Of the axial approach of a ball bearing under its force.
+# Exponent of the axial approach of a ball bearing over its force.
 _APPROACH_EXPONENT = 2.0 / 3.0
 
 
@@ -67,7 +67,7 @@ def _preload(groups: list[Any], position: int, kind: Mapping[str, Any]) -> Itera
 def tandem_factor(towards_rear: int, towards_nose: int) -> float:
     """Preload of a set of matched bearings over that of a pair of them.
 
-    Each bearing is ground to stand back as far as its class asks, so that the set closes
+    Each bearing is ground with the offset of its preload class, so that the set closes
     the same distance as a pair; its approach goes with the force to the power of 2/3.
 
     A pair, a triplex set and a quadruplex set:
@@ -82,7 +82,7 @@ def tandem_factor(towards_rear: int, towards_nose: int) -> float:
 def _spacers(
     content: dict[str, Any], group: Mapping[str, Any], kind: Mapping[str, Any]
 ) -> Iterator[tuple[str, str]]:
-    """Rings between bearings that stand apart, as high as the bearing's rings."""
+    """Rings between bearings with gaps, as high as the bearing's rings."""
     material = group.get("spacers")
     rows, parts = group.get("bearing"), content.get("part")
     if not isinstance(rows, list) or not isinstance(parts, list):
@@ -125,7 +125,7 @@ def is_known_material(name: Any, given: Any) -> bool:
 
 
 def _gaps(places: list[Any]) -> list[tuple[float, float]]:
-    """What neighbouring bearings leave between them, m."""
+    """Gaps between neighbouring bearings, m."""
     spans = sorted(tuple(to_si(end, "m", where="") for end in place) for place in places)
     return [(before[1], after[0]) for before, after in pairwise(spans) if after[0] - before[1] > _SAME_PLACE]
 

@@ -62,10 +62,10 @@ class Material(SpecModel):
     specific_heat_capacity: SpecificHeat
     """Constant over temperature."""
     young_modulus: Pressure = 206.0e9
-    """Where bearings sit with a `fit`, and of balls of other material than their rings, which must give it
-    (310 GPa for silicon nitride); rings take that of their type."""
+    """Used where bearings sit with a `fit`, and for balls of another material than their rings, which must
+    give it (310 GPa for silicon nitride); rings take that of their type."""
     poisson_ratio: PoissonRatio = 0.3
-    """As `young_modulus`; 0.26 for silicon nitride."""
+    """Used like `young_modulus`; 0.26 for silicon nitride."""
     thermal_expansion: ThermalExpansion = 12.5e-6
     """Linear, for rings, balls, shaft and housing with `heat.thermal_preload`."""
 
@@ -81,7 +81,7 @@ class AnnulusSegment(SpecModel):
     name: Name
     """Unique within its part."""
     z: Range
-    """From and to along the axis; z = 0 is the spindle nose."""
+    """Start and end along the axis; z = 0 is the spindle nose."""
     inner_diameter: Radius
     """0 for a solid shaft."""
     outer_diameter: UncertainLength
@@ -107,7 +107,7 @@ class Part(SpecModel):
     """One solid of revolution: its segments are fused."""
 
     name: Name
-    """Joints, surfaces and probes use it."""
+    """Name in joints, surfaces and probes."""
     material: Name
     """A key of ``[materials]``, or one that ships."""
     rotating: Flag = False
@@ -122,11 +122,11 @@ class SetBearing(SpecModel):
     name: Name
     """Its rings are the parts `NAME.inner_ring` and `NAME.outer_ring`."""
     z: Range
-    """From and to of its rings, as long as the type is wide; or where they begin."""
+    """Start and end of its rings, as long as the type is wide; or their start only."""
     takes_thrust: Literal["towards_rear", "towards_nose"] | None = None
     """Direction of the force on the shaft that this ball bearing carries; rollers carry none."""
     bearing_type: Annotated[str, Field(strict=True)] | None = None
-    """Where it is another than its set's: other balls, another contact angle; balls with balls only."""
+    """Type if different from its set's: other balls, another contact angle; balls with balls only."""
 
 
 class BallRow(SpecModel):
@@ -137,7 +137,7 @@ class BallRow(SpecModel):
     """
 
     kind: Literal["contact", "constant"] = "contact"
-    """How the conductances between balls and raceways come about."""
+    """Model of the conductances between balls and raceways."""
     conductance: UncertainConductance | None = None
     """Balls of one bearing to each raceway, with ``kind = "constant"`` only."""
     capacity: HeatCapacity | None = None
@@ -188,9 +188,9 @@ class BearingSet(SpecModel):
     preload_kind: Literal["rigid", "spring"] = "rigid"
     """Held by a distance (rings, locknut) or by a force (springs)."""
     fit: Fit | None = None
-    """How its rings sit; rigid rings where none is given."""
+    """Fits of its rings; rigid rings if not given."""
     assembly_temperature: Temperature = 293.15
-    """At which preload and fits are measured."""
+    """Temperature at which preload and fits are measured."""
     carries_thrust: Flag = False
     """Exactly one set of a machine, of ball bearings, takes the external thrust."""
     carries_radial: Flag = True
@@ -202,7 +202,7 @@ class BearingSet(SpecModel):
     bearing: Annotated[tuple[SetBearing, ...], Field(min_length=1)]
     """From the nose to the rear."""
     spacers: Name | None = None
-    """A material: bearings that stand apart get rings between them, the parts `NAME_inner_spacer` and
+    """A material: bearings with gaps get rings between them, the parts `NAME_inner_spacer` and
     `NAME_outer_spacer` of the set NAME (numbered where there are several), unless the file has such parts."""
 
     def type_name(self, bearing: SetBearing) -> str:
@@ -233,7 +233,7 @@ class Grease(SpecModel):
     catalogue: str | None = None
     """A grease that ships, which gives what is missing: ``high_speed_grease``, ``general_grease``."""
     name: str
-    """For reports."""
+    """Name in reports."""
     kinematic_viscosity_40: OilViscosity
     """Base oil at 40 °C."""
     kinematic_viscosity_100: OilViscosity

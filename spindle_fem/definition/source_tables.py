@@ -22,9 +22,9 @@ class SourceTable(SpecModel):
     """Heat over speed, or over speed and thrust: linear between entries, the last value beyond the ends."""
 
     speed: Annotated[tuple[RotationalSpeed, ...], Field(min_length=2)]
-    """At least two entries that grow."""
+    """At least two increasing entries."""
     heat: tuple[Power, ...]
-    """As long as ``speed``; with ``thrust`` one such row after the other, a row for each thrust."""
+    """As long as ``speed``; with ``thrust`` one row after the other, a row for each thrust."""
     thrust: tuple[Force, ...] = ()
     """External axial forces on the shaft, growing; none where the heat follows the speed alone."""
 
@@ -87,5 +87,5 @@ class HeatSource(SpecModel):
 
     @property
     def place(self) -> str:
-        """Where it enters, as models name places."""
+        """Place where the heat enters, as models name places."""
         return str(self.part or self.surface)

@@ -1,4 +1,4 @@
-"""Lengths with a tolerance, and how far a machine is from its drawing where the definition does not say."""
+"""Lengths with a tolerance, and default deviations of a machine from its drawing."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 from spindle_fem.errors import UnitError
 from spindle_fem.units import LARGEST_SIGMA_REL, to_si
 
-# One standard deviation where a definition gives none: what drawings of other states, castings and mounting
-# leave open on a machine that nobody has measured, far more than a machinist's tolerance.
+# Default standard deviations: other states of drawings, castings and mounting of a machine that nobody
+# has measured, far more than a machinist's tolerance.
 DIAMETER_SHARE = 0.02
-"""Of an exposed diameter."""
+"""Standard deviation of an exposed diameter, relative."""
 PLACE = 1.0e-3
-"""Of the place and the section of a cooling channel, and of the thickness of a flange or cover, m."""
+"""Standard deviation of place and section of a cooling channel and of a flange or cover's thickness, m."""
 
 
 class TolerancedLength(float):
@@ -37,7 +37,7 @@ class TolerancedLength(float):
 
 
 def sigma_of(length: float, otherwise: float) -> float:
-    """One standard deviation of a length [m]: what the definition says, or else another.
+    """One standard deviation of a length [m]: from the definition, or else the given one.
 
     >>> sigma_of(TolerancedLength(0.28, 1e-3), 5e-3), sigma_of(0.28, 5e-3)
     (0.001, 0.005)

@@ -1,7 +1,7 @@
-"""Bearing heat behind one interface, whatever model makes it.
+"""Bearing heat by any heat model, through one interface.
 
 A heat model is called with the operating point and the temperatures of every
-bearing and answers with :class:`BearingHeat` for each. A new model is a
+bearing and returns :class:`BearingHeat` for each. A new model is a
 function of that form, entered in :func:`heat_model_of`.
 """
 
@@ -55,18 +55,18 @@ class BearingTemperatures:
 
     @classmethod
     def of_state(cls, state: NDArray[np.float64]) -> BearingTemperatures:
-        """From what :attr:`state` gives."""
+        """Restore from :attr:`state`."""
         return cls(*state[:5].tolist(), 1.0e-6 * state[5:] if state.size > 5 else None)
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """Temperatures in K, then shifts in µm where there are any: all that heat follows, alike in size."""
+        """Temperatures in K, then any shifts in µm: all inputs of the heat, similar in size."""
         return np.append(self.kelvins, () if self.shifts is None else 1.0e6 * self.shifts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilmCurves:
-    """What one bearing does over the temperature of its film while nothing expands.
+    """Heat and conductances of one bearing over the temperature of its film, without expansion.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ HeatModel = Callable[
 
 
 def heat_model_of(spec: MachineSpec) -> HeatModel:
-    """The heat model that a definition asks for."""
+    """Heat model selected by a definition."""
     if not spec.bearing_set:
         return lambda point, temperatures: ({}, ())
     if spec.heat.model != "table":
@@ -123,7 +123,7 @@ def grows(spec: MachineSpec) -> bool:
 
 
 def at_assembly_size(spec: MachineSpec) -> MachineSpec:
-    """The same machine with bearings that keep the size of assembly."""
+    """The machine with bearings that keep their size at assembly."""
     return spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": False})})
 
 
@@ -322,7 +322,7 @@ class BearingMechanics:
         return np.array(heat).T, np.array(conductance).swapaxes(0, 1)
 
     def _load(self, group: BearingSet, point: OperatingPoint) -> mounting.ExternalLoad:
-        """What a set carries."""
+        """External load of a set."""
         return mounting.ExternalLoad(
             point.thrust if group.carries_thrust else 0.0, self.radial_loads[group.name]
         )
@@ -472,5 +472,5 @@ class BearingMechanics:
 
 
 def _control(options: HeatOptions) -> str:
-    """What decides the attitude of the balls, as the heat model needs it."""
+    """Raceway control (attitude of the balls) that the heat model needs."""
     return HEAT_MODELS[options.level].ball_attitude

@@ -33,7 +33,7 @@ class CircuitAnswer:
 
 
 def duct_flow(film: CircuitFilm) -> DuctFlow:
-    """What flows through the duct of a circuit."""
+    """Flow through the duct of a circuit."""
     section = DUCT_KINDS[film.duct](film.diameter, film.outer_diameter)
     return DuctFlow(section, film.length, coolant_by_name(film.fluid), film.flow, film.inlet_temperature)
 
@@ -54,7 +54,7 @@ def circuit_film(film: CircuitFilm) -> CircuitAnswer:
 
 @dataclass(frozen=True, slots=True)
 class CircuitMarch:
-    """How the coolant of one circuit follows its walls at given conductances.
+    """Coolant temperatures of one circuit from its walls, at given conductances.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What every coefficient of a machine is at an operating point, and which parameters scale it."""
+"""Values of every coefficient of a machine at an operating point, and the parameters that scale each."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class CoefficientTable:
         return (f"heat.{bearing}", f"heat.{owner}")
 
     def targets(self, parameter: str) -> tuple[str, ...]:
-        """Factors that a parameter stands for: a shared factor's, or its own name.
+        """Factors that a parameter acts on: a shared factor's targets, or its own name.
 
         Raises
         ------

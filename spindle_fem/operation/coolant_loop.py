@@ -51,7 +51,7 @@ class CoolantLoop:
         self.cells = cells
         self.path = CoolantPath.of(spec)
         self.coolant, self.section = self.path.coolant, self.path.section
-        # Of the film: what the first and last cells wet, the ends of the channel among it.
+        # Length of the film's first and last cells, which include the ends of the channel.
         self.port_length = 0.0
         if cells.is_port.any():
             wetted = cells.cell_area[:, cells.is_port].mean()
@@ -90,7 +90,7 @@ class CoolantLoop:
         return CoolantState(march, value, low, high, pressure)
 
     def film_choice(self, factor: ArrayLike) -> FilmChoice:
-        """The film that the definition asks for, times a factor."""
+        """Film of the definition, times a factor."""
         local = self.spec.coolant.properties_at == "bulk"
         return FilmChoice(self.spec.coolant.film_model, "local" if local else "inlet", factor)
 

@@ -1,6 +1,6 @@
-"""What the terms of effects do at operating points and sensed temperatures, with exact derivatives.
+"""Evaluate the terms of effects at operating points and sensed temperatures, with exact derivatives.
 
-The one evaluator of every model: mesh, reduced model and written network ask it for the heat of each
+The one evaluator of every model: mesh, reduced model and written network obtain from it the heat of each
 place, the factor on each bearing's friction and the factor on each coefficient, at one instant or at
 many. Heats of several terms in one place add up. Factors of several terms on one coefficient or one
 bearing's friction multiply: two independent causes that each halve a conductance leave a quarter.
@@ -26,16 +26,16 @@ COMPLEX_STEP = 1e-30
 
 
 class Derivatives(Enum):
-    """Which derivatives are evaluated beside the values."""
+    """Derivatives to evaluate beside the values."""
 
     NONE = "none"
     STATE = "sensed temperatures and memories"
-    ALL = "these and the asked parameters"
+    ALL = "these and the requested parameters"
 
 
 @dataclass(frozen=True, slots=True)
 class Instants:
-    """When terms are asked, and the inputs then.
+    """Instants at which terms are evaluated, and the inputs then.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Instants:
 
     @property
     def number(self) -> int:
-        """How many there are."""
+        """Number of instants."""
         return np.size(self.times)
 
     def at(self, rows: NDArray[np.int64]) -> Instants:
@@ -65,8 +65,8 @@ class Quantities:
     ----------
     value : (n, q) ndarray
     by : (n, q, n_y + n_x + p) ndarray
-        To the sensed temperatures, the memories and the asked parameters (to their logarithms where
-        they are logarithmic), side by side; fewer columns where fewer were asked for.
+        Derivatives by sensed temperatures, memories and requested parameters (by their logarithms if
+        they are logarithmic), side by side; fewer columns if fewer were requested.
     """
 
     value: Array
@@ -86,22 +86,22 @@ class Quantities:
 
     @property
     def by_parameter(self) -> Array:
-        """Explicit derivatives to the asked parameters, (n, q, p)."""
+        """Explicit derivatives by the requested parameters, (n, q, p)."""
         return self.by[:, :, self.n_sensed + self.n_states :]
 
     def copy(self) -> Quantities:
-        """The same in arrays of its own."""
+        """Copy with arrays of its own."""
         return Quantities(self.value.copy(), self.by.copy(), self.n_sensed, self.n_states)
 
 
 @dataclass(frozen=True, slots=True)
 class TermAnswers:
-    """What all terms do together.
+    """Sum of all terms.
 
     Attributes
     ----------
     heat : Quantities
-        Of every one of :attr:`EffectTerms.places`, W; K for fluids. A place may stand there twice.
+        Heat into each of :attr:`EffectTerms.places`, W; K for fluids. A place may occur twice.
     friction : Quantities
         Factor on the friction heat of every one of :attr:`EffectTerms.bearings`.
     factor : Quantities
@@ -115,7 +115,7 @@ class TermAnswers:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Where the answers of one term go among all quantities of a kind.
+    """Positions of one term's values among all quantities of a kind.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ class _Layout:
     def of(
         cls, term: Term, values: Mapping[str, float], reads: slice, states: slice, own: Mapping[str, int]
     ) -> _Layout:
-        """Columns of a term; ``own`` maps its asked parameters to their positions among all."""
+        """Columns of a term; ``own`` maps its requested parameters to their positions among all."""
         n_reads, n_states = len(term.reads), term.n_states
         width = 1 + n_reads + n_states + len(own)
         temperatures = np.zeros((n_reads, width), dtype=complex)
@@ -179,7 +179,7 @@ class _Layout:
     def context(
         self, instants: Instants, sensed: Array, states: Array, derivatives: Derivatives
     ) -> TermContext:
-        """What the term sees, the columns of each instant side by side."""
+        """Inputs of the term, the columns of each instant side by side."""
         width, number = self.width(derivatives), instants.number
         own = sensed[:, self.reads].T[:, :, None] + self.temperatures[:, None, :width]
         state = states[:, self.states].T[:, :, None] + self.state[:, None, :width]
@@ -340,13 +340,13 @@ class EffectTerms:
         return Quantities(value, np.zeros((number, rows, width)), self.n_sensed, self.n_states)
 
     def _put(self, found: Quantities, rows: slice, layout: _Layout, answers: NDArray) -> None:
-        """Put a term's complex answers (k, n · columns) into quantities of its own, in place."""
+        """Put a term's complex values (k, n · columns) into its own quantities, in place."""
         value, slopes = _split(answers, len(found.value))
         found.value[:, rows] = value
         self._spread(found, rows, layout, slopes)
 
     def _multiply(self, found: Quantities, target: _Target, layout: _Layout, answers: NDArray) -> None:
-        """Multiply some quantities by a term's complex answers, in place."""
+        """Multiply some quantities by a term's complex values, in place."""
         value, slopes = _split(answers, len(found.value))
         at = target.positions
         if target.fresh:
@@ -376,14 +376,14 @@ class EffectTerms:
 
 
 def _split(answers: NDArray, number: int) -> tuple[Array, Array]:
-    """Values (n, k) and derivatives (n, k, columns) of complex answers (k, n · columns)."""
+    """Values (n, k) and derivatives (n, k, columns) of complex values (k, n · columns)."""
     found = np.asarray(answers, dtype=complex)
     found = found.reshape(len(found), number, -1).transpose(1, 0, 2)
     return found[:, :, 0].real, found[:, :, 1:].imag * (1.0 / COMPLEX_STEP)
 
 
 def _targets(terms: Sequence[Term], kind: str) -> tuple[tuple[str, ...], list[_Target]]:
-    """Everything of a kind that terms name, each once, and where the answers of each term go."""
+    """All names of a kind used by terms, each once, and the positions of each term's values."""
     known: dict[str, int] = {}
     found = []
     for term in terms:

@@ -42,7 +42,7 @@ def film_temperature(inner: ArrayLike, outer: ArrayLike, balls: ArrayLike) -> ND
 
 
 def chebyshev_nodes(low: float, high: float, number: int, *, ends: bool = False) -> Array:
-    """Temperatures to solve at, rising, (number,) [K]; with both ends among them if asked.
+    """Temperatures to solve at, ascending, (number,) [K]; including both ends on request.
 
     >>> chebyshev_nodes(0.0, 2.0, 3, ends=True).round(12).tolist()
     [0.0, 1.0, 2.0]
@@ -107,7 +107,7 @@ class FilmSeries:
         return (2.0 / (self.high - self.low)) * np.matmul(basis[:, :, : own.shape[1]], own).transpose(0, 2, 1)
 
     def _basis(self, film: NDArray) -> tuple[NDArray, Array]:
-        """What films are beyond the range in its half widths (n_bearings, k), and polynomials inside."""
+        """Excess of films beyond the range, in half widths (n_bearings, k), and polynomials inside."""
         scaled = (2.0 * film - self.low - self.high) / (self.high - self.low)
         inside = np.clip(scaled.real, -1.0, 1.0)
         return scaled - inside, chebvander(inside, self.coefficients.shape[2] - 1)
@@ -154,7 +154,7 @@ class FrictionMap:
         found = FilmSeries(*FILM_TEMPERATURES, turning)
         if speed >= self.speed[0]:
             return found
-        # What the lubricant carries around the balls goes with the root of the speed.
+        # Heat carried by the lubricant around the balls varies with the root of the speed.
         nodes = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
         films = np.tile(nodes, (len(self.bearings), 1))
         still = FilmSeries(*FILM_TEMPERATURES, np.tensordot(shares, self.at_rest, axes=1))

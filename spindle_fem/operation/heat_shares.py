@@ -1,4 +1,4 @@
-"""Where the friction heat of a bearing enters: both rings and the balls."""
+"""Distribution of the friction heat of a bearing: both rings and the balls."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class BearingHeat:
 
 @dataclass(frozen=True, slots=True)
 class LoadChange:
-    """What physics beyond the machine's own does to its loads at one instant.
+    """Changes of a machine's loads by effects at one instant.
 
     Attributes
     ----------

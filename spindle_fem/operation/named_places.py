@@ -19,11 +19,11 @@ Array = NDArray[np.float64]
 
 
 class MachineOnMesh(Protocol):
-    """What places need of a prepared machine."""
+    """Interface of a prepared machine that places need."""
 
     @property
     def spec(self) -> MachineSpec:
-        """Its definition."""
+        """Definition of the machine."""
 
     @property
     def operators(self) -> ThermalOperators:
@@ -31,7 +31,7 @@ class MachineOnMesh(Protocol):
 
     @property
     def builder(self) -> LoadsBuilder:
-        """What knows its ball rows."""
+        """Builder that has the ball rows."""
 
 
 def named_places(machine: MachineOnMesh, lumped: tuple[str, ...], size: int) -> Iterator[tuple[str, Array]]:
@@ -98,7 +98,7 @@ def place_load(spec: MachineSpec, operators: ThermalOperators, place: str) -> Ar
     Raises
     ------
     SpecError
-        A segment too thin for the mesh to tell apart.
+        A segment too thin for the mesh to resolve.
     """
     if place in operators.surface_rows:
         found = _surface_load(operators, operators.surface_rows[place])
@@ -121,7 +121,7 @@ def _part_load(operators: ThermalOperators, part: str) -> Array:
 
 
 def _segment_load(operators: ThermalOperators, part_load: Array, segment: AnnulusSegment) -> Array | None:
-    """Share of a part's load between a segment's ends; None where a mesh cannot tell it apart."""
+    """Share of a part's load between a segment's ends; None if the mesh cannot resolve it."""
     z = operators.mesh.points[: operators.n_unknowns, 2]
     inside = (z >= segment.z[0] - 1e-9) & (z <= segment.z[1] + 1e-9)
     vector = np.where(inside, part_load, 0.0)

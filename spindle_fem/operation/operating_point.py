@@ -11,7 +11,7 @@ from spindle_fem.recordings.standard_inputs import standard_inputs
 
 @dataclass(frozen=True, slots=True)
 class OperatingPoint:
-    """What drives the machine at one instant, SI.
+    """Inputs of the machine at one instant, SI.
 
     Attributes
     ----------
@@ -19,7 +19,7 @@ class OperatingPoint:
     thrust : float, [N]
     ambient_temperature, coolant_inlet_temperature : float, [K]
     coolant_flow : float, [m³/s]
-        What flows, not what a pump is asked for.
+        Actual flow, not the flow requested from a pump.
     extra_heat : mapping of source name to float, [W]
     beside : mapping of str to float
         What was recorded beside the inputs and only terms follow, ``covariate.<column>``, or what
@@ -36,7 +36,7 @@ class OperatingPoint:
 
     @classmethod
     def of(cls, spec: MachineSpec) -> OperatingPoint:
-        """The steady operating point that the definition asks for."""
+        """The steady operating point of the definition."""
         return cls(*standard_inputs(spec).values())
 
     @property

@@ -40,7 +40,7 @@ FORMAT = "spindle-fem/preload-response/1"
 DIFFERENCES = (-8.0, -3.0, 0.0, 3.0, 7.0, 12.0, 20.0, 30.0, 45.0)
 # m; from a ring that the housing squeezes hard to one that heavy balls hardly spread to it.
 GAPS = (-25e-6, -15e-6, -8e-6, -3e-6, 0.0, 3e-6, 8e-6, 20e-6)
-# Of the highest speed: load decides less of the friction where balls throw outwards.
+# Shares of the highest speed: load decides less of the friction where balls are thrown outwards.
 SPEED_SHARES = (0.05, 0.22, 0.55, 1.0)
 # Points that shape-preserving pieces put between two solved ones: cubic splines through solved points
 # alone swing by a tenth where rings meet the housing.
@@ -51,7 +51,7 @@ HIGHEST_SPEED = 1.5
 LEVEL_OF_TABLES = "full"
 # m
 ON_LINE = 1.0e-9
-# Of the whole: parts of the housing that move the seats of a set by less are left out.
+# Parts of the housing that move the seats of a set by less than this share are left out.
 LEAST_SHARE = 0.03
 
 
@@ -60,7 +60,7 @@ _known: dict[str, PreloadResponse] = {}
 
 @dataclass(frozen=True, slots=True)
 class PreloadMechanics:
-    """Answers of a machine's bearing sets, each worked out when it is first asked for.
+    """Preload responses of a machine's bearing sets, each computed on first use.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class PreloadMechanics:
     places: frozenset[str]
 
     def __call__(self, component: str) -> PreloadResponse | None:
-        """Of one bearing set; None without fits, preload, grease or parts that carry the rings."""
+        """Response of one bearing set; None without fits, preload, grease or parts that carry the rings."""
         sets = {f"{group.name}_bearings": group for group in self.spec.bearing_set}
         group = sets.get(component)
         if group is None or group.fit is None or not group.preload > 0.0:
@@ -92,16 +92,16 @@ class PreloadMechanics:
 
 
 def machine_view(names: MachineNames, recording: Recording) -> MachineView:
-    """A machine with geometry on one recording, with what its bearing sets answer to heat."""
+    """View of a machine with geometry for one recording, with the preload responses of its bearing sets."""
     return replace(
         view_of(names, recording), preload=PreloadMechanics(names.spec, frozenset(names.place_names))
     )
 
 
 def _digest(spec: MachineSpec, group: str, places: Collection[str]) -> str:
-    """Hash of all that the answer of a set depends on."""
+    """Hash of all inputs of a set's response."""
     content = spec.model_dump(mode="json")
-    # not what a calibration moves
+    # without quantities that a calibration moves
     sets = [
         {k: v for k, v in own.items() if k not in ("heat_factor", "ball_row")}
         for own in content["bearing_set"]
@@ -199,7 +199,7 @@ def _fit_sigma(diameter: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _SetSolver:
-    """One set at states of temperature.
+    """Equilibrium of one set at given temperatures.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the reduced model knows of the neighbourhood of each point probe, and of the sides of standing parts.
+"""Places around each point probe, and sides of stationary parts, in the reduced model.
 
 A patch of the probe's own part around it, where an unmodelled source may sit,
 the ring about the axis through it, and how the reading changes when the probe
@@ -49,7 +49,7 @@ def near_places(operators: ThermalOperators, probes: Sequence[Probe]) -> Iterato
 
 
 def around_places(operators: ThermalOperators, probes: Sequence[Probe]) -> Iterator[tuple[str, Array]]:
-    """The same of the distance in the meridian plane, by name ``around.<probe>``: a ring about the axis."""
+    """Patch by distance in the meridian plane, by name ``around.<probe>``: a ring about the axis."""
     x, y, z = _corners(operators).T
     radius = np.hypot(x, y)
     for probe in probes:

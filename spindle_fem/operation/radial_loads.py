@@ -1,4 +1,4 @@
-"""What forces across the shaft leave at each bearing set."""
+"""Loads at each bearing set from forces across the shaft."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the seats of rings conduct as their fits press or open, over what they conduct as assembled."""
+"""Conductance of the seats of rings as their fits press or open, relative to the assembled state."""
 
 from __future__ import annotations
 

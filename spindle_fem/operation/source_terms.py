@@ -62,7 +62,7 @@ class SourceTerm(Term):
         self.heat_places = (source.place,)
 
     def heat(self, context: TermContext) -> NDArray[np.complex128]:
-        """What it gives, (1, k) W."""
+        """Heat of the source, (1, k) W."""
         found = np.empty((1, context.temperatures.shape[-1]), dtype=complex)
         found[:] = source_heat(self.source, context.inputs)
         return found

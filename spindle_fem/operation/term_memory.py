@@ -1,4 +1,4 @@
-"""What terms remember over a whole run, all its steps at once.
+"""Memory of terms over a whole run, all its steps at once.
 
 A memory follows from the one before it, step by step, mostly along a straight line, as a first-order
 lag does: evaluated at all steps together, with its derivative, a guess then leads to the answer by one
@@ -16,7 +16,7 @@ from spindle_fem.operation.effect_terms import Derivatives, EffectTerms, Instant
 
 Array = NDArray[np.float64]
 
-# Of the largest memory: a round that moves less ends.
+# Share of the largest memory below which a round's change ends the iteration.
 SETTLED = 1e-11
 
 
