@@ -174,7 +174,7 @@ def options(path: str = "", model: type[BaseModel] = MachineSpec) -> dict[str, R
         while inner.kind in ("list", "mapping"):
             own += ".NAME" if inner.kind == "mapping" else ""
             inner = shape_of(inner.inner)
-        for nested in inner.models:
+        for nested in written(inner):
             found |= options(own, nested)
     return found
 
@@ -204,7 +204,7 @@ def _range_text(thing: Any) -> str:
 
 def key_sections(path: str, shape: Shape, *, in_list: bool) -> Iterator[str]:
     """Lines that list the keys of a table and of those in it."""
-    for model in shape.models:
+    for model in written(shape):
         kind = (
             f" with kind {value_text(annotation_of(model.model_fields['kind']))}"
             if len(shape.models) > 1
@@ -224,6 +224,11 @@ def key_sections(path: str, shape: Shape, *, in_list: bool) -> Iterator[str]:
                 nested += "" if inner.kind == "list" else ".NAME"
                 if entries.kind == "table":
                     yield from key_sections(nested, entries, in_list=inner.kind == "list")
+
+
+def written(shape: Shape) -> tuple[type[BaseModel], ...]:
+    """Tables of a shape that a file gives, without those that are made of others."""
+    return tuple(model for model in shape.models if not getattr(model, "made", False))
 
 
 def _fields(model: type[BaseModel]) -> list[tuple[str, FieldInfo]]:

@@ -105,6 +105,7 @@ CHANGES_RESULT = (
 )
 _HARMS = (
     "grease_temperature",
+    "oil_temperature",
     "counter_bearing_unloaded",
     "gross_sliding",
     "contact_pressure",

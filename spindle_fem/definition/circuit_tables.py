@@ -20,20 +20,21 @@ from spindle_fem.definition.field_types import (
     Name,
     PositiveLength,
     Range,
-    SpecModel,
     Temperature,
     UncertainNumber,
     VolumeFlow,
     choice_field,
     raise_faults,
 )
+from spindle_fem.definition.lubrication_tables import LubricationFilm
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.units import Uncertain
 
 DuctKind = choice_field("spindle_fem.physics.coolant.duct_kinds")
 DuctLaw = choice_field("spindle_fem.physics.coolant.duct_films")
 
 
-class CircuitFilm(SpecModel):
+class CircuitFilm(StreamFilm):
     """A separate coolant that flows along a straight duct and warms on its way.
 
     The walls need no ``[[surface]]``: cells along the flow name them ``NAME.1``, ``NAME.2`` and so on from
@@ -90,11 +91,6 @@ class CircuitFilm(SpecModel):
         return self
 
     @property
-    def temperature(self) -> float:
-        """Temperature of the fluid at the inlet, K."""
-        return self.inlet_temperature
-
-    @property
     def length(self) -> float:
         """Length of the duct, m."""
         return self.z[1] - self.z[0]
@@ -106,11 +102,6 @@ class CircuitFilm(SpecModel):
         if self.duct == "annulus":
             return tuple((f"{self.name}.inner.{n}", f"{self.name}.outer.{n}") for n in numbers)
         return tuple((f"{self.name}.{n}",) for n in numbers)
-
-    @property
-    def surface(self) -> tuple[str, ...]:
-        """Names of all its walls, as other films have them."""
-        return tuple(name for names in self.cell_surfaces for name in names)
 
     @property
     def walls(self) -> tuple[Surface, ...]:
@@ -135,4 +126,6 @@ class CircuitFilm(SpecModel):
         )
 
 
-Film = Annotated[ConstantFilm | NaturalFilm | RotatingFilm | CircuitFilm, Field(discriminator="kind")]
+Film = Annotated[
+    ConstantFilm | NaturalFilm | RotatingFilm | CircuitFilm | LubricationFilm, Field(discriminator="kind")
+]

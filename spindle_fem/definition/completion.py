@@ -52,6 +52,7 @@ def complete(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Assumpti
     _bearing_places(result, assumed)
     assumed += [Assumption(where, rule) for where, rule in add_set_rules(result)]
     _grease(result, assumed)
+    _oils(result, assumed)
     _materials(result, assumed)
     if result.get("surroundings") == "workshop":
         # Loads numpy, which reading other definitions does without.
@@ -191,6 +192,24 @@ def _grease(content: dict[str, Any], assumed: list[Assumption]) -> None:
         content["grease"] = _under(found, table)
         values = f"{found['kinematic_viscosity_40']} at 40 °C, {found['kinematic_viscosity_100']} at 100 °C"
         assumed.append(Assumption("grease", f"{name}: {found['name']}, {values}"))
+
+
+def _oils(content: dict[str, Any], assumed: list[Assumption]) -> None:
+    groups = content.get("bearing_set")
+    if not isinstance(groups, list):
+        return
+    content["bearing_set"] = [_with_oil(group, assumed) for group in groups]
+
+
+def _with_oil(group: Any, assumed: list[Assumption]) -> Any:
+    table = group.get("lubrication") if isinstance(group, Mapping) else None
+    name = table.get("oil") if isinstance(table, Mapping) else None
+    found = standard_materials.OILS.get(name) if isinstance(name, str) else None
+    if found is None or not set(found) - set(table):
+        return group
+    values = f"{found['kinematic_viscosity_40']} at 40 °C, {found['kinematic_viscosity_100']} at 100 °C"
+    assumed.append(Assumption(f"bearing_set.{group.get('name')}.lubrication", f"{name}: {values}"))
+    return {**group, "lubrication": _under(found, table)}
 
 
 def _materials(content: dict[str, Any], assumed: list[Assumption]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from spindle_fem.definition.bearing_faults import bearing_faults
 from spindle_fem.definition.bearing_seats import followed_joint_faults
 from spindle_fem.definition.bearing_types import BearingType
+from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.displacement_faults import displacement_faults
 from spindle_fem.definition.machine_spec import MachineSpec, Probe
 from spindle_fem.definition.schema import names_of
@@ -213,14 +214,16 @@ def _heat(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
     names = declared.names["bearing"]
     if spec.heat is None:
         return
-    by_contact = [group.name for group in spec.bearing_set if group.ball_row.kind == "contact"]
+    dry = [group for group in spec.bearing_set if group.lubrication is None]
+    contacts = any(group.ball_row.kind == "contact" for group in spec.bearing_set)
+    by_contact = [group.name for group in dry] if contacts else []
     if "grease" in declared.tables:
         pass
-    elif spec.heat.model != "table" and names:
+    elif spec.heat.model != "table" and names and (dry or not spec.bearing_set):
         yield SpecError(
             "grease",
             f'is missing, heat.model = "{spec.heat.model}" needs it.',
-            'Add [grease], or heat.model = "table".',
+            'Add [grease], lubrication of every bearing set, or heat.model = "table".',
         )
     elif by_contact:
         yield SpecError(
@@ -302,6 +305,8 @@ def _surfaces(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError
 
 def _circuits(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
     for film in spec.circuits:
+        if not isinstance(film, CircuitFilm):
+            continue
         for key in ("part", "outer_part"):
             part = getattr(film, key)
             if part is None:

@@ -9,6 +9,7 @@ concerns one table is checked here and in :mod:`spindle_fem.definition.solid_tab
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -52,6 +53,7 @@ from spindle_fem.definition.field_types import (
     quantity_field,
     raise_faults,
 )
+from spindle_fem.definition.lubrication_tables import Lubrication, LubricationFilm
 from spindle_fem.definition.solid_tables import (
     AnnulusSegment,
     BallRow,
@@ -62,6 +64,7 @@ from spindle_fem.definition.solid_tables import (
     SetBearing,
 )
 from spindle_fem.definition.source_tables import HeatSource, SourceTable
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.units import Uncertain
 
 MACHINE_SCHEMA = "spindle-fem/machine/1"
@@ -295,7 +298,7 @@ class MachineSpec(SpecModel):
     bearing_set: tuple[BearingSet, ...] = ()
     """Bearings in their sets."""
     grease: Grease | None = None
-    """Needed unless ``heat.model = "table"``."""
+    """Needed unless ``heat.model = "table"`` or every bearing set has its `lubrication`."""
     channel: Channel | None = None
     """Goes with ``[coolant]``."""
     coolant: Coolant | None = None
@@ -323,6 +326,34 @@ class MachineSpec(SpecModel):
     effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
     """Effects of the catalogue that are switched on."""
 
+    @model_validator(mode="after")
+    def _add_streams(self) -> MachineSpec:
+        """Streams through bearings are films like all others; a machine that is read again gets them once."""
+        given = {film.name: film for film in self.film if isinstance(film, LubricationFilm)}
+        own = tuple(film for film in self.film if not isinstance(film, LubricationFilm))
+        streams = (
+            _lubrication_film(group, bearing, self.bearing_types[group.type_name(bearing)])
+            for group, bearing in self.bearings
+            if group.lubrication is not None and group.type_name(bearing) in self.bearing_types
+        )
+        found = tuple(
+            film.model_copy(update={"factor": given[film.name].factor}) if film.name in given else film
+            for film in streams
+        )
+        if found or given:
+            # Frozen for everybody else.
+            self.__dict__["film"] = own + found
+        return self
+
+    def lubricant_of(self, group: BearingSet) -> Grease | Lubrication | None:
+        """What lubricates a set: its own oil, or the machine's grease."""
+        return group.lubrication or self.grease
+
+    @property
+    def knows_lubricants(self) -> bool:
+        """Whether every bearing set has grease or oil."""
+        return all(self.lubricant_of(group) is not None for group in self.bearing_set)
+
     @property
     def bearings(self) -> tuple[tuple[BearingSet, SetBearing], ...]:
         """Every bearing with its set, in file order."""
@@ -342,9 +373,9 @@ class MachineSpec(SpecModel):
         return coolant is not None and (coolant.pressure_limit, coolant.pump_curve) != (None, None)
 
     @property
-    def circuits(self) -> tuple[CircuitFilm, ...]:
-        """Circuits beside the channel."""
-        return tuple(film for film in self.film if isinstance(film, CircuitFilm))
+    def circuits(self) -> tuple[StreamFilm, ...]:
+        """Streams beside the channel: circuits, oil or air through bearings."""
+        return tuple(film for film in self.film if isinstance(film, StreamFilm))
 
     @property
     def source_inputs(self) -> tuple[str, ...]:
@@ -373,6 +404,23 @@ class MachineSpec(SpecModel):
         raise KeyError(part_name)
 
 
+def _lubrication_film(group: BearingSet, bearing: SetBearing, kind: BearingType) -> LubricationFilm:
+    balls = isinstance(kind, BallBearingType)
+    return LubricationFilm.model_construct(
+        kind="lubrication",
+        name=f"{bearing.name}.lubrication",
+        bearing=bearing.name,
+        lubrication=group.lubrication,
+        pitch_diameter=kind.pitch,
+        element_diameter=kind.element_diameter,
+        axial_cosine=math.cos(kind.contact_angle) if balls else 1.0,
+        inner_diameter=kind.inner_ring_outer_diameter,
+        outer_diameter=kind.outer_ring_inner_diameter,
+        rolls_on_balls=balls,
+        factor=group.lubrication.film_factor,
+    )
+
+
 __all__ = [
     "MACHINE_SCHEMA",
     "AnnulusSegment",
@@ -394,6 +442,8 @@ __all__ = [
     "HeatSource",
     "HeatTable",
     "JointGroup",
+    "Lubrication",
+    "LubricationFilm",
     "MachineSpec",
     "Material",
     "MeshSettings",
@@ -409,5 +459,6 @@ __all__ = [
     "SetBearing",
     "SharedFactor",
     "SourceTable",
+    "StreamFilm",
     "Surface",
 ]

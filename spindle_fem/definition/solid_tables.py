@@ -31,6 +31,7 @@ from spindle_fem.definition.field_types import (
     quantity_field,
     raise_faults,
 )
+from spindle_fem.definition.lubrication_tables import Lubrication
 from spindle_fem.units import Uncertain
 
 PoissonRatio = quantity_field("", at_least=0.0, at_most=0.5)
@@ -199,6 +200,8 @@ class BearingSet(SpecModel):
     """Factor on the friction heat of every bearing of the set."""
     ball_row: BallRow = BallRow()
     """Heat paths through the balls."""
+    lubrication: Lubrication | None = None
+    """Oil in the place of ``[grease]``."""
     bearing: Annotated[tuple[SetBearing, ...], Field(min_length=1)]
     """From the nose to the rear."""
     spacers: Name | None = None

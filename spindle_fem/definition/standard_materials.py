@@ -48,3 +48,21 @@ GREASES: dict[str, dict[str, Any]] = {
         "pressure_viscosity": "2.2e-8 1/Pa",
     },
 }
+
+# Typical mineral oils of ISO 3448 grades with a viscosity index of about 100, as coolants of these names.
+OILS: dict[str, dict[str, Any]] = {
+    f"iso_vg_{grade}": {
+        "marks": {"default": "A"},
+        "kinematic_viscosity_40": f"{grade} mm**2/s",
+        "kinematic_viscosity_100": f"{at_100} mm**2/s",
+        "density": f"{density} kg/m**3",
+    }
+    for grade, at_100, density in (
+        (10, 2.6, 850),
+        (22, 4.3, 866),
+        (32, 5.4, 871),
+        (46, 6.8, 877),
+        (68, 8.7, 882),
+        (100, 11.2, 886),
+    )
+}

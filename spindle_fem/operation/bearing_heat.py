@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.operation.assembled_sets import assembled_set, require_known_friction
+from spindle_fem.operation.bearing_lubricants import SetLubricant
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.radial_loads import radial_loads
@@ -24,7 +25,6 @@ from spindle_fem.physics.bearings import mounting
 from spindle_fem.physics.bearings.bearing_set import solve_bearing_set, solve_states
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.contact_conduction import BallConductance, ball_conductance
-from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.bearings.roller_set import RollerSet, solve_roller_set
@@ -185,17 +185,7 @@ class BearingMechanics:
 
     def __init__(self, spec: MachineSpec, seats: Mapping[str, SeatBodies] | None = None) -> None:
         self.spec = spec
-        grease = spec.grease
-        self.lubricant = Lubricant(
-            kinematic_viscosity_40=grease.kinematic_viscosity_40,
-            kinematic_viscosity_100=grease.kinematic_viscosity_100,
-            density=grease.base_oil_density,
-            pressure_viscosity=grease.pressure_viscosity,
-            thermal_conductivity=grease.thermal_conductivity,
-            film_starvation=grease.film_starvation,
-            path_fill=grease.path_fill,
-            temperature_limit=grease.temperature_limit,
-        )
+        self.lubricants = {group.name: SetLubricant(spec, group) for group in spec.bearing_set}
         level = spec.heat.model
         self.options = HeatOptions(
             level="palmgren" if level == "table" else level,
@@ -245,17 +235,18 @@ class BearingMechanics:
                     point.speed,
                     self._load(group, point),
                     set_temperatures,
-                    lubricant=self.lubricant,
+                    lubricant=self.lubricants[group.name].at(point.speed),
                     control=_control(options or self.options),
-                    heat=options or self.options,
+                    heat=self.lubricants[group.name].options(options or self.options),
                 )
             found |= {state.name: state for state in states}
         return found
 
     def knows(self, temperature: float) -> bool:
-        """Whether the grease's viscosity is known at a temperature (K)."""
+        """Whether the viscosity of every lubricant is known at a temperature (K)."""
         try:
-            self.lubricant.kinematic_viscosity(temperature)
+            for lubricant in self.lubricants.values():
+                lubricant.at(0.0).kinematic_viscosity(temperature)
         except OutOfValidityError:
             return False
         return True
@@ -311,9 +302,9 @@ class BearingMechanics:
                     point.speed,
                     self._load(group, point),
                     set_temperatures,
-                    lubricant=self.lubricant,
+                    lubricant=self.lubricants[group.name].at(point.speed),
                     control=_control(self.options),
-                    heat=self.options,
+                    heat=self.lubricants[group.name].options(self.options),
                 )
             for states in zip(*found, strict=True):
                 paths = [self._ball_path(group, state) for state in states]
@@ -341,8 +332,8 @@ class BearingMechanics:
             point.speed,
             self._load(group, point),
             self._set_temperatures(group, around, expand),
-            lubricant=self.lubricant,
-            heat=options or self.options,
+            lubricant=self.lubricants[group.name].at(point.speed),
+            heat=self.lubricants[group.name].options(options or self.options),
         )
 
     def _set_temperatures(
@@ -362,13 +353,13 @@ class BearingMechanics:
 
     def _ball_path(self, group: BearingSet, state: BearingState) -> BallConductance:
         bearing = next(item for item in group.bearing if item.name == state.name)
-        kind, grease = self.spec.bearing_types[group.type_name(bearing)], self.spec.grease
+        kind, lubricant = self.spec.bearing_types[group.type_name(bearing)], self.lubricants[group.name]
         return ball_conductance(
             state,
-            self.lubricant,
+            lubricant.at(state.speed),
             ring_conductivity=self.spec.materials[kind.ring_material].thermal_conductivity,
             ball_conductivity=self.spec.materials[kind.element_material].thermal_conductivity,
-            wetted_share=grease.free_volume_fill if grease.wetted_share is None else grease.wetted_share,
+            wetted_share=lubricant.wetted_share,
         )
 
     @staticmethod
@@ -427,6 +418,8 @@ class BearingMechanics:
                 **seats.get(name, {}),
             )
             warnings += state.warnings
+        for lubricant in self.lubricants.values():
+            warnings += lubricant.warnings(self.options)
         return heat, tuple(warnings)
 
     def _seats(

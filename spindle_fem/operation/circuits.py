@@ -1,4 +1,4 @@
-"""Circuits beside the channel: their films, and how their coolant warms on its way.
+"""Streams beside the channel (circuits, oil or air through bearings): their films, and how they warm.
 
 Properties and film are those of the inlet, so that at given coefficients everything is linear in the
 temperatures of the walls. Every model takes the warming from here.
@@ -13,43 +13,58 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.circuit_tables import CircuitFilm
+from spindle_fem.definition.lubrication_tables import LubricationFilm
+from spindle_fem.definition.stream_films import StreamFilm
+from spindle_fem.operation.bearing_lubricants import bearing_stream
 from spindle_fem.physics.coolant.duct_films import DUCT_FILMS
 from spindle_fem.physics.coolant.duct_kinds import DUCT_KINDS
 from spindle_fem.physics.coolant.ducts import DuctFlow
 from spindle_fem.physics.coolant.linear_march import MarchMaps, march_maps
+from spindle_fem.physics.coolant.lubrication_kinds import LUBRICATION_KINDS
 from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.physics.coolant.streams import StreamAnswer
 from spindle_fem.validity import CodedWarning
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class CircuitAnswer:
-    """Film of a circuit before its factor [W/(m²·K)], and what leaves the range of its law."""
+def stream_answer(film: StreamFilm, speed: float) -> StreamAnswer:
+    """Flow and film of a stream at a speed of the shaft [rad/s]."""
+    if isinstance(film, LubricationFilm):
+        return LUBRICATION_KINDS[film.lubrication.kind].film(bearing_stream(film, speed))
+    flow = duct_flow(film)
+    answer = DUCT_FILMS[film.law](flow)
+    conductivity = float(flow.properties.thermal_conductivity)
+    return StreamAnswer(
+        coefficient=answer.nusselt * conductivity / flow.section.hydraulic_diameter,
+        capacity_rate=flow.capacity_rate,
+        reynolds=flow.reynolds,
+        prandtl=flow.prandtl,
+        velocity=flow.velocity,
+        regime=flow.regime,
+        pressure_drop=flow.pressure_drop,
+        source=answer.source,
+        faults=answer.faults,
+    )
 
-    coefficient: float
-    source: str
-    warnings: tuple[CodedWarning, ...]
+
+def stream_warnings(film: StreamFilm, answer: StreamAnswer) -> tuple[CodedWarning, ...]:
+    """What leaves the range of a stream's laws."""
+    if not answer.faults:
+        return ()
+    text = f"Circuit {film.name}: {'; '.join(answer.faults)} ({answer.source})."
+    return (CodedWarning("circuit_film_extrapolated", text),)
+
+
+def capacity_rate(film: StreamFilm) -> float:
+    """Mass flow times heat capacity of a whole stream, W/K; the same at every speed."""
+    return stream_answer(film, 0.0).capacity_rate
 
 
 def duct_flow(film: CircuitFilm) -> DuctFlow:
     """Flow through the duct of a circuit."""
     section = DUCT_KINDS[film.duct](film.diameter, film.outer_diameter)
     return DuctFlow(section, film.length, coolant_by_name(film.fluid), film.flow, film.inlet_temperature)
-
-
-def circuit_film(film: CircuitFilm) -> CircuitAnswer:
-    """Mean film of a circuit by its law."""
-    flow = duct_flow(film)
-    answer = DUCT_FILMS[film.law](flow)
-    conductivity = float(flow.properties.thermal_conductivity)
-    warnings: tuple[CodedWarning, ...] = ()
-    if answer.faults:
-        text = f"Circuit {film.name}: {'; '.join(answer.faults)} ({answer.source})."
-        warnings = (CodedWarning("circuit_film_extrapolated", text),)
-    return CircuitAnswer(
-        answer.nusselt * conductivity / flow.section.hydraulic_diameter, answer.source, warnings
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +88,7 @@ class CircuitMarch:
     capacity_rate: float
 
     @classmethod
-    def of(cls, film: CircuitFilm, conductance: Array, cell: NDArray[np.int64]) -> CircuitMarch:
+    def of(cls, film: StreamFilm, conductance: Array, cell: NDArray[np.int64]) -> CircuitMarch:
         """March of a circuit.
 
         Parameters
@@ -83,16 +98,16 @@ class CircuitMarch:
         cell : (k,) int ndarray
             Cell of each, from the inlet.
         """
-        total = np.zeros(film.cells, dtype=conductance.dtype)
+        total = np.zeros(film.n_cells, dtype=conductance.dtype)
         np.add.at(total, cell, conductance)
-        share = np.zeros((film.cells, len(cell)), dtype=conductance.dtype)
+        share = np.zeros((film.n_cells, len(cell)), dtype=conductance.dtype)
         # A wall that does not conduct gives nothing; its share is of no account.
         there = total[cell] != 0.0
         share[cell, np.arange(len(cell))] = np.where(
             there, conductance / np.where(there, total[cell], 1.0), 0.0
         )
-        rate = duct_flow(film).capacity_rate
-        return cls(cell, share, march_maps(rate, np.ones(film.cells), total), rate)
+        rate = capacity_rate(film)
+        return cls(cell, share, march_maps(rate, np.ones(film.n_cells), total), rate)
 
     @property
     def warming(self) -> Array:
@@ -105,13 +120,13 @@ class CircuitMarch:
         return self.maps.outlet_from_wall @ self.share
 
 
-def wall_cells(film: CircuitFilm) -> NDArray[np.int64]:
+def wall_cells(film: StreamFilm) -> NDArray[np.int64]:
     """Cell of each wall of a circuit, in the order of ``film.surface``."""
     return np.array([n for n, names in enumerate(film.cell_surfaces) for _ in names], dtype=np.int64)
 
 
 def coolant_temperatures(
-    film: CircuitFilm, conductance: Mapping[str, float], wall: Mapping[str, float]
+    film: StreamFilm, conductance: Mapping[str, float], wall: Mapping[str, float]
 ) -> tuple[dict[str, float], float]:
     """Coolant at every wall of a circuit and at its outlet, K.
 

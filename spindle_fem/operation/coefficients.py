@@ -12,17 +12,18 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.definition.circuit_tables import CircuitFilm, Film
+from spindle_fem.definition.circuit_tables import Film
 from spindle_fem.definition.machine_spec import (
     BearingSet,
     ConstantFilm,
     Gap,
     MachineSpec,
     NaturalFilm,
+    StreamFilm,
 )
 from spindle_fem.definition.solid_tables import SetBearing
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
-from spindle_fem.operation.circuits import circuit_film
+from spindle_fem.operation.circuits import stream_answer, stream_warnings
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.surroundings.air_gaps import AirGap
@@ -62,9 +63,9 @@ def film_coefficient(
         return np.full(wall.shape, film.coefficient.value), ()
     if isinstance(film, NaturalFilm):
         return _natural_coefficient(film, wall, fluid), ()
-    if isinstance(film, CircuitFilm):
-        answer = circuit_film(film)
-        return np.full(wall.shape, film.factor.value * answer.coefficient), answer.warnings
+    if isinstance(film, StreamFilm):
+        answer = stream_answer(film, point.speed)
+        return np.full(wall.shape, film.factor.value * answer.coefficient), stream_warnings(film, answer)
     rotating = rotating_film(film.correlation, point.speed, film.diameter, minimum=film.minimum)
     return np.full(wall.shape, film.factor.value * rotating.value), rotating.warnings
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.circuit_tables import CircuitFilm
-from spindle_fem.definition.machine_spec import BearingSet, MachineSpec
+from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, StreamFilm
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.channel_cells import ChannelCells, build_channel_cells
@@ -230,7 +229,7 @@ class LoadsBuilder:
         films = {}
         for film in self.spec.film:
             fluid = fluid_temperature(film, point.ambient_temperature)
-            if isinstance(film, CircuitFilm):
+            if isinstance(film, StreamFilm):
                 films |= self._circuit_films(film, point, state, warnings, change)
                 continue
             for surface in film.surface:
@@ -246,7 +245,7 @@ class LoadsBuilder:
 
     def _circuit_films(
         self,
-        film: CircuitFilm,
+        film: StreamFilm,
         point: OperatingPoint,
         state: FieldState,
         warnings: list[CodedWarning],
@@ -272,7 +271,7 @@ class LoadsBuilder:
         }
 
     def circuit_coolant(
-        self, film: CircuitFilm, coefficients: Mapping[str, NDArray[np.float64]], state: FieldState
+        self, film: StreamFilm, coefficients: Mapping[str, NDArray[np.float64]], state: FieldState
     ) -> tuple[dict[str, float], float]:
         """Coolant of a circuit at each of its walls and at its outlet, K.
 

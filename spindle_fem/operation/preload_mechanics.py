@@ -77,7 +77,7 @@ class PreloadMechanics:
         group = sets.get(component)
         if group is None or group.fit is None or not group.preload > 0.0:
             return None
-        if self.spec.grease is None or not carries_rings(self.spec):
+        if self.spec.lubricant_of(group) is None or not carries_rings(self.spec):
             return None
         digest = _digest(self.spec, group.name, self.places)
         if digest not in _known:
@@ -243,9 +243,9 @@ class _SetSolver:
             speed,
             self.load,
             [self._temperatures(mounted, difference, gap) for difference in differences],
-            lubricant=self.mechanics.lubricant,
+            lubricant=self.mechanics.lubricants[self.group.name].at(speed),
             control=HEAT_MODELS[self.options.level].ball_attitude,
-            heat=self.options,
+            heat=self.mechanics.lubricants[self.group.name].options(self.options),
         )
         return np.array([[state.heat.total for state in states] for states in found])
 

@@ -282,6 +282,8 @@ def _film_legend(spec: MachineSpec) -> list[tuple[str, str]]:
             text = f"by speed, at least {film.minimum:g} W/(m²·K)"
         elif film.kind == "circuit":
             text = f"{film.fluid.replace('_', ' ')}, {film.flow * 6.0e4:.3g} L/min"
+        elif film.kind == "lubrication":
+            text = f"{film.lubrication.kind.replace('_', ' ')}, {film.flow * 6.0e4:.3g} L/min"
         else:
             text = f"natural convection and radiation, emissivity {film.emissivity:g}"
         to = "ambient" if film.temperature == "ambient" else f"{film.temperature - ZERO_CELSIUS_K:.1f} °C"

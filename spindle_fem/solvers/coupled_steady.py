@@ -13,7 +13,7 @@ from spindle_fem.errors import ConvergenceError, NoSteadyStateError, SpindleFemE
 from spindle_fem.model.mesh.linear_solvers import RELATIVE_TOLERANCE
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady
 from spindle_fem.operation.bearing_heat import follows_preload
-from spindle_fem.operation.circuits import duct_flow
+from spindle_fem.operation.circuits import capacity_rate
 from spindle_fem.operation.coolant_loop import CoolantState
 from spindle_fem.operation.loads import NO_CHANGE, LoadChange, Loads
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -272,7 +272,7 @@ def circuit_mismatch(machine: PreparedMachine, solution: ConductionSolution, loa
             # A term that shifts the fluid of one wall says nothing of the coolant that goes on.
             continue
         heat = np.array([solution.balance.films[surface] for surface in film.surface])
-        rise = duct_flow(film).capacity_rate * (outlet - film.inlet_temperature)
+        rise = capacity_rate(film) * (outlet - film.inlet_temperature)
         worst = max(worst, abs(float(heat.sum()) - rise) / max(float(np.abs(heat).sum()), 1.0e-12))
     return worst
 

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.model.mesh.evaluate import mean_matrix, probe_matrix
-from spindle_fem.operation.circuits import CircuitMarch, circuit_film, wall_cells
+from spindle_fem.operation.circuits import CircuitMarch, stream_answer, wall_cells
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 
@@ -26,8 +25,7 @@ class ReadingRows:
     Attributes
     ----------
     rows : (n_outputs, n + m) sparse array
-        Point probes, raceway means of every bearing, ball rows, outlets of circuits above their inlets,
-        channel cells.
+        Point probes, raceway means of every bearing, ball rows, walls of circuits, channel cells.
     probes : tuple of str
         In the order of the definition.
     """
@@ -61,7 +59,8 @@ class ReadingRows:
                     balls[row, operators.n_unknowns + lumped_names.index(node)] = 1.0 / len(nodes)
             blocks.append(sparse.csr_array(balls))
         if spec.circuits:
-            blocks.append(_widened(_circuit_outlets(machine), width))
+            walls = [name for film in spec.circuits for name in film.surface]
+            blocks.append(_widened(mean_matrix(operators, walls), width))
         if machine.builder.cells is not None:
             blocks.append(_widened(_cell_means(machine), width))
         rows = sparse.csr_array(sparse.vstack(blocks)) if blocks else sparse.csr_array((0, width))
@@ -82,7 +81,7 @@ class ReadingRows:
             if probe.kind == "coolant_outlet":
                 readings[:, column] = self._coolant_outlet(outputs, times, coolant_at)
             elif probe.kind == "circuit_outlet":
-                readings[:, column] = self._circuit_outlet(outputs, probe.circuit)
+                readings[:, column] = self._circuit_outlet(outputs, times, coolant_at, probe.circuit)
             else:
                 readings[:, column] = outputs[:, self._points.index(probe.name)]
         return readings
@@ -93,14 +92,23 @@ class ReadingRows:
         rings = outputs[:, first : first + 2 * number]
         return rings[:, 0::2], rings[:, 1::2], outputs[:, first + 2 * number : first + 3 * number]
 
-    def _circuit_outlet(self, outputs: Array, name: str) -> Array:
+    def _circuit_outlet(self, outputs: Array, times: Array, coolant_at: CoolantAt, name: str) -> Array:
         """Outlet of a circuit, its films those of the definition: (n_times,) K."""
-        machine = self.machine
-        number = [film.name for film in machine.spec.circuits].index(name)
-        film = machine.spec.circuits[number]
-        kept = 1.0 - float(_outlet_weights(machine, film).sum())
-        row = len(self._points) + 3 * len(self.bearings) + number
-        return outputs[:, row] + kept * film.inlet_temperature
+        machine, first = self.machine, len(self._points) + 3 * len(self.bearings)
+        for film in machine.spec.circuits:
+            if film.name == name:
+                break
+            first += len(film.surface)
+        walls = outputs[:, first : first + len(film.surface)] - film.inlet_temperature
+        areas = np.array([machine.builder.facet_area[name].sum() for name in film.surface])
+        speeds = np.array([coolant_at(float(time))[0].speed for time in times])
+        found = np.empty(len(times))
+        for speed in np.unique(speeds):
+            value = film.factor.value * stream_answer(film, float(speed)).coefficient
+            weights = CircuitMarch.of(film, value * areas, wall_cells(film)).outlet
+            then = speeds == speed
+            found[then] = film.inlet_temperature + walls[then] @ weights
+        return found
 
     def _coolant_outlet(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
         builder = self.machine.builder
@@ -117,23 +125,6 @@ class ReadingRows:
 def _widened(block: sparse.sparray, width: int) -> sparse.csr_array:
     missing = sparse.csr_array((block.shape[0], width - block.shape[1]))
     return sparse.csr_array(sparse.hstack((block, missing)))
-
-
-def _outlet_weights(machine: PreparedMachine, film: CircuitFilm) -> Array:
-    """Outlet of a circuit from the means of its walls, (n_walls,)."""
-    value = film.factor.value * circuit_film(film).coefficient
-    areas = np.array([machine.builder.facet_area[name].sum() for name in film.surface])
-    return CircuitMarch.of(film, value * areas, wall_cells(film)).outlet
-
-
-def _circuit_outlets(machine: PreparedMachine) -> sparse.csr_array:
-    """Contribution of the walls of each circuit to its outlet, (n_circuits, n_unknowns)."""
-    rows = [
-        sparse.csr_array(_outlet_weights(machine, film)[None, :])
-        @ mean_matrix(machine.operators, list(film.surface))
-        for film in machine.spec.circuits
-    ]
-    return sparse.csr_array(sparse.vstack(rows))
 
 
 def _cell_means(machine: PreparedMachine) -> sparse.csr_array:

@@ -57,12 +57,12 @@ def heat_study(
     Raises
     ------
     SpecError
-        The machine has no bearings or no grease.
+        The machine has no bearings or no lubricant.
     """
     if not spec.bearing_set:
         raise SpecError(spec.name, "has no [[bearing_set]].", "There is no bearing heat to study.")
-    if spec.grease is None:
-        raise SpecError(f"{spec.name}: grease", "is missing.", "Films and friction need it.")
+    if not spec.knows_lubricants:
+        raise SpecError(f"{spec.name}: grease", "is missing.", "Films and friction need it, or lubrication.")
     chosen = tuple(speeds) or usual_speeds(spec)
     point = OperatingPoint.of(spec)
     mechanics = BearingMechanics(spec)

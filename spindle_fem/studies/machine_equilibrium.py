@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.machine_spec import Lubrication, MachineSpec
 from spindle_fem.operation.bearing_heat import follows_preload
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import BearingResult, Equilibrium
@@ -66,6 +66,7 @@ def assembled_preloads(spec: MachineSpec) -> dict[str, float]:
 
 def _limits(spec: MachineSpec, coupled: CoupledState, bearings: dict[str, BearingResult]) -> list[str]:
     found = []
+    lubricants = {bearing.name: spec.lubricant_of(group) for group, bearing in spec.bearings}
     for name, heat in coupled.loads.bearing_heat.items():
         if heat.contact_pressure > FATIGUE_PRESSURE:
             found.append(
@@ -75,7 +76,9 @@ def _limits(spec: MachineSpec, coupled: CoupledState, bearings: dict[str, Bearin
         if heat.seat_pressure is not None and heat.seat_pressure[0] == 0.0:
             found.append(f"{name}: the inner ring has lost its interference on the shaft.")
         hottest = max(bearings[name].temperature_inner, bearings[name].temperature_outer)
-        if spec.grease is not None and hottest > spec.grease.temperature_limit:
-            limit = spec.grease.temperature_limit - 273.15
-            found.append(f"{name}: grease at {hottest - 273.15:.1f} °C, above its {limit:.1f} °C.")
+        lubricant = lubricants[name]
+        if lubricant is not None and hottest > lubricant.temperature_limit:
+            limit = lubricant.temperature_limit - 273.15
+            word = "oil" if isinstance(lubricant, Lubrication) else "grease"
+            found.append(f"{name}: {word} at {hottest - 273.15:.1f} °C, above its {limit:.1f} °C.")
     return found

@@ -59,11 +59,11 @@ def check_coldest(coldest_inside: float, coldest_outside: float) -> Check:
     )
 
 
-def check_grease(temperatures: dict[str, float], limit: float) -> Check:
-    """Grease stays below its limit; ``temperatures`` is the warmer raceway of each bearing, K."""
+def check_lubricant(word: str, temperatures: dict[str, float], limit: float) -> Check:
+    """Grease or oil stays below its limit; ``temperatures`` is the warmer raceway of each bearing, K."""
     hottest = max(temperatures, key=temperatures.get)
     return _within(
-        "grease temperature",
+        f"{word} temperature",
         temperatures[hottest] - ZERO_CELSIUS_K,
         limit - ZERO_CELSIUS_K,
         "degC",

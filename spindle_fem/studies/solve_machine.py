@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
-from spindle_fem.operation.circuits import circuit_film, duct_flow
+from spindle_fem.operation.circuits import stream_answer
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import (
     BearingResult,
@@ -137,19 +137,17 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     ]
     if coupled.coolant is not None:
         done.append(checks.check_coolant(coolant_mismatch(machine, solution, coupled.coolant)))
-    circuits = _circuits(machine, coupled)
+    circuits = _circuits(machine, point, coupled)
     if circuits:
         done.append(checks.check_circuits(circuit_mismatch(machine, solution, coupled.loads)))
     warnings += [*_pump_pressure(spec, coolant), *_omitted_preload(machine, point, coupled, lumped)]
-    if spec.grease is not None and bearings:
-        grease = checks.check_grease(
-            {name: max(item.temperature_inner, item.temperature_outer) for name, item in bearings.items()},
-            spec.grease.temperature_limit,
-        )
-        done.append(grease)
-        if not grease.passed:
-            text = f"Grease reaches {grease.value:.1f} °C, its limit is {grease.limit:.1f} °C."
-            warnings.append(CodedWarning("grease_temperature", text))
+    for lubricant in _lubricants(spec, bearings):
+        done.append(lubricant)
+        if not lubricant.passed:
+            word = lubricant.name.partition(" ")[0]
+            reached, limit = f"{lubricant.value:.1f} °C", f"{lubricant.limit:.1f} °C"
+            text = f"{word.capitalize()} reaches {reached}, its limit is {limit}."
+            warnings.append(CodedWarning(f"{word}_temperature", text))
     films = coupled.loads.films
     return ThermalResult(
         spec=spec,
@@ -310,12 +308,28 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
     )
 
 
-def _circuits(machine: PreparedMachine, coupled: CoupledState) -> dict[str, CircuitResult]:
-    """Flow, heat and film of every circuit beside the channel."""
+def _lubricants(spec: MachineSpec, bearings: Mapping[str, BearingResult]) -> Iterator[checks.Check]:
+    """Warmest raceway of the bearings in grease, and of those in oil of each limit."""
+    warmest: dict[tuple[str, float], dict[str, float]] = {}
+    for group, bearing in spec.bearings:
+        lubricant = spec.lubricant_of(group)
+        if lubricant is not None and bearing.name in bearings:
+            found = bearings[bearing.name]
+            word = "grease" if group.lubrication is None else "oil"
+            own = warmest.setdefault((word, lubricant.temperature_limit), {})
+            own[bearing.name] = max(found.temperature_inner, found.temperature_outer)
+    for (word, limit), temperatures in warmest.items():
+        yield checks.check_lubricant(word, temperatures, limit)
+
+
+def _circuits(
+    machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState
+) -> dict[str, CircuitResult]:
+    """What every stream beside the channel did."""
     found = {}
     outlets = circuit_outlets(machine, coupled.solution, coupled.loads)
     for film in machine.spec.circuits:
-        flow, law = duct_flow(film), circuit_film(film)
+        answer = stream_answer(film, point.speed)
         areas = {name: float(machine.builder.facet_area[name].sum()) for name in film.surface}
         films = {name: float(coupled.loads.films[name].coefficient.mean()) for name in film.surface}
         found[film.name] = CircuitResult(
@@ -323,13 +337,13 @@ def _circuits(machine: PreparedMachine, coupled: CoupledState) -> dict[str, Circ
             inlet_temperature=film.inlet_temperature,
             outlet_temperature=outlets[film.name],
             heat=float(sum(coupled.solution.balance.films[name] for name in film.surface)),
-            reynolds=flow.reynolds,
-            prandtl=flow.prandtl,
-            velocity=flow.velocity,
-            regime=flow.regime,
-            source=law.source,
+            reynolds=answer.reynolds,
+            prandtl=answer.prandtl,
+            velocity=answer.velocity,
+            regime=answer.regime,
+            source=answer.source,
             film_coefficient=sum(films[name] * areas[name] for name in areas) / sum(areas.values()),
-            pressure_drop=flow.pressure_drop,
+            pressure_drop=answer.pressure_drop,
             wetted_area=sum(areas.values()),
         )
     return found

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.effects.framework.machine_view import ChannelFlow, MachineView
 from spindle_fem.effects.registry import effects_in_definition
@@ -101,7 +102,7 @@ def view_of(names: MachineNames, recording: Recording) -> MachineView:
         typical_heat=max(LEAST_HEAT, float(tabulated.max())),
         typical_rise=usual_rise(recording, inputs["ambient"]),
         channel=channel,
-        circuits=tuple(film.name for film in spec.circuits),
+        circuits=tuple(film.name for film in spec.circuits if isinstance(film, CircuitFilm)),
         reynolds=_reynolds(channel, inputs["coolant_flow"], inputs["coolant_inlet"]),
         friction=tables if spec.heat.model == "table" else {},
         inner_share=spec.heat.inner_share.value,
@@ -121,7 +122,7 @@ def _films(
     spec, places = names.spec, layout.places
     rotating = {part.name for part in spec.part if part.rotating}
     for film in spec.film:
-        if isinstance(film, CircuitFilm):
+        if isinstance(film, StreamFilm):
             # Effects on coolant handle these; here are the films to the air around the machine.
             continue
         for name in film.surface:
@@ -250,9 +251,11 @@ def _wetted_volume(spec: MachineSpec) -> float:
 
 
 def _viscosity(spec: MachineSpec) -> dict[str, tuple[float, float]]:
-    if spec.grease is None:
+    """Of the first set's lubricant: effects on friction know one oil a machine."""
+    lubricants = [spec.lubricant_of(group) for group in spec.bearing_set] or [spec.grease]
+    if lubricants[0] is None:
         return {}
-    return {"viscosity": (spec.grease.kinematic_viscosity_40, spec.grease.kinematic_viscosity_100)}
+    return {"viscosity": (lubricants[0].kinematic_viscosity_40, lubricants[0].kinematic_viscosity_100)}
 
 
 def _channel(spec: MachineSpec) -> ChannelFlow | None:

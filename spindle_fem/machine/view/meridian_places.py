@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.circuit_tables import CircuitFilm
+from spindle_fem.definition.machine_spec import LubricationFilm, MachineSpec
 from spindle_fem.machine.view.part_roles import CHANNEL_WALL, SHAFT_GAP, STANDING_GAP, Layout
 from spindle_fem.machine.view.place_names import AROUND, NEAR, STANDARD_DISTANCE
 
@@ -99,7 +100,11 @@ def _of_probe(spec: MachineSpec, name: str) -> tuple[Region, ...]:
             if probe.kind == "point":
                 return (Region((probe.z, probe.z), (probe.r, probe.r)),)
             for film in spec.circuits:
-                if film.name == probe.circuit:
+                if film.name != probe.circuit:
+                    continue
+                if isinstance(film, LubricationFilm):
+                    return _of_bearings(spec, film.bearing)
+                if isinstance(film, CircuitFilm):
                     place = film.z[1] if film.flows_to == "rear" else film.z[0]
                     return (Region((place, place), (0.5 * film.diameter,) * 2),)
             channel = spec.channel

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
-from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.machine_spec import NaturalFilm
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.model.lumped.ball_contacts import BallContactLaw, ContactFaces
 from spindle_fem.model.lumped.friction_table import FrictionTables
 from spindle_fem.model.lumped.heat_laws import (
@@ -299,7 +299,7 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
     """Films to the surroundings and the bands of mixed air."""
     spec = machine.spec
     for film in spec.film:
-        if isinstance(film, CircuitFilm):
+        if isinstance(film, StreamFilm):
             laws.append(_circuit(machine, film, point))
             continue
         if film.temperature == "ambient":
@@ -343,8 +343,8 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
         start += bands.n_bands
 
 
-def _circuit(machine: MachineNetwork, film: CircuitFilm, point: OperatingPoint) -> CircuitLaw:
-    """Coolant of a circuit, eliminated: it has no heat capacity."""
+def _circuit(machine: MachineNetwork, film: StreamFilm, point: OperatingPoint) -> CircuitLaw:
+    """The coolant of a circuit, eliminated: it holds no heat of its own."""
     value, _ = film_coefficient(film, point, np.zeros(1), film.inlet_temperature)
     patches = [machine.surfaces[surface] for surface in film.surface]
     patch = SurfacePatch.joined(patches)

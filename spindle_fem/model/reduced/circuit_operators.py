@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.circuit_tables import CircuitFilm
-from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.machine_spec import MachineSpec, StreamFilm
 from spindle_fem.model.reduced.class_operators import ClassOperators
 from spindle_fem.model.reduced.coolant_maps import COMPLEX_STEP
 from spindle_fem.model.thermal_model import ThermalModel
@@ -52,7 +51,7 @@ class CircuitWalls:
         Dense, with a film for each wall.
     """
 
-    def __init__(self, model: ThermalModel, film: CircuitFilm) -> None:
+    def __init__(self, model: ThermalModel, film: StreamFilm) -> None:
         names = [f"film.{surface}" for surface in film.surface]
         self.rows = np.array([model.coefficient_names.index(name) for name in names])
         self.load = model.fluid_load[[model.fluid_names.index(name) for name in names]]
@@ -60,7 +59,7 @@ class CircuitWalls:
         self.mean = self.load / self.area[:, None]
         self.cell = wall_cells(film)
 
-    def maps(self, film: CircuitFilm, values: Array) -> CircuitMaps:
+    def maps(self, film: StreamFilm, values: Array) -> CircuitMaps:
         """Maps at coefficients of the walls, (k,) W/(m²·K); they may be complex, for derivatives."""
         march = CircuitMarch.of(film, values * self.area, self.cell)
         weighted, warming, outlet = values[:, None] * self.load, march.warming, march.outlet
@@ -71,7 +70,7 @@ class CircuitWalls:
             1.0 - outlet.sum(),
         )
 
-    def heat(self, film: CircuitFilm, values: Array, unknowns: Array) -> Array:
+    def heat(self, film: StreamFilm, values: Array, unknowns: Array) -> Array:
         """Heat that each wall gives to the coolant at states (..., n), (..., k) W."""
         rise = unknowns @ self.mean.T - film.inlet_temperature
         warming = CircuitMarch.of(film, values * self.area, self.cell).warming

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.machine_spec import AnnulusSegment, MachineSpec, Part
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.definition.tolerances import DIAMETER_SHARE, PLACE, sigma_of
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
@@ -442,7 +442,7 @@ def _conducts(group: Any) -> bool:
 def _masses(spec: MachineSpec, mesh: TaggedMesh) -> Iterator[StructuralDirection]:
     """Steel on surfaces with a film of their own: tool holders, pulleys, what is screwed on."""
     for film in spec.film:
-        if isinstance(film, CircuitFilm):
+        if isinstance(film, StreamFilm):
             continue
         for surface in film.surface:
             part = mesh.part_of_surface[surface]

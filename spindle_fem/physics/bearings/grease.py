@@ -50,6 +50,8 @@ class Lubricant:
         not the fill of the free volume.
     temperature_limit : float, [K]
         Above it the grease ages fast: a warning.
+    word : {"grease", "oil"}
+        For messages.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class Lubricant:
     film_starvation: float = 1.0
     path_fill: float = 0.01
     temperature_limit: float = 393.15
+    word: Literal["grease", "oil"] = "grease"
 
     def __post_init__(self) -> None:
         lowest = _WALTHER_LOWEST_MM2_S * 1e-6
@@ -199,8 +202,8 @@ class Lubricant:
         if temperature > self.temperature_limit:
             warnings.append(
                 CodedWarning(
-                    "grease_temperature",
-                    f"{name}: {temperature - 273.15:.1f} °C is above the grease's limit of "
+                    f"{self.word}_temperature",
+                    f"{name}: {temperature - 273.15:.1f} °C is above the {self.word}'s limit of "
                     f"{self.temperature_limit - 273.15:.1f} °C.",
                 )
             )

@@ -36,12 +36,18 @@ class HeatOptions:
         2 F_R u. Some papers count one.
     hysteresis_loss : float, [-]
         Share of the elastic work lost in a load cycle of hard steel.
+    palmgren_f0_rollers : float or None, [-]
+        f_0 of a row of rollers; that of the bearing or its kind where None.
+    skf_replenishment : float, [-]
+        K_rs: 6e-8 for grease and oil-air, 3e-8 for oil baths and jets.
     """
 
     level: str = "full"
     rolling_surfaces: int = 2
     hysteresis_loss: float = 0.01
     palmgren_f0: float = 2.0
+    palmgren_f0_rollers: float | None = None
+    skf_replenishment: float = 6.0e-8
     skf_friction_ehl: float = 0.04
     skf_friction_boundary: float = 0.15
 

@@ -151,7 +151,7 @@ def _checks(coarse: MachineNetwork, smeared: MachineNetworkState, heat_model: He
         perfect = _with_perfect_lands(machine)
         state = solve_machine_network(perfect, point, heat_model=heat_model)
         found["perfect_fins"] = gather_network(coarse, state) - base
-    if machine.spec.bearing_set and machine.spec.grease is not None:
+    if machine.spec.bearing_set and machine.spec.knows_lubricants:
         found["raceway_bands"] = _narrow_raceways(coarse, smeared, heat_model)
     return found
 

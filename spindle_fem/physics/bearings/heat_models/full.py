@@ -73,6 +73,10 @@ def _rolling_powers(inputs: HeatInputs, options: HeatOptions) -> tuple[FloatArra
     reduction = float(
         inlet_shear_factor(inputs.speed, inputs.geometry.pitch_diameter, inputs.kinematic_viscosity)
     )
-    reduction *= float(replenishment_factor(inputs.speed, bore, outer, inputs.kinematic_viscosity))
+    reduction *= float(
+        replenishment_factor(
+            inputs.speed, bore, outer, inputs.kinematic_viscosity, constant=options.skf_replenishment
+        )
+    )
     lossy = hysteresis_force(patch.load, patch.semi_minor, patch.rolling_radius, options.hysteresis_loss)
     return options.rolling_surfaces * reduction * force * speed, lossy * speed

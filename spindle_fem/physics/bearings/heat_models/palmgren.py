@@ -25,7 +25,11 @@ from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 def of_rollers(inputs: RollerHeatInputs, options: HeatOptions) -> BearingHeat:
     """The same moments of roller bearings."""
     moment = palmgren_roller_moment(
-        inputs.geometry, inputs.speed, inputs.kinematic_viscosity, inputs.states.driving_load
+        inputs.geometry,
+        inputs.speed,
+        inputs.kinematic_viscosity,
+        inputs.states.driving_load,
+        lubrication_factor=options.palmgren_f0_rollers,
     )
     return moment.heat("palmgren", inputs.speed, inputs.geometry)
 
@@ -81,7 +85,12 @@ def palmgren_moment(
 
 
 def palmgren_roller_moment(
-    geometry: RollerGeometry, speed: float, kinematic_viscosity: float, driving_load: float
+    geometry: RollerGeometry,
+    speed: float,
+    kinematic_viscosity: float,
+    driving_load: float,
+    *,
+    lubrication_factor: float | None = None,
 ) -> FrictionMoment:
     """Friction moment of a roller bearing after Palmgren: ``viscous`` (M_0, of every row) and ``load`` (M_1).
 
@@ -91,6 +100,8 @@ def palmgren_roller_moment(
     kinematic_viscosity : float, [m²/s]
     driving_load : float, [N]
         Radial load, or what stands for it (``RollerStates.driving_load``).
+    lubrication_factor : float, optional
+        f_0 of a row, in the place of the bearing's own.
 
     Source: Harris & Kotzalas, vol. 1; Palmgren (1959); f_0 and f_1 of a row are those of the kind.
 
@@ -100,7 +111,7 @@ def palmgren_roller_moment(
     >>> round(palmgren_roller_moment(rollers, 0.0, 20e-6, 1000.0).total * 1e3, 2)
     18.2
     """
-    kind, given = geometry.catalogue, geometry.palmgren_lubrication_factor
+    kind, given = geometry.catalogue, lubrication_factor or geometry.palmgren_lubrication_factor
     factor = kind.palmgren_lubrication_factor if given is None else given
     viscous = _viscous_moment(geometry.pitch_diameter, speed, kinematic_viscosity, factor)
     load = kind.palmgren_load_factor * abs(driving_load) * geometry.pitch_diameter

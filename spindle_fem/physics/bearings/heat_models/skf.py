@@ -31,6 +31,7 @@ def of_rollers(inputs: RollerHeatInputs, options: HeatOptions) -> BearingHeat:
         inputs.kinematic_viscosity,
         inputs.states.driving_load,
         friction_boundary=options.skf_friction_boundary,
+        replenishment=options.skf_replenishment,
     )
     return moment.heat("skf", inputs.speed, inputs.geometry)
 
@@ -47,6 +48,7 @@ def skf(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
         inputs.radial_force,
         friction_ehl=options.skf_friction_ehl,
         friction_boundary=options.skf_friction_boundary,
+        replenishment=options.skf_replenishment,
     )
     return moment.heat("skf", inputs.speed, inputs.geometry)
 
@@ -60,6 +62,7 @@ def skf_moment(
     *,
     friction_ehl: float = 0.04,
     friction_boundary: float = 0.15,
+    replenishment: float = 6.0e-8,
 ) -> FrictionMoment:
     """Friction moment of the SKF model: ``rolling`` and ``sliding`` (no contact seal, no oil bath).
 
@@ -72,6 +75,8 @@ def skf_moment(
         Full-film friction coefficient: 0.05 mineral, 0.04 synthetic.
     friction_boundary : float
         0.12-0.15.
+    replenishment : float
+        K_rs: 6e-8 for grease and oil-air, 3e-8 for oil baths and jets.
 
     The constants are those of the bearing's kind.
 
@@ -85,7 +90,7 @@ def skf_moment(
     share = _groove_moments if geometry.catalogue.skf_groove is not None else _angular_moments
     rolling, sliding = share(geometry, mean, rpm, axial, radial)
     reduction = float(inlet_shear_factor(speed, mean * 1e-3, kinematic_viscosity)) * float(
-        replenishment_factor(speed, bore, outer, kinematic_viscosity)
+        replenishment_factor(speed, bore, outer, kinematic_viscosity, constant=replenishment)
     )
     coefficient = _sliding_coefficient(rpm * viscosity, mean, friction_ehl, friction_boundary)
     return FrictionMoment(
@@ -126,6 +131,7 @@ def skf_roller_moment(
     driving_load: float,
     *,
     friction_boundary: float = 0.15,
+    replenishment: float = 6.0e-8,
 ) -> FrictionMoment:
     """Friction moment of cylindrical rollers by the SKF model: ``rolling`` and ``sliding``.
 
@@ -140,6 +146,8 @@ def skf_roller_moment(
         Radial load, or what stands for it (``RollerStates.driving_load``).
     friction_boundary : float
         0.12-0.15.
+    replenishment : float
+        K_rs: 6e-8 for grease and oil-air, 3e-8 for oil baths and jets.
 
     Source: SKF rolling bearings catalogue (2013): G_rr = R1 d_m^2.41 F_r^0.31, G_sl = S2 d_m F_r without
     axial load.
@@ -152,7 +160,12 @@ def skf_roller_moment(
     share = abs(driving_load) / geometry.rows
     reduction = float(inlet_shear_factor(speed, mean * 1e-3, kinematic_viscosity)) * float(
         replenishment_factor(
-            speed, bore, outer, kinematic_viscosity, geometry_constant=kind.skf_replenishment
+            speed,
+            bore,
+            outer,
+            kinematic_viscosity,
+            constant=replenishment,
+            geometry_constant=kind.skf_replenishment,
         )
     )
     rolling = kind.skf_rolling * mean**2.41 * share**0.31

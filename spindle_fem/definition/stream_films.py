@@ -1,0 +1,43 @@
+"""What films of flowing fluids have in common: a fluid of its own that warms along its walls."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from spindle_fem.definition.exchange_tables import Surface
+from spindle_fem.definition.field_types import SpecModel
+
+
+class StreamFilm(SpecModel):
+    """A stream with a constant flow and inlet, whose coefficients do not follow temperatures.
+
+    A stream has ``name``, ``inlet_temperature``, ``flow`` and ``factor``.
+    """
+
+    in_parallel: ClassVar[bool] = False
+    """Whether every cell takes its own share of the flow from the inlet, or what the cell before left."""
+
+    @property
+    def temperature(self) -> float:
+        """Of the fluid as it enters, K."""
+        return self.inlet_temperature
+
+    @property
+    def cell_surfaces(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the walls of each cell, from the inlet."""
+        raise NotImplementedError
+
+    @property
+    def n_cells(self) -> int:
+        """Along the flow."""
+        return len(self.cell_surfaces)
+
+    @property
+    def surface(self) -> tuple[str, ...]:
+        """Names of all its walls, as other films have them."""
+        return tuple(name for names in self.cell_surfaces for name in names)
+
+    @property
+    def walls(self) -> tuple[Surface, ...]:
+        """Surfaces that it names itself."""
+        return ()

@@ -1,0 +1,35 @@
+"""What a stream past walls answers, whatever it flows through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class StreamAnswer:
+    """Flow and film of a stream, properties at its inlet.
+
+    Attributes
+    ----------
+    coefficient : float, [W/(m²·K)]
+        On the walls as they are drawn, before the film's own factor.
+    capacity_rate : float, [W/K]
+        Mass flow times heat capacity.
+    reynolds, prandtl : float, [-]
+    velocity : float, [m/s]
+    pressure_drop : float, [Pa]
+    source : str
+        Of the film.
+    faults : tuple of str
+        What leaves the range of a law.
+    """
+
+    coefficient: float
+    capacity_rate: float
+    reynolds: float
+    prandtl: float
+    velocity: float
+    regime: str
+    pressure_drop: float
+    source: str
+    faults: tuple[str, ...] = ()

@@ -1,0 +1,146 @@
+"""Oil lubrication: balances by hand, factors of friction, what a definition may say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.lubrication_tables import Lubrication
+from spindle_fem.errors import FaultsError
+from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
+from spindle_fem.operation.bearing_lubricants import SetLubricant, bearing_stream
+from spindle_fem.operation.circuits import capacity_rate, coolant_temperatures, stream_answer, stream_warnings
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
+from spindle_fem.physics.coolant.lubrication_kind import flooded_fill, path_fill_parker
+from tests.support.oiled_machine import oiled
+
+RPM = math.pi / 30.0
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory):
+    return load_machine(str(oiled(tmp_path_factory.mktemp("oiled"))))
+
+
+def film(spec, bearing):
+    return next(film for film in spec.circuits if film.name == f"{bearing}.lubrication")
+
+
+def test_air_through_a_bearing_by_hand(spec):
+    # 7006 C: 55 and 30 mm, 7.1 mm balls; 30 L/min of air of 1.204 kg/m3 and 1006 J/(kg K).
+    answer = stream_answer(film(spec, "F1"), 12_000 * RPM)
+    assert answer.capacity_rate == pytest.approx(1.204 * 1006.0 * 0.5e-3, rel=1e-3)
+    stream = bearing_stream(film(spec, "F1"), 12_000 * RPM)
+    cage = 0.5 * 12_000 * RPM * (1.0 - stream.relative_size) * 0.5 * stream.pitch_diameter
+    through = 0.5e-3 / (0.25 * math.pi * (stream.outer_diameter**2 - stream.inner_diameter**2))
+    assert answer.velocity == pytest.approx(math.hypot(cage, through), rel=1e-12)
+    assert answer.coefficient == pytest.approx(9.7 + 5.33 * answer.velocity**0.8, rel=1e-12)
+    assert 40.0 < answer.coefficient < 60.0
+
+
+def test_oil_through_a_bearing_by_hand(spec):
+    # 0.5 L/min of VG 10: 0.843 kg/L and some 1.92 kJ/(kg K) at 25 degC.
+    answer = stream_answer(film(spec, "R1"), 12_000 * RPM)
+    assert answer.capacity_rate == pytest.approx(843.0 * 1920.0 * 0.5e-3 / 60.0, rel=0.02)
+    assert 1_000.0 < answer.coefficient < 3_000.0
+    twice = stream_answer(film(spec, "R1"), 48_000 * RPM)
+    assert twice.coefficient == pytest.approx(2.0 * answer.coefficient, rel=1e-12)
+
+
+def test_at_rest_oil_still_conducts_through_its_slit(spec):
+    own = film(spec, "R1")
+    answer = stream_answer(own, 0.0)
+    width = own.outer_diameter - own.inner_diameter
+    assert answer.coefficient == pytest.approx(7.541 * 0.136 / width, rel=0.03)
+
+
+def test_what_raceways_give_the_stream_carries_away(spec):
+    own = film(spec, "R1")
+    names, conductance = own.surface, {own.surface[0]: 3.0, own.surface[1]: 5.0}
+    wall = {names[0]: 330.0, names[1]: 310.0}
+    bulk, outlet = coolant_temperatures(own, conductance, wall)
+    given = sum(conductance[name] * (wall[name] - bulk[name]) for name in names)
+    assert given == pytest.approx(capacity_rate(own) * (outlet - own.inlet_temperature), rel=1e-12)
+    # One mixed stream past walls of their common mean: 1 - exp(-N) of the rise.
+    mean = (3.0 * 330.0 + 5.0 * 310.0) / 8.0
+    units = 8.0 / capacity_rate(own)
+    expected = own.inlet_temperature - (mean - own.inlet_temperature) * math.expm1(-units)
+    assert outlet == pytest.approx(expected, rel=1e-12)
+
+
+def test_friction_follows_the_oil_of_each_set(spec):
+    mechanics, point = BearingMechanics(spec), OperatingPoint.of(spec)
+    warm = {bearing.name: BearingTemperatures(*(313.15,) * 5) for _, bearing in spec.bearings}
+    states = mechanics.states(point, warm, expand=False)
+    for name, factor, viscosity in (("F1", 1.7, 22.0e-6), ("R1", 6.6, 10.0e-6)):
+        state = states[name]
+        moment = palmgren_moment(
+            state.geometry, point.speed, viscosity, state.axial_force, state.radial_force,
+            lubrication_factor=factor,
+        )  # fmt: skip
+        assert state.heat.total == pytest.approx(moment.total * point.speed, rel=1e-3)
+        assert state.heat.terms["viscous"] > state.heat.terms["load"]
+
+
+def test_the_path_that_oil_fills_follows_flow_and_speed(spec):
+    # NASA TP 2275: 2 gal/min through 120 mm bore at 20 000 rpm fill some 2 to 3 %.
+    assert 0.02 < float(path_fill_parker(7571.0, 20.0e3, 155.0)) < 0.03
+    rear = next(group for group in spec.bearing_set if group.name == "rear")
+    lubricant = SetLubricant(spec, rear)
+    stream = bearing_stream(film(spec, "R1"), 24_000 * RPM)
+    assert lubricant.at(24_000 * RPM).path_fill == flooded_fill(stream)
+    assert lubricant.at(24_000 * RPM).path_fill < lubricant.at(20_000 * RPM).path_fill
+    assert lubricant.at(0.0).path_fill == 0.0
+
+
+def test_beyond_its_range_a_law_says_so(spec):
+    own = film(spec, "R1")
+    (warning,) = stream_warnings(own, stream_answer(own, 1_000 * RPM))
+    assert warning.code == "circuit_film_extrapolated"
+    assert "R1.lubrication" in warning.text
+    assert "speed is 1000" in warning.text
+    assert not stream_warnings(film(spec, "F1"), stream_answer(film(spec, "F1"), 1_000 * RPM))
+
+
+def test_the_catalogue_formula_says_that_it_leaves_drag_out(spec, tmp_path):
+    other = load_machine(str(oiled(tmp_path)), ["heat.model=skf"])
+    mechanics = BearingMechanics(other)
+    warm = {bearing.name: BearingTemperatures(*(313.15,) * 5) for _, bearing in other.bearings}
+    said = {item.code: item.text for item in mechanics(OperatingPoint.of(other), warm)[1]}
+    assert "rear" in said["oil_drag_omitted"]
+    assert "front" not in said["oil_drag_omitted"]
+
+
+def test_streams_are_made_once(spec):
+    again = type(spec).model_validate(spec.model_dump(mode="json", by_alias=True))
+    assert [film.name for film in again.circuits] == [film.name for film in spec.circuits]
+    assert len(again.film) == len(spec.film)
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ("bearing_set.front.lubrication.oil=tar", "iso_vg_10"),
+        ("bearing_set.front.lubrication.air_flow=-1 L/min", "air_flow"),
+        ("bearing_set.rear.lubrication.air_flow=10 L/min", 'Only kind = "oil_air" takes it.'),
+        ("bearing_set.rear.lubrication.kind=bath", "oil_jet"),
+        ("bearing_set.rear.lubrication.kinematic_viscosity_100=20 mm**2/s", "thins"),
+    ],
+)
+def test_faults_say_what_is_allowed(tmp_path, change, fault):
+    with pytest.raises(FaultsError) as raised:
+        load_machine(str(oiled(tmp_path)), [change])
+    assert fault in str(raised.value)
+
+
+def test_own_oils_need_no_name():
+    table = {
+        "kind": "oil_jet",
+        "kinematic_viscosity_40": "12 mm**2/s",
+        "kinematic_viscosity_100": "3.1 mm**2/s",
+        "oil_flow": "1 L/min",
+        "inlet_temperature": "30 degC",
+    }
+    assert np.isclose(Lubrication.model_validate(table).oil_flow, 1.0e-3 / 60.0)
