@@ -257,6 +257,8 @@ def judge(
     coarseness : float
         As :func:`tempered` has it.
     """
+    if coarseness > 1.0:
+        hypotheses = _with_needed_events(hypotheses, left, beyond)
     ranked = rank(hypotheses, coarseness)
     p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
@@ -384,6 +386,28 @@ def may_stand_for(fit: Fit, other: Fit, overlapping: Mapping[str, frozenset[str]
 
 def _free_in_time(fit: Fit) -> int:
     return sum(in_intervals(effect_of(c.effect), c) for c in fit.candidates)
+
+
+def _with_needed_events(
+    hypotheses: Sequence[Hypothesis], left: Callable[[Fit], float], beyond: Callable[[Fit], float]
+) -> list[Hypothesis]:
+    """Sets without those of whose laws some, or none, leave no more of the readings than may be left of them.
+
+    What may come and go at any time fits some of whatever a coarse picture leaves, and follows held-out
+    readings themselves: that they become likelier with it says little.
+    """
+
+    def only_laws(item: Hypothesis) -> frozenset:
+        laws = [c for c in item.fit.candidates if not in_intervals(effect_of(c.effect), c)]
+        return frozenset((c.effect, c.component) for c in laws)
+
+    plain = [item for item in hypotheses if not _free_in_time(item.fit)]
+
+    def needed(item: Hypothesis) -> bool:
+        laws = [other.fit for other in plain if other.keys <= only_laws(item)]
+        return all(max(left(fit), beyond(fit)) > tuned.MOST_LEFT for fit in laws)
+
+    return [item for item in hypotheses if not _free_in_time(item.fit) or needed(item)]
 
 
 def _without(ranked: Sequence[Ranked], empty: Ranked) -> list[Ranked]:

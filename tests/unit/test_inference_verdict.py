@@ -7,7 +7,9 @@ import pytest
 from scipy.stats import chi2
 
 from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.effects.framework.unrecorded import InIntervals, UnrecordedHeatTerm
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Coordinate, Fit
@@ -245,6 +247,27 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_not_named():
     assert verdict(*better, coarseness=2.0, **within).verdict == "missing_physics"
     # where readings leave far more than noise, nothing that is known explains it
     assert verdict(*same, left=lambda fit: 3.0).verdict == "unexplained"
+
+
+def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
+    heat = "unrecorded_heat_source"
+    term = UnrecordedHeatTerm(heat, TermParameter("heat", 1.0, 1.2), Spread(()), InIntervals([(0.0, 100.0)]))
+    event = replace(candidate(heat, "oil"), terms=(term,))
+    null, law = hypothesis(misfit=2000.0), hypothesis(PRELOAD, misfit=900.0)
+    alone, both = hypothesis(event, misfit=500.0), hypothesis(PRELOAD, event, misfit=400.0)
+    little, much = 0.9 * tuned.MOST_LEFT, 1.1 * tuned.MOST_LEFT
+
+    def found(of_nothing, of_law, *sets, coarseness=2.0):
+        rest = {id(null.fit): of_nothing, id(law.fit): of_law}
+        left = {"left": lambda fit: rest.get(id(fit), 1.0), "beyond": lambda fit: 1.0}
+        return verdict(*sets, coarseness=coarseness, **left).chosen.fit.keys
+
+    assert found(much, much, null, alone) == alone.keys
+    assert found(little, much, null, alone) == null.keys
+    assert found(much, little, null, law, both) == law.keys
+    assert found(much, much, null, law, both) == both.keys
+    # A machine that is drawn has likelihoods that may be trusted.
+    assert found(little, much, null, alone, coarseness=1.0) == alone.keys
 
 
 def test_what_nothing_could_do_by_chance_has_no_probability_left():
